@@ -1,0 +1,136 @@
+"""The central types of a scene's content: the anchor model, plain splat layers, and what they decode to."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from runtime_models.shapes import check
+
+HEADS = ("offset", "scale", "rotation", "opacity", "color")
+SIZE_PER_SPLAT = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1, "color": 3}
+STOP_KINDS = ("rgb", "thermal", "layer", "style")
+
+
+class BadFile(ValueError):
+    """A file cannot be used.  The message says what was found, what was wanted and what to do."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A named place on the slider: one modality, layer or style."""
+
+    name: str
+    x: float  # control value in [0, 1]
+    kind: str = "rgb"  # one of STOP_KINDS
+    palette: str = ""  # colour map of a thermal stop ("ironbow", "gray", ...); "" = none
+    value_range: tuple[float, float] | None = None  # the values that intensity 0 and 1 stand for
+    unit: str = ""  # unit of value_range, e.g. "°C"
+
+
+@dataclass(frozen=True)
+class ControlEncoding:
+    """Psi(x) of the paper's equations 6 and 7: d Gaussians of width sigma at 0, s, 2s, ..."""
+
+    d: int = 16
+    spacing: float = 1 / 15  # s; the paper leaves it open, 1/(d-1) puts the last one at x = 1
+    sigma: float = 0.04
+
+    def encode(self, x: float) -> np.ndarray:
+        """(d,) float32 control encoding of one scalar x."""
+        t = np.arange(self.d) * self.spacing
+        return np.exp(-((t - x) ** 2) / (2 * self.sigma**2)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Mlp:
+    """Fully connected, ReLU between layers, then y = gain * head(clip(z)).
+
+    `inputs` names the concatenated parts in order, out of "feature", "direction" and "control".
+    """
+
+    weights: tuple[np.ndarray, ...]  # each (out, in) float32
+    biases: tuple[np.ndarray, ...]  # each (out,) float32
+    head: str = "none"  # none | tanh | sigmoid | softplus | exp
+    inputs: tuple[str, ...] = ("feature", "control")
+    clip: tuple[float, float] | None = None  # applied to z before the head
+    gain: float = 1.0
+
+    @property
+    def width_in(self) -> int:
+        return self.weights[0].shape[1]
+
+    @property
+    def width_out(self) -> int:
+        return self.weights[-1].shape[0]
+
+
+@dataclass(frozen=True)
+class AnchorModel:
+    """A trained shape-shifting model: anchors, features and five networks (paper section 3.2)."""
+
+    anchors: np.ndarray  # (A, 3) metres, object frame
+    features: np.ndarray  # (A, F)
+    networks: dict[str, Mlp]  # keys HEADS; outputs: offset and scale metres, rotation wxyz
+    #                           not normalised, opacity in (-1, 1], color display sRGB 0..1
+    splats_per_anchor: int  # k; the model draws A * k splats
+    encoding: ControlEncoding
+    stops: tuple[Stop, ...]
+    provenance: dict = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
+
+    @property
+    def splat_count(self) -> int:
+        return len(self.anchors) * self.splats_per_anchor
+
+
+@dataclass(frozen=True)
+class SplatLayers:
+    """Plain trained splats, one set a stop, weighed by x: how 3DGS files come in."""
+
+    means: np.ndarray  # (N, 3) metres, object frame
+    scales: np.ndarray  # (N, 3) metres, one sigma
+    wxyz: np.ndarray  # (N, 4) unit quaternions
+    opacity: np.ndarray  # (N,) 0..1
+    sh: np.ndarray  # (N, M, 3) spherical harmonics, M = 1, 4, 9 or 16; colour = 0.5 + sum
+    layer: np.ndarray  # (N,) int32, index into stops
+    stops: tuple[Stop, ...]
+    mode: str = "cumulative"  # cumulative: stop i shows layers 0..i; exclusive: layer i alone
+    provenance: dict = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check(
+            means=(self.means, "N 3"),
+            scales=(self.scales, "N 3"),
+            wxyz=(self.wxyz, "N 4"),
+            opacity=(self.opacity, "N"),
+            sh=(self.sh, "N M 3"),
+        )
+
+    @property
+    def splat_count(self) -> int:
+        return len(self.means)
+
+    def weights(self, x: float) -> np.ndarray:
+        """(stops,) float32 in 0..1: how much of each layer is there at x.
+
+        Cumulative layers fade in on the way from the stop before and stay; exclusive layers fade
+        out again on the way to the next stop.
+        """
+        xs = np.array([s.x for s in self.stops])
+        rows = np.eye(len(xs))
+        if self.mode == "cumulative":
+            rows = np.tril(np.ones_like(rows))  # row i: what stop i shows
+        return np.array([np.interp(x, xs, column) for column in rows.T], np.float32)
+
+
+@dataclass(frozen=True)
+class Splats:
+    """What both kinds decode to at one x and one eye position."""
+
+    means: np.ndarray  # (N, 3) metres
+    scales: np.ndarray  # (N, 3) metres, one sigma
+    wxyz: np.ndarray  # (N, 4) unit
+    opacity: np.ndarray  # (N,), negative = absent
+    color: np.ndarray  # (N, 3) display sRGB 0..1

@@ -1,0 +1,32 @@
+"""Posed photos of one place in several modalities: what training reads."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import Stop
+from scene.pose import View
+
+
+@dataclass(frozen=True)
+class Photo:
+    view: View  # world frame of the program (+Y up), size of the image file
+    path: Path
+    modality: str  # a Stop's name
+    mask: Path | None = None  # white where the photo counts
+    split: str = "train"  # train | test
+
+
+@dataclass(frozen=True)
+class Capture:
+    folder: Path
+    stops: tuple[Stop, ...]
+    photos: tuple[Photo, ...]
+    points: np.ndarray | None = None  # (P, 3) metres, world frame
+    point_colors: np.ndarray | None = None  # (P, 3) 0..1
+    background: tuple[float, float, float] | None = None  # what lies behind; None = black
+    notes: dict = field(default_factory=dict)
+
+    def of(self, modality: str, split: str) -> list[Photo]:
+        return [p for p in self.photos if p.modality == modality and p.split == split]

@@ -1,0 +1,123 @@
+"""Where a thing is.  World is metres, +Y up, right-handed, the eye looks along -Z (OpenGL, OpenXR).
+
+Name transforms by what they give and take:  p_world = world_from_object @ p_object.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# OpenCV axes (x right, y down, z forward) from eye axes (x right, y up, -z forward).
+OPENCV_FROM_EYE = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Pose:
+    position: np.ndarray  # (3,) metres
+    wxyz: np.ndarray  # (4,) unit quaternion, w first
+
+    def matrix(self) -> np.ndarray:
+        """(4, 4) float64 parent_from_local; its columns are the local axes in the parent."""
+        w, x, y, z = self.wxyz
+        out = np.eye(4)
+        out[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        out[:3, 3] = self.position
+        return out
+
+    @staticmethod
+    def from_matrix(parent_from_local: np.ndarray) -> "Pose":
+        """The pose of a rigid (4, 4) matrix; its rotation must be orthonormal."""
+        m = np.asarray(parent_from_local, np.float64)
+        r = m[:3, :3]
+        # The largest of the four squared components is found first: no division by nearly 0.
+        square = 1 + np.array(
+            [r[0, 0] + r[1, 1] + r[2, 2], r[0, 0] - r[1, 1] - r[2, 2],
+             r[1, 1] - r[0, 0] - r[2, 2], r[2, 2] - r[0, 0] - r[1, 1]]
+        )  # fmt: skip
+        a, b, c = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+        d, e, f = r[1, 0] + r[0, 1], r[0, 2] + r[2, 0], r[2, 1] + r[1, 2]
+        rows = [
+            [square[0], a, b, c],
+            [a, square[1], d, e],
+            [b, d, square[2], f],
+            [c, e, f, square[3]],
+        ]
+        q = np.array(rows[int(np.argmax(square))])
+        return Pose(m[:3, 3].copy(), q / np.linalg.norm(q))
+
+
+@dataclass(frozen=True)
+class View:
+    """One eye.  Desktop is a list of one, stereo a list of two."""
+
+    world_from_eye: Pose
+    tangents: tuple[float, float, float, float]  # left, right, down, up; left and down negative
+    near: float  # metres
+    far: float  # metres
+    size: tuple[int, int]  # width, height, pixels
+
+    def clip_from_eye(self) -> np.ndarray:
+        """(4, 4) OpenGL projection: eye metres to clip, depth -1..1, off-centre allowed."""
+        left, right, down, up = self.tangents
+        n, f = self.near, self.far
+        return np.array(
+            [
+                [2 / (right - left), 0, (right + left) / (right - left), 0],
+                [0, 2 / (up - down), (up + down) / (up - down), 0],
+                [0, 0, (n + f) / (n - f), 2 * n * f / (n - f)],
+                [0, 0, -1, 0],
+            ]
+        )
+
+    def eye_from_world(self) -> np.ndarray:
+        """(4, 4) float64."""
+        return np.linalg.inv(self.world_from_eye.matrix())
+
+    def pinhole(self) -> tuple[np.ndarray, float, float, float, float]:
+        """camera_from_world (4, 4) with OpenCV axes, then fx, fy, cx, cy in pixels, row 0 on top."""
+        left, right, down, up = self.tangents
+        width, height = self.size
+        fx, fy = width / (right - left), height / (up - down)
+        return OPENCV_FROM_EYE @ self.eye_from_world(), fx, fy, -left * fx, up * fy
+
+    @staticmethod
+    def from_pinhole(
+        world_from_camera: np.ndarray,
+        focal: tuple[float, float],
+        centre: tuple[float, float],
+        size: tuple[int, int],
+        near: float = 0.05,
+        far: float = 1000.0,
+    ) -> "View":
+        """The view of a COLMAP-style camera: (4, 4) with OpenCV axes, pixels, row 0 on top."""
+        (fx, fy), (cx, cy), (width, height) = focal, centre, size
+        tangents = (-cx / fx, (width - cx) / fx, -(height - cy) / fy, cy / fy)
+        pose = Pose.from_matrix(np.asarray(world_from_camera, np.float64) @ OPENCV_FROM_EYE)
+        return View(pose, tangents, near, far, size)
+
+    def resized(self, size: tuple[int, int]) -> "View":
+        """The same field of view in another number of pixels."""
+        return View(self.world_from_eye, self.tangents, self.near, self.far, size)
+
+
+def look_at(eye: np.ndarray, target: np.ndarray, up: tuple = (0.0, 1.0, 0.0)) -> Pose:
+    """The pose of an eye at `eye` (3,) that looks at `target` (3,), metres in the world."""
+    back = np.asarray(eye, np.float64) - np.asarray(target, np.float64)
+    back /= np.linalg.norm(back)
+    right = np.cross(np.asarray(up, np.float64), back)
+    right /= np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
+    matrix[:3, 3] = eye
+    return Pose.from_matrix(matrix)
+
+
+def perspective(fov_y: float, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Centred tangents of a vertical field of view in radians."""
+    up = float(np.tan(fov_y / 2))
+    right = up * size[0] / size[1]
+    return (-right, right, -up, up)
