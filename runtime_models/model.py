@@ -1,4 +1,4 @@
-"""The central types of a scene's content: the anchor model, plain splat layers, and what they decode to."""
+"""The central types of what a scene holds: anchor model, plain splat layers, decoded splats."""
 
 from dataclasses import dataclass, field
 

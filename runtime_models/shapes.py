@@ -1,10 +1,10 @@
-"""Array contracts, checked where data enters: `check(means=(means, "N 3"), opacity=(opacity, "N"))`."""
+"""Array contracts, checked where data enters: `check(means=(means, "N 3"))`."""
 
 import numpy as np
 
 
 def check(**arrays: tuple[np.ndarray, str]) -> dict[str, int]:
-    """Every array is float32, finite and of its stated shape; a letter means the same size everywhere.
+    """Every array is float32, finite and of its stated shape; equal letters mean equal sizes.
 
     Returns the sizes found for the letters.  Raises ValueError naming the array, what it is and
     what was expected.

@@ -78,7 +78,7 @@ class View:
         return np.linalg.inv(self.world_from_eye.matrix())
 
     def pinhole(self) -> tuple[np.ndarray, float, float, float, float]:
-        """camera_from_world (4, 4) with OpenCV axes, then fx, fy, cx, cy in pixels, row 0 on top."""
+        """camera_from_world (4, 4) with OpenCV axes; fx, fy, cx, cy in pixels, row 0 on top."""
         left, right, down, up = self.tangents
         width, height = self.size
         fx, fy = width / (right - left), height / (up - down)

@@ -1,4 +1,4 @@
-"""What is in the world: objects with a pose and a control value.  Renderers read it, nobody else draws."""
+"""What is in the world: objects with a pose and a control value."""
 
 from dataclasses import dataclass
 
