@@ -93,7 +93,10 @@ def install_packages(packages: list[str]) -> None:
         say(f"Shapeshift needs system libraries that are not here. Install them with: sudo {line}")
         return
     say(f"Installing system libraries: {' '.join(packages)}")
-    quiet = {"stdout": subprocess.DEVNULL, "env": {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}}
+    quiet = {
+        "stdout": subprocess.DEVNULL,
+        "env": {**os.environ, "DEBIAN_FRONTEND": "noninteractive"},
+    }
     subprocess.run(["apt-get", "update", "-qq"], check=False, **quiet)
     if subprocess.run(line.split(), check=False, **quiet).returncode != 0:
         say(f"apt-get could not install them all; to see why, run: {line}")
@@ -132,7 +135,9 @@ def make_environment(testing: bool) -> None:
         say("No system OpenCL driver: using the slower one from the package index.")
         wanted.append(OPENCL_WHEEL)
     if subprocess.run(install + wanted, check=False).returncode != 0:
-        stop("pip could not install the requirements (see above); check the network and start again.")
+        stop(
+            "pip could not install the requirements (see above); check the network and start again."
+        )
     stamp.write_text(want)
 
 
@@ -155,7 +160,7 @@ def hand_over(arguments: list[str]) -> int:
 def main(arguments: list[str]) -> int:
     if sys.version_info < OLDEST_PYTHON:
         found = ".".join(map(str, sys.version_info[:3]))
-        stop(f"Shapeshift needs Python 3.11 or newer, this is {found}; start it with a newer python3.")
+        stop(f"Shapeshift needs Python 3.11 or newer, this is {found}; start it with that.")
     testing = arguments[:1] == ["test"]
     try:
         make_environment(testing)

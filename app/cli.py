@@ -1,0 +1,104 @@
+"""Command line: one table of modes; only the mode that is asked for is imported."""
+
+import importlib
+import os
+import sys
+from pathlib import Path
+
+# Installed as shapeshift.app.cli, the folders' flat imports need the package's folder on the path.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+# command: (module of app/, what it does); each module has `Options` and `run(options) -> int`
+COMMANDS = {
+    "view": ("desktop", "open a scene in a window"),
+    "render": ("render", "draw a scene into PNG files, no window needed"),
+    "bench": ("bench", "frame times and image error, no window needed"),
+    "info": ("info", "what is in a scene"),
+    "train": ("train", "posed photos of several modalities to a scene"),
+    "eval": ("evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
+    "demo": ("demo", "make the bundled demo again: ray-trace its capture, train it"),
+    "headless": ("headless", "draw the bundled demo into pictures and time it"),
+}
+BAD_INPUT = 2  # exit code
+INTERRUPTED = 130
+
+
+def usage() -> str:
+    rows = [f"  {name:9} {text}" for name, (_, text) in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: python3 launch.py [command] [options]     (command --help lists its options)",
+            "",
+            "With no command: the viewer on the bundled demo, or, without a display, its pictures.",
+            "With a file or folder: the viewer on that scene.",
+            "",
+            *rows,
+            "  test      run the tests",
+        ]
+    )
+
+
+def has_display() -> bool:
+    if sys.platform.startswith("linux"):
+        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return True
+
+
+def choose(arguments: list[str]) -> tuple[str, list[str]]:
+    """The command and its own arguments; no command means the viewer or its stand-in."""
+    if arguments and arguments[0] in COMMANDS:
+        return arguments[0], arguments[1:]
+    if not arguments and not has_display():
+        print("No display here: drawing the demo without a window.", file=sys.stderr)
+        return "headless", []
+    return "view", arguments
+
+
+def known_failures() -> tuple[type[Exception], ...]:
+    """Errors whose text is meant for the user.  Looked up late: they live with heavy modules."""
+    names = {
+        "runtime_models.model": "BadFile",
+        "app.errors": "UsageError",
+        "rasterizer.device": "NoDevice",
+        "renderer.context": "NoContext",
+    }
+    loaded = [(sys.modules.get(module), name) for module, name in names.items()]
+    return tuple(getattr(module, name) for module, name in loaded if module)
+
+
+def run_command(command: str, arguments: list[str]) -> int:
+    import tyro
+
+    module = importlib.import_module(f"app.{COMMANDS[command][0]}")
+    options = tyro.cli(module.Options, args=arguments, prog=f"launch.py {command}")
+    return module.run(options)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    arguments = sys.argv[1:] if arguments is None else arguments
+    if arguments[:1] in (["-h"], ["--help"], ["help"]):
+        print(usage())
+        return 0
+    command, rest = choose(arguments)
+    if command == "view" and rest and not rest[0].startswith("-") and not Path(rest[0]).exists():
+        print(
+            f"'{rest[0]}' is neither a command nor a file here; `launch.py --help` lists the commands.",
+            file=sys.stderr,
+        )
+        return BAD_INPUT
+    try:
+        return run_command(command, rest)
+    except KeyboardInterrupt:
+        print("Interrupted.", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        return 0  # the reader of our output went away, as `| head` does
+    except Exception as error:
+        if isinstance(error, known_failures()):
+            print(f"shapeshift {command}: {error}", file=sys.stderr)
+            return BAD_INPUT
+        raise
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
