@@ -20,6 +20,7 @@ COMMANDS = {
     "headless": ("headless", "draw the bundled demo into pictures and time it"),
 }
 BAD_INPUT = 2  # exit code
+FAULT = 3
 INTERRUPTED = 130
 
 
@@ -66,6 +67,29 @@ def known_failures() -> tuple[type[Exception], ...]:
     return tuple(getattr(module, name) for module, name in loaded if module)
 
 
+def refuse(sentence: str) -> int:
+    print(f"shapeshift {sentence}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def report_fault(command: str, error: Exception) -> int:
+    """A fault of the program itself: one sentence for the user, the traceback in a file."""
+    import tempfile
+    import traceback
+
+    if os.environ.get("SHAPESHIFT_DEBUG"):
+        raise error
+    with tempfile.NamedTemporaryFile("w", prefix="shapeshift-", suffix=".log", delete=False) as log:
+        traceback.print_exception(error, file=log)
+    text = str(error).splitlines()[0] if str(error) else type(error).__name__
+    print(
+        f"shapeshift {command}: a fault of the program, not of your input ({text}); "
+        f"the details are in {log.name}.",
+        file=sys.stderr,
+    )
+    return FAULT
+
+
 def run_command(command: str, arguments: list[str]) -> int:
     import tyro
 
@@ -81,11 +105,7 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     command, rest = choose(arguments)
     if command == "view" and rest and not rest[0].startswith("-") and not Path(rest[0]).exists():
-        print(
-            f"'{rest[0]}' is neither a command nor a file here; `launch.py --help` lists the commands.",
-            file=sys.stderr,
-        )
-        return BAD_INPUT
+        return refuse(f"'{rest[0]}' is neither a command nor a file; --help lists the commands.")
     try:
         return run_command(command, rest)
     except KeyboardInterrupt:
@@ -93,11 +113,12 @@ def main(arguments: list[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         return 0  # the reader of our output went away, as `| head` does
+    except known_failures() as error:
+        return refuse(f"{command}: {error}")
+    except OSError as error:
+        return refuse(f"{command}: {error.strerror or error}: {error.filename or 'no file named'}")
     except Exception as error:
-        if isinstance(error, known_failures()):
-            print(f"shapeshift {command}: {error}", file=sys.stderr)
-            return BAD_INPUT
-        raise
+        return report_fault(command, error)
 
 
 if __name__ == "__main__":
