@@ -107,17 +107,26 @@ def requirement_files(testing: bool) -> list[Path]:
     return [ROOT / name for name in names]
 
 
-def digest(files: list[Path]) -> str:
+def digest(testing: bool) -> str:
     """Changes when a requirement, this file or the Python changes: then the set-up runs again."""
-    text = b"".join(f.read_bytes() for f in [*files, Path(__file__)]) + sys.version.encode()
-    return hashlib.sha256(text).hexdigest()
+    files = [*requirement_files(testing), Path(__file__)]
+    return hashlib.sha256(
+        b"".join(f.read_bytes() for f in files) + sys.version.encode()
+    ).hexdigest()
+
+
+def stamp_file(testing: bool) -> Path:
+    return VENV / ("ready-test" if testing else "ready")
+
+
+def is_ready(testing: bool) -> bool:
+    stamp = stamp_file(testing)
+    return PYTHON.exists() and stamp.exists() and stamp.read_text() == digest(testing)
 
 
 def make_environment(testing: bool) -> None:
     """Make .venv with the pinned requirements, unless it is there already."""
-    files = requirement_files(testing)
-    stamp, want = VENV / ("ready-test" if testing else "ready"), digest(files)
-    if stamp.exists() and stamp.read_text() == want and PYTHON.exists():
+    if is_ready(testing):
         return
     if missing := missing_packages(testing):
         install_packages(missing)
@@ -130,7 +139,7 @@ def make_environment(testing: bool) -> None:
             )
     say("Installing the Python packages (once, about a minute)")
     install = [str(PYTHON), "-m", "pip", "install", "-q", "--disable-pip-version-check"]
-    wanted = [word for f in files for word in ("-r", str(f))]
+    wanted = [word for f in requirement_files(testing) for word in ("-r", str(f))]
     if not has_opencl() and sys.platform == "linux" and platform.machine() == "x86_64":
         say("No system OpenCL driver: using the slower one from the package index.")
         wanted.append(OPENCL_WHEEL)
@@ -138,7 +147,8 @@ def make_environment(testing: bool) -> None:
         stop(
             "pip could not install the requirements (see above); check the network and start again."
         )
-    stamp.write_text(want)
+    for level in {False, testing}:
+        stamp_file(level).write_text(digest(level))
 
 
 def hand_over(arguments: list[str]) -> int:
