@@ -1,0 +1,135 @@
+"""Where to stand: robust bounds of splats, the views that show them, the point under a ray."""
+
+import numpy as np
+
+from runtime_models.model import AnchorModel, SplatLayers
+from scene.pose import View, look_at, perspective
+from scene.scene import Scene
+
+FOV_Y = 0.8  # radians, vertical
+ELEVATION = 0.3  # radians above the horizon: slightly down
+MARGIN = 1.08  # of the distance at which the bounding sphere just fits
+MIN_OPACITY = 0.1  # fainter splats are mostly floaters; they do not count for the bounds
+PERCENTILES = (2, 98)
+FAR_RADII = 200.0
+NEAR_RADII = 0.01
+FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
+
+
+def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre (3,) and radius in metres of splats with means (N, 3) and opacity (N,).
+
+    The 2nd to 98th percentile of what can be seen: a few far floaters move neither.  With nothing
+    that opaque every finite mean counts; with no mean at all, a metre about the origin.
+    """
+    finite = np.isfinite(means).all(axis=1)
+    seen = finite & (opacity > MIN_OPACITY)  # NaN opacity is not seen
+    points = means[seen if seen.any() else finite].astype(np.float64)  # (P, 3)
+    if not len(points):
+        return np.zeros(3), FALLBACK_RADIUS
+    low, high = np.percentile(points, PERCENTILES, axis=0)
+    centre = (low + high) / 2
+    radius = float(np.percentile(np.linalg.norm(points - centre, axis=1), PERCENTILES[1]))
+    return centre, radius if radius > 0 else FALLBACK_RADIUS
+
+
+def fit_distance(radius: float, size: tuple[int, int], fov_y: float = FOV_Y) -> float:
+    """Metres from which a sphere of that radius fits the narrower side of a size (W, H)."""
+    _, right, _, up = perspective(fov_y, size)
+    return MARGIN * radius / float(np.sin(np.arctan(min(right, up))))
+
+
+def view_from(
+    eye: np.ndarray,
+    target: np.ndarray,
+    radius: float,
+    size: tuple[int, int],
+    fov_y: float = FOV_Y,
+) -> View:
+    """The view of an eye (3,) on a target (3,), depth range chosen for content of that radius."""
+    near, far = NEAR_RADII * radius, FAR_RADII * radius
+    return View(look_at(eye, target), perspective(fov_y, size), near, far, size)
+
+
+def orbit_path(
+    count: int,
+    centre: np.ndarray,
+    radius: float,
+    size: tuple[int, int],
+    fov_y: float = FOV_Y,
+    elevation: float = ELEVATION,
+    distance: float | None = None,
+) -> list[View]:
+    """`count` views on a level circle about the centre, the first from +Z, counter-clockwise.
+
+    The distance in metres is the one that fits the sphere of `radius` unless it is given.
+    """
+    if distance is None:
+        distance = fit_distance(radius, size, fov_y)
+    turn = 2 * np.pi * np.arange(count) / max(count, 1)
+    direction = np.stack(
+        [
+            np.sin(turn) * np.cos(elevation),
+            np.full(count, np.sin(elevation)),
+            np.cos(turn) * np.cos(elevation),
+        ],
+        axis=1,
+    )  # (count, 3) unit, from the centre to the eye
+    eyes = np.asarray(centre, np.float64) + distance * direction
+    return [view_from(eye, centre, radius, size, fov_y) for eye in eyes]
+
+
+def model_points(model: AnchorModel | SplatLayers) -> tuple[np.ndarray, np.ndarray]:
+    """Points (N, 3) and opacity (N,) that stand for a model without decoding it."""
+    if isinstance(model, AnchorModel):
+        return model.anchors, np.ones(len(model.anchors), np.float32)
+    return model.means, model.opacity
+
+
+def scene_points(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """World points (N, 3) and opacity (N,) of the visible objects of a scene."""
+    means, opacities = [np.zeros((0, 3))], [np.zeros(0)]
+    for item in scene.objects:
+        if item.visible:
+            points, opacity = model_points(item.model)
+            world_from_object = item.world_from_object.matrix()
+            means.append(points @ world_from_object[:3, :3].T + world_from_object[:3, 3])
+            opacities.append(opacity)
+    return np.concatenate(means), np.concatenate(opacities)
+
+
+def default_view(model: AnchorModel | SplatLayers, size: tuple[int, int]) -> View:
+    """The first look at a model: provenance["view"] where it has one, else its bounds framed.
+
+    provenance["view"] is {"eye": [x, y, z], "target": [x, y, z], "fov_y": radians}, metres in the
+    object frame, fov_y optional.
+    """
+    centre, radius = frame_points(*model_points(model))
+    wished = model.provenance.get("view")
+    if wished:
+        eye, target = np.asarray(wished["eye"], float), np.asarray(wished["target"], float)
+        return view_from(eye, target, radius, size, float(wished.get("fov_y", FOV_Y)))
+    return orbit_path(1, centre, radius, size)[0]
+
+
+def point_under(
+    means: np.ndarray,
+    opacity: np.ndarray,
+    origin: np.ndarray,
+    direction: np.ndarray,
+    half_angle: float = 0.012,
+) -> np.ndarray | None:
+    """The point (3,) that a ray meets first in a cloud (N, 3), or None where it meets nothing.
+
+    Points within `half_angle` (radians) of the ray count; the depth is their 10th percentile, so
+    that one floater before the surface does not win.
+    """
+    ray = np.asarray(direction, np.float64)
+    ray = ray / np.linalg.norm(ray)
+    to_point = means - origin  # (N, 3)
+    depth = to_point @ ray  # (N,) metres
+    off = np.linalg.norm(to_point - depth[:, None] * ray, axis=1)
+    near = (depth > 0) & (off < depth * np.tan(half_angle)) & (opacity > MIN_OPACITY)
+    if not near.any():
+        return None
+    return np.asarray(origin) + float(np.percentile(depth[near], 10)) * ray
