@@ -1,0 +1,139 @@
+"""Palettes of thermal stops, and how much of a palette the control value asks for."""
+
+import numpy as np
+
+from runtime_models.model import BadFile, Stop
+from scene.scene import Scene
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
+STEPS = 256
+
+# (place in 0..1, display sRGB): what a thermal camera shows, cold to hot; luminance only grows
+IRONBOW = (
+    (0.00, (0.00, 0.00, 0.04)),
+    (0.15, (0.13, 0.00, 0.42)),
+    (0.30, (0.45, 0.00, 0.60)),
+    (0.45, (0.73, 0.12, 0.55)),
+    (0.60, (0.91, 0.34, 0.20)),
+    (0.75, (0.98, 0.60, 0.05)),
+    (0.90, (1.00, 0.87, 0.33)),
+    (1.00, (1.00, 1.00, 0.96)),
+)
+# blue to red through green, smooth at its ends: many distinct hues, luminance highest in the middle
+TURBO = (
+    (0.00, (0.18, 0.07, 0.25)),
+    (0.12, (0.27, 0.37, 0.86)),
+    (0.28, (0.16, 0.70, 0.96)),
+    (0.42, (0.13, 0.93, 0.66)),
+    (0.55, (0.55, 0.99, 0.29)),
+    (0.68, (0.90, 0.85, 0.21)),
+    (0.80, (0.98, 0.56, 0.16)),
+    (0.90, (0.85, 0.26, 0.05)),
+    (1.00, (0.48, 0.02, 0.01)),
+)
+
+
+def palette_colors(name: str) -> np.ndarray:
+    """(256, 3) float32 display sRGB of a palette; BadFile for a name that there is not."""
+    if name not in PALETTES:
+        known = ", ".join(PALETTES)
+        raise BadFile(f"there is no palette {name!r}; a thermal stop may name one of: {known}.")
+    return PALETTES[name]().astype(np.float32)
+
+
+def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
+    """(palette name, weight 0..1, the thermal stop) of the visible object nearest to a thermal stop.
+
+    The weight is 1 at a thermal stop and falls to 0 at the next stop that is not thermal.
+    Name "" (the stop's colours are final) and weight 0: nothing to do.
+    """
+    best: tuple[str, float, Stop | None] = ("", 0.0, None)
+    for thing in scene.objects:
+        stops = sorted(thing.model.stops, key=lambda s: s.x)
+        if not thing.visible or not any(s.kind == "thermal" for s in stops):
+            continue
+        hats = np.array(
+            [np.interp(thing.x, [s.x for s in stops], hat) for hat in np.eye(len(stops))]
+        )
+        thermal = hats * [s.kind == "thermal" for s in stops]
+        weight, stop = float(thermal.sum()), stops[int(np.argmax(thermal))]
+        if weight > best[1]:
+            best = (stop.palette, min(weight, 1.0), stop)
+    return best
+
+
+def apply_palette(rgba: np.ndarray, name: str, weight: float) -> np.ndarray:
+    """Premultiplied (H, W, 4) with its colour mixed towards palette[luminance]; same shape.
+
+    The palette colours what is there, not the background: colour is divided by alpha first.
+    """
+    if not name or not weight > 0:
+        return rgba
+    colors = palette_colors(name)
+    alpha = rgba[..., 3:]
+    luminance = (rgba[..., :3] @ LUMINANCE)[..., None] / np.maximum(alpha, 1e-6)
+    place = np.clip(luminance[..., 0], 0, 1) * (STEPS - 1)
+    false = np.stack([np.interp(place, np.arange(STEPS), c) for c in colors.T], axis=-1)
+    mixed = rgba[..., :3] * (1 - weight) + false * alpha * weight
+    return np.concatenate([mixed, alpha], axis=-1).astype(rgba.dtype)
+
+
+def _gray() -> np.ndarray:
+    return np.repeat(np.linspace(0, 1, STEPS)[:, None], 3, axis=1)
+
+
+def _through(points: tuple) -> np.ndarray:
+    """(256, 3) through control points by monotone cubics: no overshoot, no visible corner."""
+    place = np.array([p for p, _ in points])
+    color = np.array([c for _, c in points])
+    step = np.diff(place)[:, None]
+    rise = np.diff(color, axis=0) / step
+    same_sign = rise[:-1] * rise[1:] > 0
+    total = np.where(same_sign, rise[:-1] + rise[1:], 1.0)
+    inner = np.where(same_sign, 2 * rise[:-1] * rise[1:] / total, 0.0)  # harmonic mean
+    slope = np.concatenate([rise[:1], inner, rise[-1:]])
+    at = np.linspace(0, 1, STEPS)
+    i = np.clip(np.searchsorted(place, at, side="right") - 1, 0, len(place) - 2)
+    t = ((at - place[i]) / step[i, 0])[:, None]
+    curve = (
+        (1 + 2 * t) * (1 - t) ** 2 * color[i]
+        + t * (1 - t) ** 2 * step[i] * slope[i]
+        + t**2 * (3 - 2 * t) * color[i + 1]
+        + t**2 * (t - 1) * step[i] * slope[i + 1]
+    )
+    return np.clip(curve, 0, 1)
+
+
+def _perceptual() -> np.ndarray:
+    """Equal steps of Oklab lightness from dark violet to pale yellow: equal steps look equal."""
+    t = np.linspace(0, 1, STEPS)
+    lightness = 0.16 + 0.80 * t
+    hue = np.radians(-75 + 185 * t)  # violet, red, orange, yellow
+    chroma = 0.03 + 0.16 * np.sin(np.pi * (0.08 + 0.84 * t))
+    oklab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
+    return np.clip(_srgb_from_oklab(oklab), 0, 1)
+
+
+def _srgb_from_oklab(oklab: np.ndarray) -> np.ndarray:
+    """(N, 3) display sRGB; the two matrices of B. Ottosson, "A perceptual color space" (2020)."""
+    lms_from_lab = [
+        [1, 0.3963377774, 0.2158037573],
+        [1, -0.1055613458, -0.0638541728],
+        [1, -0.0894841775, -1.2914855480],
+    ]
+    rgb_from_lms = [
+        [4.0767416621, -3.3077115913, 0.2309699292],
+        [-1.2684380046, 2.6097574011, -0.3413193965],
+        [-0.0041960863, -0.7034186147, 1.7076147010],
+    ]
+    linear = (oklab @ np.transpose(lms_from_lab)) ** 3 @ np.transpose(rgb_from_lms)
+    linear = np.clip(linear, 0, 1)
+    return np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
+
+
+PALETTES = {
+    "gray": _gray,
+    "ironbow": lambda: _through(IRONBOW),
+    "turbo": lambda: _through(TURBO),
+    "perceptual": _perceptual,
+}
