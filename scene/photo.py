@@ -1,0 +1,75 @@
+"""The pixels of a photo and of its mask, in the size that is asked for."""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from runtime_models.model import BadFile
+from scene.capture import Photo
+
+GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
+
+
+def open_image(path: Path) -> Image.Image:
+    """The image file, its header read; BadFile when it is missing or no image."""
+    try:
+        return Image.open(path)
+    except FileNotFoundError:
+        raise BadFile(
+            f"{path}: the image file is missing; put it there or drop the frame"
+        ) from None
+    except (UnidentifiedImageError, OSError) as error:
+        raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
+
+
+def load_photo(
+    photo: Photo, size: tuple[int, int] | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """rgb (H, W, 3) float32 display sRGB 0..1 and mask (H, W) float32 0..1 or None.
+
+    Greyscale becomes three equal channels.  An alpha channel becomes the mask and the colours are
+    laid over black with it; a mask file takes precedence over alpha.  `size` (width, height) is
+    reached by the mean over each new pixel's area.
+    """
+    rgb, alpha = read_pixels(photo.path)
+    mask = alpha if photo.mask is None else read_pixels(photo.mask)[0].mean(axis=2)
+    if mask is not None and mask.shape != rgb.shape[:2]:
+        raise BadFile(
+            f"{photo.mask}: the mask has {mask.shape[1]}x{mask.shape[0]} pixels, its photo "
+            f"{rgb.shape[1]}x{rgb.shape[0]}; make them the same size"
+        )
+    if size is None or size == (rgb.shape[1], rgb.shape[0]):
+        return rgb, mask
+    return shrink(rgb, size), None if mask is None else shrink(mask[..., None], size)[..., 0]
+
+
+def read_pixels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
+    with open_image(path) as image:
+        try:
+            image.load()
+        except OSError as error:
+            raise BadFile(f"{path}: the image is cut off ({error}); copy it again") from None
+        if image.mode in GREY_16:
+            grey = np.asarray(image, np.float32) / 65535
+            return np.repeat(grey[..., None], 3, axis=2), None
+        if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+            rgba = np.asarray(image.convert("RGBA"), np.float32) / 255
+            return rgba[..., :3] * rgba[..., 3:], rgba[..., 3].copy()
+        return np.asarray(image.convert("RGB"), np.float32) / 255, None
+
+
+def shrink(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(H, W, C) -> (height, width, C), each new pixel the mean over the area it covers."""
+    rows = area_weights(pixels.shape[0], size[1])
+    columns = area_weights(pixels.shape[1], size[0])
+    return np.stack([rows @ plane @ columns.T for plane in np.moveaxis(pixels, 2, 0)], axis=2)
+
+
+def area_weights(old: int, new: int) -> np.ndarray:
+    """(new, old) float32 rows that add up to 1: how much of each old pixel a new one covers."""
+    edges = np.arange(new + 1) * old / new
+    start, end = edges[:-1, None], edges[1:, None]
+    cell = np.arange(old)
+    covered = np.minimum(end, cell + 1) - np.maximum(start, cell)
+    return (np.maximum(covered, 0) * new / old).astype(np.float32)

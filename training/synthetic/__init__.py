@@ -1,0 +1,1 @@
+"""Captures that we make ourselves: a small ray tracer and the places it photographs."""
