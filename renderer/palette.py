@@ -42,7 +42,7 @@ def palette_colors(name: str) -> np.ndarray:
 
 
 def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
-    """(palette name, weight 0..1, the thermal stop) of the visible object nearest to a thermal stop.
+    """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop.
 
     The weight is 1 at a thermal stop and falls to 0 at the next stop that is not thermal.
     Name "" (the stop's colours are final) and weight 0: nothing to do.

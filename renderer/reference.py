@@ -55,10 +55,15 @@ def project_object(thing: SceneObject, view: View, settings: RenderSettings) -> 
     )  # (M, 2, 3) pixels per metre
     half = jacobian @ camera_from_object[:3, :3] @ axes
     covariance = half @ half.transpose(0, 2, 1) + settings.low_pass * np.eye(2)
-    largest = np.sqrt(np.linalg.eigvalsh(covariance)[:, -1]) if len(mean) else depth
     mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
-    small = largest <= settings.max_pixels
+    small = largest_axis_px(covariance) <= settings.max_pixels
     return tuple(a[small] for a in (depth, mean_px, covariance, opacity, color))
+
+
+def largest_axis_px(covariance: np.ndarray) -> np.ndarray:
+    """(M,) one sigma along the longer axis of screen ellipses with covariance (M, 2, 2)."""
+    a, b, c = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    return np.sqrt((a + c) / 2 + np.hypot((a - c) / 2, b))
 
 
 def blend(

@@ -1,0 +1,99 @@
+"""Palettes: their ends, their order of luminance, and how near a scene is to a thermal stop."""
+
+import numpy as np
+import pytest
+
+from renderer.palette import LUMINANCE, PALETTES, apply_palette, palette_colors, thermal_blend
+from runtime_models.model import BadFile, SplatLayers, Stop
+from scene.scene import Scene, SceneObject
+
+STOPS = (
+    Stop("rgb", 0.0),
+    Stop("heat", 0.4, kind="thermal", palette="ironbow", value_range=(15, 80), unit="°C"),
+    Stop("open", 1.0, kind="layer"),
+)
+
+
+def thing(x: float, stops: tuple[Stop, ...] = STOPS, visible: bool = True) -> SceneObject:
+    one = np.ones((1, 4), np.float32)
+    model = SplatLayers(
+        one[:, :3], one[:, :3], one, one[:, 0], one[:, :3, None].transpose(0, 2, 1),
+        np.zeros(1, np.int32), stops,
+    )  # fmt: skip
+    return SceneObject("thing", model, x=x, visible=visible)
+
+
+@pytest.mark.parametrize("name", PALETTES)
+def test_every_palette_is_256_display_colors_without_a_jump(name):
+    colors = palette_colors(name)
+    assert colors.shape == (256, 3) and colors.dtype == np.float32
+    assert np.isfinite(colors).all() and colors.min() >= 0 and colors.max() <= 1
+    assert np.abs(np.diff(colors, axis=0)).max() < 0.03
+
+
+@pytest.mark.parametrize("name", ["gray", "ironbow", "perceptual"])
+def test_luminance_only_grows(name):
+    assert (np.diff(palette_colors(name) @ LUMINANCE) > 0).all()
+
+
+def test_lightness_of_the_perceptual_palette_is_nearly_even():
+    display = palette_colors("perceptual").astype(float)
+    linear = np.where(display > 0.04045, ((display + 0.055) / 1.055) ** 2.4, display / 12.92)
+    lightness = 116 * np.cbrt(linear @ LUMINANCE) - 16  # CIE L*, a second opinion to Oklab
+    steps = np.diff(lightness[8:])
+    assert steps.min() > 0.2 * steps.mean() and steps.max() < 2 * steps.mean()
+
+
+@pytest.mark.parametrize(
+    ("name", "cold", "hot"),
+    [("gray", (0, 0, 0), (1, 1, 1)), ("ironbow", (0, 0, 0.04), (1, 1, 0.96))],
+)
+def test_ends(name, cold, hot):
+    colors = palette_colors(name)
+    np.testing.assert_allclose(colors[[0, -1]], [cold, hot], atol=1e-6)
+
+
+def test_turbo_is_blue_when_cold_green_in_the_middle_and_red_when_hot():
+    colors = palette_colors("turbo")
+    assert [int(np.argmax(colors[i])) for i in (40, 130, 240)] == [2, 1, 0]
+
+
+def test_an_unknown_palette_is_named_with_those_there_are():
+    with pytest.raises(BadFile, match=r"no palette 'rainbowish'.*gray, ironbow"):
+        palette_colors("rainbowish")
+
+
+@pytest.mark.parametrize(
+    ("x", "weight"), [(0.0, 0), (0.1, 0.25), (0.4, 1), (0.7, 0.5), (1.0, 0), (-3, 0), (7, 0)]
+)
+def test_weight_is_a_hat_over_the_thermal_stop(x, weight):
+    name, got, stop = thermal_blend(Scene((thing(x),)))
+    assert got == pytest.approx(weight)
+    assert (name, stop) == (("ironbow", STOPS[1]) if weight else ("", None))
+
+
+def test_between_two_thermal_stops_nothing_is_taken_back():
+    stops = (Stop("a", 0, "thermal", "gray"), Stop("b", 1, "thermal", "ironbow"))
+    assert thermal_blend(Scene((thing(0.3, stops),))) == ("gray", pytest.approx(1), stops[0])
+    assert thermal_blend(Scene((thing(0.7, stops),)))[::2] == ("ironbow", stops[1])
+
+
+def test_the_nearest_visible_object_decides_and_hidden_ones_do_not():
+    scene = Scene((thing(0.2), thing(0.4, visible=False), thing(0.3), thing(1.0)))
+    assert thermal_blend(scene)[1] == pytest.approx(0.75)
+    assert thermal_blend(Scene(())) == ("", 0.0, None)
+
+
+def test_the_palette_colors_what_is_there_and_leaves_coverage_alone():
+    gray = np.array([0.0, 0.25, 0.5, 1.0])
+    for alpha in (1.0, 0.5):
+        rgba = np.concatenate([np.repeat(gray[:, None], 3, 1), np.ones((4, 1))], 1) * alpha
+        out = apply_palette(rgba[None], "ironbow", 1.0)[0]
+        np.testing.assert_array_equal(out[:, 3], rgba[:, 3])
+        want = palette_colors("ironbow")[np.round(gray * 255).astype(int)] * alpha
+        np.testing.assert_allclose(out[:, :3], want, atol=0.02)
+        half = apply_palette(rgba[None], "ironbow", 0.5)[0]
+        np.testing.assert_allclose(half, (out + rgba) / 2, atol=1e-9)
+    empty = np.zeros((2, 2, 4))
+    np.testing.assert_array_equal(apply_palette(empty, "turbo", 1.0), empty)
+    assert apply_palette(empty, "", 1.0) is empty
