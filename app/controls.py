@@ -1,0 +1,212 @@
+"""Orbit and fly cameras of the desktop as plain numbers: input in, View out; no GL, no window."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scene.framing import FAR_RADII, FOV_Y, NEAR_RADII, fit_distance
+from scene.pose import Pose, View, perspective
+
+POLE = 1.5  # radians of pitch; straight up or down would lose which way is right
+MIN_RADII, MAX_RADII = 0.02, 20.0  # the orbit distance stays within these, in scene radii
+DOLLY_STEP = 0.85  # of the distance, one notch of the wheel
+FLY_STEP_RADII = 0.08  # metres a notch, in scene radii
+SMOOTH_S = 0.06  # the picture follows the hand with this time constant
+BRAKE_S = 0.09  # so does the flying speed follow the keys
+SPEED_RADII = 0.8  # metres a second with a key held, in scene radii
+FAST, SLOW = 5.0, 0.2  # Shift, Ctrl
+STILL = 2e-4  # radians, or scene radii: less is not seen, the camera counts as at rest
+
+# A camera is six numbers, so that its goal, and how far the picture lags behind, can be subtracted.
+ANCHOR, YAW, PITCH, LOG_DISTANCE = slice(0, 3), 3, 4, 5
+
+
+def axes_of(yaw: float, pitch: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Right, up and forward (3,) of an eye; yaw 0 looks along -Z, positive turns to the left."""
+    right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
+    forward = np.array([-np.sin(yaw) * np.cos(pitch), np.sin(pitch), -np.cos(yaw) * np.cos(pitch)])
+    return right, np.cross(right, forward), forward
+
+
+@dataclass(frozen=True)
+class Push:
+    """What the movement keys ask for: -1, 0 or 1 along the eye's right, up and forward."""
+
+    right: float = 0.0
+    up: float = 0.0
+    forward: float = 0.0
+    pace: float = 1.0  # FAST, 1 or SLOW
+
+    @property
+    def any(self) -> bool:
+        return bool(self.right or self.up or self.forward)
+
+
+class Camera:
+    """One eye that either orbits an anchor or flies; switching between the two moves nothing.
+
+    In orbit the anchor is the point looked at, in flight it is the eye.  Inputs change the goal at
+    once, `step` lets the picture follow: exact exponentials, so frame times do not matter.
+    """
+
+    def __init__(self, view: View, centre: np.ndarray, radius: float) -> None:
+        self.flying = False
+        self._home = (view, np.asarray(centre, np.float64), radius)
+        self._goal = np.zeros(6)
+        self._lag = np.zeros(6)  # goal - shown
+        self._velocity = np.zeros(3)  # metres a second
+        self.radius = radius
+        self.fov_y = FOV_Y
+        self.reset()
+        self._lag[:] = 0
+
+    @property
+    def position(self) -> np.ndarray:
+        """(3,) metres: the eye as it is shown now."""
+        return self._eye(self._goal - self._lag)
+
+    @property
+    def target(self) -> np.ndarray:
+        """(3,) metres: the point that the orbit goes around."""
+        return self._eye(self._goal) + self.distance * axes_of(*self._goal[3:5])[2]
+
+    @property
+    def distance(self) -> float:
+        return float(np.exp(self._goal[LOG_DISTANCE]))
+
+    @property
+    def moving(self) -> bool:
+        """False when another `step` without input would change nothing that can be seen."""
+        metres = np.abs(np.r_[self._lag[ANCHOR], self._velocity * BRAKE_S]).max()
+        return bool(metres > STILL * self.radius or np.abs(self._lag[3:]).max() > STILL)
+
+    def view(self, size: tuple[int, int]) -> View:
+        """What the eye sees now in size (W, H) pixels."""
+        shown = self._goal - self._lag
+        right, up, forward = axes_of(shown[YAW], shown[PITCH])
+        world_from_eye = np.eye(4)
+        world_from_eye[:3, :3] = np.stack([right, up, -forward], axis=1)
+        world_from_eye[:3, 3] = self._eye(shown)
+        distance = float(np.exp(shown[LOG_DISTANCE]))
+        near, far = NEAR_RADII * self.radius, FAR_RADII * self.radius + distance
+        pose = Pose.from_matrix(world_from_eye)
+        return View(pose, perspective(self.fov_y, size), near, far, size)
+
+    def turn(self, yaw: float, pitch: float) -> None:
+        """Orbits around the anchor, or looks about when flying, by radians."""
+        goal = self._goal.copy()
+        goal[YAW] += yaw
+        goal[PITCH] = np.clip(goal[PITCH] + pitch, -POLE, POLE)
+        self._move_to(goal)
+
+    def pan(self, right: float, up: float) -> None:
+        """Shifts eye and anchor by parts of the picture's height, measured at the anchor."""
+        metres = 2 * np.tan(self.fov_y / 2) * self.distance
+        axis_right, axis_up, _ = axes_of(*self._goal[3:5])
+        goal = self._goal.copy()
+        goal[ANCHOR] += metres * (right * axis_right + up * axis_up)
+        self._move_to(goal)
+
+    def dolly(self, notches: float) -> None:
+        """Nearer to the anchor (positive) or away from it; straight ahead when flying."""
+        goal = self._goal.copy()
+        if self.flying:
+            goal[ANCHOR] += notches * FLY_STEP_RADII * self.radius * axes_of(*goal[3:5])[2]
+        else:
+            goal[LOG_DISTANCE] = self._bounded(goal[LOG_DISTANCE] + notches * np.log(DOLLY_STEP))
+        self._move_to(goal)
+
+    def step(self, seconds: float, push: Push = Push()) -> None:
+        """Lets time pass: the keys move the camera, the picture catches up with its goal."""
+        right, _, forward = axes_of(*self._goal[3:5])
+        wanted = push.right * right + push.up * np.array([0, 1.0, 0]) + push.forward * forward
+        length = np.linalg.norm(wanted)
+        if length > 0:
+            wanted *= SPEED_RADII * self.radius * push.pace / length
+        # v' = (wanted - v) / BRAKE_S solved exactly: two short steps equal a long one
+        keep = np.exp(-seconds / BRAKE_S)
+        gap = self._velocity - wanted
+        self._goal[ANCHOR] += wanted * seconds + gap * BRAKE_S * (1 - keep)
+        self._velocity = wanted + gap * keep
+        self._lag *= np.exp(-seconds / SMOOTH_S)
+        if not push.any and not self.moving:
+            self._lag[:] = 0
+            self._velocity[:] = 0
+
+    def toggle_flying(self) -> None:
+        """Between orbit and flight; the eye stays where it is."""
+        goal, shown = self._goal, self._goal - self._lag
+        reach = -1.0 if not self.flying else 1.0
+        for state in (goal, shown):
+            forward = axes_of(state[YAW], state[PITCH])[2]
+            state[ANCHOR] += reach * np.exp(state[LOG_DISTANCE]) * forward
+        self.flying = not self.flying
+        self._lag = goal - shown
+
+    def focus(self, point: np.ndarray) -> None:
+        """Brings a world point (3,) to the middle and makes it what the orbit goes around."""
+        if self.flying:
+            x, y, z = np.asarray(point, np.float64) - self._eye(self._goal)
+            goal = self._goal.copy()
+            goal[YAW] += _half_turn_at_most(np.arctan2(-x, -z) - goal[YAW])
+            goal[PITCH] = np.clip(np.arctan2(y, np.hypot(x, z)), -POLE, POLE)
+            self._move_to(goal)
+            return
+        self._reanchor(float((point - self.position) @ axes_of(*self._goal[3:5])[2]))
+        goal = self._goal.copy()
+        goal[ANCHOR] = point
+        self._move_to(goal)
+
+    def frame(self, centre: np.ndarray, radius: float, size: tuple[int, int]) -> None:
+        """Shows a sphere whole, looking in the same direction as before."""
+        distance = fit_distance(radius, size, self.fov_y)
+        self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance)
+
+    def reset(self) -> None:
+        """Back to the first view of the scene."""
+        view, centre, radius = self._home
+        self.radius = radius
+        self.fov_y = float(np.arctan(view.tangents[3]) - np.arctan(view.tangents[2]))
+        eye, forward = view.world_from_eye.position, -view.world_from_eye.matrix()[:3, 2]
+        yaw = np.arctan2(-forward[0], -forward[2])
+        yaw = self._goal[YAW] + _half_turn_at_most(yaw - self._goal[YAW])
+        pitch = np.clip(np.arcsin(np.clip(forward[1], -1, 1)), -POLE, POLE)
+        distance = float((centre - eye) @ forward)
+        if not distance > MIN_RADII * radius:  # the scene lies behind or around the eye
+            distance = radius
+        self._stand(eye + distance * forward, yaw, pitch, distance)
+
+    def _stand(self, target: np.ndarray, yaw: float, pitch: float, distance: float) -> None:
+        """Sets the goal from orbit's terms, whichever mode is on."""
+        anchor = target - self.flying * distance * axes_of(yaw, pitch)[2]
+        self._move_to(np.r_[anchor, yaw, pitch, self._bounded(np.log(distance))])
+
+    def _reanchor(self, distance: float) -> None:
+        """Slides the orbit's anchor along the line of sight; eye and picture stay."""
+        goal, shown = self._goal, self._goal - self._lag
+        log_distance = self._bounded(np.log(max(distance, 1e-9)))
+        for state in (goal, shown):
+            forward = axes_of(state[YAW], state[PITCH])[2]
+            state[ANCHOR] += (np.exp(log_distance) - np.exp(state[LOG_DISTANCE])) * forward
+            state[LOG_DISTANCE] = log_distance
+        self._lag = goal - shown
+
+    def _move_to(self, goal: np.ndarray) -> None:
+        """A new goal; what is shown stays and will catch up."""
+        self._lag += goal - self._goal
+        self._goal = goal
+
+    def _eye(self, state: np.ndarray) -> np.ndarray:
+        if self.flying:
+            return state[ANCHOR].copy()
+        forward = axes_of(state[YAW], state[PITCH])[2]
+        return state[ANCHOR] - np.exp(state[LOG_DISTANCE]) * forward
+
+    def _bounded(self, log_distance: float) -> float:
+        low, high = np.log(np.array([MIN_RADII, MAX_RADII]) * self.radius)
+        return float(np.clip(log_distance, low, high))
+
+
+def _half_turn_at_most(angle: float) -> float:
+    """The same turn in -pi..pi."""
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
