@@ -1,0 +1,211 @@
+"""The five heads on the device against plain numpy in float64, forward and backward."""
+
+import numpy as np
+import pytest
+
+from rasterizer.device import open_device
+from runtime_models.model import HEADS, SIZE_PER_SPLAT
+from training.gaussians import REACH, SCALE_CLIP, UNIT, Activation, Gaussians
+from training.networks import HeadLayout, Heads, initial_weights, padded
+
+VOXEL = 0.05
+EYE = np.array([2.0, 1.0, 1.5])
+
+
+@pytest.fixture(scope="module")
+def device():
+    return open_device("cpu")
+
+
+def model(layout: HeadLayout, count: int, seed: int = 0):
+    """(weights, anchors, features, control): everything active, so that no gradient is trivial."""
+    rng = np.random.default_rng(seed)
+    anchors = rng.normal(size=(count, 3)).astype(np.float32)
+    features = np.zeros((count, padded(layout.features)), np.float32)
+    features[:, : layout.features] = rng.normal(size=(count, layout.features))
+    control = rng.random(layout.control).astype(np.float32)
+    return initial_weights(layout, rng), anchors, features, control
+
+
+def inputs_of(name, layout, anchors, features, control):
+    direction = anchors - EYE
+    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    repeated = np.repeat(control[None].astype(np.float64), len(anchors), axis=0)
+    parts = [features[:, : layout.features]]
+    return np.concatenate([*parts, *([direction] if name == "color" else []), repeated], axis=1)
+
+
+def plain_heads(layout, networks, anchors, features, control):
+    """(hidden, raw) of every head by name, float64."""
+    out = {}
+    for name in HEADS:
+        w1, b1, w2, b2 = (np.asarray(a, np.float64) for a in networks[name])
+        hidden = np.maximum(inputs_of(name, layout, anchors, features, control) @ w1.T + b1, 0)
+        out[name] = (hidden, hidden @ w2.T + b2)
+    return out
+
+
+def raw_of(raw, layout, name):
+    head = HEADS.index(name)
+    start = layout.raw_at[head]
+    return raw[:, start : start + layout.outs[head]]
+
+
+def relative(found, wanted) -> float:
+    return float(np.abs(found - wanted).max() / max(np.abs(wanted).max(), 1e-30))
+
+
+LAYOUTS = [
+    HeadLayout(splats=5),
+    HeadLayout(splats=10),
+    HeadLayout(splats=1, features=1, hidden=1, control=1),
+    HeadLayout(splats=3, features=7, hidden=9, control=5),
+    HeadLayout(splats=4, features=32, hidden=64, control=16),
+]
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_pack_then_unpack_is_the_identity(layout):
+    rng = np.random.default_rng(1)
+    networks = {}
+    for name in HEADS:
+        inputs, out = len(layout.first_rows(name)), layout.splats * SIZE_PER_SPLAT[name]
+        shapes = ((layout.hidden, inputs), layout.hidden, (out, layout.hidden), out)
+        networks[name] = tuple(rng.normal(size=s).astype(np.float32) for s in shapes)
+    flat = layout.pack(networks)
+    for name, arrays in layout.unpack(flat).items():
+        for found, wanted in zip(arrays, networks[name], strict=True):
+            np.testing.assert_array_equal(found, wanted)
+    assert np.count_nonzero(flat) == sum(a.size for n in networks.values() for a in n)
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 5, 8, 9, 129])
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_forward_equals_plain_numpy(device, layout, count):
+    weights, anchors, features, control = model(layout, count)
+    arrays = map(device.upload, (weights, anchors, features))
+    raw = device.download(Heads(device, layout).forward(*arrays, control, EYE))
+    wanted = plain_heads(layout, layout.unpack(weights), anchors, features, control)
+    for name in HEADS:
+        assert relative(raw_of(raw, layout, name), wanted[name][1]) < 2e-6, name
+
+
+@pytest.mark.parametrize("count", [1, 7, 8, 9, 137])
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_backward_equals_plain_numpy(device, layout, count):
+    weights, anchors, features, control = model(layout, count)
+    rng = np.random.default_rng(5)
+    on_device = [device.upload(a) for a in (weights, anchors, features)]
+    heads = Heads(device, layout)
+    heads.forward(*on_device, control, EYE)
+    grad_raw = np.zeros((count, layout.raw_at[-1]), np.float32)
+    for name in HEADS:
+        raw_of(grad_raw, layout, name)[:] = rng.normal(size=raw_of(grad_raw, layout, name).shape)
+    before = rng.normal(size=anchors.shape).astype(np.float32)
+    grad_anchors = device.upload(before)
+    grads = heads.backward(*on_device, device.upload(grad_raw), grad_anchors)
+    grad_weights, grad_features = (device.download(g) for g in grads)
+
+    networks = layout.unpack(weights)
+    plain = plain_heads(layout, networks, anchors, features, control)
+    found = layout.unpack(grad_weights)
+    wanted_features, flow = np.zeros((count, layout.features)), None
+    for name in HEADS:
+        w1, _, w2, _ = (a.astype(np.float64) for a in networks[name])
+        d_out = raw_of(grad_raw, layout, name).astype(np.float64)
+        d_hidden = (d_out @ w2) * (plain[name][0] > 0)
+        inputs = inputs_of(name, layout, anchors, features, control)
+        wanted = (d_hidden.T @ inputs, d_hidden.sum(0), d_out.T @ plain[name][0], d_out.sum(0))
+        for got, want in zip(found[name], wanted, strict=True):
+            assert relative(got, want) < 5e-6, name
+        wanted_features += (d_hidden @ w1)[:, : layout.features]
+        if name == "color":
+            flow = (d_hidden @ w1)[:, layout.features : layout.features + 3]
+    assert relative(grad_features[:, : layout.features], wanted_features) < 5e-6
+    away = anchors - EYE
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    unit = away / length
+    through_direction = (flow - unit * (flow * unit).sum(1, keepdims=True)) / length
+    added = device.download(grad_anchors) - before
+    assert np.abs(added - through_direction).max() < 5e-6 * max(np.abs(before).max(), 1)
+
+
+def test_padding_never_learns(device):
+    layout = HeadLayout(splats=3, features=7, hidden=9, control=5)
+    weights, anchors, features, control = model(layout, 20)
+    on_device = [device.upload(a) for a in (weights, anchors, features)]
+    heads = Heads(device, layout)
+    heads.forward(*on_device, control, EYE)
+    grad_raw = np.zeros((20, layout.raw_at[-1]), np.float32)
+    for name in HEADS:
+        raw_of(grad_raw, layout, name)[:] = 1
+    grads = heads.backward(*on_device, device.upload(grad_raw), device.zeros((20, 3)))
+    grad_weights, grad_features = (device.download(g) for g in grads)
+    np.testing.assert_array_equal(layout.pack(layout.unpack(grad_weights)), grad_weights)
+    assert not grad_features[:, layout.features :].any()
+
+
+def test_an_eye_at_an_anchor_is_finite(device):
+    layout = HeadLayout(splats=2)
+    weights, anchors, features, control = model(layout, 4)
+    anchors[2] = EYE
+    on_device = [device.upload(a) for a in (weights, anchors, features)]
+    heads = Heads(device, layout)
+    raw = heads.forward(*on_device, control, EYE)
+    grads = heads.backward(*on_device, raw, device.zeros((4, 3)))
+    for array in (raw, *grads):
+        assert np.isfinite(device.download(array)).all()
+
+
+def activated(layout, raw, anchors):
+    """Splats of raw outputs (A, RAW) in float64, fields in the order of Gaussians."""
+    per = {n: raw_of(raw.astype(np.float64), layout, n) for n in HEADS}
+    size = len(anchors) * layout.splats
+    offset = REACH * VOXEL * np.tanh(per["offset"].reshape(size, 3))
+    return (
+        np.repeat(anchors, layout.splats, axis=0) + offset,
+        UNIT * VOXEL * np.exp(np.clip(per["scale"].reshape(size, 3), *SCALE_CLIP)),
+        per["rotation"].reshape(size, 4),
+        np.tanh(per["opacity"].reshape(size)),
+        1 / (1 + np.exp(-per["color"].reshape(size, 3))),
+    )
+
+
+@pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere
+def test_activations_and_their_gradient(device, spread):
+    layout = HeadLayout(splats=3)
+    rng = np.random.default_rng(2)
+    anchors = rng.normal(size=(21, 3)).astype(np.float32)
+    raw = (spread * rng.normal(size=(21, layout.raw_at[-1]))).astype(np.float32)
+    activation = Activation(device, layout, VOXEL)
+    splats = activation.forward(device.upload(raw), device.upload(anchors))
+    wanted = activated(layout, raw, anchors)
+    for got, want in zip(splats.fields(), wanted, strict=True):
+        assert relative(device.download(got), want) < 1e-6
+    grads = [rng.normal(size=w.shape).astype(np.float32) for w in wanted]
+    on_device = Gaussians(*(device.upload(g) for g in grads))
+    grad_raw, grad_anchors = activation.backward(device.upload(raw), on_device)
+    found = device.download(grad_raw)
+
+    def scalar(values):
+        return sum(
+            (a * g).sum() for a, g in zip(activated(layout, values, anchors), grads, strict=True)
+        )
+
+    step, real = (
+        1e-6,
+        np.concatenate(
+            [np.arange(s, s + n) for s, n in zip(layout.raw_at, layout.outs, strict=False)]
+        ),
+    )
+    for column in real:
+        for row in rng.choice(21, 4, replace=False):
+            up, down = (raw.astype(np.float64) for _ in range(2))
+            up[row, column] += step
+            down[row, column] -= step
+            numeric = (scalar(up) - scalar(down)) / (2 * step)
+            assert abs(found[row, column] - numeric) < 2e-6 * max(abs(numeric), 1)
+    unused = np.setdiff1d(np.arange(layout.raw_at[-1]), real)
+    assert not found[:, unused].any()
+    summed = grads[0].reshape(21, 3, 3).sum(1)
+    np.testing.assert_allclose(device.download(grad_anchors), summed, atol=2e-6)

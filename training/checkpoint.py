@@ -1,0 +1,35 @@
+"""The file beside the output from which an interrupted run goes on."""
+
+import json
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import BadFile
+
+
+def checkpoint_path(out: Path) -> Path:
+    """Where the checkpoint of a package `out` lies."""
+    return out.with_name(out.name + ".checkpoint.npz")
+
+
+def write_checkpoint(path: Path, state: dict[str, np.ndarray], notes: dict) -> None:
+    """All arrays and notes in one file, never half-written."""
+    temporary = path.with_name(path.name + ".partial")
+    with open(temporary, "wb") as file:
+        np.savez(file, notes=np.array(json.dumps(notes)), **state)
+    os.replace(temporary, path)
+
+
+def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict]:
+    """(arrays, notes).  Raises BadFile."""
+    if not path.exists():
+        raise BadFile(f"{path}: no checkpoint to resume from; train once without --resume.")
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            state = {name: file[name] for name in file.files}
+        return state, json.loads(str(state.pop("notes")))
+    except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise BadFile(f"{path}: not a readable checkpoint ({error}); delete it.") from error

@@ -1,0 +1,113 @@
+"""Where the first anchors stand: at points, on a visual hull, or in the cameras' common view."""
+
+import numpy as np
+
+from runtime_models.model import BadFile
+from scene.pose import View
+from training.photos import LoadedPhoto
+
+HULL_SIDE = 64  # grid cells along each side of the box that is carved
+RANDOM_POINTS = 20_000
+SAMPLE = 1000  # points whose nearest neighbour is looked for
+
+
+def median_neighbour(points: np.ndarray, rng: np.random.Generator) -> float:
+    """Median distance in metres from a point to its nearest neighbour, over a sample."""
+    picked = rng.choice(len(points), min(SAMPLE, len(points)), replace=False)
+    square = (points**2).sum(1)
+    nearest = []
+    for chunk in np.array_split(picked, max(1, len(picked) // 100)):
+        distance2 = square[chunk, None] + square[None] - 2 * points[chunk] @ points.T
+        distance2[np.arange(len(chunk)), chunk] = np.inf
+        nearest.append(distance2.min(axis=1))
+    return float(np.sqrt(np.median(np.maximum(np.concatenate(nearest), 0))))
+
+
+def voxel_centres(points: np.ndarray, voxel: float) -> np.ndarray:
+    """(A, 3) float32 the grid nodes of spacing `voxel` that have a point, each once, sorted."""
+    return (np.unique(np.round(points / voxel), axis=0) * voxel).astype(np.float32)
+
+
+def choose_voxel(points: np.ndarray, most: int, rng: np.random.Generator) -> float:
+    """Median neighbour distance, or as much more as it takes to come down to `most` anchors."""
+    low = max(median_neighbour(points, rng), 1e-9)
+    if len(voxel_centres(points, low)) <= most:
+        return low
+    high = low
+    while len(voxel_centres(points, high)) > most:
+        low, high = high, high * 2
+    for _ in range(8):  # to 0.4 %
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if len(voxel_centres(points, middle)) > most else (low, middle)
+    return high
+
+
+def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(P, 2) pixels, row 0 on top, and (P,) whether the point lies in the image."""
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    x, y, z = (points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixel = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1)
+    width, height = view.size
+    inside = (z > view.near) & (pixel >= 0).all(1) & (pixel < (width, height)).all(1)
+    return pixel, inside
+
+
+def common_box(views: list[View]) -> tuple[np.ndarray, np.ndarray]:
+    """(centre (3,), half side) metres of the place that the cameras look at together."""
+    eyes = np.array([v.world_from_eye.position for v in views])
+    ahead = np.array([-v.world_from_eye.matrix()[:3, 2] for v in views])
+    # nearest point to all viewing axes, least squares; nearly parallel axes are held near the eyes
+    away = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
+    spread = max(float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-3)
+    pull = 1e-3 * len(views)
+    guess = (eyes + spread * ahead).mean(0)
+    centre = np.linalg.solve(
+        away.sum(0) + pull * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + pull * guess
+    )
+    distance = np.median(np.linalg.norm(eyes - centre, axis=1))
+    tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
+    return centre, float(distance * min(tangent, 0.9))
+
+
+def visual_hull(photos: list[LoadedPhoto], centre: np.ndarray, half: float) -> np.ndarray:
+    """(P, 3) surface cells of the box that no see-through photo shows as background."""
+    axis = (np.arange(HULL_SIDE) + 0.5) / HULL_SIDE * 2 - 1
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    points = centre + half * grid
+    solid, seen = np.ones(len(points), bool), np.zeros(len(points), int)
+    for photo in photos:
+        pixel, inside = pixel_of(photo.view, points)
+        column, row = pixel[inside].astype(int).T
+        opaque = photo.rgba[row, column, 3] >= 128
+        solid[np.flatnonzero(inside)[~opaque]] = False
+        seen[inside] += 1
+    solid &= seen >= max(2, len(photos) // 4)
+    cells = np.pad(solid.reshape((HULL_SIDE,) * 3), 1)
+    buried = np.ones_like(cells)
+    for shift in (-1, 1):
+        for dimension in range(3):
+            buried &= np.roll(cells, shift, dimension)
+    surface = (cells & ~buried)[1:-1, 1:-1, 1:-1].reshape(-1)
+    return points[surface]
+
+
+def initial_points(
+    points: np.ndarray | None, photos: list[LoadedPhoto], rng: np.random.Generator
+) -> tuple[np.ndarray, str]:
+    """(P, 3) metres and where they come from: points, hull or random."""
+    if points is not None and len(points):
+        return np.asarray(points, np.float64), "points"
+    centre, half = common_box([p.view for p in photos])
+    masked = [p for p in photos if p.see_through]
+    if masked:
+        hull = visual_hull(masked, centre, half)
+        if not len(hull):
+            raise BadFile(
+                "The masks of the capture have no volume in common; check that masks and poses "
+                "belong together, or train with --masks ignore."
+            )
+        return hull, "hull"
+    cloud = centre + half * rng.uniform(-1, 1, (RANDOM_POINTS, 3))
+    watched = sum(pixel_of(p.view, cloud)[1] for p in photos) >= max(1, len(photos) // 3)
+    return (cloud[watched] if watched.any() else cloud), "random"

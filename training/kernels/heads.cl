@@ -1,0 +1,219 @@
+// The five heads, forward and backward: anchor features -> raw outputs (paper section 3.2, eq. 5).
+//
+// Defined by networks.py: FEATURES, HIDDEN (padded to 8), CONTROL, RAW (row of all raw outputs) and
+// for each head m OUTm (padded width), OUT_AT m (its place in a raw row), WEIGHTS_ATm.
+// The weights of one head lie as W1 [FEATURES + CONTROL + 3][HIDDEN], b1 [HIDDEN],
+// W2 [HIDDEN][OUT], b2 [OUT]; the last three rows of W1 meet the view direction, which only the
+// last head (colour) takes.  Padding weights are zero, get zero gradients and so stay zero.
+//
+// Psi(x) is one vector for all anchors, so W1_control . Psi + b1 is folded into one bias a step;
+// that is exact and halves the first layer.
+
+#define DIRECTION_ROW (FEATURES + CONTROL)
+#define INPUTS (FEATURES + CONTROL + 3)
+#define HIDDEN8 (HIDDEN / 8)
+#define FEATURES8 (FEATURES / 8)
+#define MAX_OUT8 (MAX_OUT / 8)
+#define COLOR 4
+#define BLOCK 8  // anchors that share one pass over the weights in the backward kernel
+
+__constant int OUT[5] = {OUT0, OUT1, OUT2, OUT3, OUT4};
+__constant int OUT_AT[5] = {OUT_AT0, OUT_AT1, OUT_AT2, OUT_AT3, OUT_AT4};
+__constant int WEIGHTS_AT[5] = {WEIGHTS_AT0, WEIGHTS_AT1, WEIGHTS_AT2, WEIGHTS_AT3, WEIGHTS_AT4};
+
+// Unit vector from the eye to an anchor (eq. 4) and 1 / distance; finite when they coincide.
+inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {
+  float3 d = (float3)(anchor[0], anchor[1], anchor[2]) - eye;
+  float inverse = 1.0f / fmax(sqrt(dot(d, d)), 1e-8f);
+  return (float4)(d * inverse, inverse);
+}
+
+// One work-item a hidden unit of a head: the folded bias, and both layers transposed, so that the
+// backward kernel never sums across a vector.
+__kernel void prepare_weights(__global const float *weights, __global const float *control,
+                              __global float *bias, __global float *first_t,
+                              __global float *second_t) {
+  int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
+  __global const float *first = weights + WEIGHTS_AT[m];
+  __global const float *second = first + (INPUTS + 1) * HIDDEN;
+  float sum = first[INPUTS * HIDDEN + j];
+  for (int d = 0; d < CONTROL; d++) sum += control[d] * first[(FEATURES + d) * HIDDEN + j];
+  bias[m * HIDDEN + j] = sum;
+  for (int i = 0; i < FEATURES; i++)
+    first_t[(m * HIDDEN + j) * FEATURES + i] = first[i * HIDDEN + j];
+  for (int c = 0; c < OUT[m]; c++)
+    second_t[OUT_AT[m] * HIDDEN + c * HIDDEN + j] = second[j * OUT[m] + c];
+}
+
+// One work-item four anchors: every weight row is loaded once for the four.
+__kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float eye_z,
+                            __global const float *weights, __global const float *bias,
+                            __global const float *anchors, __global const float *features,
+                            __global float *hidden, __global float *raw) {
+  int first_anchor = get_global_id(0) * 4;
+  if (!(first_anchor < anchors_count)) return;
+  float3 eye = (float3)(eye_x, eye_y, eye_z);
+  int a[4];
+  float feature[4][FEATURES], direction[4][3];
+  for (int b = 0; b < 4; b++) {
+    a[b] = min(first_anchor + b, anchors_count - 1);  // the last ones repeat and write the same
+    for (int i = 0; i < FEATURES; i++) feature[b][i] = features[a[b] * FEATURES + i];
+    float4 d = direction_and_inverse(eye, anchors + 3 * a[b]);
+    direction[b][0] = d.x; direction[b][1] = d.y; direction[b][2] = d.z;
+  }
+  for (int m = 0; m < 5; m++) {
+    __global const float *first = weights + WEIGHTS_AT[m];
+    __global const float *second = first + (INPUTS + 1) * HIDDEN;
+    float unit[4][HIDDEN];
+    for (int j = 0; j < HIDDEN8; j++) {
+      float8 h[4];
+      for (int b = 0; b < 4; b++) h[b] = vload8(j, bias + m * HIDDEN);
+      for (int i = 0; i < FEATURES; i++) {
+        float8 w = vload8(j, first + i * HIDDEN);
+        for (int b = 0; b < 4; b++) h[b] += feature[b][i] * w;
+      }
+      if (m == COLOR)
+        for (int i = 0; i < 3; i++) {
+          float8 w = vload8(j, first + (DIRECTION_ROW + i) * HIDDEN);
+          for (int b = 0; b < 4; b++) h[b] += direction[b][i] * w;
+        }
+      for (int b = 0; b < 4; b++) {
+        h[b] = fmax(h[b], (float8)(0.0f));
+        vstore8(h[b], j, unit[b]);
+        vstore8(h[b], j, hidden + (a[b] * 5 + m) * HIDDEN);
+      }
+    }
+    int outs = OUT[m];
+    for (int c = 0; c < outs / 8; c++) {
+      float8 y[4];
+      for (int b = 0; b < 4; b++) y[b] = vload8(c, second + HIDDEN * outs);
+      for (int j = 0; j < HIDDEN; j++) {
+        float8 w = vload8(c, second + j * outs);
+        for (int b = 0; b < 4; b++) y[b] += unit[b][j] * w;
+      }
+      for (int b = 0; b < 4; b++) vstore8(y[b], c, raw + a[b] * RAW + OUT_AT[m]);
+    }
+  }
+}
+
+// One work-item a chunk of anchors, with weight gradients of its own that sum_chunks adds up in a
+// fixed order: no atomics, the same bits for any number of threads.
+// grad_anchors already holds the gradient through the means and gets that of the direction added.
+__kernel void heads_backward(int anchors_count, int chunks, float eye_x, float eye_y, float eye_z,
+                             __global const float *weights, __global const float *first_t,
+                             __global const float *second_t, __global const float *anchors,
+                             __global const float *features, __global const float *hidden,
+                             __global const float *grad_raw, __global float *grad_chunks,
+                             __global float *grad_features, __global float *grad_anchors) {
+  int chunk = get_global_id(0);
+  if (!(chunk < chunks)) return;
+  __global float *grad = grad_chunks + (long)chunk * WEIGHTS;
+  for (int i = 0; i < WEIGHTS; i++) grad[i] = 0;
+  float3 eye = (float3)(eye_x, eye_y, eye_z);
+  int from = (long)anchors_count * chunk / chunks, to = (long)anchors_count * (chunk + 1) / chunks;
+  for (int base = from; base < to; base += BLOCK) {
+    int count = min(BLOCK, to - base);
+    float input[BLOCK][FEATURES];
+    float8 grad_input[BLOCK][FEATURES8];
+    float4 direction[BLOCK];
+    for (int b = 0; b < BLOCK; b++) {  // beyond the end: zeros, which add nothing
+      int a = base + min(b, count - 1);
+      for (int i = 0; i < FEATURES; i++) input[b][i] = features[a * FEATURES + i];
+      for (int i = 0; i < FEATURES8; i++) grad_input[b][i] = 0;
+      direction[b] = direction_and_inverse(eye, anchors + 3 * a);
+    }
+    for (int m = 0; m < 5; m++) {
+      __global const float *first = weights + WEIGHTS_AT[m];
+      __global float *g_first = grad + WEIGHTS_AT[m];
+      __global float *g_second = g_first + (INPUTS + 1) * HIDDEN;
+      __global const float *my_first_t = first_t + m * HIDDEN * FEATURES;
+      __global const float *my_second_t = second_t + OUT_AT[m] * HIDDEN;
+      int outs = OUT[m], outs8 = OUT[m] / 8;
+      float unit[BLOCK][HIDDEN], d_out[BLOCK][MAX_OUT], d_unit[BLOCK][HIDDEN];
+      for (int b = 0; b < BLOCK; b++) {
+        int a = base + min(b, count - 1);
+        float live = b < count ? 1.0f : 0.0f;
+        for (int c = 0; c < outs8; c++)
+          vstore8(live * vload8(c, grad_raw + a * RAW + OUT_AT[m]), c, d_out[b]);
+        for (int j = 0; j < HIDDEN8; j++)
+          vstore8(vload8(j, hidden + (a * 5 + m) * HIDDEN), j, unit[b]);
+      }
+      // second layer: b2, W2, and what flows on into the hidden units through the ReLU
+      for (int c = 0; c < outs8; c++) {
+        float8 d[BLOCK], sum = vload8(c, g_second + HIDDEN * outs);
+        for (int b = 0; b < BLOCK; b++) { d[b] = vload8(c, d_out[b]); sum += d[b]; }
+        vstore8(sum, c, g_second + HIDDEN * outs);
+        for (int j = 0; j < HIDDEN; j++) {
+          float8 g = vload8(c, g_second + j * outs);
+          for (int b = 0; b < BLOCK; b++) g += unit[b][j] * d[b];
+          vstore8(g, c, g_second + j * outs);
+        }
+      }
+      for (int j = 0; j < HIDDEN8; j++) {
+        float8 d[BLOCK];
+        for (int b = 0; b < BLOCK; b++) d[b] = 0;
+        for (int c = 0; c < outs; c++) {
+          float8 w = vload8(j, my_second_t + c * HIDDEN);
+          for (int b = 0; b < BLOCK; b++) d[b] += d_out[b][c] * w;
+        }
+        float8 sum = vload8(j, g_first + INPUTS * HIDDEN);
+        for (int b = 0; b < BLOCK; b++) {
+          d[b] = select((float8)(0.0f), d[b], isgreater(vload8(j, unit[b]), (float8)(0.0f)));
+          sum += d[b];
+          vstore8(d[b], j, d_unit[b]);
+        }
+        vstore8(sum, j, g_first + INPUTS * HIDDEN);
+        // first layer: W1 of the features (and of the direction)
+        for (int i = 0; i < FEATURES; i++) {
+          float8 g = vload8(j, g_first + i * HIDDEN);
+          for (int b = 0; b < BLOCK; b++) g += input[b][i] * d[b];
+          vstore8(g, j, g_first + i * HIDDEN);
+        }
+        if (m == COLOR)
+          for (int i = 0; i < 3; i++) {
+            float8 g = vload8(j, g_first + (DIRECTION_ROW + i) * HIDDEN);
+            for (int b = 0; b < BLOCK; b++)
+              g += (i == 0 ? direction[b].x : i == 1 ? direction[b].y : direction[b].z) * d[b];
+            vstore8(g, j, g_first + (DIRECTION_ROW + i) * HIDDEN);
+          }
+      }
+      for (int j = 0; j < HIDDEN; j++)
+        for (int i = 0; i < FEATURES8; i++) {
+          float8 w = vload8(i, my_first_t + j * FEATURES);
+          for (int b = 0; b < BLOCK; b++) grad_input[b][i] += d_unit[b][j] * w;
+        }
+      if (m == COLOR)
+        for (int b = 0; b < count; b++) {
+          float g[3];
+          for (int i = 0; i < 3; i++) {
+            g[i] = 0;
+            for (int j = 0; j < HIDDEN; j++)
+              g[i] += d_unit[b][j] * first[(DIRECTION_ROW + i) * HIDDEN + j];
+          }
+          float3 u = direction[b].xyz, gu = (float3)(g[0], g[1], g[2]);
+          float3 flow = (gu - u * dot(gu, u)) * direction[b].w;
+          __global float *out = grad_anchors + 3 * (base + b);
+          out[0] += flow.x; out[1] += flow.y; out[2] += flow.z;
+        }
+    }
+    for (int b = 0; b < count; b++)
+      for (int i = 0; i < FEATURES8; i++)
+        vstore8(grad_input[b][i], i, grad_features + (base + b) * FEATURES);
+  }
+}
+
+__kernel void sum_chunks(int chunks, __global const float *grad_chunks, __global float *grad) {
+  int i = get_global_id(0);
+  if (!(i < WEIGHTS)) return;
+  float sum = 0;
+  for (int c = 0; c < chunks; c++) sum += grad_chunks[(long)c * WEIGHTS + i];
+  grad[i] = sum;
+}
+
+// The rows of W1 that meet Psi: each is Psi[d] times the gradient of the bias it was folded into.
+__kernel void control_gradient(__global const float *control, __global float *grad) {
+  int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
+  __global float *first = grad + WEIGHTS_AT[m];
+  for (int d = 0; d < CONTROL; d++)
+    first[(FEATURES + d) * HIDDEN + j] = control[d] * first[INPUTS * HIDDEN + j];
+}

@@ -1,0 +1,200 @@
+// Image losses and their gradient: (1 - lambda) L1 + lambda (1 - SSIM), both fused (eq. 8).
+//
+// Images are planar: the drawn image and its gradient [3][H][W] as the rasterizer has them, every
+// map of ours [3][H][STRIDE] with STRIDE = W padded to 8, so that whole vectors can be written for
+// any width.  What lies in the padding is never read as image and counts for nothing.
+// Defined by losses.py: ROW, the longest padded row plus the window, as private memory for a row.
+//
+// SSIM with an 11 x 11 Gaussian window, sigma 1.5, zeros beyond the border, as 3DGS has it:
+//   S = (2 a b + C1)(2 cov + C2) / ((a^2 + b^2 + C1)(var_a + var_b + C2))  of windowed means a, b.
+// A window is separable: one pass along rows, one along columns, forward and again backward.
+//
+// A weight map (a photo's mask) draws the pixel towards its target, a = t + w (p - t): what a mask
+// leaves out counts as right, in L1 and in every SSIM window that sees it.
+
+#define REACH 5
+#define TAPS 11
+#define C1 1e-4f  // (0.01)^2, for images in 0..1
+#define C2 9e-4f  // (0.03)^2
+
+__constant float WINDOW[TAPS] = {0.00102838f, 0.00759876f, 0.03600077f, 0.10936069f,
+                                 0.21300554f, 0.26601172f, 0.21300554f, 0.10936069f,
+                                 0.03600077f, 0.00759876f, 0.00102838f};
+
+inline float sum8(float8 v) {
+  float4 a = v.lo + v.hi;
+  float2 b = a.lo + a.hi;
+  return b.x + b.y;
+}
+
+// 1 in the lanes of columns x .. x+7 that lie inside the image, else 0.
+inline float8 inside(int x, int width) {
+  float8 lane = (float8)(0, 1, 2, 3, 4, 5, 6, 7) + (float)x;
+  return select((float8)(0.0f), (float8)(1.0f), isless(lane, (float8)((float)width)));
+}
+
+inline float8 along_row(const float *row, int x) {
+  float8 sum = 0;
+  for (int k = 0; k < TAPS; k++) sum += WINDOW[k] * vload8(0, row + x + k);
+  return sum;
+}
+
+inline float8 along_column(__global const float *plane, int x, int y, int height, int stride) {
+  float8 sum = 0;
+  for (int k = 0; k < TAPS; k++) {
+    int row = y + k - REACH;
+    if (row >= 0 && row < height) sum += WINDOW[k] * vload8(0, plane + row * stride + x);
+  }
+  return sum;
+}
+
+// Photo bytes (H, W, 4) over a background -> target planes.  One work-item a row of a channel.
+__kernel void compose_target(int width, int height, int stride, float red, float green,
+                             float blue, __global const uchar *rgba, __global float *target) {
+  int channel = get_global_id(0) / height, y = get_global_id(0) % height;
+  float behind = channel == 0 ? red : channel == 1 ? green : blue;
+  __global float *row = target + get_global_id(0) * stride;
+  for (int x = 0; x < stride; x++) {
+    if (x < width) {
+      __global const uchar *p = rgba + 4 * (y * width + x);
+      float alpha = p[3] / 255.0f;
+      row[x] = alpha * (p[channel] / 255.0f) + (1.0f - alpha) * behind;
+    } else {
+      row[x] = 0;
+    }
+  }
+}
+
+// The two windowed maps of a target that never change: mean of b and of b^2; first along rows.
+__kernel void target_rows(int width, int height, int stride, __global const float *target,
+                          __global float *blurred) {
+  int at = get_global_id(0) * stride, map = 3 * height * stride;
+  float plain[ROW], square[ROW];
+  for (int x = 0; x < stride + 2 * REACH; x++) plain[x] = square[x] = 0;
+  for (int x = 0; x < width; x++) {
+    float b = target[at + x];
+    plain[x + REACH] = b;
+    square[x + REACH] = b * b;
+  }
+  for (int x = 0; x < stride; x += 8) {
+    vstore8(along_row(plain, x), 0, blurred + at + x);
+    vstore8(along_row(square, x), 0, blurred + map + at + x);
+  }
+}
+
+__kernel void target_columns(int height, int stride, __global const float *blurred,
+                             __global float *target_mean, __global float *target_square) {
+  int channel = get_global_id(0) / height, y = get_global_id(0) % height;
+  int plane = channel * height * stride, map = 3 * height * stride;
+  for (int x = 0; x < stride; x += 8) {
+    vstore8(along_column(blurred + plane, x, y, height, stride), 0,
+            target_mean + plane + y * stride + x);
+    vstore8(along_column(blurred + map + plane, x, y, height, stride), 0,
+            target_square + plane + y * stride + x);
+  }
+}
+
+// Windowed along rows: the image a, a^2 and a b.  masked: 1 when `weight` [H][W] counts.
+__kernel void image_rows(int width, int height, int stride, int masked,
+                         __global const float *image, __global const float *target,
+                         __global const float *weight, __global float *blurred) {
+  int row = get_global_id(0), y = row % height;
+  int at = row * stride, map = 3 * height * stride;
+  float plain[ROW], square[ROW], product[ROW];
+  for (int x = 0; x < stride + 2 * REACH; x++) plain[x] = square[x] = product[x] = 0;
+  for (int x = 0; x < width; x++) {
+    float a = image[row * width + x], b = target[at + x];
+    if (masked) a = b + weight[y * width + x] * (a - b);
+    plain[x + REACH] = a;
+    square[x + REACH] = a * a;
+    product[x + REACH] = a * b;
+  }
+  for (int x = 0; x < stride; x += 8) {
+    vstore8(along_row(plain, x), 0, blurred + at + x);
+    vstore8(along_row(square, x), 0, blurred + map + at + x);
+    vstore8(along_row(product, x), 0, blurred + 2 * map + at + x);
+  }
+}
+
+// SSIM of every pixel: its sum a row, and its derivatives by the three windowed maps.
+__kernel void ssim_columns(int width, int height, int stride, __global const float *blurred,
+                           __global const float *target_mean,
+                           __global const float *target_square, __global float *derivative,
+                           __global float *ssim_rows) {
+  int channel = get_global_id(0) / height, y = get_global_id(0) % height;
+  int plane = channel * height * stride, map = 3 * height * stride;
+  float8 total = 0;
+  for (int x = 0; x < stride; x += 8) {
+    int at = plane + y * stride + x;
+    float8 a = along_column(blurred + plane, x, y, height, stride);
+    float8 aa = along_column(blurred + map + plane, x, y, height, stride);
+    float8 ab = along_column(blurred + 2 * map + plane, x, y, height, stride);
+    float8 b = vload8(0, target_mean + at), bb = vload8(0, target_square + at);
+    float8 likeness = 2 * a * b + C1, structure = 2 * (ab - a * b) + C2;
+    float8 power = a * a + b * b + C1, variance = aa - a * a + bb - b * b + C2;
+    float8 inverse = 1.0f / (power * variance), live = inside(x, width);
+    float8 ssim = likeness * structure * inverse;
+    total += live * ssim;
+    float8 by_mean = 2 * b * (structure - likeness) * inverse -
+                     2 * ssim * a * (1.0f / power - 1.0f / variance);
+    vstore8(live * by_mean, 0, derivative + at);
+    vstore8(-live * ssim / variance, 0, derivative + map + at);
+    vstore8(2 * live * likeness * inverse, 0, derivative + 2 * map + at);
+  }
+  ssim_rows[get_global_id(0)] = sum8(total);
+}
+
+// The window is symmetric, so the derivative of windowing is windowing again; first along rows.
+__kernel void derivative_rows(int width, int height, int stride,
+                              __global const float *derivative, __global float *blurred) {
+  float row[ROW];
+  for (int m = 0; m < 3; m++) {
+    int at = m * 3 * height * stride + get_global_id(0) * stride;
+    for (int x = 0; x < stride + 2 * REACH; x++) row[x] = 0;
+    for (int x = 0; x < width; x++) row[x + REACH] = derivative[at + x];
+    for (int x = 0; x < stride; x += 8) vstore8(along_row(row, x), 0, blurred + at + x);
+  }
+}
+
+// Then along columns, joined with L1: the gradient of the whole image loss, and |a - b| a row.
+// scale is 1 over the number of values that count (three times the sum of the weights).
+__kernel void gradient_columns(int width, int height, int stride, int masked, float ssim_share,
+                               float scale, __global const float *blurred,
+                               __global const float *image, __global const float *target,
+                               __global const float *weight, __global float *grad_image,
+                               __global float *l1_rows) {
+  int row = get_global_id(0), channel = row / height, y = row % height;
+  int plane = channel * height * stride, map = 3 * height * stride;
+  float l1 = 0;
+  for (int x = 0; x < stride; x += 8) {
+    float by_mean[8], by_square[8], by_product[8];
+    vstore8(along_column(blurred + plane, x, y, height, stride), 0, by_mean);
+    vstore8(along_column(blurred + map + plane, x, y, height, stride), 0, by_square);
+    vstore8(along_column(blurred + 2 * map + plane, x, y, height, stride), 0, by_product);
+    int lanes = min(8, width - x);
+    for (int i = 0; i < lanes; i++) {
+      float b = target[row * stride + x + i], a = image[row * width + x + i];
+      float w = masked ? weight[y * width + x + i] : 1.0f;
+      if (masked) a = b + w * (a - b);
+      float difference = a - b;
+      float sign = difference > 0 ? 1.0f : difference < 0 ? -1.0f : 0.0f;
+      float ssim = by_mean[i] + 2 * a * by_square[i] + b * by_product[i];
+      l1 += fabs(difference);
+      grad_image[row * width + x + i] =
+          w * scale * ((1.0f - ssim_share) * sign - ssim_share * ssim);
+    }
+  }
+  l1_rows[row] = l1;
+}
+
+// Eq. 9: mean |opacity| and mean |scale| over all splats, added to their gradients.  Literal: an
+// absent splat (opacity below zero) is drawn towards zero as well.
+__kernel void regularise(int splats, float opacity_share, float scale_share,
+                         __global const float *opacity, __global const float *scales,
+                         __global float *grad_opacity, __global float *grad_scales) {
+  int i = get_global_id(0);
+  if (!(i < splats)) return;
+  float o = opacity[i];
+  grad_opacity[i] += opacity_share / splats * (o > 0 ? 1.0f : o < 0 ? -1.0f : 0.0f);
+  for (int c = 0; c < 3; c++) grad_scales[3 * i + c] += scale_share / (3.0f * splats);
+}

@@ -1,0 +1,185 @@
+"""The five heads on the device: packing of their weights, forward and backward (eq. 4, 5)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import HEADS, SIZE_PER_SPLAT
+
+KERNELS = Path(__file__).parent / "kernels"
+DIRECTION = 3
+Layers = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # W1 (hidden, in), b1, W2, b2
+
+
+def padded(width: int) -> int:
+    """Rounded up to whole vectors of the kernels."""
+    return (width + 7) // 8 * 8
+
+
+@dataclass(frozen=True)
+class HeadLayout:
+    """Sizes of the five one-hidden-layer networks and where each lies in the flat weights."""
+
+    splats: int = 10  # k, Gaussians an anchor
+    features: int = 16  # F
+    hidden: int = 32
+    control: int = 16  # d of Psi
+
+    @property
+    def outs(self) -> list[int]:
+        """Real output widths in the order of HEADS."""
+        return [self.splats * SIZE_PER_SPLAT[name] for name in HEADS]
+
+    @property
+    def raw_at(self) -> list[int]:
+        """Where each head's outputs begin in an anchor's row of raw outputs; last, its length."""
+        return np.cumsum([0] + [padded(n) for n in self.outs]).tolist()
+
+    @property
+    def inputs(self) -> int:
+        """Rows of every first layer on the device: features, control, direction."""
+        return padded(self.features) + self.control + DIRECTION
+
+    @property
+    def weights_at(self) -> list[int]:
+        """Where each head begins in the flat weights; last, their number."""
+        hidden = padded(self.hidden)
+        sizes = [(self.inputs + 1) * hidden + (hidden + 1) * padded(n) for n in self.outs]
+        return np.cumsum([0, *sizes]).tolist()
+
+    def defines(self) -> dict[str, int]:
+        """What heads.cl and gaussians.cl are compiled with."""
+        numbers = {
+            "FEATURES": padded(self.features), "HIDDEN": padded(self.hidden),
+            "CONTROL": self.control, "SPLATS": self.splats, "RAW": self.raw_at[-1],
+            "WEIGHTS": self.weights_at[-1], "MAX_OUT": max(padded(n) for n in self.outs),
+        }  # fmt: skip
+        for m, out in enumerate(self.outs):
+            numbers |= {
+                f"OUT{m}": padded(out),
+                f"OUT_AT{m}": self.raw_at[m],
+                f"WEIGHTS_AT{m}": self.weights_at[m],
+            }
+        return numbers
+
+    def parts(self, flat: np.ndarray, head: int) -> Layers:
+        """Views into the flat weights: W1 (inputs, hidden), b1, W2 (hidden, out), b2, padded."""
+        hidden, out, at = padded(self.hidden), padded(self.outs[head]), self.weights_at[head]
+        stops = np.cumsum([self.inputs * hidden, hidden, hidden * out, out]) + at
+        first, bias, second, last = np.split(flat[at : stops[-1]], stops[:-1] - at)
+        return first.reshape(-1, hidden), bias, second.reshape(-1, out), last
+
+    def first_rows(self, name: str) -> list[int]:
+        """Rows of the device's first layer in the order of the exported network's inputs."""
+        width = padded(self.features)
+        control = list(range(width, width + self.control))
+        direction = list(range(width + self.control, self.inputs)) if name == "color" else []
+        return [*range(self.features), *direction, *control]
+
+    def pack(self, networks: dict[str, Layers]) -> np.ndarray:
+        """Flat float32 weights out of W1 (hidden, in), b1, W2 (out, hidden), b2 for each head."""
+        flat = np.zeros(self.weights_at[-1], np.float32)
+        for head, name in enumerate(HEADS):
+            w1, b1, w2, b2 = networks[name]
+            first, bias, second, last = self.parts(flat, head)
+            first[self.first_rows(name), : self.hidden] = w1.T
+            bias[: self.hidden] = b1
+            second[: self.hidden, : self.outs[head]] = w2.T
+            last[: self.outs[head]] = b2
+        return flat
+
+    def unpack(self, flat: np.ndarray) -> dict[str, Layers]:
+        """The inverse of `pack`."""
+        networks = {}
+        for head, name in enumerate(HEADS):
+            first, bias, second, last = self.parts(flat, head)
+            out = self.outs[head]
+            networks[name] = (
+                np.ascontiguousarray(first[self.first_rows(name), : self.hidden].T),
+                bias[: self.hidden].copy(),
+                np.ascontiguousarray(second[: self.hidden, :out].T),
+                last[:out].copy(),
+            )
+        return networks
+
+
+def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
+    """Flat weights to start from: splats of opacity 0.3, unturned, spread about their anchor."""
+    k = layout.splats
+    last_bias = {
+        "offset": rng.uniform(-0.25, 0.25, 3 * k),  # of 2 voxels: half a voxel each way
+        "scale": np.zeros(3 * k),
+        "rotation": np.tile([1.0, 0, 0, 0], k),
+        "opacity": np.full(k, np.arctanh(0.3)),
+        "color": rng.uniform(-1, 1, 3 * k) / np.sqrt(layout.hidden),
+    }
+    gain = {"offset": 1.0, "scale": 0.5, "rotation": 0.5, "opacity": 0.5, "color": 1.0}
+    networks = {}
+    for name in HEADS:
+        inputs, out = len(layout.first_rows(name)), k * SIZE_PER_SPLAT[name]
+        w1 = rng.uniform(-1, 1, (layout.hidden, inputs)) / np.sqrt(inputs)
+        b1 = rng.uniform(-1, 1, layout.hidden) / np.sqrt(inputs)
+        w2 = rng.uniform(-1, 1, (out, layout.hidden)) / np.sqrt(layout.hidden) * gain[name]
+        networks[name] = (w1, b1, w2, last_bias[name])
+    return layout.pack(networks)
+
+
+class Heads:
+    """Runs the heads; device buffers are kept from call to call and grow with the anchors."""
+
+    def __init__(self, device, layout: HeadLayout) -> None:
+        self.device, self.layout = device, layout
+        self.kernels = device.program(KERNELS / "heads.cl", **layout.defines())
+        hidden, features = padded(layout.hidden), padded(layout.features)
+        # Each chunk sums its own weight gradients.  The number is fixed a kind of device, never
+        # taken from the cores: the order of additions, so every bit, would depend on it.
+        self.chunks = 16 if device.kind == "cpu" else 512
+        self.control = device.zeros(layout.control)
+        self.bias = device.empty(5 * hidden)
+        self.first_t = device.empty(5 * hidden * features)
+        self.second_t = device.empty(layout.raw_at[-1] * hidden)
+        self.grad_chunks = device.empty((self.chunks, layout.weights_at[-1]))
+        self.grad_weights = device.empty(layout.weights_at[-1])
+        self.count = -1
+
+    def resize(self, count: int) -> None:
+        if count == self.count:
+            return
+        device, layout, self.count = self.device, self.layout, count
+        self.hidden = device.empty((count, 5, padded(layout.hidden)))
+        self.raw = device.empty((count, layout.raw_at[-1]))
+        self.grad_features = device.empty((count, padded(layout.features)))
+
+    def forward(self, weights, anchors, features, control: np.ndarray, eye: np.ndarray):
+        """Raw outputs (A, RAW) on the device for Psi `control` (d,) and an eye (3,) in metres."""
+        self.resize(len(anchors))
+        self.control.set(np.asarray(control, np.float32))
+        self.eye = [np.float32(v) for v in eye]
+        layout = self.layout
+        self.device.launch(
+            self.kernels["prepare_weights"], 5 * padded(layout.hidden), 8,
+            weights, self.control, self.bias, self.first_t, self.second_t,
+        )  # fmt: skip
+        self.device.launch(
+            self.kernels["heads_forward"], (self.count + 3) // 4, 1,
+            self.count, *self.eye, weights, self.bias, anchors, features, self.hidden, self.raw,
+        )  # fmt: skip
+        return self.raw
+
+    def backward(self, weights, anchors, features, grad_raw, grad_anchors):
+        """(grad_weights, grad_features) of the last `forward`; adds to grad_anchors in place."""
+        self.device.launch(
+            self.kernels["heads_backward"], self.chunks, 1,
+            self.count, self.chunks, *self.eye, weights, self.first_t, self.second_t, anchors,
+            features, self.hidden, grad_raw, self.grad_chunks, self.grad_features, grad_anchors,
+        )  # fmt: skip
+        self.device.launch(
+            self.kernels["sum_chunks"], self.layout.weights_at[-1], 64, self.chunks,
+            self.grad_chunks, self.grad_weights,
+        )  # fmt: skip
+        self.device.launch(
+            self.kernels["control_gradient"], 5 * padded(self.layout.hidden), 8,
+            self.control, self.grad_weights,
+        )  # fmt: skip
+        return self.grad_weights, self.grad_features

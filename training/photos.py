@@ -1,0 +1,92 @@
+"""Photos of a capture, read once, made smaller, and handed to the loss as targets on the device."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime_models.model import BadFile
+from scene.capture import Capture, Photo
+from scene.photo import load_photo
+from scene.pose import View
+from training.losses import ImageLoss, Target
+
+MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
+CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use
+BLACK = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class LoadedPhoto:
+    view: View  # of the size used
+    modality: str
+    rgba: np.ndarray  # (H, W, 4) uint8; alpha below 255 where the background shows
+    weight: np.ndarray | None  # (H, W) float32, what counts; None = everything
+    name: str  # of the file
+
+    @property
+    def see_through(self) -> bool:
+        return bool((self.rgba[..., 3] < 255).any())
+
+    def over(self, background: tuple[float, float, float]) -> np.ndarray:
+        """(H, W, 3) float32 the photo over a background, display sRGB 0..1."""
+        alpha = self.rgba[..., 3:].astype(np.float32) / 255
+        color = self.rgba[..., :3].astype(np.float32) / 255
+        return alpha * color + (1 - alpha) * np.asarray(background, np.float32)
+
+
+def choose_downscale(photos: tuple[Photo, ...]) -> int:
+    """The smallest whole factor after which no side exceeds MOST_PIXELS."""
+    longest = max(max(photo.view.size) for photo in photos)
+    return -(-longest // MOST_PIXELS)
+
+
+def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
+    """Load one photo, made smaller by `factor`; `masks` is that of TrainSettings."""
+    width, height = photo.view.size
+    size = (max(round(width / factor), 1), max(round(height / factor), 1))
+    rgb, mask = load_photo(photo, size)
+    alpha, weight = np.ones_like(rgb[..., :1]), None
+    if mask is not None and photo.mask is None:  # the file's own alpha; colours times alpha
+        alpha = mask[..., None]
+        rgb = rgb / np.maximum(alpha, 1e-6)
+    elif mask is not None and masks == "object":
+        alpha = mask[..., None]
+    elif mask is not None and masks == "valid":
+        weight = mask.astype(np.float32)
+        if not weight.sum() > 0:
+            raise BadFile(f"{photo.mask} is black all over: nothing of its photo would count.")
+    rgba = np.clip(np.rint(255 * np.concatenate([rgb, alpha], axis=2)), 0, 255).astype(np.uint8)
+    return LoadedPhoto(photo.view.resized(size), photo.modality, rgba, weight, str(photo.path))
+
+
+def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
+    return [read(p, factor, masks) for p in capture.photos if p.split == split]
+
+
+class Targets:
+    """Makes loss targets of photos and keeps as many as fit into CACHE_BYTES."""
+
+    def __init__(self, device) -> None:
+        self.device = device
+        self.losses: dict[tuple[int, int], ImageLoss] = {}
+        self.kept: dict[tuple[str, str], Target] = {}
+        self.bytes = 0
+
+    def loss(self, photo: LoadedPhoto) -> ImageLoss:
+        """The image loss of the photo's size."""
+        size = photo.view.size
+        if size not in self.losses:
+            self.losses[size] = ImageLoss(self.device, size)
+        return self.losses[size]
+
+    def target(self, photo: LoadedPhoto, background: tuple[float, float, float]) -> Target:
+        """The photo over a background; kept unless the photo shows the background."""
+        key = (photo.modality, photo.name)
+        if key in self.kept:
+            return self.kept[key]
+        rgba = self.device.upload(photo.rgba)
+        target = self.loss(photo).target(rgba, background, photo.weight)
+        if not photo.see_through and self.bytes + target.bytes <= CACHE_BYTES:
+            self.kept[key] = target
+            self.bytes += target.bytes
+        return target

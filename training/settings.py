@@ -1,0 +1,76 @@
+"""Every number that a training run can be asked for; `preset` gives the two starting points."""
+
+from dataclasses import asdict, dataclass, replace
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Adam's learning rates at the start.  Anchors move in voxels, so theirs is in voxels too."""
+
+    offset: float
+    scale: float
+    rotation: float
+    opacity: float
+    color: float
+    feature: float
+    anchor: float
+    decay: float  # what is left of every rate at the end of the run, exponentially
+
+
+# Ten seconds to ten minutes on a CPU: 5 and 10 times the rates that Scaffold-GS uses for 30,000
+# iterations.  Short runs end best when they stay fast, long ones when they end ten times finer.
+SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, decay=0.1)
+LONG = Rates(0.04, 0.04, 0.04, 0.02, 0.08, 0.075, 0.01, decay=0.01)
+SHORT_RUN = 1000  # iterations
+# Paper, section 5.1; it states no decay.  Its anchor rate is in metres: 0.001, here in voxels.
+PAPER = Rates(0.001, 0.001, 0.0004, 0.0005, 0.008, 0.0075, 0.01, decay=0.1)
+
+
+@dataclass(frozen=True)
+class TrainSettings:
+    """What is written into a package's provenance and checked when a run is resumed."""
+
+    preset: str = "fast"
+    iterations: int | None = 2000  # budget in steps (the same bits every time) ...
+    seconds: float | None = None  # ... or in time
+    seed: int = 0
+    splats_per_anchor: int = 5  # k
+    features: int = 16  # F
+    hidden: int = 32
+    control: int = 16  # d of Psi
+    sigma: float = 0.04  # of Psi
+    voxel: float | None = None  # metres; None: from the points and `anchors`
+    anchors: int = 4000  # to start with at most, where voxel is None
+    max_anchors: int = 12000  # cap of growing
+    grow: bool = True
+    grow_every: int = 100  # iterations
+    grow_threshold: float = 2e-4  # screen gradient of a splat, in half image widths
+    prune_opacity: float = 0.005  # an anchor whose splats' mean opacity stays below goes
+    ssim_share: float = 0.2  # of the image loss; eq. 8 read literally says 0.8, which is worse
+    opacity_share: float = 0.0  # lambda_alpha of eq. 9; the paper says 0.01
+    scale_share: float = 0.0  # lambda_S of eq. 9; the paper says 1e-9
+    downscale: int | None = None  # of the photos; None: until neither side exceeds 640 pixels
+    masks: str = "object"  # object: nothing outside it | valid: unknown outside it | ignore
+    background: str = "auto"  # auto: the capture's, else random where photos have alpha | black ...
+    rate_scale: float = 1.0  # times every learning rate
+
+    def rates(self, iterations: int) -> Rates:
+        """The learning rates of a run of so many iterations."""
+        if self.preset == "paper":
+            return PAPER
+        return SHORT if iterations <= SHORT_RUN else LONG
+
+    def as_dict(self) -> dict:
+        return asdict(self)
+
+
+def preset(name: str) -> TrainSettings:
+    """fast: minutes on a CPU.  paper: the numbers of section 5.1."""
+    if name == "fast":
+        return TrainSettings()
+    if name == "paper":
+        return replace(
+            TrainSettings(), preset="paper", iterations=30000, splats_per_anchor=10,
+            max_anchors=100_000, anchors=100_000, opacity_share=0.01, scale_share=1e-9,
+        )  # fmt: skip
+    raise ValueError(f"There is no preset '{name}'; use fast or paper.")

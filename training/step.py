@@ -1,0 +1,116 @@
+"""One training step in order: heads, Gaussians, project, bin, rasterize, loss, and all back."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from rasterizer.bin import bin_tiles
+from rasterizer.project import Camera, project, project_backward
+from rasterizer.raster import rasterize, rasterize_backward
+from scene.pose import View
+from training.density import Evidence
+from training.gaussians import Activation, Gaussians
+from training.losses import ImageLoss, Target, regularise
+from training.networks import HeadLayout, Heads
+from training.optimizer import Adam
+
+Color = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn view with what the way back needs; device arrays."""
+
+    camera: Camera
+    splats: Gaussians
+    projected: object
+    tiles: object
+    frame: object
+
+
+def camera_of(view: View) -> Camera:
+    return Camera(*view.pinhole(), view.size, view.near)
+
+
+class Step:
+    """Draws the model that an optimiser holds and learns from a target."""
+
+    def __init__(self, device, layout: HeadLayout, voxel: float, adam: Adam) -> None:
+        self.device, self.adam = device, adam
+        self.heads = Heads(device, layout)
+        self.activation = Activation(device, layout, voxel)
+        self.ms: dict[str, float] | None = None  # of each pass, summed; a dict switches it on
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        if self.ms is not None:
+            self.device.queue.finish()
+            self.ms[name] = self.ms.get(name, 0.0) + 1e3 * (time.perf_counter() - start)
+
+    def decode(self, control: np.ndarray, eye: np.ndarray) -> Gaussians:
+        """The model's splats for Psi `control` (d,) seen from `eye` (3,) metres."""
+        adam = self.adam
+        with self.timed("heads"):
+            raw = self.heads.forward(
+                adam["weights"], adam["anchors"], adam["features"], control, eye
+            )
+        with self.timed("activate"):
+            return self.activation.forward(raw, adam["anchors"])
+
+    def draw(self, view: View, control: np.ndarray, background: Color) -> Drawing:
+        splats = self.decode(control, view.world_from_eye.position)
+        camera = camera_of(view)
+        with self.timed("project"):
+            projected = project(self.device, *splats.fields(), camera)
+        with self.timed("bin"):
+            tiles = bin_tiles(self.device, projected, view.size)
+        with self.timed("rasterize"):
+            frame = rasterize(self.device, projected, tiles, view.size, background)
+        return Drawing(camera, splats, projected, tiles, frame)
+
+    def gradients(
+        self,
+        drawing: Drawing,
+        loss: ImageLoss,
+        target: Target,
+        ssim_share: float,
+        opacity_share: float = 0.0,
+        scale_share: float = 0.0,
+        evidence: Evidence | None = None,
+    ) -> dict[str, object]:
+        """Gradients of the loss by weights, anchors and features, as the optimiser names them."""
+        device, adam = self.device, self.adam
+        with self.timed("loss"):
+            grad_image = loss.compare(drawing.frame.image, target, ssim_share)
+        with self.timed("rasterize backward"):
+            grad_record = rasterize_backward(
+                device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None
+            )
+        with self.timed("project backward"):
+            grad = Gaussians(
+                *project_backward(
+                    device, *drawing.splats.fields(), drawing.camera, drawing.projected, grad_record
+                )
+            )
+        with self.timed("density"):
+            if evidence is not None:
+                width = drawing.camera.size[0]
+                record = drawing.projected.record
+                evidence.add(record, grad_record, drawing.splats.opacity, width)
+        with self.timed("heads backward"):
+            if opacity_share or scale_share:
+                regularise(device, drawing.splats, grad, opacity_share, scale_share)
+            grad_raw, grad_anchors = self.activation.backward(self.heads.raw, grad)
+            weights, features = self.heads.backward(
+                adam["weights"], adam["anchors"], adam["features"], grad_raw, grad_anchors
+            )
+        return {"weights": weights, "anchors": grad_anchors, "features": features}
+
+    def update(self, grads: dict[str, object], rate_scale: float) -> None:
+        with self.timed("adam"):
+            self.adam.step(grads, rate_scale)

@@ -1,0 +1,270 @@
+"""The training loop: a Capture in, step after step, and at any moment an AnchorModel out."""
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from runtime_models.model import AnchorModel, BadFile, ControlEncoding
+from scene.capture import Capture
+from training.density import Evidence, changed_state, given_up, newcomers
+from training.export import model_of
+from training.guard import EVERY as GUARD_EVERY
+from training.guard import SNAPSHOT_EVERY, Guard
+from training.initial import choose_voxel, initial_points, voxel_centres
+from training.metrics import psnr
+from training.networks import HeadLayout, initial_weights, padded
+from training.optimizer import Adam
+from training.photos import (
+    BLACK,
+    LoadedPhoto,
+    Targets,
+    choose_downscale,
+    load_photos,
+)
+from training.schedule import Budget, Schedule, choose_background
+from training.settings import Rates, TrainSettings
+from training.step import Step
+
+GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
+SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
+PACE_STEPS = 20  # steps after which the length of a timed run is known
+FEATURE_SPREAD = 0.1  # standard deviation of the first features
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a step has to say."""
+
+    iteration: int  # steps done
+    fraction: float  # of the budget, 0..1
+    loss: float | None  # every few steps
+    anchors: int
+    fell_back: bool = False  # the guard turned the run back
+
+
+def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str, np.ndarray]:
+    """Rates as the optimiser takes them: one a weight, one for all anchors, one for features."""
+    flat = np.zeros(layout.weights_at[-1], np.float32)
+    heads = (rates.offset, rates.scale, rates.rotation, rates.opacity, rates.color)
+    for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
+        flat[start:stop] = rate
+    return {
+        "weights": flat,
+        "anchors": np.array([rates.anchor * voxel], np.float32),
+        "features": np.array([rates.feature], np.float32),
+    }
+
+
+class Trainer:
+    """One run.  `steps` trains; `model` may be called between any two steps."""
+
+    def __init__(
+        self, device, capture: Capture, settings: TrainSettings, resume: tuple | None = None
+    ) -> None:
+        """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller."""
+        self.device, self.capture, self.settings = device, capture, settings
+        self.budget = Budget.of(settings)
+        self.factor = settings.downscale or choose_downscale(capture.photos)
+        self.stops = capture.stops
+        photos = load_photos(capture, "train", self.factor, settings.masks)
+        self.held_out = load_photos(capture, "test", self.factor, settings.masks)
+        by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
+        for name, found in by_modality.items():
+            if not found:
+                raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
+        background = choose_background(settings.background, capture.background)
+        self.schedule = Schedule(by_modality, settings.seed, background)
+        self.encoding = ControlEncoding(
+            settings.control, 1 / max(settings.control - 1, 1), settings.sigma
+        )
+        self.layout = HeadLayout(
+            settings.splats_per_anchor, settings.features, settings.hidden, settings.control
+        )
+        self.targets = Targets(device)
+        if resume is None:
+            self.start(photos)
+        else:
+            self.go_on(*resume)
+        self.step = Step(device, self.layout, self.voxel, self.adam)
+        self.guard = Guard(self.adam.state())
+
+    def start(self, photos: list[LoadedPhoto]) -> None:
+        """Anchors, features and weights of a new run."""
+        settings = self.settings
+        rng = np.random.default_rng([settings.seed, 0])
+        points, self.origin = initial_points(self.capture.points, photos, rng)
+        self.voxel = settings.voxel or choose_voxel(points, settings.anchors, rng)
+        anchors = voxel_centres(points, self.voxel)[: settings.max_anchors]
+        features = np.zeros((len(anchors), padded(settings.features)), np.float32)
+        features[:, : settings.features] = (
+            rng.normal(size=(len(anchors), settings.features)) * FEATURE_SPREAD
+        )
+        values = {
+            "weights": initial_weights(self.layout, rng),
+            "anchors": anchors,
+            "features": features,
+        }
+        self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
+        self.rate_scale, self.run_length = settings.rate_scale, settings.iterations
+        self.adam = Adam(self.device, values, self.all_rates())
+        self.evidence = Evidence(self.device, self.layout, len(anchors))
+
+    def go_on(self, state: dict[str, np.ndarray], notes: dict) -> None:
+        """Everything as it was when the checkpoint was written."""
+        self.voxel, self.origin = notes["voxel"], notes["origin"]
+        self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
+        self.grown_at, self.rate_scale = notes["grown_at"], notes["rate_scale"]
+        self.run_length = notes["run_length"]
+        values = {n: state[f"{n}.value"] for n in ("weights", "anchors", "features")}
+        self.adam = Adam(self.device, values, self.all_rates())
+        self.adam.load(state)
+        self.evidence = Evidence(self.device, self.layout, len(values["anchors"]))
+        self.evidence.load(state)
+
+    def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
+        """(state, notes) from which `resume` goes on to the same bits."""
+        notes = {
+            "voxel": self.voxel, "origin": self.origin, "iteration": self.iteration,
+            "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
+            "run_length": self.run_length, "settings": self.settings.as_dict(),
+        }  # fmt: skip
+        return self.adam.state() | self.evidence.state(), notes
+
+    @property
+    def anchors_count(self) -> int:
+        return len(self.adam["anchors"])
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last growing lies far enough back for the picture to count."""
+        return self.iteration - self.grown_at >= SETTLE
+
+    def rates(self) -> Rates:
+        return self.settings.rates(self.run_length or 0)
+
+    def all_rates(self) -> dict[str, np.ndarray]:
+        return parameter_rates(self.layout, self.rates(), self.voxel)
+
+    def control(self, modality: str) -> np.ndarray:
+        x = next(s.x for s in self.stops if s.name == modality)
+        return self.encoding.encode(x)
+
+    def steps(self) -> Iterator[Progress]:
+        """Train until the budget is used; yields after every step."""
+        self.warm_up()
+        clock = time.perf_counter() - self.elapsed
+        self.elapsed = time.perf_counter() - clock
+        while self.budget.fraction(self.iteration, self.elapsed) < 1:
+            loss, fell_back = self.one_step()
+            self.elapsed = time.perf_counter() - clock
+            fraction = self.budget.fraction(self.iteration, self.elapsed)
+            yield Progress(self.iteration, fraction, loss, self.anchors_count, fell_back)
+
+    def warm_up(self) -> None:
+        """Compile every kernel for every photo size, outside of the time that is counted."""
+        before, evidence = self.adam.state(), self.evidence.state()
+        sizes = {}
+        for photos in self.schedule.photos.values():
+            sizes |= {p.view.size: p for p in photos}
+        for photo in sizes.values():
+            self.step.update(self.learn(photo, BLACK), 0.0)
+        self.adam.load(before)
+        self.evidence.load(evidence)
+
+    def learn(self, photo: LoadedPhoto, background) -> dict[str, object]:
+        settings = self.settings
+        target = self.targets.target(photo, background)
+        self.drawing = self.step.draw(photo.view, self.control(photo.modality), background)
+        return self.step.gradients(
+            self.drawing, self.targets.loss(photo), target, settings.ssim_share,
+            settings.opacity_share, settings.scale_share, self.evidence,
+        )  # fmt: skip
+
+    def one_step(self) -> tuple[float | None, bool]:
+        """(loss or None, whether the guard turned back)."""
+        photo = self.schedule.photo(self.iteration)
+        background = self.schedule.background_of(self.iteration, photo)
+        grads = self.learn(photo, background)
+        fraction = self.budget.fraction(self.iteration, self.elapsed)
+        self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
+        self.iteration += 1
+        loss, fell_back = None, False
+        if self.iteration % GUARD_EVERY == 0:
+            loss = self.targets.loss(photo).value()
+            fell_back = self.look_after(photo.modality, loss)
+        if self.run_length is None and self.iteration == PACE_STEPS:
+            self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
+            self.adam.set_rates(self.all_rates())
+        if self.settings.grow and self.iteration % self.settings.grow_every == 0:
+            if GROW_FROM <= fraction <= GROW_UNTIL:
+                self.grow()
+        return loss, fell_back
+
+    def look_after(self, modality: str, loss: float) -> bool:
+        """The guard's look at the last step; True when it turned the run back."""
+        record = self.device.download(self.drawing.projected.record)
+        visible = float((record[:, 9] > 0).mean())
+        if self.guard.healthy(modality, loss, visible):
+            if self.iteration % SNAPSHOT_EVERY == 0:
+                self.guard.remember(self.adam.state())
+            return False
+        self.adam.load(self.guard.fall_back())
+        self.evidence = Evidence(self.device, self.layout, self.anchors_count)
+        self.rate_scale /= 2
+        return True
+
+    def grow(self) -> None:
+        """New anchors where splats pull at the picture; anchors that show nothing go."""
+        settings, count = self.settings, self.anchors_count
+        state, evidence = self.adam.state(), self.evidence.state()
+        means = [
+            self.device.download(self.step.decode(self.encoding.encode(s.x), np.zeros(3)).means)
+            for s in self.stops
+        ]
+        new = newcomers(
+            state["anchors.value"], means, evidence["evidence.gradient"], self.voxel,
+            settings.grow_threshold, max(settings.max_anchors - count, 0),
+        )  # fmt: skip
+        gone = given_up(
+            evidence["evidence.opacity"], self.evidence.steps, self.layout.splats,
+            settings.prune_opacity,
+        )  # fmt: skip
+        if gone.all():
+            gone[:] = False
+        self.adam.load(changed_state(state, ~gone, new))
+        self.evidence = Evidence(self.device, self.layout, self.anchors_count)
+        self.grown_at = self.iteration
+
+    def held_out_psnr(self, most: int = 2) -> dict[str, float]:
+        """Mean PSNR in dB of each modality over its first held-out photos, as they are trained."""
+        out = {}
+        background = self.schedule.background or BLACK
+        for stop in self.stops:
+            photos = [p for p in self.held_out if p.modality == stop.name][:most]
+            values = []
+            for photo in photos:
+                drawing = self.step.draw(photo.view, self.control(stop.name), background)
+                image = self.device.download(drawing.frame.image).transpose(1, 2, 0)
+                values.append(psnr(image, photo.over(background), photo.weight))
+            if values:
+                out[stop.name] = float(np.mean(values))
+        return out
+
+    def model(self) -> AnchorModel:
+        provenance = {
+            "trained_by": "shapeshift train",
+            "capture": self.capture.folder.name,
+            "settings": self.settings.as_dict(),
+            "iterations": self.iteration,
+            "seconds": round(self.elapsed, 3),
+            "voxel_m": self.voxel,
+            "first_anchors": self.origin,
+            "downscale": self.factor,
+            "background": self.schedule.background,
+            "rate_scale": self.rate_scale,
+        }
+        return model_of(
+            self.adam.state(), self.layout, self.voxel, self.encoding, self.stops, provenance
+        )
