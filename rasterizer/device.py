@@ -1,0 +1,200 @@
+"""The OpenCL device that everything here runs on: GPU before CPU, a plain word where is none."""
+
+import os
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rasterizer.program import build
+
+if TYPE_CHECKING:
+    import pyopencl as cl
+    from pyopencl.array import Array
+
+INSTALL = (
+    "on Debian or Ubuntu run `apt-get install pocl-opencl-icd` (fastest on a CPU), elsewhere "
+    "`pip install pocl-binary-distribution`, or install the driver of your GPU"
+)
+
+
+class NoDevice(RuntimeError):
+    """No OpenCL device can be used.  The message says what to install."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """One OpenCL device with its queue.  Arrays come from a pool: freed ones are reused."""
+
+    context: "cl.Context"
+    queue: "cl.CommandQueue"
+    name: str
+    platform: str  # name and version, e.g. "Portable Computing Language 3.1 (system)"
+    kind: str  # cpu | gpu
+    units: int  # compute units: how many work-groups run at once
+    pool: object = field(repr=False)
+    programs: dict = field(default_factory=dict, repr=False)
+
+    def empty(self, shape, dtype=np.float32) -> "Array":
+        """A device array with undefined contents."""
+        from pyopencl.array import Array
+
+        return Array(self.queue, shape, dtype, allocator=self.pool)
+
+    def zeros(self, shape, dtype=np.float32) -> "Array":
+        """A device array of zeros."""
+        array = self.empty(shape, dtype)
+        if array.size:
+            array.fill(0)
+        return array
+
+    def upload(self, host: np.ndarray) -> "Array":
+        """A copy of a numpy array on the device, C order."""
+        host = np.ascontiguousarray(host)
+        array = self.empty(host.shape, host.dtype)
+        if host.size:
+            array.set(host)
+        return array
+
+    def download(self, array: "Array") -> np.ndarray:
+        """A copy of a device array in numpy."""
+        return array.get() if array.size else np.empty(array.shape, array.dtype)
+
+    def view(self, array: "Array") -> np.ndarray:
+        """The contents of a device array, read only; on a CPU without a copy.
+
+        The view keeps the array's memory alive.  Kernels that write to `array` later show
+        through it on a CPU: download() where that matters.
+        """
+        if self.kind != "cpu" or not array.size:
+            return self.download(array)
+        import pyopencl as cl
+
+        flags = cl.map_flags.READ
+        host, _ = cl.enqueue_map_buffer(
+            self.queue, array.base_data, flags, array.offset, array.shape, array.dtype
+        )
+        view = np.asarray(_Mapped(host, array))
+        view.flags.writeable = False
+        return view
+
+    def program(self, path: Path, **defines) -> dict:
+        """Kernels by name of an OpenCL C file, built once for each set of defines."""
+        key = (str(path), tuple(sorted(defines.items())))
+        if key not in self.programs:
+            options = ["-cl-std=CL1.2", "-cl-mad-enable", "-cl-no-signed-zeros"]
+            options += [f"-D{name}={_literal(value)}" for name, value in defines.items()]
+            self.programs[key] = build(self.context, Path(path), options)
+        return self.programs[key]
+
+    def launch(self, kernel, items, group, *arguments) -> None:
+        """Enqueue a kernel.  ints become int32, floats float32, device arrays their buffers.
+
+        items: global size, rounded up to a multiple of `group` (the local size); each an int.
+        """
+        if items > 0:
+            size = -(-items // group) * group
+            kernel(self.queue, (size,), (group,), *[_argument(a) for a in arguments])
+
+
+class _Mapped:
+    """Owner of a mapped view: gives the memory back to the pool when numpy lets go of it."""
+
+    def __init__(self, host: np.ndarray, array: "Array") -> None:
+        self.__array_interface__ = host.__array_interface__
+        self.host, self.array = host, array
+
+
+def _argument(value):
+    if isinstance(value, bool | int | np.integer):
+        return np.int32(value)
+    if isinstance(value, float | np.floating):
+        return np.float32(value)
+    return value.data if hasattr(value, "base_data") else value
+
+
+def _literal(value) -> str:
+    return f"{value!r}f" if isinstance(value, float) else str(int(value))
+
+
+def cache_folder() -> Path:
+    """Where PoCL keeps built kernels unless POCL_CACHE_DIR says otherwise: a folder of the user's.
+
+    Linux ~/.cache/shapeshift/pocl (XDG_CACHE_HOME is heeded), macOS ~/Library/Caches/...,
+    Windows %LOCALAPPDATA%; a temporary folder of the user's where the home cannot be written.
+    """
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or tempfile.gettempdir())
+    elif sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = base / "shapeshift" / "pocl"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
+        folder = Path(tempfile.gettempdir()) / f"shapeshift-{user}" / "pocl"
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def open_device(kind: str | None = None) -> Device:
+    """The best OpenCL device: a GPU, else a CPU, the system's PoCL before the wheel's.
+
+    kind: "gpu" or "cpu" to insist on one.  Raises NoDevice.
+    """
+    if "POCL_CACHE_DIR" not in os.environ:
+        os.environ["POCL_CACHE_DIR"] = str(cache_folder())
+    import pyopencl as cl
+    from pyopencl.tools import ImmediateAllocator, MemoryPool
+
+    try:
+        found = [d for platform in cl.get_platforms() for d in platform.get_devices()]
+    except cl.LogicError:  # PLATFORM_NOT_FOUND_KHR: there is no driver at all
+        found = []
+    usable = [d for d in found if d.available and kind in (None, _kind(d))]
+    if not usable:
+        wanted = f" of kind {kind!r}" if kind and found else ""
+        raise NoDevice(f"There is no OpenCL device{wanted} on this machine: {INSTALL}.")
+    device = max(usable, key=_preference)
+    context = cl.Context([device])
+    queue = cl.CommandQueue(context)
+    return Device(
+        context,
+        queue,
+        device.name.strip(),
+        _platform(device),
+        _kind(device),
+        device.max_compute_units,
+        MemoryPool(ImmediateAllocator(queue)),
+    )
+
+
+def _kind(device: "cl.Device") -> str:
+    import pyopencl as cl
+
+    return "cpu" if device.type & cl.device_type.CPU else "gpu"
+
+
+def _is_wheel(device: "cl.Device") -> bool:
+    """True for the PoCL of PyPI: it says 3.0 and knows neither AVX-512 nor its distribution."""
+    version = device.platform.version
+    return "PoCL" in version and "DISTRO" not in version and "debian" not in version.lower()
+
+
+def _preference(device: "cl.Device") -> tuple:
+    # Debian's PoCL 3.1 is about twice as fast as the wheel's 3.0 on the same CPU.
+    return (_kind(device) == "gpu", not _is_wheel(device), device.max_compute_units)
+
+
+def _platform(device: "cl.Device") -> str:
+    platform = device.platform
+    if "PoCL" not in platform.version:
+        return f"{platform.name.strip()}, {platform.version.strip()}"
+    version = platform.version.split("PoCL", 1)[1].split()[0]
+    source = "wheel, slower than the system's" if _is_wheel(device) else "system"
+    return f"PoCL {version} ({source})"

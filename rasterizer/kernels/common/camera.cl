@@ -1,0 +1,10 @@
+// A pinhole camera as 20 floats: camera_from_world rows (12), fx, fy, cx, cy, four tangent limits.
+// OpenCV axes: x right, y down, z forward.
+#define CAMERA_FX 12
+#define CAMERA_FY 13
+#define CAMERA_CX 14
+#define CAMERA_CY 15
+#define LEAST_X 16  // x/z and y/z are clamped to these in the Jacobian (1.3 times the view)
+#define MOST_X 17
+#define LEAST_Y 18
+#define MOST_Y 19

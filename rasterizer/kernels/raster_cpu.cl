@@ -1,0 +1,264 @@
+// raster, CPU form: one work-item a tile of 16x16 pixels, kept in registers and the first cache.
+// A block is eight pixels, BLOCK_W x BLOCK_H, one vector.  Columns of blocks are numbered first
+// down, then right, so that a column's blocks are neighbouring bits of a mask.
+// Reads: tile_start (tiles + 1), instances, record.  Early stop: blocks whose transmittance is
+// below STOP everywhere are dropped from the mask every BATCH instances; a tile ends with its last.
+#include "common/vector.cl"
+#include "common/tiles.cl"
+#ifndef BLOCK_W
+#define BLOCK_W 4
+#endif
+#define BLOCK_H (LANES / BLOCK_W)
+#define DOWN (TILE / BLOCK_H)   // blocks in a column
+#define ACROSS (TILE / BLOCK_W)  // columns
+#define BLOCKS (DOWN * ACROSS)   // 32: one bit each
+#define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
+#define BATCH 32
+#define STOP 1e-4f
+#define HALF_LOG2E 0.72134752044f
+
+#if BLOCK_W == 8
+#define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 4.5f, 5.5f, 6.5f, 7.5f)
+#define LANE_Y 0.5f
+#else
+#define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
+#define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
+#endif
+
+// Bits of the blocks of a column that rows [top, bottom] of the tile touch.
+inline uint rows_mask(float top, float bottom) {
+  const int first = max(0, (int)ceil(top - 0.5f)) / BLOCK_H;
+  const int last = min(TILE - 1, (int)floor(bottom - 0.5f)) / BLOCK_H;
+  return first > last ? 0 : (COLUMN_BITS >> (DOWN - 1 - last + first)) << first;
+}
+
+// Copies a batch of records side by side: independent loads, so that their misses overlap.
+inline int fetch(int p, int end, __global const int* instances, __global const float* record,
+                 float* batch) {
+  const int n = min(BATCH, end - p);
+  for (int j = 0; j < n; j++) {
+    __global const float* s = record + (size_t)RECORD * instances[p + j];
+    vstore8(vload8(0, s), 0, batch + RECORD * j);
+    vstore4(vload4(0, s + 8), 0, batch + RECORD * j + 8);
+  }
+  return n;
+}
+
+// 1 on the pixels of block k that lie in the image: those outside need nothing and stop nothing.
+inline float8 inside(int k, int x0, int y0, int width, int height) {
+  const float8 x = LANE_X + (float)(x0 + k / DOWN * BLOCK_W);
+  const float8 y = LANE_Y + (float)(y0 + k % DOWN * BLOCK_H);
+  return select((float8)(0), (float8)(1), isless(x, (float8)(width)) & isless(y, (float8)(height)));
+}
+
+inline uint still_open(uint open, const float8* T) {
+  for (int k = 0; k < BLOCKS; k++)
+    if (!(max8(T[k]) >= STOP)) open &= ~(1u << k);
+  return open;
+}
+
+__kernel void rasterize(int width, int height, int tiles_x, __global const int* tile_start,
+                        __global const int* instances, __global const float* record, float red,
+                        float green, float blue, __global float* image,
+                        __global float* transmittance, __global int* tile_end) {
+  const int tile = get_global_id(0);
+  const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+  float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
+  for (int k = 0; k < BLOCKS; k++) {
+    T[k] = inside(k, x0, y0, width, height);
+    R[k] = G[k] = B[k] = 0;
+  }
+  float batch[RECORD * BATCH];
+  uint open = 0xffffffffu;
+  int p = tile_start[tile];
+  const int end = tile_start[tile + 1];
+  while (p < end && open) {
+    const int n = fetch(p, end, instances, record, batch);
+    for (int j = 0; j < n; j++) {
+      const float* s = batch + RECORD * j;
+      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0, ex = s[EXTENT_X];
+      const uint rows = rows_mask(my - s[EXTENT_Y], my + s[EXTENT_Y]);
+      const int first = max(0, (int)ceil(mx - ex - 0.5f)) / BLOCK_W;
+      const int last = min(TILE - 1, (int)floor(mx + ex - 0.5f)) / BLOCK_W;
+      const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
+      const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[CUT];
+      for (int column = first; column <= last; column++) {
+        const float8 dx = LANE_X + (BLOCK_W * column - mx);
+        const float8 along = qa * dx * dx, slope = qb * dx;
+        uint left = open >> (column * DOWN) & rows;
+        while (left) {
+          const int row = 31 - clz(left);
+          left ^= 1u << row;
+          const float8 dy = LANE_Y + (BLOCK_H * row - my);
+          const float8 power = fma(dy, fma(qc, dy, slope), along);
+          const int k = column * DOWN + row;
+          float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
+          alpha = select((float8)(0), alpha, isgreaterequal(power, (float8)(least)));
+          const float8 w = alpha * T[k];
+          R[k] = fma(w, s[RED], R[k]);
+          G[k] = fma(w, s[GREEN], G[k]);
+          B[k] = fma(w, s[BLUE], B[k]);
+          T[k] -= w;
+        }
+      }
+    }
+    p += n;
+    open = still_open(open, T);
+  }
+  tile_end[tile] = p;
+  const size_t plane = (size_t)width * height;
+  for (int k = 0; k < BLOCKS; k++) {
+    const float8 t = T[k];
+    float r[LANES], g[LANES], b[LANES], a[LANES];
+    vstore8(fma(t, red, R[k]), 0, r);
+    vstore8(fma(t, green, G[k]), 0, g);
+    vstore8(fma(t, blue, B[k]), 0, b);
+    vstore8(t, 0, a);
+    for (int lane = 0; lane < LANES; lane++) {
+      const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
+      const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
+      if (x >= width || y >= height) continue;
+      const size_t at = (size_t)y * width + x;
+#ifdef RGBA  // premultiplied, alpha last, for drawing
+      vstore4((float4)(r[lane], g[lane], b[lane], 1 - a[lane]), at, image);
+#else
+      image[at] = r[lane];
+      image[at + plane] = g[lane];
+      image[at + 2 * plane] = b[lane];
+      transmittance[at] = a[lane];
+#endif
+    }
+  }
+}
+
+// Front to back again, with the same decisions.  Per pixel: T, and rest = what the gradient still
+// expects from behind: dL/dC . C + dL/dT T at first, less what each splat gave.  Then
+//   dL/dalpha = T (c . dL/dC) - rest / (1 - alpha)
+// which needs no division to get T back.  Each instance writes its 12 numbers to its own slot.
+__kernel void rasterize_backward(int width, int height, int tiles_x,
+                                 __global const int* tile_start, __global const int* tile_end,
+                                 __global const int* instances, __global const int4* places,
+                                 __global const int* first_slot, __global const float* record,
+                                 __global const float* image, __global const float* transmittance,
+                                 __global const float* grad_image,
+                                 __global const float* grad_transmittance, int with_transmittance,
+                                 __global float* slots) {
+  const int tile = get_global_id(0);
+  const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
+  const int x0 = tile_x * TILE, y0 = tile_y * TILE;
+  const size_t plane = (size_t)width * height;
+  float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
+  for (int k = 0; k < BLOCKS; k++) {
+    float r[LANES], g[LANES], b[LANES], d[LANES];
+    for (int lane = 0; lane < LANES; lane++) {
+      const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
+      const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
+      const size_t at = (size_t)y * width + x;
+      r[lane] = g[lane] = b[lane] = d[lane] = 0;
+      if (x >= width || y >= height) continue;
+      r[lane] = grad_image[at];
+      g[lane] = grad_image[at + plane];
+      b[lane] = grad_image[at + 2 * plane];
+      d[lane] = r[lane] * image[at] + g[lane] * image[at + plane] + b[lane] * image[at + 2 * plane];
+      if (with_transmittance) d[lane] += grad_transmittance[at] * transmittance[at];
+    }
+    T[k] = inside(k, x0, y0, width, height);
+    grad_r[k] = vload8(0, r);
+    grad_g[k] = vload8(0, g);
+    grad_b[k] = vload8(0, b);
+    rest[k] = vload8(0, d);
+  }
+  float batch[RECORD * BATCH];
+  uint open = 0xffffffffu;
+  const int end = tile_end[tile], last_instance = tile_start[tile + 1];
+  for (int p = tile_start[tile]; p < end; p += BATCH) {
+    const int n = fetch(p, end, instances, record, batch);
+    for (int j = 0; j < n; j++) {
+      const float* s = batch + RECORD * j;
+      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0, ex = s[EXTENT_X];
+      const uint rows = rows_mask(my - s[EXTENT_Y], my + s[EXTENT_Y]);
+      const int first = max(0, (int)ceil(mx - ex - 0.5f)) / BLOCK_W;
+      const int last = min(TILE - 1, (int)floor(mx + ex - 0.5f)) / BLOCK_W;
+      const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
+      const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
+      const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[CUT];
+      float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
+      float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, absolute_x = 0, absolute_y = 0;
+      for (int column = first; column <= last; column++) {
+        const float8 dx = LANE_X + (BLOCK_W * column - mx);
+        const float8 along = qa * dx * dx, slope = qb * dx;
+        const float8 ax = A * dx, bx = B * dx;
+        float8 column_p = 0, column_y = 0;
+        uint left = open >> (column * DOWN) & rows;
+        while (left) {
+          const int row = 31 - clz(left);
+          left ^= 1u << row;
+          const float8 dy = LANE_Y + (BLOCK_H * row - my);
+          const float8 power = fma(dy, fma(qc, dy, slope), along);
+          const int k = column * DOWN + row;
+          const float8 raw = s[OPACITY] * exp2_8(power);
+          const int8 counts = isgreaterequal(power, (float8)(least));
+          const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), counts);
+          const float8 before = T[k];
+          const float8 w = alpha * before;
+          const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
+          const float8 behind = fma(-w, given, rest[k]);
+          rest[k] = behind;
+          T[k] = before - w;
+          sum_r = fma(w, grad_r[k], sum_r);
+          sum_g = fma(w, grad_g[k], sum_g);
+          sum_b = fma(w, grad_b[k], sum_b);
+          const float8 grad_alpha = fma(before, given, -behind / (1.0f - alpha));
+          // d alpha / d power = alpha; none where the 0.99 holds it.
+          const float8 g =
+              select(alpha * grad_alpha, (float8)(0), isgreater(raw, (float8)(MAX_ALPHA)));
+          const float8 gy = g * dy;
+          column_p += g;
+          column_y += gy;
+          sum_yy = fma(gy, dy, sum_yy);
+          absolute_x += fabs(g * fma(dy, B, ax));
+          absolute_y += fabs(g * fma(dy, C, bx));
+        }
+        const float8 gx = column_p * dx;
+        sum_p += column_p;
+        sum_y += column_y;
+        sum_x += gx;
+        sum_xx = fma(gx, dx, sum_xx);
+        sum_xy = fma(column_y, dx, sum_xy);
+      }
+      const int splat = instances[p + j];
+      const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
+      __global float* out = slots + (size_t)RECORD * slot;
+      const float8 one = sums8(sum_x, sum_y, sum_xx, sum_xy, sum_yy, sum_p, sum_r, sum_g);
+      vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
+                       -0.5f * one.s4, one.s5 / s[OPACITY], one.s6, one.s7),
+              0, out);
+      vstore4((float4)(sum8(sum_b), sum8(absolute_x), sum8(absolute_y), 0), 0, out + 8);
+    }
+    open = still_open(open, T);
+  }
+  for (int p = end; p < last_instance; p++) {  // behind the early stop: nothing is felt there
+    const int splat = instances[p];
+    const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
+    __global float* out = slots + (size_t)RECORD * slot;
+    vstore8((float8)(0), 0, out);
+    vstore4((float4)(0), 0, out + 8);
+  }
+}
+
+// A splat's slots lie side by side: their sum in a fixed order is its gradient.
+__kernel void sum_slots(int count, __global const int4* places, __global const int* first_slot,
+                        __global const float* slots, __global float* grad_record) {
+  const int i = get_global_id(0);
+  if (i >= count) return;
+  const int n = places[i].w;
+  __global const float* slot = slots + (size_t)RECORD * first_slot[i];
+  float8 lo = 0;
+  float4 hi = 0;
+  for (int k = 0; k < n; k++, slot += RECORD) {
+    lo += vload8(0, slot);
+    hi += vload4(0, slot + 8);
+  }
+  vstore8(lo, 0, grad_record + (size_t)RECORD * i);
+  vstore4(hi, 0, grad_record + (size_t)RECORD * i + 8);
+}

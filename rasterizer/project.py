@@ -1,0 +1,139 @@
+"""project: splats in the world -> ellipses on the screen, and back; the only culling gate."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rasterizer.device import Device
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
+
+KERNELS = Path(__file__).parent / "kernels"
+RECORD = 12  # floats a splat: mean x y | conic a b c | opacity | r g b | half extents x y | cut
+LEAST_ALPHA = 1 / 255  # below it a pixel is not drawn (3DGS)
+LOW_PASS = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
+CLAMP = 1.3  # the Jacobian's x/z and y/z stay within this many times the view's tangents (3DGS)
+LEAST_CHUNK = 2048  # splats: less is not worth a work-item
+CULL_REASONS = ("opacity", "size", "distance", "frustum")
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole with OpenCV axes: made by Camera(*view.pinhole(), view.size, view.near)."""
+
+    camera_from_world: np.ndarray  # (4, 4); x right, y down, z forward, metres
+    fx: float  # pixels
+    fy: float
+    cx: float  # pixels; anywhere, row 0 on top
+    cy: float
+    size: tuple[int, int]  # width, height, pixels
+    near: float  # metres: drawn where z > near
+
+    def limits(self) -> tuple[float, float, float, float]:
+        """Least and most x/z, least and most y/z that the Jacobian sees."""
+        width, height = self.size
+        return (
+            -CLAMP * self.cx / self.fx,
+            CLAMP * (width - self.cx) / self.fx,
+            -CLAMP * self.cy / self.fy,
+            CLAMP * (height - self.cy) / self.fy,
+        )
+
+    def packed(self) -> np.ndarray:
+        """(20,) float32 as kernels/common/camera.cl reads it."""
+        rows = np.asarray(self.camera_from_world, np.float64)[:3].ravel()
+        lens = (self.fx, self.fy, self.cx, self.cy)
+        return np.concatenate([rows, lens, self.limits()]).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Projected:
+    """Splats on the screen.  Both arrays lie on the device."""
+
+    record: "Array"  # (N, 12) float32, see kernels/common/record.cl; extents <= 0: culled
+    depth: "Array"  # (N,) float32 metres along the view, 1e30 where culled
+    low_pass: float = LOW_PASS  # px^2
+    culled_counts: "Array | None" = None  # (chunks, 4) int32, CULL_REASONS
+
+    def culled(self, device: Device) -> dict[str, int]:
+        """How many splats each gate kept out; empty where it was not counted."""
+        if self.culled_counts is None:
+            return {}
+        totals = device.view(self.culled_counts).sum(axis=0, dtype=np.int64)
+        return dict(zip(CULL_REASONS, totals.tolist(), strict=True))
+
+
+def project(
+    device: Device, means, scales, wxyz, opacity, color, camera: Camera, low_pass: float = LOW_PASS
+) -> Projected:
+    """Screen ellipses and depths of N splats given as device arrays, float32.
+
+    means (N, 3) world metres, scales (N, 3) metres, wxyz (N, 4) of any length, opacity (N,),
+    color (N, 3).  Culled: opacity at most 1/255, z not beyond near, off the screen, not finite.
+    """
+    count = means.shape[0]
+    record, depth = device.empty((count, RECORD)), device.empty(count)
+    kernel = device.program(KERNELS / "project.cl")["project"]
+    width, height = camera.size
+    device.launch(
+        kernel, count, 64,
+        count, width, height, float(camera.near), LEAST_ALPHA, float(low_pass),
+        device.upload(camera.packed()), means, scales, wxyz, opacity, color, record, depth,
+    )  # fmt: skip
+    return Projected(record, depth, low_pass)
+
+
+def project_backward(
+    device: Device, means, scales, wxyz, opacity, color,
+    camera: Camera, projected: Projected, grad_record,
+) -> tuple:  # fmt: skip
+    """Gradients (means, scales, wxyz, opacity, color) from grad_record (N, 12), device arrays."""
+    count = means.shape[0]
+    grads = tuple(device.empty(a.shape) for a in (means, scales, wxyz, opacity, color))
+    kernel = device.program(KERNELS / "project.cl")["project_backward"]
+    device.launch(
+        kernel, count, 64,
+        count, float(projected.low_pass), device.upload(camera.packed()), means, scales, wxyz,
+        projected.record, grad_record, *grads,
+    )  # fmt: skip
+    return grads
+
+
+def project_arena(
+    device: Device, mean_opacity, covariance, color, object_index, world_from_object,
+    camera: Camera, min_alpha: float = LEAST_ALPHA, max_pixels: float = float("inf"),
+    max_distance: float = float("inf"), low_pass: float = LOW_PASS,
+) -> Projected:  # fmt: skip
+    """For drawing: N splats of O posed objects, device arrays; counts what each gate keeps out.
+
+    mean_opacity (N, 4) object frame metres and 0..1; covariance (N, 8) m^2, object frame, xx xy xz
+    yy yz zz and two unused; color (N, 4), last unused; object_index (N,) int32.
+    world_from_object: numpy (O, 3 or 4, 4) or (O, 12) rows, rigid.  max_pixels: one sigma of the
+    longer screen axis.  max_distance: metres from the eye.
+    """
+    count = mean_opacity.shape[0]
+    record, depth = device.empty((count, RECORD)), device.empty(count)
+    chunks = max(1, min(4 * device.units, count // LEAST_CHUNK))
+    counts = device.zeros((chunks, 4), np.int32)
+    width, height = camera.size
+    device.launch(
+        device.program(KERNELS / "project_arena.cl")["project_arena"], chunks if count else 0, 1,
+        count, -(-count // chunks), width, height, float(camera.near), float(min_alpha),
+        float(max_pixels), float(max_distance), float(low_pass), device.upload(camera.packed()),
+        mean_opacity, covariance, color, object_index,
+        device.upload(_camera_from_object(camera, world_from_object)), record, depth, counts,
+    )  # fmt: skip
+    return Projected(record, depth, low_pass, counts)
+
+
+def _camera_from_object(camera: Camera, world_from_object) -> np.ndarray:
+    """(O, 12) float32 rows of each object's matrix into the camera."""
+    poses = np.asarray(world_from_object, np.float64)
+    poses = poses.reshape(-1, poses.size // max(1, len(poses)) // 4, 4)[:, :3]  # (O, 3, 4)
+    camera_from_world = np.asarray(camera.camera_from_world, np.float64)
+    chained = camera_from_world[:3, :3] @ poses
+    chained[:, :, 3] += camera_from_world[:3, 3]
+    return chained.reshape(-1, 12).astype(np.float32)
