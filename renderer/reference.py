@@ -1,9 +1,9 @@
 """The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
 
 import numpy as np
+from runtime_models.evaluate import evaluate
 
 from renderer.settings import RenderSettings
-from runtime_models.evaluate import evaluate
 from runtime_models.model import Splats
 from scene.pose import View
 from scene.scene import Scene, SceneObject
@@ -12,10 +12,17 @@ MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
 JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection counts as flat
 
 
-def reference_image(scene: Scene, view: View, settings: RenderSettings | None = None) -> np.ndarray:
-    """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top."""
+def reference_image(
+    scene: Scene, view: View, settings: RenderSettings | None = None, eye: np.ndarray | None = None
+) -> np.ndarray:
+    """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top.
+
+    eye: (3,) world metres, where colours are looked at from if not from the view's own eye
+    (stereo computes them once, for the centre of both).
+    """
     settings = settings or RenderSettings()
-    parts = [project_object(o, view, settings) for o in scene.objects if o.visible]
+    eye = view.world_from_eye.position if eye is None else eye
+    parts = [project_object(o, view, settings, eye) for o in scene.objects if o.visible]
     if not parts:
         return np.zeros((view.size[1], view.size[0], 4))
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
@@ -23,14 +30,17 @@ def reference_image(scene: Scene, view: View, settings: RenderSettings | None = 
     return blend(*(column[order] for column in columns[1:]), view.size, settings.min_alpha)
 
 
-def project_object(thing: SceneObject, view: View, settings: RenderSettings) -> tuple:
+def project_object(
+    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
+) -> tuple:
     """depth (M,), mean_px (M, 2), covariance_px (M, 2, 2), opacity (M,), color (M, 3) of what is
     in front of the eye and passes the settings' limits.
     """
     world_from_object = thing.world_from_object.matrix()
     camera_from_world, fx, fy, cx, cy = view.pinhole()
     camera_from_object = camera_from_world @ world_from_object
-    eye_object = np.linalg.inv(camera_from_object)[:3, 3]
+    object_from_world = np.linalg.inv(world_from_object)
+    eye_object = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
     splats = _finite(evaluate(thing.model, thing.x, eye_object))
 
     mean = splats.means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres

@@ -1,0 +1,181 @@
+"""Draws scenes: the passes of a frame in order.  The file to read first in renderer/."""
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from renderer.context import is_software
+from renderer.palette import apply_palette, thermal_blend
+from renderer.settings import FrameStats, RenderSettings
+from renderer.timing import PassTimer
+from runtime_models.model import AnchorModel, SplatLayers
+from scene.pose import View
+from scene.scene import Scene
+
+HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
+CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
+
+
+@dataclass
+class _Decoded:
+    """What of an object lies in the arena now."""
+
+    model: AnchorModel | SplatLayers
+    x: float | None = None  # control value of its geometry; None: not decoded yet
+    color_key: tuple | None = None  # what its colours were computed for
+
+
+class Renderer:
+    """Keeps a scene decoded and draws views of it.
+
+    drawing, mlps, sort: "auto" takes tiles, onnxruntime and numpy where GL is software or absent,
+    and quads, gl, gl on a GPU; `backends` says what is in use and it never changes by itself.
+    target: "rgba16f" | "rgba32f", what quads blend into (tiles blend in registers, float32).
+    ctx None: no GL at all, tiles only, present() is not there.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context | None,
+        drawing: str = "auto",
+        mlps: str = "auto",
+        sort: str = "auto",
+        target: str = "rgba16f",
+    ) -> None:
+        drawing, mlps, sort = _choose(ctx, drawing, mlps, sort)
+        self.settings = RenderSettings()
+        self._ctx = ctx
+        if drawing == "tiles":
+            from renderer.tiles import TilesDrawing  # needs OpenCL, which quads do without
+
+            self._drawing = TilesDrawing()
+        else:
+            from renderer.quads import QuadsDrawing
+
+            self._drawing = QuadsDrawing(ctx, mlps, sort, target)
+        self._timer = PassTimer(ctx if drawing == "quads" else None)
+        self._scene = Scene(())
+        self._decoded: list[_Decoded] = []
+        self._drawing.allocate([])
+        self._geometry_runs = self._color_runs = 0
+        self._resolve = None
+
+    @property
+    def backends(self) -> dict[str, str]:
+        """What is in use: drawing, mlps, sort."""
+        return self._drawing.backends
+
+    @property
+    def stats_names(self) -> str:
+        """The same as one line of text."""
+        return ", ".join(f"{what} {name}" for what, name in self.backends.items())
+
+    def update(self, scene: Scene) -> None:
+        """Takes over poses and control values; decodes only what is new or has another x."""
+        with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
+            if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
+                self._drawing.allocate([o.model for o in scene.objects])
+                self._decoded = [_Decoded(o.model) for o in scene.objects]
+            for i, (thing, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
+                if thing.visible and decoded.x != thing.x:
+                    self._drawing.decode_geometry(i, thing.x)
+                    decoded.x = thing.x
+                    self._geometry_runs += 1
+        poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
+        self._drawing.place(poses)
+        self._scene = scene
+
+    def draw(
+        self,
+        views: list[View],
+        target: moderngl.Framebuffer | list[moderngl.Framebuffer] | None = None,
+    ) -> FrameStats:
+        """Draws every view; with `target` (one framebuffer a view) presents them there as well.
+
+        Colours are computed once a frame, for the centre of the views' eyes, and only when it
+        moved.  Counts of splats in the result are those of the first view.
+        """
+        self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
+        counts = [self._drawing.draw(i, v, self.settings, self._timer) for i, v in enumerate(views)]
+        if target is not None:
+            targets = target if isinstance(target, list) else [target]
+            with self._timer.time("resolve"):
+                for i, framebuffer in enumerate(targets[: len(views)]):
+                    self.present(framebuffer, i)
+        drawn = counts[0].pop("drawn")
+        runs = (self._geometry_runs, self._color_runs)
+        self._geometry_runs = self._color_runs = 0
+        return FrameStats(self._timer.take(), self._scene.splat_count, drawn, counts[0], *runs)
+
+    def _decode_colors(self, eye_world: np.ndarray) -> None:
+        """Runs the colour of the visible objects towards which the eye (3,) has moved."""
+        with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
+            for i, (thing, decoded) in enumerate(
+                zip(self._scene.objects, self._decoded, strict=True)
+            ):
+                if not thing.visible:
+                    continue
+                object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+                eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
+                key = color_key(thing.model, thing.x, eye)
+                if key != decoded.color_key:
+                    self._drawing.decode_color(i, thing.x, eye)
+                    decoded.color_key = key
+                    self._color_runs += 1
+
+    def image(self, i: int = 0) -> np.ndarray:
+        """(H, W, 4) float32 of view i, premultiplied over nothing, row 0 on top."""
+        return self._drawing.image(i)
+
+    def resolved(self, i: int = 0) -> np.ndarray:
+        """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background."""
+        name, weight, _ = thermal_blend(self._scene)
+        rgba = apply_palette(self.image(i), name, weight)
+        return rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(self.settings.background)
+
+    def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
+        """Fills a GL framebuffer with view i as resolved() shows it."""
+        raise RuntimeError
+
+    def close(self) -> None:
+        """Gives the memory of the scene and the programs back; the context stays."""
+        self._drawing.close()
+
+    def __enter__(self) -> "Renderer":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.close()
+
+
+def color_key(model: AnchorModel | SplatLayers, x: float, eye: np.ndarray) -> tuple:
+    """What the colours of a model depend on: equal keys, equal colours."""
+    if isinstance(model, SplatLayers):
+        return tuple(eye) if model.sh.shape[1] > 1 else ()
+    inputs = model.networks["color"].inputs
+    return (x if "control" in inputs else None, tuple(eye) if "direction" in inputs else None)
+
+
+def _choose(ctx: moderngl.Context | None, drawing: str, mlps: str, sort: str) -> tuple:
+    """(drawing, mlps, sort) with "auto" replaced; ValueError for what cannot work."""
+    for what, name in (("drawing", drawing), ("mlps", mlps), ("sort", sort)):
+        if name != "auto" and name not in CHOICES[what]:
+            raise ValueError(
+                f"there is no {what} {name!r}; choose auto, {', '.join(CHOICES[what])}."
+            )
+    gpu = ctx is not None and not is_software(ctx)
+    if drawing == "auto":
+        drawing = "quads" if gpu else "tiles"
+    if drawing == "tiles" and (mlps == "gl" or sort == "gl"):
+        raise ValueError(
+            "tiles decode and sort without GL; leave mlps and sort at auto, or draw quads."
+        )
+    if drawing == "quads" and ctx is None:
+        raise ValueError("quads are drawn with GL; open a context, or draw tiles.")
+    by_default = ("gl", "gl") if gpu and drawing == "quads" else ("onnxruntime", "numpy")
+    return (
+        drawing,
+        by_default[0] if mlps == "auto" else mlps,
+        by_default[1] if sort == "auto" else sort,
+    )

@@ -1,0 +1,98 @@
+"""Scenes that tests of the drawing back ends share."""
+
+import numpy as np
+
+from runtime_models.model import SplatLayers, Stop
+from scene.pose import Pose, View, look_at
+from scene.scene import Scene, SceneObject
+
+POISON = (np.nan, np.inf, -np.inf)
+FIELDS = ("means", "scales", "wxyz", "opacity", "sh")
+
+
+def random_layers(count: int, seed: int = 0, coefficients: int = 4, layers: int = 1) -> SplatLayers:
+    """A cloud of long and flat splats of every opacity, two metres across."""
+    rng = np.random.default_rng(seed)
+    wxyz = rng.normal(size=(count, 4))
+    arrays = (
+        rng.normal(size=(count, 3)) * 0.7,
+        np.exp(rng.normal(size=(count, 3)) * 0.8 - 3.7),
+        wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
+        rng.uniform(-0.1, 1.1, count).clip(0, 1),
+        rng.normal(size=(count, coefficients, 3)) * 0.3,
+    )
+    stops = tuple(Stop(f"layer {i}", i / max(layers - 1, 1), "layer") for i in range(layers))
+    index = rng.integers(0, layers, count).astype(np.int32)
+    return SplatLayers(*(a.astype(np.float32) for a in arrays), index, stops)
+
+
+def one_splat(**changes) -> SplatLayers:
+    """A round splat of 5 cm at the origin, white, opacity 0.8; `changes` are SplatLayers fields."""
+    fields = {
+        "means": [[0, 0, 0]],
+        "scales": [[0.05, 0.05, 0.05]],
+        "wxyz": [[1, 0, 0, 0]],
+        "opacity": [0.8],
+        "sh": [[[0.5 / 0.28209479177387814] * 3]],
+    } | changes
+    arrays = [np.asarray(fields[name], np.float32) for name in FIELDS]
+    return SplatLayers(*arrays, np.zeros(len(arrays[0]), np.int32), (Stop("only", 0.0),))
+
+
+def alone(model, **placed) -> Scene:
+    return Scene((SceneObject("thing", model, **placed),))
+
+
+def two_objects(count: int) -> Scene:
+    """A random cloud and a smaller one that stands across it, turned and moved."""
+    turned = Pose(np.array([0.9, -0.2, 0.3]), np.array([0.5, 0.5, -0.5, 0.5]))
+    return Scene(
+        (
+            SceneObject("cloud", random_layers(count - count // 8)),
+            SceneObject("other", random_layers(count // 8, 1, 16), turned),
+        )
+    )
+
+
+def front_view(size: tuple[int, int] = (256, 256), distance: float = 4.0) -> View:
+    return View(look_at((0.4, 0.8, distance), (0, 0, 0)), (-0.4, 0.4, -0.4, 0.4), 0.05, 50, size)
+
+
+def stereo_views(size: tuple[int, int] = (256, 256)) -> list[View]:
+    """Two parallel eyes 64 mm apart whose fields of view lean outwards, as headsets have them."""
+    pose = front_view().world_from_eye
+    right = pose.matrix()[:3, 0]
+    return [
+        View(Pose(pose.position + side * right, pose.wxyz), tangents, 0.05, 50, size)
+        for side, tangents in (
+            (-0.032, (-0.55, 0.35, -0.5, 0.4)),
+            (0.032, (-0.35, 0.55, -0.5, 0.4)),
+        )
+    ]
+
+
+def psnr_db(image: np.ndarray, reference: np.ndarray) -> float:
+    """Decibels of the error against a peak of 1; a pixel that is not finite gives nan."""
+    error = np.mean((np.asarray(image, np.float64) - reference) ** 2)
+    return float("inf") if error == 0 else float(-10 * np.log10(error))
+
+
+def poisoned(layers: SplatLayers, seed: int = 5) -> tuple[SplatLayers, np.ndarray]:
+    """A copy with one number of every twentieth splat broken, and which splats are still whole.
+
+    The door refuses such numbers; here they get in behind it, as out of a network gone wrong.
+    """
+    rng = np.random.default_rng(seed)
+    broken = only(layers, np.arange(len(layers.means)))
+    bad = np.arange(0, len(layers.means), 20)
+    for n, i in enumerate(bad):
+        name = FIELDS[n % len(FIELDS)]
+        row = getattr(broken, name)[i : i + 1].reshape(-1)  # a view
+        # An infinite coefficient may mean black by rule, since colour is clamped at 0; NaN never.
+        row[rng.integers(len(row))] = np.nan if name == "sh" else POISON[n // len(FIELDS) % 3]
+    return broken, np.setdiff1d(np.arange(len(layers.means)), bad)
+
+
+def only(layers: SplatLayers, rows: np.ndarray) -> SplatLayers:
+    arrays = [getattr(layers, name)[rows] for name in FIELDS]
+    return SplatLayers(*arrays, layers.layer[rows], layers.stops)
