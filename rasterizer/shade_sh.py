@@ -16,7 +16,7 @@ GROUP = 64
 
 def upload_sh(device: Device, sh: np.ndarray) -> "Array":
     """The coefficients (n, M, 3) as shade_sh reads them: (M * 3, n) on the device."""
-    return device.upload(np.asarray(sh, np.float32).reshape(len(sh), -1).T)
+    return device.upload(np.asarray(sh, np.float32).reshape(len(sh), 3 * sh.shape[1]).T)
 
 
 def shade_sh(

@@ -1,10 +1,11 @@
 """The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
 
 import numpy as np
-from runtime_models.evaluate import evaluate
 
 from renderer.settings import RenderSettings
+from runtime_models.evaluate import evaluate
 from runtime_models.model import Splats
+from runtime_models.rotation import normalize, rotation_matrices
 from scene.pose import View
 from scene.scene import Scene, SceneObject
 
@@ -51,7 +52,9 @@ def project_object(
     )
     mean, opacity, color = mean[keep], splats.opacity[keep], splats.color[keep]
     depth = mean[:, 2]
-    axes = rotations(splats.wxyz[keep]) * splats.scales[keep][:, None, :]  # (M, 3, 3) metres
+    axes = (
+        rotation_matrices(normalize(splats.wxyz[keep])) * splats.scales[keep][:, None, :]
+    )  # (M, 3, 3) metres
 
     left, right, down, up = (t * JACOBIAN_MARGIN for t in view.tangents)
     x, y = np.clip(mean[:, 0] / depth, left, right), np.clip(mean[:, 1] / depth, -up, -down)
@@ -107,24 +110,10 @@ def blend(
     return np.concatenate([image, 1 - through[..., None]], axis=2)
 
 
-def rotations(wxyz: np.ndarray) -> np.ndarray:
-    """(N, 3, 3) of quaternions (N, 4) of any length but zero."""
-    w, x, y, z = (wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)).T
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=1),
-            np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=1),
-            np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1),
-        ],
-        axis=1,
-    )
-
-
 def _finite(splats: Splats) -> Splats:
-    """The splats of which every number is finite and whose quaternion has a length, in float64."""
+    """The splats of which every number is finite, in float64."""
     parts = [splats.means, splats.scales, splats.wxyz, splats.opacity[:, None], splats.color]
     good = np.isfinite(np.concatenate(parts, axis=1)).all(axis=1)
-    good &= np.abs(splats.wxyz).max(axis=1, initial=0) > 0
     return Splats(
         *(
             np.asarray(a, np.float64)[good]

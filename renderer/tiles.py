@@ -6,7 +6,6 @@ Same life as renderer/quads.py: allocate, decode what changed, place, draw.  No 
 from dataclasses import dataclass
 
 import numpy as np
-from runtime_models.evaluate import Evaluator
 
 from rasterizer.bin import bin_tiles
 from rasterizer.device import Device, open_device
@@ -16,6 +15,7 @@ from rasterizer.raster import rasterize_rgba
 from rasterizer.shade_sh import shade_sh, upload_sh
 from renderer.settings import RenderSettings
 from renderer.timing import PassTimer
+from runtime_models.evaluate import Evaluator
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import View
 
@@ -42,6 +42,7 @@ class TilesDrawing:
             "mlps": "onnxruntime",
             "sort": f"tiles ({self.device.platform})",
         }
+        self.allocations = 0  # how often the arena was made: once for each set of objects
         self._slots: list[_Slot] = []
         self._images: dict[int, np.ndarray] = {}
 
@@ -50,6 +51,7 @@ class TilesDrawing:
         counts = [model.splat_count for model in models]
         starts = np.concatenate([[0], np.cumsum(counts, dtype=int)])
         self.splats = int(starts[-1])
+        self.allocations += 1
         device = self.device
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
@@ -86,7 +88,7 @@ class TilesDrawing:
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
-        self._world_from_objects = np.stack(world_from_objects)
+        self._world_from_objects = np.reshape(world_from_objects, (-1, 4, 4))
 
     def draw(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> dict:
         """Draws view number i.  Returns {drawn, opacity, size, distance, frustum}: splat counts."""
@@ -114,7 +116,8 @@ class TilesDrawing:
             device.queue.finish()
         with timer.time("splat", on_gpu=False):
             self._images[i] = rasterize_rgba(device, projected, tiles, view.size)
-        return {"drawn": len(tiles.order), **projected.culled(device)}
+        culled = projected.culled(device)
+        return {"drawn": self.splats - sum(culled.values()), **culled}
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
