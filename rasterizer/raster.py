@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 KERNELS = Path(__file__).parent / "kernels"
+# form: kernel file, work-items a tile forward, work-items a tile backward
+FORMS = {
+    "cpu": (KERNELS / "raster_cpu.cl", 1, 1),
+    "gpu": (KERNELS / "raster_gpu.cl", 256, 32),
+}
 
 
 @dataclass(frozen=True)
@@ -31,15 +36,19 @@ def rasterize(
     tiles: Tiles,
     size: tuple[int, int],
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    form: str | None = None,
 ) -> Frame:
-    """The image of `size` (width, height) pixels over a background colour."""
+    """The image of `size` (width, height) pixels over a background colour.
+
+    form: "cpu" or "gpu", by default the device's kind; any form draws the lists of any other.
+    """
     width, height = size
     number = tiles.grid[0] * tiles.grid[1]
     image, transmittance = device.empty((3, height, width)), device.empty((height, width))
     ends = device.empty(number, np.int32)
-    kernel = device.program(KERNELS / "raster_cpu.cl")["rasterize"]
+    file, group, _ = FORMS[form or device.kind]
     device.launch(
-        kernel, number, 1,
+        device.program(file)["rasterize"], number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
         *(float(c) for c in background), image, transmittance, ends,
     )  # fmt: skip
@@ -47,7 +56,11 @@ def rasterize(
 
 
 def rasterize_rgba(
-    device: Device, projected: Projected, tiles: Tiles, size: tuple[int, int]
+    device: Device,
+    projected: Projected,
+    tiles: Tiles,
+    size: tuple[int, int],
+    form: str | None = None,
 ) -> np.ndarray:
     """(H, W, 4) float32 premultiplied over nothing, alpha = 1 - transmittance, row 0 on top.
 
@@ -56,9 +69,9 @@ def rasterize_rgba(
     width, height = size
     number = tiles.grid[0] * tiles.grid[1]
     image, ends = device.empty((height, width, 4)), device.empty(number, np.int32)
-    kernel = device.program(KERNELS / "raster_cpu.cl", RGBA=1)["rasterize"]
+    file, group, _ = FORMS[form or device.kind]
     device.launch(
-        kernel, number, 1,
+        device.program(file, RGBA=1)["rasterize"], number * group, group,
         width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
         0.0, 0.0, 0.0, image, None, ends,
     )  # fmt: skip
@@ -72,6 +85,7 @@ def rasterize_backward(
     frame: Frame,
     grad_image: "Array",
     grad_transmittance: "Array | None" = None,
+    form: str | None = None,
 ) -> "Array":
     """(N, 12) gradients of the records from those of the image (3, H, W) and transmittance (H, W).
 
@@ -79,20 +93,18 @@ def rasterize_backward(
     """
     count = projected.depth.shape[0]
     _, height, width = frame.image.shape
-    first_slot, slots = device.empty(count, np.int32), device.empty((tiles.count, RECORD))
-    bin_kernels = device.program(KERNELS / "bin.cl")
-    kernels = device.program(KERNELS / "raster_cpu.cl")
-    device.launch(bin_kernels["number_slots"], 1, 1, count, tiles.places, first_slot)
+    first_slot, slots = tiles.slots(device), device.empty((tiles.count, RECORD))
+    file, _, group = FORMS[form or device.kind]
+    kernel = device.program(file)["rasterize_backward"]
     with_transmittance = grad_transmittance is not None
     device.launch(
-        kernels["rasterize_backward"], tiles.grid[0] * tiles.grid[1], 1,
+        kernel, tiles.grid[0] * tiles.grid[1] * group, group,
         width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.instances, tiles.places,
         first_slot, projected.record, frame.image, frame.transmittance, grad_image,
         grad_transmittance if with_transmittance else frame.transmittance, with_transmittance,
         slots,
     )  # fmt: skip
     grad_record = device.empty((count, RECORD))
-    device.launch(
-        kernels["sum_slots"], count, 64, count, tiles.places, first_slot, slots, grad_record
-    )
+    kernel = device.program(KERNELS / "sum_slots.cl")["sum_slots"]
+    device.launch(kernel, count, 64, count, tiles.places, first_slot, slots, grad_record)
     return grad_record

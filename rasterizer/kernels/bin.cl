@@ -9,7 +9,7 @@
 // chunk's start, and the histogram of their low digits.  status: visible, instances, key range.
 __kernel void find_places(int count, int chunk, int tiles_x, int tiles_y,
                           __global const float* record, __global const float* depth,
-                          __global int4* places, __global uint* keys, __global int* splats,
+                          __global uint2* places, __global uint* keys, __global int* splats,
                           __global int* histogram, __global uint4* status) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
@@ -19,20 +19,20 @@ __kernel void find_places(int count, int chunk, int tiles_x, int tiles_y,
   uint instances = 0, least = 0xffffffffu, most = 0;
   for (int i = first; i < last; i++) {
     __global const float* s = record + (size_t)RECORD * i;
-    int4 place = 0;
+    uint2 place = 0;
     if (s[EXTENT_X] > 0) {
       float copy[RECORD];
       vstore8(vload8(0, s), 0, copy);
       vstore4(vload4(0, s + 8), 0, copy + 8);
-      place = tiles_of(copy, tiles_x, tiles_y);
+      place = place_of(copy, tiles_x, tiles_y);
     }
     places[i] = place;
-    if (place.w > 0) {
+    if (place.x >= MASKED) {
       const uint key = as_uint(depth[i]);  // positive floats sort as their bits
       keys[visible] = key;
       splats[visible++] = i;
       bins[key & (LOW_BINS - 1)]++;
-      instances += place.w;
+      instances += tiles_at(place);
       least = min(least, key);
       most = max(most, key);
     }
@@ -80,56 +80,63 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   }
 }
 
+// The tiles of a place, branch free where it is within 2 x 2 tiles, as nearly all are: a tile
+// that is not touched is sent to `spare` instead.  VISIT(tile) is done for each.
+#define FOR_EACH_TILE(place, tiles_x, spare)                                              \
+  const uint2 here = (place);                                                             \
+  const int tile = PLACE_ROW(here) * (tiles_x) + PLACE_COLUMN(here);                      \
+  if (here.x & MASKED && !(here.y & ~0x303u)) {                                           \
+    VISIT(here.y & 1 ? tile : (spare));                                                   \
+    VISIT(here.y & 2 ? tile + 1 : (spare));                                               \
+    VISIT(here.y & 0x100 ? tile + (tiles_x) : (spare));                                   \
+    VISIT(here.y & 0x200 ? tile + (tiles_x) + 1 : (spare));                               \
+  } else if (here.x & MASKED) {                                                           \
+    for (uint mask = here.y; mask; mask &= mask - 1) {                                    \
+      const int bit = 31 - clz(mask & -mask);                                             \
+      VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7));                                   \
+    }                                                                                     \
+  } else {                                                                                \
+    for (uint row = 0; row < here.y >> 16; row++)                                         \
+      for (uint column = 0; column < (here.y & 0xffff); column++)                         \
+        VISIT(tile + row * (tiles_x) + column);                                           \
+  }
+
+// table (chunks, tiles + 1): how often each tile is touched; the last column is the spare tile.
 __kernel void count_tiles(int count, int chunk, int tiles_x, int tiles,
-                          __global const int* order, __global const int4* places,
+                          __global const int* order, __global const uint2* places,
                           __global int* table) {
   const int c = get_global_id(0);
-  __global int* mine = table + c * tiles;
-  for (int t = 0; t < tiles; t++) mine[t] = 0;
+  __global int* mine = table + c * (tiles + 1);
+  for (int t = 0; t <= tiles; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
-    const int4 place = places[order[i]];
-    const int columns = place.y & 0xffff, rows = place.y >> 16;
-    const int tile = (place.x >> 16) * tiles_x + (place.x & 0xffff);
-    if (place.w == columns * rows) {
-      for (int y = 0; y < rows; y++)
-        for (int x = 0; x < columns; x++) mine[tile + y * tiles_x + x]++;
-    } else {
-      int bit = 0;
-      for (int y = 0; y < rows; y++)
-        for (int x = 0; x < columns; x++, bit++) mine[tile + y * tiles_x + x] += place.z >> bit & 1;
-    }
+#define VISIT(tile) mine[tile]++
+    FOR_EACH_TILE(places[order[i]], tiles_x, tiles)
+#undef VISIT
   }
+  mine[tiles] = 0;
 }
 
+// instances has one entry more than the lists need: what is sent to the spare tile goes there.
 __kernel void scatter_tiles(int count, int chunk, int tiles_x, int tiles,
-                            __global const int* order, __global const int4* places,
+                            __global const int* order, __global const uint2* places,
                             __global int* table, __global int* instances) {
   const int c = get_global_id(0);
-  __global int* next = table + c * tiles;
+  __global int* next = table + c * (tiles + 1);
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     const int splat = order[i];
-    const int4 place = places[splat];
-    const int columns = place.y & 0xffff, rows = place.y >> 16;
-    const int tile = (place.x >> 16) * tiles_x + (place.x & 0xffff);
-    if (place.w == columns * rows) {
-      for (int y = 0; y < rows; y++)
-        for (int x = 0; x < columns; x++) instances[next[tile + y * tiles_x + x]++] = splat;
-    } else {
-      int bit = 0;
-      for (int y = 0; y < rows; y++)
-        for (int x = 0; x < columns; x++, bit++)
-          if (place.z >> bit & 1) instances[next[tile + y * tiles_x + x]++] = splat;
-    }
+#define VISIT(tile) instances[next[tile]] = splat, next[tile] += (tile) != tiles
+    FOR_EACH_TILE(places[splat], tiles_x, tiles)
+#undef VISIT
   }
 }
 
 // First slot of every splat: gradients of its instances lie side by side from there.
-__kernel void number_slots(int count, __global const int4* places, __global int* first_slot) {
+__kernel void number_slots(int count, __global const uint2* places, __global int* first_slot) {
   int sum = 0;
   for (int i = 0; i < count; i++) {
     first_slot[i] = sum;
-    sum += places[i].w;
+    sum += tiles_at(places[i]);
   }
 }

@@ -137,7 +137,7 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
 // which needs no division to get T back.  Each instance writes its 12 numbers to its own slot.
 __kernel void rasterize_backward(int width, int height, int tiles_x,
                                  __global const int* tile_start, __global const int* tile_end,
-                                 __global const int* instances, __global const int4* places,
+                                 __global const int* instances, __global const uint2* places,
                                  __global const int* first_slot, __global const float* record,
                                  __global const float* image, __global const float* transmittance,
                                  __global const float* grad_image,
@@ -244,21 +244,4 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
     vstore8((float8)(0), 0, out);
     vstore4((float4)(0), 0, out + 8);
   }
-}
-
-// A splat's slots lie side by side: their sum in a fixed order is its gradient.
-__kernel void sum_slots(int count, __global const int4* places, __global const int* first_slot,
-                        __global const float* slots, __global float* grad_record) {
-  const int i = get_global_id(0);
-  if (i >= count) return;
-  const int n = places[i].w;
-  __global const float* slot = slots + (size_t)RECORD * first_slot[i];
-  float8 lo = 0;
-  float4 hi = 0;
-  for (int k = 0; k < n; k++, slot += RECORD) {
-    lo += vload8(0, slot);
-    hi += vload4(0, slot + 8);
-  }
-  vstore8(lo, 0, grad_record + (size_t)RECORD * i);
-  vstore4(hi, 0, grad_record + (size_t)RECORD * i + 8);
 }

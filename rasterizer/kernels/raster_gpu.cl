@@ -1,0 +1,144 @@
+// raster, GPU form: one work-group a tile of 16x16 pixels; same inputs and outputs as raster_cpu.cl.
+#include "common/tiles.cl"
+#define PIXELS (TILE * TILE)
+#define STOP 1e-4f
+#define LANES 32  // of the backward pass: splats in flight
+
+// A work-item owns a pixel; the group loads 256 splats at a time to local memory.
+__kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
+    int width, int height, int tiles_x, __global const int* tile_start,
+    __global const int* instances, __global const float* record, float red, float green,
+    float blue, __global float* image, __global float* transmittance, __global int* tile_end) {
+  __local float batch[PIXELS * RECORD];
+  __local int open;
+  const int tile = get_group_id(0), l = get_local_id(0);
+  const int px = tile % tiles_x * TILE + l % TILE, py = tile / tiles_x * TILE + l / TILE;
+  const float x = px + 0.5f, y = py + 0.5f;
+  const bool inside = px < width && py < height;
+  float T = inside ? 1 : 0, r = 0, g = 0, b = 0;
+  int p = tile_start[tile];
+  const int end = tile_start[tile + 1];
+  while (p < end) {
+    if (l == 0) open = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (T >= STOP) open = 1;  // every writer writes the same
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (!open) break;
+    const int n = min(PIXELS, end - p);
+    if (l < n) {
+      __global const float* s = record + (size_t)RECORD * instances[p + l];
+      for (int k = 0; k < RECORD; k++) batch[l * RECORD + k] = s[k];
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (int j = 0; j < n && T >= STOP; j++) {
+      __local const float* s = batch + j * RECORD;
+      const float dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
+      const float q = s[CONIC_A] * dx * dx + 2 * s[CONIC_B] * dx * dy + s[CONIC_C] * dy * dy;
+      if (!(q <= s[CUT])) continue;
+      const float w = fmin(MAX_ALPHA, s[OPACITY] * exp(-0.5f * q)) * T;
+      r += w * s[RED];
+      g += w * s[GREEN];
+      b += w * s[BLUE];
+      T -= w;
+    }
+    p += n;
+    barrier(CLK_LOCAL_MEM_FENCE);
+  }
+  if (l == 0) tile_end[tile] = p;
+  if (!inside) return;
+  const size_t at = (size_t)py * width + px, plane = (size_t)width * height;
+#ifdef RGBA  // premultiplied, alpha last, for drawing
+  vstore4((float4)(r, g, b, 1 - T), at, image);
+#else
+  image[at] = r + T * red;
+  image[at + plane] = g + T * green;
+  image[at + 2 * plane] = b + T * blue;
+  transmittance[at] = T;
+#endif
+}
+
+// A work-item owns a splat, the pixels lie in local memory; item l meets pixel i - l at step i, so
+// that every pixel sees the splats in order and no two items hold a pixel at once: no atomics, no
+// sums across items.  Formulas as in raster_cpu.cl.
+__kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backward(
+    int width, int height, int tiles_x, __global const int* tile_start,
+    __global const int* tile_end, __global const int* instances, __global const uint2* places,
+    __global const int* first_slot, __global const float* record, __global const float* image,
+    __global const float* transmittance, __global const float* grad_image,
+    __global const float* grad_transmittance, int with_transmittance, __global float* slots) {
+  __local float T[PIXELS], rest[PIXELS], grad_r[PIXELS], grad_g[PIXELS], grad_b[PIXELS];
+  const int tile = get_group_id(0), l = get_local_id(0);
+  const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
+  const int x0 = tile_x * TILE, y0 = tile_y * TILE;
+  const size_t plane = (size_t)width * height;
+  for (int i = l; i < PIXELS; i += LANES) {
+    const int px = x0 + i % TILE, py = y0 + i / TILE;
+    const size_t at = (size_t)py * width + px;
+    T[i] = rest[i] = grad_r[i] = grad_g[i] = grad_b[i] = 0;
+    if (px >= width || py >= height) continue;
+    grad_r[i] = grad_image[at];
+    grad_g[i] = grad_image[at + plane];
+    grad_b[i] = grad_image[at + 2 * plane];
+    T[i] = 1;
+    rest[i] = grad_r[i] * image[at] + grad_g[i] * image[at + plane] +
+              grad_b[i] * image[at + 2 * plane];
+    if (with_transmittance) rest[i] += grad_transmittance[at] * transmittance[at];
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  const int end = tile_end[tile], last = tile_start[tile + 1];
+  for (int p = tile_start[tile]; p < end; p += LANES) {
+    const bool mine = p + l < end;
+    float s[RECORD], sum[RECORD], xx = 0, xy = 0, yy = 0, along_x = 0, along_y = 0;
+    const int splat = mine ? instances[p + l] : 0;
+    for (int k = 0; k < RECORD; k++) {
+      s[k] = mine ? record[(size_t)RECORD * splat + k] : 0;
+      sum[k] = 0;
+    }
+    const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
+    for (int i = 0; i < PIXELS + LANES - 1; i++) {
+      const int pixel = i - l;
+      const bool meets = mine && pixel >= 0 && pixel < PIXELS;
+      const float dx = x0 + (pixel & (TILE - 1)) + 0.5f - s[MEAN_X];
+      const float dy = y0 + (pixel >> 4) + 0.5f - s[MEAN_Y];
+      const float q = A * dx * dx + 2 * B * dx * dy + C * dy * dy;
+      if (meets && q <= s[CUT] && T[pixel] >= STOP) {
+        const float raw = s[OPACITY] * exp(-0.5f * q), alpha = fmin(raw, MAX_ALPHA);
+        const float before = T[pixel], w = alpha * before;
+        const float given =
+            grad_r[pixel] * s[RED] + grad_g[pixel] * s[GREEN] + grad_b[pixel] * s[BLUE];
+        const float behind = rest[pixel] - w * given;
+        rest[pixel] = behind;
+        T[pixel] = before - w;
+        sum[RED] += w * grad_r[pixel];
+        sum[GREEN] += w * grad_g[pixel];
+        sum[BLUE] += w * grad_b[pixel];
+        const float grad_alpha = before * given - behind / (1 - alpha);
+        const float grad = raw > MAX_ALPHA ? 0 : alpha * grad_alpha;
+        const float gx = grad * dx, gy = grad * dy;
+        sum[OPACITY] += grad;
+        along_x += gx;
+        along_y += gy;
+        xx += gx * dx;
+        xy += gx * dy;
+        yy += gy * dy;
+        sum[EXTENT_X] += fabs(A * gx + B * gy);
+        sum[EXTENT_Y] += fabs(B * gx + C * gy);
+      }
+      barrier(CLK_LOCAL_MEM_FENCE);
+    }
+    if (mine) {
+      sum[MEAN_X] = A * along_x + B * along_y;
+      sum[MEAN_Y] = B * along_x + C * along_y;
+      sum[CONIC_A] = -0.5f * xx;
+      sum[CONIC_B] = -xy;
+      sum[CONIC_C] = -0.5f * yy;
+      sum[OPACITY] /= s[OPACITY];
+      const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
+      for (int k = 0; k < RECORD; k++) slots[(size_t)RECORD * slot + k] = sum[k];
+    }
+  }
+  for (int p = end + l; p < last; p += LANES) {  // behind the early stop: nothing is felt there
+    const int slot = first_slot[instances[p]] + rank_of_tile(places[instances[p]], tile_x, tile_y);
+    for (int k = 0; k < RECORD; k++) slots[(size_t)RECORD * slot + k] = 0;
+  }
+}
