@@ -1,0 +1,112 @@
+"""INRIA's 3DGS PLY to plain splats, turned into our axes."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import BadFile
+from runtime_models.rotation import normalize
+from runtime_models.spherical_harmonics import COEFFICIENTS, HALF_TURN_SIGNS
+
+TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1",
+         "uint8": "u1", "char": "i1", "int8": "i1", "short": "<i2", "int16": "<i2", "ushort": "<u2",
+         "uint16": "<u2", "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4"}  # fmt: skip
+LARGEST_HEADER = 1 << 16  # bytes
+GEOMETRY = ("x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2",
+            "rot_0", "rot_1", "rot_2", "rot_3", "f_dc_0", "f_dc_1", "f_dc_2")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PlainSplats:
+    """One file's splats in our axes; SplatLayers joins several."""
+
+    means: np.ndarray  # (N, 3) metres
+    scales: np.ndarray  # (N, 3) metres, one sigma
+    wxyz: np.ndarray  # (N, 4) unit
+    opacity: np.ndarray  # (N,) 0..1
+    sh: np.ndarray  # (N, M, 3)
+    dropped: int = 0  # rows with NaN or Inf that were left out
+
+
+def read_ply(path: str | Path) -> PlainSplats:
+    """Splats of a binary 3DGS PLY of SH degree 0 to 3.  Raises BadFile."""
+    path = Path(path)
+    table = read_table(path)
+    missing = [name for name in GEOMETRY if name not in table.dtype.names]
+    if missing:
+        raise BadFile(
+            f"{path.name} has no {missing[0]}: a point cloud or another format, not 3DGS splats; "
+            "export it as a 3DGS PLY."
+        )
+    rest = sum(name.startswith("f_rest_") for name in table.dtype.names)
+    count = rest // 3 + 1
+    if rest % 3 or count not in COEFFICIENTS:
+        raise BadFile(f"{path.name} has {rest} f_rest columns, expected 0, 9, 24 or 45.")
+    sh = np.empty((len(table), count, 3), np.float32)
+    for c in range(3):
+        sh[:, 0, c] = table[f"f_dc_{c}"]
+        for i in range(count - 1):  # channel-major: all of red, then green, then blue
+            sh[:, i + 1, c] = table[f"f_rest_{c * (count - 1) + i}"]
+    with np.errstate(over="ignore"):
+        opacity = 1 / (1 + np.exp(-table["opacity"].astype(np.float32)))
+        scales = np.exp(columns(table, "scale_0", "scale_1", "scale_2"))
+    means, wxyz = columns(table, "x", "y", "z"), columns(table, "rot_0", "rot_1", "rot_2", "rot_3")
+    return turn_half(drop_broken(means, scales, wxyz, opacity, sh, path))
+
+
+def columns(table: np.ndarray, *names: str) -> np.ndarray:
+    return np.stack([table[n] for n in names], 1).astype(np.float32, copy=False)
+
+
+def read_table(path: Path) -> np.ndarray:
+    """(N,) records of the vertex element, memory-mapped."""
+    with path.open("rb") as file:
+        head = file.read(LARGEST_HEADER)
+    end = head.find(b"end_header\n")
+    if not head.startswith(b"ply") or end < 0:
+        raise BadFile(f"{path.name} is no PLY file: its header is missing or never ends.")
+    lines = head[:end].decode("ascii", "replace").splitlines()
+    if "format binary_little_endian 1.0" not in lines:
+        raise BadFile(f"{path.name} is not a binary little-endian PLY; convert it to that.")
+    element = re.search(r"^element vertex (\d+)$", "\n".join(lines), re.M)
+    if not element or sum(line.startswith("element") for line in lines) != 1:
+        raise BadFile(f"{path.name} must have the one element 'vertex'; convert it to a 3DGS PLY.")
+    fields = [line.split() for line in lines if line.startswith("property")]
+    if any(len(f) != 3 or f[1] not in TYPES for f in fields):
+        raise BadFile(f"{path.name} has a property of a type that splats do not have.")
+    if len({f[2] for f in fields}) != len(fields):
+        raise BadFile(f"{path.name} names a property twice.")
+    row, start = np.dtype([(f[2], TYPES[f[1]]) for f in fields]), end + len(b"end_header\n")
+    want, found = int(element[1]) * row.itemsize, path.stat().st_size - start
+    if found < want or int(element[1]) == 0:
+        raise BadFile(
+            f"{path.name}: the header promises {element[1]} splats of {row.itemsize} bytes, the "
+            f"file holds {found // max(row.itemsize, 1)}; it is cut off or its header is wrong."
+        )
+    return np.memmap(path, row, "r", start, (int(element[1]),))
+
+
+def drop_broken(means, scales, wxyz, opacity, sh, path: Path) -> PlainSplats:
+    """Rows with NaN or Inf go (an infinite logit is a plain 0 or 1 by now); unit quaternions."""
+    good = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(wxyz).all(1)
+    good &= np.isfinite(opacity) & np.isfinite(sh).all((1, 2))
+    if not good.any():
+        raise BadFile(f"{path.name}: not one of {len(means)} splats is finite.")
+    if not good.all():
+        means, scales, wxyz, opacity, sh = (a[good] for a in (means, scales, wxyz, opacity, sh))
+    return PlainSplats(means, scales, normalize(wxyz), opacity, sh, int((~good).sum()))
+
+
+def turn_half(splats: PlainSplats) -> PlainSplats:
+    """From COLMAP's axes (y down, z forward) into ours: half a turn about x."""
+    w, x, y, z = splats.wxyz.T  # (0, 1, 0, 0) * (w, x, y, z)
+    return PlainSplats(
+        splats.means * np.array([1, -1, -1], np.float32),
+        splats.scales,
+        np.stack([-x, w, -z, y], 1),
+        splats.opacity,
+        splats.sh * HALF_TURN_SIGNS[: splats.sh.shape[1], None],
+        splats.dropped,
+    )

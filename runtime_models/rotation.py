@@ -1,0 +1,28 @@
+"""Quaternions to rotation matrices and covariances, for many splats at once."""
+
+import numpy as np
+
+
+def normalize(wxyz: np.ndarray) -> np.ndarray:
+    """(N, 4) unit quaternions; one of length zero becomes the identity."""
+    length = np.linalg.norm(wxyz, axis=-1, keepdims=True)
+    identity = np.array([1, 0, 0, 0], wxyz.dtype)
+    return np.where(length > 0, wxyz / np.where(length > 0, length, 1), identity)
+
+
+def rotation_matrices(wxyz: np.ndarray) -> np.ndarray:
+    """(N, 3, 3) of unit quaternions (N, 4)."""
+    w, x, y, z = np.moveaxis(wxyz, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, -1) for row in rows], -2)
+
+
+def covariance(scales: np.ndarray, wxyz: np.ndarray) -> np.ndarray:
+    """(N, 6) xx xy xz yy yz zz in m^2 of R S S^T R^T (paper eq. 1); scales (N, 3), wxyz (N, 4)."""
+    m = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3)
+    full = m @ np.swapaxes(m, 1, 2)
+    return full[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
