@@ -13,9 +13,19 @@ MARCH_STEPS = 64  # a torus is met by walking along its distance field
 MARCH_HIT = 1e-5  # metres
 
 
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(n,) of two (n, 3); numpy's own sum over an axis of three is ten times slower."""
+    return np.einsum("ij,ij->i", a, b)
+
+
+def length(v: np.ndarray) -> np.ndarray:
+    """(n,) of (n, 3)."""
+    return np.sqrt(dot(v, v))
+
+
 def unit(v: np.ndarray) -> np.ndarray:
     """(..., 3) divided by its length; a zero vector stays zero."""
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
+    return v / np.maximum(np.sqrt(np.einsum("...i,...i->...", v, v))[..., None], 1e-12)
 
 
 @dataclass(frozen=True)
@@ -27,16 +37,16 @@ class Ball:
         return self.radius
 
     def roots(self, o: np.ndarray, d: np.ndarray) -> np.ndarray:
-        b = (o * d).sum(1)
+        b = dot(o, d)
         with np.errstate(invalid="ignore"):
-            s = np.sqrt(b * b - (o * o).sum(1) + self.radius**2)
+            s = np.sqrt(b * b - dot(o, o) + self.radius**2)
         return np.stack([-b - s, -b + s])
 
     def normal(self, p: np.ndarray) -> np.ndarray:
         return p / self.radius
 
     def distance(self, p: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(p, axis=1) - self.radius
+        return length(p) - self.radius
 
 
 @dataclass(frozen=True)
@@ -51,7 +61,9 @@ class Box:
     def roots(self, o: np.ndarray, d: np.ndarray) -> np.ndarray:
         with np.errstate(divide="ignore", invalid="ignore"):
             a, b = (-np.asarray(self.half) - o) / d, (np.asarray(self.half) - o) / d
-        enter, leave = np.minimum(a, b).max(1), np.maximum(a, b).min(1)
+        low, high = np.minimum(a, b).T, np.maximum(a, b).T
+        enter = np.maximum(np.maximum(low[0], low[1]), low[2])
+        leave = np.minimum(np.minimum(high[0], high[1]), high[2])
         return np.where(enter < leave, np.stack([enter, leave]), np.nan)
 
     def normal(self, p: np.ndarray) -> np.ndarray:
@@ -59,7 +71,8 @@ class Box:
 
     def distance(self, p: np.ndarray) -> np.ndarray:
         q = np.abs(p) - self.half
-        return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(1), 0)
+        most = np.maximum(np.maximum(q[:, 0], q[:, 1]), q[:, 2])
+        return length(np.maximum(q, 0)) + np.minimum(most, 0)
 
 
 @dataclass(frozen=True)
@@ -110,10 +123,9 @@ class Cylinder:
         return unit(np.stack([p[:, 0] * out, up + lean, p[:, 2] * out], axis=1))
 
     def distance(self, p: np.ndarray) -> np.ndarray:
-        q = np.stack(
-            [np.hypot(p[:, 0], p[:, 2]) - self.radius_at(p[:, 1]), np.abs(p[:, 1]) - self.half], 1
-        )
-        return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(1), 0)
+        out = np.hypot(p[:, 0], p[:, 2]) - self.radius_at(p[:, 1])
+        up = np.abs(p[:, 1]) - self.half
+        return np.hypot(np.maximum(out, 0), np.maximum(up, 0)) + np.minimum(np.maximum(out, up), 0)
 
 
 @dataclass(frozen=True)
@@ -134,9 +146,9 @@ class Ring:
         return self.major * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
 
     def roots(self, o: np.ndarray, d: np.ndarray) -> np.ndarray:
-        b = (o * d).sum(1)
+        b = dot(o, d)
         with np.errstate(invalid="ignore"):
-            s = np.sqrt(b * b - (o * o).sum(1) + self.reach**2)
+            s = np.sqrt(b * b - dot(o, o) + self.reach**2)
         t, end = np.maximum(-b - s, 0), -b + s
         t = np.where(end > 0, t, np.nan)
         hit = np.zeros(len(t), bool)
@@ -153,7 +165,7 @@ class Ring:
         return unit(p - self.core(p))
 
     def distance(self, p: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(p - self.core(p), axis=1) - self.minor
+        return length(p - self.core(p)) - self.minor
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scene.pose import View
-from training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, unit
+from training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, dot, unit
 
 Pattern = Callable[[np.ndarray], np.ndarray]  # local points (n, 3) metres -> (n, 3) or (n,)
 NEAREST = 1e-4  # metres; a hit nearer than this is the surface the ray starts on
 LIFT = 1e-3  # metres; shadow rays start this far above the surface
-EDGE = 0.04  # a pixel that differs this much from a neighbour is sampled more finely
+EDGE = 0.06  # a pixel that differs this much from a neighbour is sampled more finely
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Surface:
     celsius: Pattern | float = 22.0
     gloss: float = 0.0  # strength of the highlight
     shininess: float = 30.0  # Blinn's exponent
+    mirror: float = 0.0  # how much of the bright sky a surface reflects
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,8 @@ def grow_tree(solids: list[Solid], which: np.ndarray) -> Tree:
 
 def may_hit(tree: Tree, o: np.ndarray, d: np.ndarray) -> np.ndarray:
     to_centre = tree.centre - o
-    along = np.einsum("ij,ij->i", to_centre, d)
-    across2 = np.einsum("ij,ij->i", to_centre, to_centre) - along**2
+    along = dot(to_centre, d)
+    across2 = dot(to_centre, to_centre) - along**2
     return (across2 <= tree.reach**2 * (1 + 1e-9)) & (along > -tree.reach)
 
 
@@ -162,7 +163,7 @@ def look(place: Place, o: np.ndarray, d: np.ndarray) -> Hits:
         normals[here] = solid.shape.normal(solid.local(points[here])) @ (
             solid.world_from_local[:3, :3].T
         )
-    away = np.einsum("ij,ij->i", normals, d) > 0
+    away = dot(normals, d) > 0
     return Hits(distance, index, points, np.where(away[:, None], -normals, normals))
 
 
@@ -205,9 +206,14 @@ def shade(
     around = upness * light.sky + (1 - upness) * np.array(light.ground)
     around = around * np.broadcast_to(openness, len(d))[:, None]
     key = (facing * (light.in_shadow + (1 - light.in_shadow) * share))[:, None] * light.key
-    halfway = np.maximum((hits.normals * unit(towards - d)).sum(1), 0)
+    halfway = np.maximum(dot(hits.normals, unit(towards - d)), 0)
     shininess = pattern_at(place, hits, "shininess", 1)[:, 0]
     highlight = gloss * (share * halfway**shininess)[:, None]
+    mirror = pattern_at(place, hits, "mirror", 1)
+    if mirror.any():
+        upwards = d[:, 1] - 2 * dot(d, hits.normals) * hits.normals[:, 1]
+        sky = np.clip(0.5 + 1.5 * upwards, 0, 1) * np.broadcast_to(openness, len(d))
+        highlight = highlight + mirror * sky[:, None] * np.array(light.sky)
     return np.clip(color * (around + key) + highlight, 0, 1)
 
 

@@ -1,0 +1,227 @@
+"""The rest of the workshop: bench, control cabinet with its conduit, mug and tools."""
+
+import numpy as np
+
+from training.synthetic.pipework import AMBIENT, drip_stain
+from training.synthetic.placing import (
+    bar,
+    box,
+    bump,
+    disc,
+    frame,
+    inside,
+    mix,
+    noise,
+    ring,
+    run_of_pipe,
+    turned,
+)
+from training.synthetic.tracer import Solid, Surface
+
+BENCH = (0.64, 0.03, 0.38)  # metres, half sizes of the top
+CABINET = (-0.40, 0.165, 0.04)  # metres, its centre
+SHELL = (0.11, 0.155, 0.07)  # metres, its half sizes
+MOTOR = (0.27, 0.123, 0.11)  # metres, the middle of its axis
+MUG = (-0.13, 0.0, 0.22)
+
+
+def plank_color(p: np.ndarray) -> np.ndarray:
+    plank = np.floor(p[:, 2] / 0.095)
+    tone = 0.5 + 0.5 * np.sin(plank * 12.9)
+    grain = noise(p * (3.0, 1.0, 30.0) + plank[:, None] * 7.7, 4.0)
+    fine = noise(p * (4.0, 1.0, 60.0) + plank[:, None] * 3.1, 4.0)
+    out = mix((0.58, 0.39, 0.23), (0.82, 0.61, 0.40), 0.35 * tone + 0.45 * grain + 0.2 * fine)
+    gap = np.abs(p[:, 2] / 0.095 - np.round(p[:, 2] / 0.095)) < 0.018
+    out[gap] *= 0.55
+    return out * (1 - 0.45 * drip_stain(p)[:, None])
+
+
+def plank_heat(p: np.ndarray) -> np.ndarray:
+    level = p * (1, 0, 1)
+    heat = AMBIENT + 4 + 1.5 * noise(p * (1.0, 1.0, 8.0), 6.0)
+    heat += 9 * bump(level, (MOTOR[0], 0, MOTOR[2]), 0.11)
+    heat += 14 * bump(level, (MUG[0], 0, MUG[2]), 0.04) + 12 * drip_stain(p)
+    return heat + 12 * bump(level, (-0.54, 0, -0.2), 0.05)
+
+
+def bench() -> list[Solid]:
+    iron = Surface((0.42, 0.44, 0.47), AMBIENT + 2, 0.15, 20.0)
+    w, h, d = BENCH
+    out = [
+        box((0, -h, 0), BENCH, Surface(plank_color, plank_heat, 0.08, 20.0), 0.006),
+        box((0, -0.085, 0), (w - 0.05, 0.025, d - 0.05), iron, 0.006),
+    ]
+    for x in (-1, 1):
+        for z in (-1, 1):
+            foot = (x * (w - 0.09), -0.135, z * (d - 0.09))
+            out.append(box(foot, (0.035, 0.03, 0.035), iron))
+    return out
+
+
+def front(p: np.ndarray) -> np.ndarray:
+    """The door: a yellow warning triangle on grey paint."""
+    out = np.tile([0.83, 0.83, 0.79], (len(p), 1))
+    x, y = p[:, 0] + 0.0, p[:, 1] + 0.065
+    forward = p[:, 2] > 0.004
+    triangle = (y > -0.03) & (np.abs(x) < 0.036 * (1 - (y + 0.03) / 0.066))
+    inner = (y > -0.024) & (np.abs(x) < 0.027 * (1 - (y + 0.024) / 0.052))
+    bolt = inner & (np.abs(x + 0.25 * y) < 0.0045) & (y < 0.014)
+    out[forward & triangle] = (0.10, 0.10, 0.10)
+    out[forward & inner] = (0.97, 0.78, 0.10)
+    out[forward & bolt] = (0.10, 0.10, 0.10)
+    return out
+
+
+def cabinet_heat(p: np.ndarray) -> np.ndarray:
+    """Cool, a little warmer towards the top."""
+    return 29 + 14 * np.clip(p[:, 1], -0.15, 0.15)
+
+
+def door() -> list[Solid]:
+    """In its own frame: the middle of its back face is the origin, it faces +z."""
+    w, h, _ = SHELL
+    black = Surface((0.12, 0.12, 0.13), 33.0, 0.3, 30.0)
+    out = [
+        box(
+            (0, 0, 0.007),
+            (w - 0.006, h - 0.006, 0.007),
+            Surface(front, cabinet_heat, 0.15, 20.0),
+            0.004,
+        ),
+        box((0, 0.075, 0.016), (0.062, 0.036, 0.004), black),
+        box((0, 0.075, 0.0205), (0.052, 0.026, 0.001), Surface(screen, 41.0, 0.2, 60.0)),
+        box((w - 0.022, -0.03, 0.019), (0.006, 0.03, 0.008), black),
+    ]
+    for k, color in enumerate(((0.15, 0.75, 0.30), (0.98, 0.70, 0.10), (0.88, 0.15, 0.12))):
+        at = (-0.045 + 0.045 * k, 0.018, 0.006)
+        lamp = Surface(color, 44.0, 0.5, 30.0, 0.2)
+        out.append(bar(at, (at[0], at[1], 0.02), 0.0155, black))
+        out.append(bar(at, (at[0], at[1], 0.026), 0.0115, lamp, bevel=0.005))
+    return out
+
+
+def screen(p: np.ndarray) -> np.ndarray:
+    """A curve on a blue display."""
+    curve = 0.008 * np.sin(p[:, 0] * 130) + 0.004 * np.sin(p[:, 0] * 47)
+    out = mix((0.05, 0.16, 0.28), (0.10, 0.30, 0.44), (p[:, 1] + 0.026) / 0.052)
+    out[np.abs(p[:, 1] - curve) < 0.003] = (0.55, 0.95, 0.75)
+    return out
+
+
+def switchgear() -> list[Solid]:
+    """What the open cabinet shows, its back plate at z = 0: breakers, contactors, terminals."""
+    white, dark = Surface((0.90, 0.90, 0.87), 30.0), Surface((0.16, 0.17, 0.19), 34.0)
+    out = [box((0, 0, 0.003), (0.1, 0.145, 0.003), Surface((0.86, 0.66, 0.22), 25.0))]
+    for k in range(5):
+        x = -0.068 + 0.034 * k
+        out.append(box((x, 0.095, 0.03), (0.0145, 0.033, 0.026), white))
+        blue = Surface((0.10, 0.35, 0.75) if k < 3 else (0.85, 0.2, 0.12), 30.0)
+        out.append(box((x, 0.098, 0.06), (0.008, 0.012, 0.008), blue))
+    for k in range(3):
+        x = -0.058 + 0.058 * k
+        out.append(box((x, 0.0, 0.033), (0.024, 0.032, 0.03), dark))
+        out.append(box((x, 0.006, 0.066), (0.014, 0.013, 0.004), Surface((0.75, 0.75, 0.70), 40.0)))
+    hues = ((0.75, 0.2, 0.15), (0.85, 0.65, 0.15), (0.2, 0.5, 0.25), (0.2, 0.35, 0.7))
+    for k in range(8):
+        at = (-0.07 + 0.02 * k, -0.09, 0.025)
+        out.append(box(at, (0.0085, 0.022, 0.02), Surface(hues[k % 4], 27.0)))
+    grey = Surface((0.55, 0.57, 0.60), 26.0)
+    out += [box((0, y, 0.02), (0.095, 0.008, 0.018), grey) for y in (0.047, -0.047, -0.13)]
+    return out
+
+
+def cabinet(opened: bool) -> list[Solid]:
+    """A control cabinet; opened, its door swings to the left and shows the switchgear."""
+    paint = Surface((0.77, 0.78, 0.75), cabinet_heat, 0.15, 20.0)
+    w, h, d = SHELL
+    hinge = frame((-w, 0, d))
+    turn = frame((0, 0, 0), turned("y", -97.0)) if opened else np.eye(4)
+    swung = inside(hinge @ turn @ frame((w, 0, 0)), door())
+    if opened:
+        t = 0.005
+        walls = [
+            box((0, 0, -d + t), (w, h, t), paint),
+            box((-w + t, 0, 0), (t, h, d), paint),
+            box((w - t, 0, 0), (t, h, d), paint),
+            box((0, h - t, 0), (w, t, d), paint),
+            box((0, -h + t, 0), (w, t, d), paint),
+        ]
+        walls += inside(frame((0, 0, -d + 2 * t)), switchgear())
+    else:
+        walls = [box((0, 0, 0), SHELL, paint, 0.004)]
+    feet = [
+        box((x, -h - 0.005, 0), (0.02, 0.005, d - 0.01), Surface((0.15, 0.15, 0.16), 22.0))
+        for x in (-0.07, 0.07)
+    ]
+    return inside(frame(CABINET), walls + swung + feet)
+
+
+def conduit() -> list[Solid]:
+    """From the cabinet along the bench, up to the motor's terminal box."""
+    rubber = Surface((0.14, 0.14, 0.16), lambda p: 27 + 3 * noise(p, 12), 0.25, 20.0, 0.05)
+    x, y, z = MOTOR
+    corners = [
+        (CABINET[0] + 0.1, 0.035, z - 0.09),
+        (x - 0.245, 0.035, z - 0.09),
+        (x - 0.245, 0.035, z - 0.02),
+        (x - 0.245, y + 0.108, z - 0.02),
+        (x - 0.04, y + 0.108, z - 0.02),
+    ]
+    gland = Surface((0.66, 0.66, 0.68), 34.0, 0.4, 30.0, 0.3)
+    return [
+        *run_of_pipe(corners, 0.03, 0.011, rubber),
+        bar((x - 0.064, y + 0.108, z - 0.02), (x - 0.04, y + 0.108, z - 0.02), 0.017, gland),
+        bar(
+            (CABINET[0] + 0.1, 0.035, z - 0.09), (CABINET[0] + 0.128, 0.035, z - 0.09), 0.017, gland
+        ),
+    ]
+
+
+def mug() -> list[Solid]:
+    """Coffee, still hot: the one hot thing that everybody knows."""
+    glaze = Surface((0.93, 0.90, 0.82), lambda p: 52 + 60 * p[:, 1], 0.35, 40.0, 0.12)
+    stripe = Surface((0.85, 0.35, 0.18), 56.0, 0.35, 40.0, 0.12)
+    return inside(
+        frame(MUG, turned("y", 35)),
+        [
+            bar((0, 0, 0), (0, 0.082, 0), 0.037, glaze, bevel=0.004),
+            bar((0, 0.03, 0), (0, 0.052, 0), 0.0375, stripe),
+            disc((0, 0.0826, 0), "y", 0.034, Surface((0.20, 0.11, 0.06), 71.0, 0.3, 60.0, 0.15)),
+            ring((0, 0.083, 0), "y", 0.0355, 0.0035, glaze),
+            ring((0.04, 0.042, 0), "z", 0.023, 0.0055, glaze),
+        ],
+    )
+
+
+def tools() -> list[Solid]:
+    """A screwdriver, a ring spanner and an oil can on the front of the bench."""
+    orange = Surface((0.93, 0.45, 0.08), 31.0, 0.4, 30.0, 0.1)
+    chrome = Surface((0.68, 0.69, 0.72), 20.0, 0.5, 40.0, 0.45)
+    driver = [
+        bar((0, 0.017, 0), (0.095, 0.017, 0), 0.0165, orange, top_radius=0.013, bevel=0.004),
+        bar((0.095, 0.017, 0), (0.215, 0.015, 0), 0.0048, chrome),
+    ]
+    spanner = [
+        box((0, 0.007, 0), (0.085, 0.006, 0.011), chrome),
+        ring((0.1, 0.009, 0), "y", 0.018, 0.009, chrome),
+        ring((-0.1, 0.009, 0), "y", 0.021, 0.009, chrome),
+    ]
+    red = Surface((0.76, 0.13, 0.10), 23.0, 0.35, 30.0, 0.15)
+    can = [
+        bar((0, 0, 0), (0, 0.065, 0), 0.037, red, bevel=0.004),
+        bar((0, 0.065, 0), (0, 0.098, 0), 0.035, red, top_radius=0.01),
+        bar((0, 0.09, 0), (0.075, 0.165, 0), 0.007, chrome, top_radius=0.003),
+        bar((0, 0.02, 0), (0, 0.045, 0), 0.0375, Surface((0.95, 0.82, 0.30), 23.0)),
+    ]
+    return (
+        inside(frame((-0.02, 0, 0.305), turned("y", 12)), driver)
+        + inside(frame((0.40, 0, 0.31), turned("y", -8)), spanner)
+        + inside(frame((0.56, 0, -0.04), turned("y", 120)), can)
+    )
+
+
+def base_plate() -> list[Solid]:
+    """The steel plate that the motor is bolted to."""
+    x, _, z = MOTOR
+    plate = Surface((0.42, 0.43, 0.46), lambda p: 28 + 6 * bump(p, (0, 0, 0), 0.1), 0.3, 30.0, 0.25)
+    return [box((x, 0.008, z), (0.15, 0.008, 0.115), plate)]

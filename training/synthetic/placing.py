@@ -1,0 +1,131 @@
+"""Where solids go, and patterns on them: frames, pipes, bolts, wood, noise."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from training.synthetic.openness import corner_weight
+from training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring
+from training.synthetic.tracer import Solid, Surface
+
+# world_from_local rotations that lay a shape's own +Y along a world axis
+ALONG = {
+    "x": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+}
+
+
+def frame(position: tuple, rotation: np.ndarray | None = None) -> np.ndarray:
+    """(4, 4) parent_from_local."""
+    out = np.eye(4)
+    out[:3, :3] = np.eye(3) if rotation is None else rotation
+    out[:3, 3] = position
+    return out
+
+
+def turned(axis: str, degrees: float) -> np.ndarray:
+    """(3, 3) right-handed rotation about a world axis."""
+    c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+    i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    out = np.eye(3)
+    out[i, i], out[i, j], out[j, i], out[j, j] = c, -s, s, c
+    return out
+
+
+def inside(parent: np.ndarray, solids: list[Solid]) -> list[Solid]:
+    """Solids given in a part's frame, moved to the frame's parent."""
+    return [replace(s, world_from_local=parent @ s.world_from_local) for s in solids]
+
+
+def box(centre: tuple, half: tuple, surface: Surface, bevel: float = 0.003, **more) -> Solid:
+    return Solid(Box(half, bevel), surface, frame(centre, more.get("rotation")), more.get("keep"))
+
+
+def bar(start: tuple, end: tuple, radius: float, surface: Surface, **more) -> Solid:
+    """A cylinder from one point to another; top_radius, bevel, capped, keep as in Cylinder."""
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    length = float(np.linalg.norm(end - start))
+    up = (end - start) / length
+    side = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
+    side /= np.linalg.norm(side)
+    keep = more.pop("keep", None)
+    shape = Cylinder(radius, length / 2, **({"bevel": 0.002} | more))
+    rotation = np.stack([side, up, np.cross(side, up)], axis=1)
+    return Solid(shape, surface, frame((start + end) / 2, rotation), keep)
+
+
+def ball(centre: tuple, radius: float, surface: Surface) -> Solid:
+    return Solid(Ball(radius), surface, frame(centre))
+
+
+def ring(centre: tuple, axis: str, major: float, minor: float, surface: Surface, **more) -> Solid:
+    return Solid(Ring(major, minor), surface, frame(centre, ALONG[axis]), more.get("keep"))
+
+
+def disc(centre: tuple, axis: str, radius: float, surface: Surface, **more) -> Solid:
+    return Solid(Disc(radius), surface, frame(centre, ALONG[axis]), more.get("keep"))
+
+
+def elbow(corner: tuple, first: tuple, second: tuple, bend: float, radius: float, surface) -> Solid:
+    """The quarter bend of a pipe at `corner` between unit directions that leave the corner."""
+    first, second = np.asarray(first, float), np.asarray(second, float)
+    middle = -(first + second) / np.sqrt(2)  # local +X: from the bend's centre to the corner
+    normal = np.cross(first, second)
+    rotation = np.stack([middle, normal, np.cross(middle, normal)], axis=1)
+    centre = np.asarray(corner, float) + bend * (first + second)
+    return Solid(Ring(bend, radius, np.pi / 4), surface, frame(centre, rotation))
+
+
+def run_of_pipe(corners: list[tuple], bend: float, radius: float, surface: Surface) -> list[Solid]:
+    """Straight pipes through the corners, with quarter bends between them."""
+    points = [np.asarray(c, float) for c in corners]
+    units = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(points)]
+    out = []
+    for i, along in enumerate(units):
+        start = points[i] + along * (bend if i else 0)
+        end = points[i + 1] - along * (bend if i < len(units) - 1 else 0)
+        out.append(bar(start, end, radius, surface))
+        if i:
+            out.append(elbow(points[i], -units[i - 1], along, bend, radius, surface))
+    return out
+
+
+def bolt_circle(
+    centre: tuple, axis: str, radius: float, count: int, surface: Surface
+) -> list[Solid]:
+    """Bolt heads of 6 mm round a flange whose axis is `axis`."""
+    out = []
+    for k in range(count):
+        angle = 2 * np.pi * (k + 0.5) / count
+        spoke = ALONG[axis] @ np.array([np.cos(angle), 0, np.sin(angle)])
+        along = ALONG[axis] @ np.array([0.0, 1, 0])
+        middle = np.asarray(centre) + radius * spoke
+        out.append(bar(middle - 0.012 * along, middle + 0.012 * along, 0.006, surface))
+    return out
+
+
+def noise(p: np.ndarray, cells_per_m: float) -> np.ndarray:
+    """(n,) smooth value noise 0..1 on a grid of `cells_per_m`."""
+    q = p * cells_per_m
+    cell = np.floor(q)
+    f = q - cell
+    f = f * f * (3 - 2 * f)
+    total = np.zeros(len(p))
+    for corner in np.ndindex(2, 2, 2):
+        at = cell + corner
+        hashed = np.sin(at @ (127.1, 311.7, 74.7)) * 43758.5453
+        weight = corner_weight(f, corner)
+        total += weight * (hashed - np.floor(hashed))
+    return total
+
+
+def mix(low: tuple, high: tuple, share: np.ndarray) -> np.ndarray:
+    share = np.clip(share, 0, 1)[:, None]
+    return np.asarray(low) * (1 - share) + np.asarray(high) * share
+
+
+def bump(p: np.ndarray, centre: tuple, width: float) -> np.ndarray:
+    """(n,) a round hill of height 1 at a point: hot spots."""
+    return np.exp(-((p - np.asarray(centre)) ** 2).sum(1) / (2 * width**2))

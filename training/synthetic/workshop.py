@@ -1,0 +1,175 @@
+"""The bundled demo's capture: a workshop bench photographed as it looks, as it radiates, opened.
+
+Three stops on one slider.  RGB and Thermal show the same things; Opened has other geometry: the
+insulation is off the pipe, the motor and the cabinet are open.
+"""
+
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import Stop
+from scene.capture import Capture, Photo
+from scene.pose import View, look_at
+from scene.write_capture import write_capture
+from training.synthetic.balls import save_png
+from training.synthetic.furniture import (
+    MOTOR,
+    base_plate,
+    bench,
+    cabinet,
+    conduit,
+    mug,
+    tools,
+)
+from training.synthetic.motor import motor
+from training.synthetic.openness import Clearance
+from training.synthetic.pipework import pipework
+from training.synthetic.placing import frame, inside
+from training.synthetic.tracer import (
+    Light,
+    Place,
+    look,
+    pattern_at,
+    photograph,
+    shade,
+    surface_points,
+)
+
+COLD, HOT = 15.0, 95.0  # °C that thermal intensity 0 and 1 stand for
+STOPS = (
+    Stop("RGB", 0.0, "rgb"),
+    Stop("Thermal", 0.5, "thermal", "ironbow", (COLD, HOT), "°C"),
+    Stop("Opened", 1.0, "layer"),
+)
+GREY = 0.09  # the studio's walls, display sRGB; as a temperature it is 22 °C, the room's
+LIGHT = Light(
+    towards=(-0.45, 0.8, 0.55),
+    key=(0.70, 0.66, 0.58),
+    sky=(0.56, 0.58, 0.62),
+    ground=(0.34, 0.32, 0.30),
+    in_shadow=0.1,
+    spread=0.045,
+)
+TARGET = (0.0, 0.07, 0.0)  # metres
+FOV_X = np.deg2rad(48)
+DISTANCES = (1.55, 2.05)  # metres
+ELEVATIONS = (8.0, 66.0)  # degrees
+GOLDEN = (5**0.5 + 1) / 2
+
+
+@lru_cache(maxsize=2)
+def place(opened: bool) -> tuple[Place, Clearance]:
+    motor_there = inside(frame(MOTOR), motor(opened))
+    here = Place.of(
+        bench()
+        + pipework(opened)
+        + cabinet(opened)
+        + conduit()
+        + mug()
+        + tools()
+        + base_plate()
+        + motor_there
+    )
+    return here, Clearance.of(here, (-0.75, -0.2, -0.48), (0.75, 0.5, 0.48))
+
+
+def radiance(stop: str):
+    """What a ray of that stop's camera brings home: colour (n, 3) and solid (n,)."""
+    here, clearance = place(stop == "Opened")
+
+    def rgb(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        hits = look(here, o, d)
+        color = shade(here, hits, d, LIGHT, clearance.openness(hits))
+        color[hits.index < 0] = GREY
+        return color, hits.index
+
+    def thermal(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        hits = look(here, o, d)
+        celsius = pattern_at(here, hits, "celsius", 1)[:, 0]
+        # Emission falls off at grazing angles, where the cool room is mirrored instead.
+        facing = np.abs((hits.normals * d).sum(1))
+        celsius = 22 + (celsius - 22) * (0.8 + 0.2 * facing)
+        share = np.where(hits.index >= 0, (celsius - COLD) / (HOT - COLD), GREY)
+        return np.repeat(np.clip(share, 0, 1)[:, None], 3, axis=1), hits.index
+
+    return thermal if stop == "Thermal" else rgb
+
+
+def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
+    """Cameras on two domes, spread by the golden angle; `offset` turns one set against another."""
+    out = []
+    right = np.tan(FOV_X / 2)
+    up = right * size[1] / size[0]
+    low, high = np.sin(np.deg2rad(ELEVATIONS))
+    for i in range(count):
+        azimuth = 2 * np.pi * (GOLDEN * i + offset)
+        height = low + (high - low) * ((i + 0.5) * GOLDEN**2 * 0.7 % 1)
+        level = np.sqrt(1 - height**2)
+        away = DISTANCES[i % 2]
+        eye = away * np.array([level * np.sin(azimuth), height, level * np.cos(azimuth)])
+        pose = look_at(eye + TARGET, TARGET)
+        out.append(View(pose, (-right, right, -up, up), 0.05, 1000.0, size))
+    return out
+
+
+def take(job: tuple[View, str, Path, Path]) -> None:
+    """One photo and its mask, written to their files."""
+    view, stop, path, mask_path = job
+    image, mask = photograph(view, radiance(stop), samples=3)
+    save_png(path, image)
+    save_png(mask_path, mask)
+
+
+def make_workshop(
+    folder: Path,
+    size: tuple[int, int] = (384, 288),
+    views: int = 64,
+    test_views: int = 8,
+    processes: int = 2,
+) -> Capture:
+    """Writes the capture into `folder`: `views` + `test_views` photos a stop, masks, points."""
+    folder = Path(folder)
+    photos, jobs = [], []
+    for number, stop in enumerate(STOPS):
+        name = stop.name.lower()
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        (folder / "masks" / name).mkdir(parents=True, exist_ok=True)
+        shots = [("train", v) for v in dome(views, number / 3, size)]
+        shots += [("test", v) for v in dome(test_views, number / 3 + 0.17, size)]
+        for i, (split, view) in enumerate(shots):
+            path = folder / name / f"{split}_{i:03}.png"
+            mask_path = folder / "masks" / name / path.name
+            jobs.append((view, stop.name, path, mask_path))
+            photos.append(Photo(view, path, stop.name, None, split))
+    with get_context("spawn").Pool(processes) as pool:
+        list(pool.imap_unordered(take, jobs, chunksize=4))
+    points, colors = colored_points(size)
+    capture = Capture(
+        folder,
+        STOPS,
+        tuple(photos),
+        points,
+        colors,
+        (GREY, GREY, GREY),
+        {"source": "ray-traced: a workshop bench; masks/ holds the share of the bench in a pixel"},
+    )
+    write_capture(capture)
+    return capture
+
+
+def colored_points(size: tuple[int, int], count: int = 40000) -> tuple[np.ndarray, np.ndarray]:
+    """Points on the closed and on the opened bench, half each, with the colours of the paint."""
+    points, colors = [], []
+    for opened in (False, True):
+        here, _ = place(opened)
+        xyz, solids = surface_points(here, dome(24, 0.4, size), count // 2, 0.0015, int(opened))
+        for i in np.unique(solids):
+            solid, mine = here.solids[i], xyz[solids == i]
+            color = solid.surface.color
+            points.append(mine)
+            paint = color(solid.local(mine)) if callable(color) else color
+            colors.append(np.broadcast_to(paint, mine.shape))
+    return np.concatenate(points).astype(np.float32), np.concatenate(colors).astype(np.float32)
