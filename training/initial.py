@@ -3,10 +3,13 @@
 import numpy as np
 
 from runtime_models.model import BadFile
+from scene.capture import Capture
 from scene.pose import View
 from training.photos import LoadedPhoto
 
-HULL_SIDE = 64  # grid cells along each side of the box that is carved
+COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of the box that is carved
+HULL_PHOTOS = 20  # a modality at most; more sharpen little and take as long as they are many
+BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
 RANDOM_POINTS = 20_000
 SAMPLE = 1000  # points whose nearest neighbour is looked for
 
@@ -67,23 +70,36 @@ def common_box(views: list[View]) -> tuple[np.ndarray, np.ndarray]:
     )
     distance = np.median(np.linalg.norm(eyes - centre, axis=1))
     tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
-    return centre, float(distance * min(tangent, 0.9))
+    return centre, float(1.5 * distance * min(tangent, 0.6))
 
 
-def visual_hull(photos: list[LoadedPhoto], centre: np.ndarray, half: float) -> np.ndarray:
-    """(P, 3) surface cells of the box that no see-through photo shows as background."""
-    axis = (np.arange(HULL_SIDE) + 0.5) / HULL_SIDE * 2 - 1
+def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | None:
+    """(H, W) bool where the photo shows the object; None where it cannot be told."""
+    if photo.see_through:
+        return photo.rgba[..., 3] >= 128
+    if background is None:
+        return None
+    difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
+    return difference > BACKGROUND_NOISE
+
+
+def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
+    """(P, 3) centres of the surface cells of a box that no silhouette shows as background.
+
+    photos: (view, silhouette).  The box from `low` to `high` has side^3 cells.
+    """
+    axis = (np.arange(side) + 0.5) / side
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
-    points = centre + half * grid
+    points = low + (high - low) * grid
     solid, seen = np.ones(len(points), bool), np.zeros(len(points), int)
-    for photo in photos:
-        pixel, inside = pixel_of(photo.view, points)
+    for view, shape in photos:
+        left = np.flatnonzero(solid)
+        pixel, inside = pixel_of(view, points[left])
         column, row = pixel[inside].astype(int).T
-        opaque = photo.rgba[row, column, 3] >= 128
-        solid[np.flatnonzero(inside)[~opaque]] = False
-        seen[inside] += 1
+        solid[left[inside]] = shape[row, column]
+        seen[left[inside]] += 1
     solid &= seen >= max(2, len(photos) // 4)
-    cells = np.pad(solid.reshape((HULL_SIDE,) * 3), 1)
+    cells = np.pad(solid.reshape(side, side, side), 1)
     buried = np.ones_like(cells)
     for shift in (-1, 1):
         for dimension in range(3):
@@ -92,22 +108,47 @@ def visual_hull(photos: list[LoadedPhoto], centre: np.ndarray, half: float) -> n
     return points[surface]
 
 
-def initial_points(
-    points: np.ndarray | None, photos: list[LoadedPhoto], rng: np.random.Generator
-) -> tuple[np.ndarray, str]:
-    """(P, 3) metres and where they come from: points, hull or random."""
-    if points is not None and len(points):
-        return np.asarray(points, np.float64), "points"
+def visual_hull(photos: list[tuple], centre: np.ndarray, half: float) -> np.ndarray:
+    """(P, 3) surface of what all silhouettes allow, carved coarsely first, then in its own box."""
+    photos = photos[:: -(-len(photos) // HULL_PHOTOS)]
+    coarse = carved(photos, centre - half, centre + half, COARSE_SIDE)
+    if not len(coarse):
+        return coarse
+    margin = 2 * half / COARSE_SIDE
+    return carved(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
+
+
+def hull_points(photos: list[LoadedPhoto], background: tuple | None) -> np.ndarray | None:
+    """(P, 3) the hulls of every modality together, since one may hide what another shows.
+
+    None where no photo tells object from background.
+    """
     centre, half = common_box([p.view for p in photos])
-    masked = [p for p in photos if p.see_through]
-    if masked:
-        hull = visual_hull(masked, centre, half)
-        if not len(hull):
-            raise BadFile(
-                "The masks of the capture have no volume in common; check that masks and poses "
-                "belong together, or train with --masks ignore."
-            )
+    found = None
+    for modality in dict.fromkeys(p.modality for p in photos):
+        shapes = [(p.view, silhouette(p, background)) for p in photos if p.modality == modality]
+        shapes = [(view, shape) for view, shape in shapes if shape is not None]
+        if shapes:
+            hull = visual_hull(shapes, centre, half)
+            found = hull if found is None else np.concatenate([found, hull])
+    return found
+
+
+def initial_points(
+    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
+) -> tuple[np.ndarray, str]:
+    """(P, 3) metres and where they come from: points, hull or random.  Raises BadFile."""
+    if capture.points is not None and len(capture.points):
+        return np.asarray(capture.points, np.float64), "points"
+    hull = hull_points(photos, capture.background)
+    if hull is not None and len(hull):
         return hull, "hull"
+    if hull is not None and any(p.see_through for p in photos):
+        raise BadFile(
+            f"{capture.folder}: the masks have no volume in common; check that masks and poses "
+            "belong together, or train with --masks ignore."
+        )
+    centre, half = common_box([p.view for p in photos])
     cloud = centre + half * rng.uniform(-1, 1, (RANDOM_POINTS, 3))
     watched = sum(pixel_of(p.view, cloud)[1] for p in photos) >= max(1, len(photos) // 3)
     return (cloud[watched] if watched.any() else cloud), "random"

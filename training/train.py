@@ -94,7 +94,7 @@ class Trainer:
         """Anchors, features and weights of a new run."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        points, self.origin = initial_points(self.capture.points, photos, rng)
+        points, self.origin = initial_points(self.capture, photos, rng)
         self.voxel = settings.voxel or choose_voxel(points, settings.anchors, rng)
         anchors = voxel_centres(points, self.voxel)[: settings.max_anchors]
         features = np.zeros((len(anchors), padded(settings.features)), np.float32)

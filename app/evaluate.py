@@ -1,0 +1,68 @@
+"""launch.py eval: PSNR and SSIM of a scene on the held-out photos of a capture."""
+
+import json
+import os
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Options:
+    """Compare a scene with the held-out photos of a capture (every 8th, unless it says which)."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A package, or any other file of splats."""
+    capture: Annotated[Path, tyro.conf.Positional]
+    """A folder of posed photos."""
+    json: Path | None = None
+    """Write the result here; - writes it to standard output."""
+    downscale: int | None = None
+    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels, as training."""
+    masks: Literal["object", "valid", "ignore"] = "object"
+    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
+    background: Literal["auto", "black", "white", "gray"] = "auto"
+    """Colour behind everything.  auto: the capture's, else black."""
+
+
+def run(options: Options) -> int:
+    from rasterizer.device import open_device
+    from runtime_models.read_scene import read_model
+    from scene.read_capture import read_capture
+    from training.evaluate import evaluate_model, report
+
+    started = time.perf_counter()
+    model, capture = read_model(options.scene), read_capture(options.capture)
+    scores = evaluate_model(
+        open_device(), model, capture, options.downscale, options.masks, options.background
+    )
+    result = report(options.scene, scores, started)
+    print_table(result)
+    if options.json == Path("-"):
+        print(json.dumps(result, indent=1))
+    elif options.json is not None:
+        write_json(options.json, result)
+    return 0
+
+
+def write_json(path: Path, result: dict) -> None:
+    temporary = path.with_name(path.name + ".partial")
+    temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def print_table(result: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("modality", "PSNR dB", "SSIM", "photos", "splats alive")
+    for name, score in result["modalities"].items():
+        row = (f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}", str(score["photos"]))
+        table.add_row(name, *row, f"{result['alive'][name]:,}")
+    console = Console(file=sys.stderr)
+    console.print(table)
+    console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")

@@ -1,0 +1,213 @@
+"""launch.py train: posed photos of one or several modalities to a scene."""
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+if TYPE_CHECKING:
+    from training.settings import TrainSettings
+    from training.train import Trainer
+
+INTERRUPTED = 130  # exit code
+SAVE_EVERY = 60.0  # seconds between checkpoints
+LOOKS = 10  # at held-out photos in a run
+BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
+
+
+@dataclass(frozen=True)
+class Options:
+    """Train a shape-shifting scene.  Where nothing is said, the preset decides."""
+
+    capture: Annotated[Path, tyro.conf.Positional]
+    """A folder of posed photos: COLMAP, transforms.json or cameras.json."""
+    out: Path
+    """The package to write: NAME.shift or a folder.  NAME.checkpoint.npz comes to lie beside it."""
+    seconds: float | None = None
+    """Train for so long; the learning rates follow the time."""
+    iterations: int | None = None
+    """Train so many steps: the same bits on every run.  fast: 2000, paper: 30000."""
+    preset: Literal["fast", "paper"] = "fast"
+    """fast: minutes on a CPU.  paper: the numbers of the paper."""
+    resume: bool = False
+    """Go on from the checkpoint with its settings; a longer --iterations or --seconds may be given."""
+    seed: int | None = None
+    """Of everything random."""
+    grow: bool | None = None
+    """Add and remove anchors between 10 % and 60 % of the run."""
+    max_anchors: int | None = None
+    """Cap of growing."""
+    anchors: int | None = None
+    """How many to start with at most, where --voxel is not given."""
+    voxel: float | None = None
+    """Metres between anchors at the start."""
+    splats_per_anchor: int | None = None
+    """k."""
+    features: int | None = None
+    """F, numbers an anchor."""
+    hidden: int | None = None
+    """Width of the five networks."""
+    ssim_share: float | None = None
+    """lambda: (1 - lambda) L1 + lambda D-SSIM.  Equation 8 read literally has 0.8."""
+    opacity_share: float | None = None
+    """lambda_alpha of equation 9."""
+    scale_share: float | None = None
+    """lambda_S of equation 9."""
+    rate_scale: float | None = None
+    """Times every learning rate."""
+    downscale: int | None = None
+    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
+    masks: Literal["object", "valid", "ignore"] | None = None
+    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
+    background: Literal["auto", "random", "black", "white", "gray"] | None = None
+    """Colour behind everything.  auto: the capture's, else random where photos have masks."""
+    device: Literal["cpu", "gpu"] | None = None
+    """Insist on one kind of OpenCL device."""
+
+
+def run(options: Options) -> int:
+    from rasterizer.device import open_device
+    from scene.read_capture import read_capture
+    from training.checkpoint import checkpoint_path, read_checkpoint
+    from training.train import Trainer
+
+    checkpoint = checkpoint_path(options.out)
+    resume = read_checkpoint(checkpoint) if options.resume else None
+    settings = settings_of(options, resume[1]["settings"] if resume else None)
+    capture = read_capture(options.capture)
+    device = open_device(options.device)
+    say(f"{device.name}, {device.platform}")
+    trainer = Trainer(device, capture, settings, resume)
+    say(describe(trainer))
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    interrupted = train(trainer, checkpoint)
+    save(trainer, options.out, checkpoint)
+    say(summary(trainer, options.out, interrupted))
+    return INTERRUPTED if interrupted else 0
+
+
+def settings_of(options: Options, before: dict | None) -> "TrainSettings":
+    """The preset with what was asked for; or those of a checkpoint, with another budget.
+
+    Raises BadFile when a resumed run is asked for anything but another budget.
+    """
+    from runtime_models.model import BadFile
+    from training.settings import TrainSettings, preset
+
+    names = {f.name for f in fields(TrainSettings)} - {"preset"}
+    asked = {n: getattr(options, n) for n in names & {f.name for f in fields(options)}}
+    asked = {n: value for n, value in asked.items() if value is not None}
+    settings = preset(options.preset) if before is None else TrainSettings(**before)
+    if before is not None:
+        other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
+        if other:
+            raise BadFile(
+                f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
+                f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
+            )
+    if "seconds" in asked and "iterations" not in asked:
+        asked["iterations"] = None
+    elif "iterations" in asked and "seconds" not in asked:
+        asked["seconds"] = None
+    return replace(settings, **asked)
+
+
+def say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def describe(trainer: "Trainer") -> str:
+    photos = trainer.schedule.photos
+    size = next(iter(photos.values()))[0].view.size
+    each = ", ".join(f"{len(found)} x {name}" for name, found in photos.items())
+    smaller = f", made {trainer.factor} times smaller" if trainer.factor > 1 else ""
+    return (
+        f"{each} of {size[0]}x{size[1]} pixels{smaller}; {len(trainer.held_out)} held out; "
+        f"{trainer.anchors_count:,} anchors from {trainer.origin}, "
+        f"{trainer.voxel:.4g} m apart, {trainer.layout.splats} splats each"
+    )
+
+
+@contextmanager
+def interrupts() -> Iterator[list]:
+    """A list that a first Ctrl-C puts something into; a second one interrupts as usual."""
+    asked: list = []
+
+    def note(signum, frame) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(signum)
+        say("Stopping; the work is kept.  Ctrl-C again to stop at once.")
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def train(trainer: "Trainer", checkpoint: Path) -> bool:
+    """The run with its progress on standard error; True when Ctrl-C ended it early."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from training.checkpoint import write_checkpoint
+
+    columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
+    look, saved = 1 / LOOKS, time.monotonic()
+    with (
+        interrupts() as asked,
+        Progress(
+            BarColumn(24), *map(TextColumn, columns), TimeElapsedColumn(),
+            console=Console(file=sys.stderr),
+        ) as bar,
+    ):  # fmt: skip
+        task = bar.add_task("compiling kernels", total=1.0, psnr="", loss="")
+        for now in trainer.steps():
+            text = f"{now.iteration} steps, {now.anchors:,} anchors"
+            bar.update(task, completed=min(now.fraction, 1.0), description=text)
+            if now.loss is not None:
+                bar.update(task, loss=f"loss {now.loss:.4f}")
+            if now.fell_back:
+                bar.console.print(
+                    f"step {now.iteration}: the picture was lost; back to the last good state "
+                    "with half the learning rates"
+                )
+            if now.fraction >= look and trainer.settled:
+                look += 1 / LOOKS
+                bar.update(task, psnr=decibels(trainer.held_out_psnr()))
+            if time.monotonic() - saved > SAVE_EVERY:
+                write_checkpoint(checkpoint, *trainer.checkpoint())
+                saved = time.monotonic()
+            if asked and trainer.settled:
+                return True
+    return False
+
+
+def decibels(psnr: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.2f} dB" for name, value in psnr.items())
+
+
+def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
+    """The package first, then the checkpoint; neither is ever half-written."""
+    from runtime_models.write_package import write_package
+    from training.checkpoint import write_checkpoint
+
+    write_package(trainer.model(), out)
+    write_checkpoint(checkpoint, *trainer.checkpoint())
+
+
+def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:
+    psnr = decibels(trainer.held_out_psnr(most=len(trainer.held_out)))
+    quality = f"held-out photos: {psnr}" if psnr else "no photo was held out"
+    state = "interrupted, --resume goes on" if interrupted else "done"
+    return (
+        f"{out}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} s, "
+        f"{trainer.anchors_count:,} anchors; {quality}"
+    )

@@ -1,0 +1,119 @@
+"""How good a scene is: its pictures beside held-out photos of a capture."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rasterizer.bin import bin_tiles
+from rasterizer.project import LEAST_ALPHA, project
+from rasterizer.raster import rasterize
+from runtime_models.evaluate import Evaluator
+from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
+from scene.capture import Capture
+from scene.pose import View
+from training.metrics import psnr, ssim
+from training.photos import BLACK, choose_downscale, load_photos
+from training.schedule import choose_background
+from training.step import camera_of
+
+
+@dataclass(frozen=True)
+class Score:
+    psnr_db: float
+    ssim: float
+    photos: int
+    alive: int  # splats of this stop that are not absent
+
+
+class Painter:
+    """Draws a model as a package holds it, through onnxruntime and the rasterizer."""
+
+    def __init__(self, device, model: AnchorModel | SplatLayers) -> None:
+        self.device, self.evaluator = device, Evaluator(model)
+        self.x: float | None = None
+
+    def set_control(self, x: float) -> int:
+        """Decode the geometry for x; returns how many splats are not absent."""
+        if x != self.x:
+            geometry = self.evaluator.geometry(x)
+            self.alive = int((geometry[3] >= LEAST_ALPHA).sum())
+            self.geometry = [self.device.upload(np.asarray(a, np.float32)) for a in geometry]
+            self.x = x
+        return self.alive
+
+    def picture(self, view: View, background: tuple[float, float, float]) -> np.ndarray:
+        """(H, W, 3) float32 of the model at the last control value."""
+        color = self.evaluator.color(self.x, view.world_from_eye.position)
+        color = self.device.upload(np.asarray(color, np.float32))
+        projected = project(self.device, *self.geometry, color, camera_of(view))
+        tiles = bin_tiles(self.device, projected, view.size)
+        frame = rasterize(self.device, projected, tiles, view.size, background)
+        return self.device.download(frame.image).transpose(1, 2, 0)
+
+
+def stop_for(model: AnchorModel | SplatLayers, capture_stop: Stop) -> Stop:
+    """The model's stop of the same name as the capture's.  Raises BadFile."""
+    for stop in model.stops:
+        if stop.name == capture_stop.name:
+            return stop
+    names = ", ".join(f"'{s.name}'" for s in model.stops)
+    raise BadFile(
+        f"the scene has no stop '{capture_stop.name}' (it has {names}); "
+        "evaluate it on the capture that it was trained on, or rename the modality."
+    )
+
+
+def evaluate_model(
+    device,
+    model: AnchorModel | SplatLayers,
+    capture: Capture,
+    downscale: int | None = None,
+    masks: str = "object",
+    background: str = "auto",
+) -> dict[str, Score]:
+    """A Score for every modality over its held-out photos.  Raises BadFile where there are none."""
+    factor = downscale or choose_downscale(capture.photos)
+    behind = choose_background(background, capture.background) or BLACK
+    photos = load_photos(capture, "test", factor, masks)
+    if not photos:
+        raise BadFile(
+            f"{capture.folder}: no photo is held out for testing; mark some with split 'test'."
+        )
+    painter, scores = Painter(device, model), {}
+    for stop in capture.stops:
+        alive = painter.set_control(stop_for(model, stop).x)
+        pairs = [
+            (painter.picture(p.view, behind), p.over(behind), p.weight)
+            for p in photos
+            if p.modality == stop.name
+        ]
+        if pairs:
+            scores[stop.name] = Score(
+                float(np.mean([psnr(*pair) for pair in pairs])),
+                float(np.mean([ssim(*pair) for pair in pairs])),
+                len(pairs),
+                alive,
+            )
+    return scores
+
+
+def bytes_on_disk(path: Path) -> int:
+    """Size of a file, or of all files in a folder."""
+    if path.is_dir():
+        return sum(p.stat().st_size for p in path.rglob("*") if p.is_file())
+    return path.stat().st_size
+
+
+def report(path: Path, scores: dict[str, Score], started: float) -> dict:
+    """What `eval --json` writes; `started` is time.perf_counter() at the beginning."""
+    return {
+        "modalities": {
+            name: {"psnr_db": round(s.psnr_db, 4), "ssim": round(s.ssim, 5), "photos": s.photos}
+            for name, s in scores.items()
+        },
+        "alive": {name: s.alive for name, s in scores.items()},
+        "bytes": bytes_on_disk(path),
+        "seconds": round(time.perf_counter() - started, 3),
+    }
