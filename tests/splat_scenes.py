@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime_models.model import SplatLayers, Stop
+from runtime_models.model import AnchorModel, ControlEncoding, Mlp, SplatLayers, Stop
 from scene.pose import Pose, View, look_at
 from scene.scene import Scene, SceneObject
 
@@ -24,6 +24,32 @@ def random_layers(count: int, seed: int = 0, coefficients: int = 4, layers: int 
     stops = tuple(Stop(f"layer {i}", i / max(layers - 1, 1), "layer") for i in range(layers))
     index = rng.integers(0, layers, count).astype(np.int32)
     return SplatLayers(*(a.astype(np.float32) for a in arrays), index, stops)
+
+
+def random_model(anchors: int, seed: int = 0, per_anchor: int = 10) -> AnchorModel:
+    """Networks of the paper's shapes with random weights: splats of a few centimetres."""
+    rng = np.random.default_rng(seed)
+
+    def network(inputs: tuple[str, ...], width: int, bias: float, **kind) -> Mlp:
+        sizes = {"feature": 16, "direction": 3, "control": 16}
+        width_in = sum(sizes[name] for name in inputs)
+        weights = (rng.normal(size=(32, width_in)) * 0.3, rng.normal(size=(width, 32)) * 0.15)
+        biases = (rng.normal(size=32) * 0.1, np.full(width, bias))
+        as_float = [tuple(a.astype(np.float32) for a in arrays) for arrays in (weights, biases)]
+        return Mlp(*as_float, inputs=inputs, **kind)
+
+    plain, seen = ("feature", "control"), ("feature", "direction", "control")
+    networks = {
+        "offset": network(plain, 3 * per_anchor, 0, gain=0.1),
+        "scale": network(plain, 3 * per_anchor, -3.5, head="exp"),
+        "rotation": network(plain, 4 * per_anchor, 0.2),
+        "opacity": network(plain, per_anchor, 0.3, head="tanh"),
+        "color": network(seen, 3 * per_anchor, 0, head="sigmoid"),
+    }
+    places, features = rng.normal(size=(anchors, 3)) * 0.6, rng.normal(size=(anchors, 16))
+    stops = (Stop("first", 0.0), Stop("second", 1.0))
+    arrays = (places.astype(np.float32), features.astype(np.float32))
+    return AnchorModel(*arrays, networks, per_anchor, ControlEncoding(), stops)
 
 
 def one_splat(**changes) -> SplatLayers:

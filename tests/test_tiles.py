@@ -10,11 +10,12 @@ from splat_scenes import (
     poisoned,
     psnr_db,
     random_layers,
+    random_model,
     stereo_views,
     two_objects,
 )
 
-from rasterizer.device import NoDevice, open_device
+from rasterizer.device import NoDevice
 from renderer.palette import palette_colors
 from renderer.reference import reference_image
 from renderer.renderer import Renderer, color_key
@@ -27,17 +28,21 @@ AWAY = View(look_at((0, 0, 9), (0, 0, 20)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (32
 
 
 @pytest.fixture(scope="module")
-def device():
+def opened():
     try:
-        return open_device()
+        with Renderer(None) as made:
+            yield made
     except NoDevice as reason:
         pytest.skip(str(reason))
 
 
 @pytest.fixture
-def renderer(device):
-    with Renderer(None) as made:
-        yield made
+def renderer(opened):
+    """One renderer for all tests, empty and with default settings at the start of each."""
+    opened.settings = RenderSettings()
+    opened.update(Scene(()))
+    opened.draw([AWAY])
+    return opened
 
 
 def drawn(renderer: Renderer, scene: Scene, view: View) -> np.ndarray:
@@ -76,6 +81,24 @@ def test_any_image_size(renderer, size):
 def test_any_number_of_splats(renderer, count):
     scene, view = alone(random_layers(count, seed=count)), front_view((64, 48))
     assert psnr_db(drawn(renderer, scene, view), reference_image(scene, view)) > 80
+
+
+def test_a_model_of_networks_equals_the_reference_and_runs_only_what_changed(renderer):
+    model, view = random_model(300), front_view((96, 96))
+    pose = Pose(np.array([0.1, 0.2, 0.3]), np.array([0.8, 0, 0.6, 0]))
+
+    def runs(x: float, view: View) -> tuple[int, int]:
+        scene = alone(model, x=x, world_from_object=pose)
+        renderer.update(scene)
+        stats = renderer.draw([view])
+        assert psnr_db(renderer.image(), reference_image(scene, view)) > 80
+        return stats.geometry_runs, stats.color_runs
+
+    assert runs(0.25, view) == (1, 1)
+    assert renderer.image()[..., 3].mean() > 0.05
+    assert runs(0.25, view) == (0, 0)
+    assert runs(0.25, front_view((96, 96), distance=3)) == (0, 1)
+    assert runs(0.75, front_view((96, 96), distance=3)) == (1, 1)
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 9, 16])
