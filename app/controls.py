@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scene.framing import FAR_RADII, FOV_Y, NEAR_RADII, fit_distance
+from scene.framing import FAR_RADII, FOV_Y, NEAR_RADII
 from scene.pose import Pose, View, perspective
 
 POLE = 1.5  # radians of pitch; straight up or down would lose which way is right
@@ -157,9 +157,8 @@ class Camera:
         goal[ANCHOR] = point
         self._move_to(goal)
 
-    def frame(self, centre: np.ndarray, radius: float, size: tuple[int, int]) -> None:
-        """Shows a sphere whole, looking in the same direction as before."""
-        distance = fit_distance(radius, size, self.fov_y)
+    def frame(self, centre: np.ndarray, distance: float) -> None:
+        """Looks at the centre (3,) from that many metres, in the same direction as before."""
         self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance)
 
     def reset(self) -> None:

@@ -11,6 +11,7 @@ ELEVATION = 0.3  # radians above the horizon: slightly down
 MARGIN = 1.08  # of the distance at which the bounding sphere just fits
 MIN_OPACITY = 0.1  # fainter splats are mostly floaters; they do not count for the bounds
 PERCENTILES = (2, 98)
+ROUND_ENOUGH = 1.3  # length over depth below which no side is the long one
 FAR_RADII = 200.0
 NEAR_RADII = 0.01
 FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
@@ -22,9 +23,7 @@ def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, fl
     The 2nd to 98th percentile of what can be seen: a few far floaters move neither.  With nothing
     that opaque every finite mean counts; with no mean at all, a metre about the origin.
     """
-    finite = np.isfinite(means).all(axis=1)
-    seen = finite & (opacity > MIN_OPACITY)  # NaN opacity is not seen
-    points = means[seen if seen.any() else finite].astype(np.float64)  # (P, 3)
+    points = _seen(means, opacity)  # (P, 3)
     if not len(points):
         return np.zeros(3), FALLBACK_RADIUS
     low, high = np.percentile(points, PERCENTILES, axis=0)
@@ -33,10 +32,52 @@ def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, fl
     return centre, radius if radius > 0 else FALLBACK_RADIUS
 
 
+def _seen(means: np.ndarray, opacity: np.ndarray) -> np.ndarray:
+    """(P, 3) float64 means that count for the bounds."""
+    finite = np.isfinite(means).all(axis=1)
+    seen = finite & (opacity > MIN_OPACITY)  # NaN opacity is not seen
+    return means[seen if seen.any() else finite].astype(np.float64)
+
+
 def fit_distance(radius: float, size: tuple[int, int], fov_y: float = FOV_Y) -> float:
     """Metres from which a sphere of that radius fits the narrower side of a size (W, H)."""
     _, right, _, up = perspective(fov_y, size)
     return MARGIN * radius / float(np.sin(np.arctan(min(right, up))))
+
+
+def fit_points(
+    means: np.ndarray,
+    opacity: np.ndarray,
+    centre: np.ndarray,
+    world_from_eye: np.ndarray,
+    tangents: tuple[float, float, float, float],
+) -> float:
+    """Metres from the centre, seen along the axes of (4, 4), at which the splats fill the picture.
+
+    Tighter than `fit_distance` for what is long or flat; a few floaters may be cut off.
+    """
+    points = _seen(means, opacity)
+    if not len(points):
+        return MARGIN * FALLBACK_RADIUS / min(tangents[1], tangents[3])
+    in_eye = (points - centre) @ world_from_eye[:3, :3]  # (P, 3) right, up, towards the eye
+    half = np.minimum([tangents[1], tangents[3]], [-tangents[0], -tangents[2]])
+    needed = in_eye[:, 2] + np.max(MARGIN * np.abs(in_eye[:, :2]) / half, axis=1)
+    return float(np.percentile(needed, 99.5))
+
+
+def broadside(means: np.ndarray, opacity: np.ndarray) -> float:
+    """Turn about +Y, radians from +Z, from which long content is seen from its long side.
+
+    0 for what is about as deep as it is wide, else in -pi/2..pi/2: the side towards +Z.
+    """
+    points = _seen(means, opacity)[:, [2, 0]]  # (P, 2) z, x
+    if len(points) < 3:
+        return 0.0
+    square, axes = np.linalg.eigh(np.cov(points.T))
+    if not square[1] > ROUND_ENOUGH**2 * square[0]:
+        return 0.0
+    z, x = axes[:, 0]  # the direction in which the content is thinnest
+    return float(np.arctan2(x, z) if z > 0 else np.arctan2(-x, -z))
 
 
 def view_from(
@@ -59,14 +100,16 @@ def orbit_path(
     fov_y: float = FOV_Y,
     elevation: float = ELEVATION,
     distance: float | None = None,
+    start: float = 0.0,
 ) -> list[View]:
-    """`count` views on a level circle about the centre, the first from +Z, counter-clockwise.
+    """`count` views on a level circle about the centre, counter-clockwise seen from above.
 
-    The distance in metres is the one that fits the sphere of `radius` unless it is given.
+    The first is `start` radians from +Z.  The distance in metres is the one that fits the sphere
+    of `radius` unless it is given.
     """
     if distance is None:
         distance = fit_distance(radius, size, fov_y)
-    turn = 2 * np.pi * np.arange(count) / max(count, 1)
+    turn = start + 2 * np.pi * np.arange(count) / max(count, 1)
     direction = np.stack(
         [
             np.sin(turn) * np.cos(elevation),
@@ -98,18 +141,28 @@ def scene_points(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(means), np.concatenate(opacities)
 
 
+def framing_view(means: np.ndarray, opacity: np.ndarray, size: tuple[int, int]) -> View:
+    """The view that shows splats whole, from their long side and slightly from above."""
+    centre, radius = frame_points(means, opacity)
+    start = broadside(means, opacity)
+    view = orbit_path(1, centre, radius, size, start=start)[0]
+    axes = view.world_from_eye.matrix()
+    distance = fit_points(means, opacity, centre, axes, view.tangents)
+    return orbit_path(1, centre, radius, size, distance=distance, start=start)[0]
+
+
 def default_view(model: AnchorModel | SplatLayers, size: tuple[int, int]) -> View:
-    """The first look at a model: provenance["view"] where it has one, else its bounds framed.
+    """The first look at a model: provenance["view"] where it has one, else `framing_view`.
 
     provenance["view"] is {"eye": [x, y, z], "target": [x, y, z], "fov_y": radians}, metres in the
     object frame, fov_y optional.
     """
-    centre, radius = frame_points(*model_points(model))
     wished = model.provenance.get("view")
     if wished:
+        _, radius = frame_points(*model_points(model))
         eye, target = np.asarray(wished["eye"], float), np.asarray(wished["target"], float)
         return view_from(eye, target, radius, size, float(wished.get("fov_y", FOV_Y)))
-    return orbit_path(1, centre, radius, size)[0]
+    return framing_view(*model_points(model), size)
 
 
 def point_under(

@@ -186,7 +186,7 @@ def test_frame_shows_the_sphere_and_reset_is_the_first_view(flying):
     cam.dolly(-9)
     settle(cam)
     direction = matrix(cam)[:3, 2]
-    cam.frame(CENTRE, RADIUS, SIZE)
+    cam.frame(CENTRE, fit_distance(RADIUS, SIZE))
     settle(cam)
     np.testing.assert_allclose(matrix(cam)[:3, 2], direction, atol=1e-9)
     np.testing.assert_allclose(where_on_screen(cam, CENTRE), 0, atol=1e-9)

@@ -5,6 +5,7 @@ import pytest
 
 from runtime_models.model import SplatLayers, Stop
 from scene.framing import (
+    broadside,
     default_view,
     fit_distance,
     frame_points,
@@ -101,6 +102,27 @@ def test_default_view_takes_the_view_of_the_package():
     np.testing.assert_allclose(view.world_from_eye.matrix()[:3, :3], np.eye(3), atol=1e-12)
     framed = default_view(layers(ball()), (80, 60))
     assert np.abs(to_ndc(framed, ball())).max() < 1
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (360, 640)])
+@pytest.mark.parametrize("shape", [(1, 1, 1), (5, 1, 1), (1, 1, 5), (0.2, 4, 0.2), (3, 0, 3)])
+def test_default_view_fills_the_picture_whatever_the_shape(shape, size):
+    points = ball() * shape
+    ndc = to_ndc(default_view(layers(points), size), points)
+    assert 0.8 < np.abs(ndc[:, :2]).max() < 1.03  # half a percent of the points may be cut
+
+
+@pytest.mark.parametrize("degrees", [-80, -30, 0, 45, 85])
+def test_long_things_are_seen_from_their_long_side(degrees):
+    angle = np.radians(degrees)
+    long_in_x = ball() * [6, 1, 1]
+    turn = np.array(
+        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    )
+    got = broadside(long_in_x @ turn.T, np.ones(2000))
+    assert np.sin(got - angle) == pytest.approx(0, abs=0.02) and abs(got) <= np.pi / 2
+    assert broadside(ball(), np.ones(2000)) == 0.0
+    assert broadside(np.zeros((0, 3)), np.zeros(0)) == 0.0
 
 
 def test_scene_points_are_in_the_world_and_of_visible_objects_only():

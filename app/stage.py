@@ -1,0 +1,140 @@
+"""What the window shows: scene, control values over time, settings, messages; no GL, no imgui."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from renderer.settings import RenderSettings
+from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
+from scene.control import Sweep
+from scene.framing import (
+    default_view,
+    fit_points,
+    frame_points,
+    framing_view,
+    point_under,
+    scene_points,
+)
+from scene.pose import View
+from scene.scene import Scene, SceneObject
+
+Model = AnchorModel | SplatLayers
+BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
+AS_FILED = ""  # the palette that the scene's own stops name
+
+
+class Stage:
+    """The scene with what a person may change about it while it is shown."""
+
+    def __init__(self, read_model: Callable[[Path], Model]) -> None:
+        self._read_model = read_model
+        self._filed: tuple[Model, ...] = ()  # as read, before a palette was chosen
+        self.scene = Scene(())
+        self.sweeps: list[Sweep] = []
+        self.settings = RenderSettings(background=BACKGROUND)
+        self.palette = AS_FILED
+        self.problem = ""  # one sentence for the message box; "" = nothing is wrong
+        self.centre, self.radius = np.zeros(3), 1.0
+        self._points = (np.zeros((0, 3)), np.zeros(0))
+
+    def open(self, paths: Sequence[Path], x: float | None = None) -> None:
+        """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
+        models = [self._read_model(path) for path in paths]
+        objects = []
+        for path, model in zip(paths, models, strict=True):
+            start = first_stop(model).x if x is None else x
+            objects.append(SceneObject(path.stem, model, x=start))
+        self.show(Scene(tuple(objects)))
+
+    def show(self, scene: Scene) -> None:
+        """Takes a scene over and frames it."""
+        self.scene = scene
+        self._filed = tuple(thing.model for thing in scene.objects)
+        self.palette = AS_FILED
+        self.sweeps = [Sweep.over(thing.model.stops) for thing in scene.objects]
+        for sweep, thing in zip(self.sweeps, scene.objects, strict=True):
+            sweep.resume_at(thing.x)
+        self._points = scene_points(scene)
+        self.centre, self.radius = frame_points(*self._points)
+
+    def drop(self, paths: Sequence[Path]) -> bool:
+        """Opens what was dropped on the window; False, and a sentence in `problem`, when bad."""
+        try:
+            self.open(paths)
+        except (BadFile, OSError) as error:
+            self.problem = str(error)
+            return False
+        return True
+
+    def first_view(self, size: tuple[int, int]) -> View:
+        """The view of a single package if it gives one, else everything framed."""
+        if len(self.scene.objects) == 1:
+            return default_view(self.scene.objects[0].model, size)
+        return framing_view(*self._points, size)
+
+    def fit(self, view: View) -> float:
+        """Metres from the centre at which all is seen in the direction of a view."""
+        axes = view.world_from_eye.matrix()
+        return fit_points(*self._points, self.centre, axes, view.tangents)
+
+    def point_under(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
+        """The world point (3,) that a ray meets, or None."""
+        return point_under(*self._points, origin, direction)
+
+    def set_x(self, index: int, x: float) -> None:
+        objects = list(self.scene.objects)
+        objects[index] = replace(objects[index], x=x)
+        self.scene = Scene(tuple(objects))
+
+    def go_to_stop(self, number: int) -> None:
+        """Every object that has a stop of that number, counted from 0, goes there and rests."""
+        for index, thing in enumerate(self.scene.objects):
+            stops = sorted(thing.model.stops, key=lambda stop: stop.x)
+            if number < len(stops):
+                self.sweeps[index].playing = False
+                self.set_x(index, stops[number].x)
+
+    def toggle_play(self, index: int | None = None) -> None:
+        """Starts or stops one object's sweep, or all together: all stop if any was playing."""
+        chosen = self.sweeps if index is None else [self.sweeps[index]]
+        start = not any(sweep.playing for sweep in chosen)
+        for sweep in chosen:
+            sweep.playing = start and sweep.period > 0
+
+    @property
+    def playing(self) -> bool:
+        return any(sweep.playing for sweep in self.sweeps)
+
+    def advance(self, seconds: float) -> None:
+        """Lets playing sweeps go on; a slider moved by hand meanwhile is where they continue."""
+        for index, sweep in enumerate(self.sweeps):
+            if sweep.playing:
+                sweep.resume_at(self.scene.objects[index].x)
+                self.set_x(index, sweep.advance(seconds))
+
+    def choose_palette(self, name: str) -> None:
+        """Shows every thermal stop in that palette; AS_FILED gives back the scene's own."""
+        self.palette = name
+        objects = [
+            replace(thing, model=model if name == AS_FILED else with_palette(model, name))
+            for thing, model in zip(self.scene.objects, self._filed, strict=True)
+        ]
+        self.scene = Scene(tuple(objects))
+
+    @property
+    def has_palettes(self) -> bool:
+        """Whether any thermal stop is drawn through a palette at all."""
+        return any(stop.palette for thing in self.scene.objects for stop in thing.model.stops)
+
+
+def first_stop(model: Model) -> Stop:
+    """The stop with the smallest x; a scene without stops starts at 0."""
+    return min(model.stops, key=lambda stop: stop.x, default=Stop("", 0.0))
+
+
+def with_palette(model: Model, name: str) -> Model:
+    """The model with another palette on those thermal stops that have one."""
+    stops = [replace(stop, palette=name) if stop.palette else stop for stop in model.stops]
+    return replace(model, stops=tuple(stops))

@@ -1,0 +1,80 @@
+"""How the overlay looks: dark and neutral, one warm accent, a readable font at any density."""
+
+from pathlib import Path
+
+import imgui_bundle
+from imgui_bundle import imgui
+
+Box = tuple[float, float, float, float]  # left, top, right, bottom in logical pixels
+
+FONT_SIZE = 15.0  # logical pixels
+FONT = Path(imgui_bundle.__file__).parent / "assets/fonts/Roboto/Roboto-Regular.ttf"
+GLYPHS = [0x20, 0xFF, 0x370, 0x3FF, 0x2000, 0x2027, 0x2190, 0x21FF, 0]  # Latin, Greek, dashes
+
+ACCENT = (0.95, 0.63, 0.27)
+TEXT = (0.90, 0.90, 0.91)
+MUTED = (0.58, 0.59, 0.62)
+SURFACE = (0.105, 0.108, 0.118)
+RAISED = (0.175, 0.180, 0.195)
+TRACK = (0.30, 0.31, 0.33)
+
+
+def color(rgb: tuple[float, float, float], alpha: float = 1.0) -> int:
+    """Packed colour for draw lists."""
+    return imgui.get_color_u32(imgui.ImVec4(*rgb, alpha))
+
+
+def window_box() -> Box:
+    """Where the overlay's window that is being made lies."""
+    low, size = imgui.get_window_pos(), imgui.get_window_size()
+    return (low.x, low.y, low.x + size.x, low.y + size.y)
+
+
+def apply(ui_scale: float, pixels_per_unit: float) -> None:
+    """Styles the current ImGui context; fonts are rastered at the density of the framebuffer."""
+    io = imgui.get_io()
+    size = round(FONT_SIZE * ui_scale * pixels_per_unit)
+    io.fonts.add_font_from_file_ttf(str(FONT), size, glyph_ranges_as_int_list=GLYPHS)
+    io.font_global_scale = 1 / pixels_per_unit
+
+    style = imgui.get_style()
+    imgui.style_colors_dark(style)
+    style.window_rounding = style.popup_rounding = 8
+    style.frame_rounding = style.grab_rounding = 4
+    style.window_border_size = 0
+    style.window_padding = imgui.ImVec2(14, 12)
+    style.frame_padding = imgui.ImVec2(8, 4)
+    style.item_spacing = imgui.ImVec2(8, 5)
+    style.cell_padding = imgui.ImVec2(4, 2)
+    style.grab_min_size = 12
+    style.scrollbar_size = 10
+    for where, (rgb, alpha) in _colors().items():
+        style.set_color_(where, imgui.ImVec4(*rgb, alpha))
+    style.scale_all_sizes(ui_scale)
+
+
+def _colors() -> dict:
+    """ImGui colour slot -> (rgb, alpha)."""
+    col = imgui.Col_
+    return {
+        col.text: (TEXT, 1),
+        col.text_disabled: (MUTED, 1),
+        col.window_bg: (SURFACE, 0.90),
+        col.popup_bg: (SURFACE, 0.98),
+        col.frame_bg: (RAISED, 1),
+        col.frame_bg_hovered: ((0.22, 0.225, 0.24), 1),
+        col.frame_bg_active: ((0.25, 0.255, 0.27), 1),
+        col.button: (RAISED, 1),
+        col.button_hovered: ((0.26, 0.265, 0.28), 1),
+        col.button_active: ((0.32, 0.325, 0.34), 1),
+        col.header: (SURFACE, 0),
+        col.header_hovered: (RAISED, 1),
+        col.header_active: (RAISED, 1),
+        col.slider_grab: (ACCENT, 0.9),
+        col.slider_grab_active: (ACCENT, 1),
+        col.check_mark: (ACCENT, 1),
+        col.plot_histogram: (ACCENT, 0.75),
+        col.separator: (TRACK, 0.5),
+        col.title_bg_active: (RAISED, 1),
+        col.modal_window_dim_bg: ((0, 0, 0), 0.45),
+    }
