@@ -121,7 +121,7 @@ def turn_upright(up: object, where: str) -> np.ndarray:
     if y < -1 + 1e-9:
         out[:3, :3] = np.diag([1.0, -1.0, -1.0])
     else:
-        cross = np.array([[0, x, 0], [-x, 0, -z], [0, z, 0]])  # [up x Y]_x
+        cross = np.array([[0, -x, 0], [x, 0, z], [0, -z, 0]])  # [up x Y]_x
         out[:3, :3] = np.eye(3) + cross + cross @ cross / (1 + y)
     return out
 
