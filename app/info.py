@@ -1,0 +1,50 @@
+"""launch.py info: what is in a scene."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Options:
+    """Say what is in a scene."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A package, a .ply, a .splat or a folder of PLY layers."""
+    json: bool = False
+    """JSON on standard output instead of a table."""
+    mode: str = "cumulative"
+    """How a folder of layers adds up: cumulative or exclusive."""
+
+
+def run(options: Options) -> int:
+    from runtime_models.read_scene import describe, read_model
+
+    facts = describe(read_model(options.scene, options.mode), options.scene)
+    if options.json:
+        print(json.dumps(facts, indent=1, ensure_ascii=False))
+    else:
+        print_table(facts)
+    return 0
+
+
+def print_table(facts: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(show_header=False)
+    for key, value in facts.items():
+        if key == "stops":
+            value = "\n".join(f"{s['x']:.3f}  {s['name']} ({s['kind']})" for s in value)
+        elif key == "heads":
+            value = "\n".join(
+                f"{name}: {' → '.join(map(str, head['layers']))}, {head['activation']}"
+                for name, head in value.items()
+            )
+        elif isinstance(value, int) and not isinstance(value, bool):
+            value = f"{value:,}"
+        table.add_row(key, "" if value is None else str(value))
+    Console().print(table)

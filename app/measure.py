@@ -1,0 +1,147 @@
+"""Measures a renderer: frame times on an orbit, mono and stereo in turns, an x sweep, the error."""
+
+import os
+import platform
+import time
+from importlib.metadata import version
+
+import numpy as np
+
+from renderer.reference import reference_image
+from renderer.renderer import Renderer
+from scene.framing import default_view, frame_points, model_points, orbit_path
+from scene.scene import Scene, SceneObject
+from scene.stereo import stereo_pair
+
+WARM_UP = 3  # frames that do not count: first use compiles and allocates
+EYE_DISTANCE = 0.064  # of a person, metres; scaled with the scene below
+QUALITY_VIEWS = 3
+DRAW_PASSES = ("bin", "splat")  # what puts pixels on the screen; the rest prepares it
+PERCENTILES = (50, 95, 99)
+
+
+class Measure:
+    """One scene at one size in one renderer."""
+
+    def __init__(self, renderer: Renderer, ctx, model, x: float, size: tuple[int, int]) -> None:
+        self.renderer, self.ctx, self.model, self.x, self.size = renderer, ctx, model, x, size
+        self.centre, self.radius = frame_points(*model_points(model))
+
+    def scene(self, x: float) -> Scene:
+        return Scene((SceneObject("scene", self.model, x=x),))
+
+    def all(self, frames: int, sweep: int, quality_size: tuple[int, int]) -> dict:
+        """The rows that `launch.py bench` prints and writes."""
+        mono, stereo, passes, stats = self.orbit(frames)
+        drawing = sum(passes[name]["p50"] for name in DRAW_PASSES if name in passes)
+        errors = self.errors(quality_size)
+        return {
+            "gl_renderer": gl_renderer(self.ctx),
+            "frame_ms": percentiles(mono),
+            "passes": passes,
+            "stereo_over_mono": float(np.median(stereo) / np.median(mono)),
+            "psnr_db": min(errors),
+            "sweep_worst_ms": max(self.sweep(sweep)),
+            "splats": self.model.splat_count,
+            "drawn": stats.drawn,
+            "culled": stats.culled,
+            "frame_over_draw": float(np.median(mono) / drawing) if drawing else None,
+            "x": self.x,
+            "size": f"{self.size[0]}x{self.size[1]}",
+            "quality_size": f"{quality_size[0]}x{quality_size[1]}",
+            "quality_images": len(errors),
+            "frames": frames,
+            "warm_up": WARM_UP,
+            "backends": self.renderer.backends,
+            "machine": machine(),
+        }
+
+    def orbit(self, frames: int) -> tuple[list[float], list[float], dict, object]:
+        """ms of mono and stereo frames, drawn in turns so that other load meets both alike."""
+        self.renderer.update(self.scene(self.x))
+        count = frames + WARM_UP
+        path = (count, self.centre, self.radius, self.size)
+        views = orbit_path(*path)
+        # Half a step further on, so that neither finds the colours of the other's eye ready.
+        between = orbit_path(*path, start=np.pi / count)
+        distance = EYE_DISTANCE * self.radius / 2  # a model of 2 m radius is seen by a person
+        mono, stereo, passes = [], [], {}
+        for i, (view, other) in enumerate(zip(views, between, strict=True)):
+            both, _ = self.timed(stereo_pair(other, distance))
+            one, stats = self.timed([view])
+            if i < WARM_UP:
+                continue
+            mono.append(one)
+            stereo.append(both)
+            for name, ms in stats.ms.items():
+                passes.setdefault(name, []).append(ms)
+        return mono, stereo, {name: percentiles(ms) for name, ms in passes.items()}, stats
+
+    def timed(self, views: list) -> tuple[float, object]:
+        """ms until the pixels are there, which for GL means until the driver has finished."""
+        start = time.perf_counter()
+        stats = self.renderer.draw(views)
+        if self.ctx is not None:
+            self.ctx.finish()
+        return (time.perf_counter() - start) * 1e3, stats
+
+    def sweep(self, count: int) -> list[float]:
+        """ms of each frame while x goes from 0 to 1; every frame runs all five networks."""
+        view = default_view(self.model, self.size)
+        times = []
+        for i, x in enumerate([0.0] * WARM_UP + np.linspace(0, 1, count).tolist()):
+            start = time.perf_counter()
+            self.renderer.update(self.scene(x))
+            self.timed([view])
+            if i >= WARM_UP:
+                times.append((time.perf_counter() - start) * 1e3)
+        return times
+
+    def errors(self, size: tuple[int, int]) -> list[float]:
+        """PSNR in dB of small images against the float64 reference, at the same settings."""
+        psnrs = []
+        self.renderer.update(self.scene(self.x))
+        for view in orbit_path(QUALITY_VIEWS, self.centre, self.radius, size):
+            self.renderer.draw([view])
+            want = reference_image(self.scene(self.x), view, self.renderer.settings)
+            error = np.mean((self.renderer.image(0).astype(np.float64) - want) ** 2)
+            psnrs.append(float(-10 * np.log10(max(error, 1e-20))))
+        return psnrs
+
+
+def percentiles(values: list[float]) -> dict[str, float]:
+    return {f"p{p}": float(np.percentile(values, p)) for p in PERCENTILES}
+
+
+def gl_renderer(ctx) -> str:
+    from renderer.context import describe
+
+    return describe(ctx)["gl_renderer"] if ctx is not None else "none (OpenCL tiles)"
+
+
+def machine() -> dict[str, object]:
+    """What a reader needs in order to compare: processor, drivers, versions."""
+    from rasterizer.device import NoDevice, open_device
+
+    try:
+        device = open_device()
+        opencl = f"{device.platform}: {device.name}"
+    except NoDevice:
+        opencl = "none"
+    return {
+        "processor": processor(),
+        "cores": os.cpu_count(),
+        "system": platform.platform(terse=True),
+        "python": platform.python_version(),
+        "opencl": opencl,
+        **{name: version(name) for name in ("numpy", "moderngl", "onnxruntime", "pyopencl")},
+    }
+
+
+def processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.split(":", 1)[1].strip() for line in file if "model name" in line]
+    except OSError:
+        names = []
+    return names[0] if names else platform.processor()

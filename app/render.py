@@ -1,0 +1,96 @@
+"""launch.py render: a scene into PNG files, without a window."""
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Options:
+    """Draw a scene into PNG files."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A package, a .ply, a .splat or a folder of PLY layers."""
+    out: Path
+    """Folder for the pictures."""
+    x: tuple[str, ...] = ("0",)
+    """Control values in 0..1, or sweep:N."""
+    camera: str = "orbit"
+    """orbit, front, or a file: our list of cameras, transforms.json, cameras.json or COLMAP."""
+    frames: int = 1
+    """Pictures on the orbit (per control value); a camera file gives its own number."""
+    size: str = ""
+    """WIDTHxHEIGHT in pixels; default 640x360, or what the camera file says."""
+    stereo: float = 0.0
+    """Distance of two eyes in metres; above 0 each picture holds both, side by side."""
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Display sRGB, 0 to 1."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Drawing back end: GL quads or OpenCL tiles."""
+    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
+    """Where GL comes from."""
+    mode: Literal["cumulative", "exclusive"] = "cumulative"
+    """How a folder of layers adds up."""
+    overwrite: bool = False
+    """Replace pictures of the same name."""
+
+
+def run(options: Options) -> int:
+    from app.errors import UsageError
+    from app.headless_drawing import make_folder, open_renderer, parse_controls, parse_size
+    from runtime_models.read_scene import read_model
+
+    controls = parse_controls(options.x)
+    size = parse_size(options.size) if options.size else None
+    if options.frames < 1:
+        raise UsageError(f"--frames is {options.frames}, expected at least 1.")
+    if not all(0 <= c <= 1 for c in options.background):
+        raise UsageError(f"--background is {options.background}, expected three values in 0..1.")
+    if not 0 <= options.stereo < 1:
+        raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
+    model = read_model(options.scene, options.mode)
+    views = choose_views(options, model, size)
+    pairs = [(x, view) for x in controls for view in views]
+    paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
+    taken = [p for p in paths if p.exists()]
+    if taken and not options.overwrite:
+        raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
+    make_folder(options.out)
+    with open_renderer(options.context, options.drawing) as (renderer, _):
+        renderer.settings = replace(renderer.settings, background=options.background)
+        draw_all(renderer, model, pairs, paths, options.stereo)
+    print(f"{len(paths)} pictures in {options.out}", file=sys.stderr)
+    return 0
+
+
+def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
+    from scene.framing import default_view, frame_points, model_points, orbit_path
+    from scene.read_cameras import read_cameras
+
+    if options.camera == "front" or (options.camera == "orbit" and options.frames == 1):
+        return [default_view(model, size or (640, 360))]
+    if options.camera == "orbit":
+        centre, radius = frame_points(*model_points(model))
+        return orbit_path(options.frames, centre, radius, size or (640, 360))
+    return read_cameras(options.camera, size)
+
+
+def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: float) -> None:
+    import numpy as np
+    from rich.console import Console
+    from rich.progress import track
+
+    from app.headless_drawing import save_png
+    from scene.scene import Scene, SceneObject
+    from scene.stereo import stereo_pair
+
+    console = Console(stderr=True)
+    work = list(zip(pairs, paths, strict=True))
+    for (x, view), path in track(work, "drawing", console=console, transient=True):
+        renderer.update(Scene((SceneObject("scene", model, x=x),)))
+        views = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
+        renderer.draw(views)
+        save_png(np.concatenate([renderer.resolved(i) for i in range(len(views))], axis=1), path)
