@@ -1,5 +1,7 @@
 """Palettes of thermal stops, and how much of a palette the control value asks for."""
 
+from functools import cache
+
 import numpy as np
 
 from runtime_models.model import BadFile, Stop
@@ -33,12 +35,15 @@ TURBO = (
 )
 
 
+@cache
 def palette_colors(name: str) -> np.ndarray:
-    """(256, 3) float32 display sRGB of a palette; BadFile for a name that there is not."""
+    """(256, 3) float32 display sRGB of a palette, read only; BadFile for an unknown name."""
     if name not in PALETTES:
         known = ", ".join(PALETTES)
         raise BadFile(f"there is no palette {name!r}; a thermal stop may name one of: {known}.")
-    return PALETTES[name]().astype(np.float32)
+    colors = PALETTES[name]().astype(np.float32)
+    colors.flags.writeable = False
+    return colors
 
 
 def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:

@@ -6,7 +6,9 @@ import moderngl
 import numpy as np
 
 from renderer.context import is_software
-from renderer.palette import apply_palette, thermal_blend
+from renderer.gpu import Gpu
+from renderer.palette import apply_palette, palette_colors, thermal_blend
+from renderer.resolve import Resolve
 from renderer.settings import FrameStats, RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.model import AnchorModel, SplatLayers
@@ -45,7 +47,8 @@ class Renderer:
     ) -> None:
         drawing, mlps, sort = _choose(ctx, drawing, mlps, sort)
         self.settings = RenderSettings()
-        self._ctx = ctx
+        self._gpu = Gpu(ctx) if ctx is not None else None
+        self._resolve = Resolve(self._gpu) if ctx is not None else None
         if drawing == "tiles":
             from renderer.tiles import TilesDrawing  # needs OpenCL, which quads do without
 
@@ -53,13 +56,12 @@ class Renderer:
         else:
             from renderer.quads import QuadsDrawing
 
-            self._drawing = QuadsDrawing(ctx, mlps, sort, target)
+            self._drawing = QuadsDrawing(self._gpu, mlps, sort, target)
         self._timer = PassTimer(ctx if drawing == "quads" else None)
         self._scene = Scene(())
         self._decoded: list[_Decoded] = []
         self._drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
-        self._resolve = None
 
     @property
     def backends(self) -> dict[str, str]:
@@ -94,19 +96,20 @@ class Renderer:
         """Draws every view; with `target` (one framebuffer a view) presents them there as well.
 
         Colours are computed once a frame, for the centre of the views' eyes, and only when it
-        moved.  Counts of splats in the result are those of the first view.
+        moved.  Counts of splats in the result are those of the last view.
         """
         self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
-        counts = [self._drawing.draw(i, v, self.settings, self._timer) for i, v in enumerate(views)]
+        for i, view in enumerate(views):
+            self._drawing.draw(i, view, self.settings, self._timer)
         if target is not None:
-            targets = target if isinstance(target, list) else [target]
             with self._timer.time("resolve"):
-                for i, framebuffer in enumerate(targets[: len(views)]):
+                for i, framebuffer in enumerate(target if isinstance(target, list) else [target]):
                     self.present(framebuffer, i)
-        drawn = counts[0].pop("drawn")
+        culled = self._drawing.counts()
+        drawn = culled.pop("drawn")
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
-        return FrameStats(self._timer.take(), self._scene.splat_count, drawn, counts[0], *runs)
+        return FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
 
     def _decode_colors(self, eye_world: np.ndarray) -> None:
         """Runs the colour of the visible objects towards which the eye (3,) has moved."""
@@ -136,11 +139,17 @@ class Renderer:
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
         """Fills a GL framebuffer with view i as resolved() shows it."""
-        raise RuntimeError
+        name, weight, _ = thermal_blend(self._scene)
+        palette = palette_colors(name) if name else None
+        image = self._drawing.presentable(i)
+        self._resolve.draw(image, framebuffer, self.settings.background, palette, weight)
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
         self._drawing.close()
+        for part in (self._resolve, self._gpu):
+            if part is not None:
+                part.release()
 
     def __enter__(self) -> "Renderer":
         return self

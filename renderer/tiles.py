@@ -10,7 +10,7 @@ import numpy as np
 from rasterizer.bin import bin_tiles
 from rasterizer.device import Device, open_device
 from rasterizer.pack import pack
-from rasterizer.project import Camera, project_arena
+from rasterizer.project import CULL_REASONS, Camera, project_arena
 from rasterizer.raster import rasterize_rgba
 from rasterizer.shade_sh import shade_sh, upload_sh
 from renderer.settings import RenderSettings
@@ -90,14 +90,14 @@ class TilesDrawing:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
         self._world_from_objects = np.reshape(world_from_objects, (-1, 4, 4))
 
-    def draw(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> dict:
-        """Draws view number i.  Returns {drawn, opacity, size, distance, frustum}: splat counts."""
+    def draw(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
+        """Draws view number i."""
         if not self.splats:
             self._images[i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
-            return {"drawn": 0}
+            return
         device = self.device
         with timer.time("project", on_gpu=False):
-            projected = project_arena(
+            self._projected = project_arena(
                 device,
                 self._mean_opacity,
                 self._covariance,
@@ -112,12 +112,21 @@ class TilesDrawing:
             )
             device.queue.finish()
         with timer.time("bin", on_gpu=False):
-            tiles = bin_tiles(device, projected, view.size)
+            tiles = bin_tiles(device, self._projected, view.size)
             device.queue.finish()
         with timer.time("splat", on_gpu=False):
-            self._images[i] = rasterize_rgba(device, projected, tiles, view.size)
-        culled = projected.culled(device)
+            self._images[i] = rasterize_rgba(device, self._projected, tiles, view.size)
+
+    def counts(self) -> dict[str, int]:
+        """{drawn, opacity, size, distance, frustum} of the view drawn last."""
+        if not self.splats:
+            return dict.fromkeys(("drawn", *CULL_REASONS), 0)
+        culled = self._projected.culled(self.device)
         return {"drawn": self.splats - sum(culled.values()), **culled}
+
+    def presentable(self, i: int) -> np.ndarray:
+        """What resolve takes: the image, row 0 on top."""
+        return self._images[i]
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
