@@ -610,7 +610,7 @@ def test_plush_points_fall_on_pixels_of_their_own_colour():
         seen = ahead & ((at >= 8) & (at < np.array(photo.view.size) - 8)).all(1)
 
         def misfit(dx: int, dy: int, rgb=rgb, at=at[seen], seen=seen) -> float:
-            x, y = (at + (dx, dy)).astype(int).T
+            x, y = np.add(at, (dx, dy)).astype(int).T
             return float(np.abs(rgb[y, x] - colors[seen]).mean())
 
         aside = [misfit(*d) for d in ((4, 0), (-4, 0), (0, 4), (0, -4))]
