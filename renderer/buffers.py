@@ -1,0 +1,146 @@
+"""The GPU copy of a scene: one arena for all objects, so that one sort is right.
+
+The life of the passes, in the order of the calls:
+
+    gpu = Gpu(ctx)                                   # renderer/gpu.py
+    projector, splatter = Projector(gpu), Splatter(gpu, "rgba16f")
+    sorter, resolve = Sorter(gpu, "gl" or "numpy"), Resolve(gpu)
+    arena = Arena(gpu, [m.splat_count for m in models])     # again when the composition changes
+    decoder = Decoder(gpu, arena, models, "gl" or "onnxruntime")
+    decoder.geometry(i, x)                           # when the control value of object i changed
+    decoder.color(i, x, eye_object)                  # then, and when the eye moved
+    arena.place(world_from_objects)                  # (4, 4) each, NaN hides; any time
+    for i, view in enumerate(views):
+        projector.project(arena, view, settings)
+        sorter.sort(arena, settings.key_bits)
+        splatter.draw(arena, i, view.size, settings.min_alpha)
+        projector.counts(arena)                      # waits for the GPU: {drawn, opacity, ...}
+    resolve.draw(splatter.texture(i), framebuffer, background, palette, weight)
+    splatter.image(i)                                # (H, W, 4) float32
+
+Every class has release() and works with `with`; nothing is allocated after the constructors
+(Splatter: after the first frame of a size).
+"""
+
+import moderngl
+import numpy as np
+
+from renderer import layout
+from renderer.gpu import Gpu, TooLarge, groups_for
+
+STAGED_SPLATS = 1 << 20  # decoded at a time; bounds the staging buffer to 46 MB
+STAGED_FLOATS = 11  # mean or offset 3, scale 3, rotation 4, opacity 1
+PARTS = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1}
+
+
+def bind(**buffers: moderngl.Buffer) -> None:
+    """Binds storage buffers by the names of layout.SLOTS, in lower case."""
+    for name, buffer in buffers.items():
+        buffer.bind_to_storage_buffer(layout.SLOTS[name.upper()])
+
+
+def fitting_splats(gpu: Gpu) -> int:
+    """How many splats an arena may have on this driver."""
+    return min(gpu.max_block // (16 * layout.RECORD_VECS), gpu.max_groups * layout.WORKGROUP)
+
+
+class Arena:
+    """The splats of all objects, and what a frame makes of them."""
+
+    def __init__(self, gpu: Gpu, counts: list[int]) -> None:
+        self.count = sum(counts)
+        if not self.count <= fitting_splats(gpu):
+            raise TooLarge(
+                f"the scene has {self.count:,} splats and this driver draws "
+                f"{fitting_splats(gpu):,} at most (GL_MAX_SHADER_STORAGE_BLOCK_SIZE is "
+                f"{gpu.max_block:,} bytes); leave objects out, or use a driver with larger blocks."
+            )
+        self.gpu = gpu
+        self.starts = [0, *np.cumsum(counts, dtype=int).tolist()]  # rows of object i: [i], [i + 1]
+        n = self.count
+        self.mean_opacity = gpu.reserve(16 * n)
+        self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * n)
+        self.color = gpu.reserve(16 * n)
+        self.object = gpu.upload(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
+        self.poses = gpu.reserve(16 * layout.POSE_ROWS * len(counts))
+        self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
+        self.keys, self.keys_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
+        self.order, self.order_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
+        sort_groups = groups_for(n, layout.WORKGROUP * layout.SORT_BLOCKS)
+        self.histogram = gpu.reserve(4 * layout.RADIX * sort_groups)
+        self.counts = gpu.reserve(4 * layout.COUNTS_SIZE)
+        self.command = gpu.upload(np.array([0, 1, 0, 0, 0], np.uint32))
+        corners = np.array([0, 1, 2, 2, 1, 3], np.uint32)
+        quads = np.arange(n, dtype=np.uint32)[:, None] * 4 + corners  # (N, 6)
+        self.quads = gpu.ctx.buffer(quads if n else corners)  # an index buffer: no block limit
+        gpu.allocations += 1
+        self.staged = min(max(counts, default=0), STAGED_SPLATS)
+        self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
+        self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
+        self._pack = gpu.compute("pack.comp")
+
+    def place(self, world_from_objects: list[np.ndarray] | np.ndarray) -> None:
+        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+        self.world_from_object[:] = world_from_objects
+
+    def staging_at(self, part: str) -> int:
+        """The float of the staging buffer where a part ("offset", "scale", ...) begins."""
+        before = list(PARTS)[: list(PARTS).index(part)]
+        return sum(PARTS[name] for name in before) * self.staged
+
+    def pack_staged(
+        self, start: int, count: int, anchors: moderngl.Buffer | None = None, first: int = 0
+    ) -> None:
+        """Turns `count` staged splats into rows start... of the arena: R S S^T R^T (paper eq. 1).
+
+        With `anchors` (vec4 each; w = splats an anchor) staged means are offsets to be added to
+        them; `first` is the anchor of the first staged splat.
+        """
+        if not count:
+            return
+        bind(mean_opacity=self.mean_opacity, covariance=self.covariance, staging=self.staging)
+        bind(anchors=anchors or self.staging)
+        groups = groups_for(count, layout.WORKGROUP)
+        sizes = {"count": count, "start": start, "capacity": self.staged, "first_anchor": first}
+        self.gpu.run(self._pack, groups, **sizes, is_offset=anchors is not None)
+
+    def write_geometry(
+        self, i: int, means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
+    ) -> None:
+        """Uploads object i as an Evaluator gives it: (n, 3) m, (n, 3) m, (n, 4), (n,)."""
+        start, end = self._rows(i, means, "means")
+        for first in range(start, end, max(self.staged, 1)):
+            part = slice(first - start, min(first - start + self.staged, end - start))
+            arrays = (means[part], scales[part], wxyz[part], opacity[part])
+            for name, array in zip(PARTS, arrays, strict=True):
+                rows = np.ascontiguousarray(array, np.float32)
+                self.staging.write(rows, offset=4 * self.staging_at(name))
+            self.pack_staged(first, part.stop - part.start)
+
+    def write_color(self, i: int, color: np.ndarray) -> None:
+        """Uploads the colours (n, 3) of object i."""
+        start, end = self._rows(i, color, "colours")
+        rows = np.zeros((end - start, 4), np.float32)
+        rows[:, :3] = color
+        if end > start:
+            self.color.write(rows, offset=16 * start)
+
+    def _rows(self, i: int, array: np.ndarray, what: str) -> tuple[int, int]:
+        start, end = self.starts[i], self.starts[i + 1]
+        if len(array) != end - start:
+            raise ValueError(f"object {i} has {end - start} splats, but {len(array)} {what} came.")
+        return start, end
+
+    def release(self) -> None:
+        for buffer in (
+            self.mean_opacity, self.covariance, self.color, self.object, self.poses, self.records,
+            self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
+            self.command, self.quads, self.staging,
+        ):  # fmt: skip
+            buffer.release()
+
+    def __enter__(self) -> "Arena":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()

@@ -1,0 +1,71 @@
+"""decode: models -> splats in the arena; geometry on control change, colour on view change."""
+
+import numpy as np
+
+from renderer.buffers import Arena
+from renderer.gpu import Gpu
+from renderer.layers import Layers
+from renderer.networks import Networks
+from runtime_models.evaluate import Evaluator
+from runtime_models.model import AnchorModel, SplatLayers
+
+MLPS = ("gl", "onnxruntime")
+
+
+class Decoder:
+    """Decodes the objects of one arena.  Objects with the same model share what lies on the GPU.
+
+    mlps "gl": networks run in compute passes; "onnxruntime": on the CPU, then uploaded (ten times
+    faster where GL is software).  Plain splats are decoded by GL with either.
+    """
+
+    def __init__(
+        self, gpu: Gpu, arena: Arena, models: list[AnchorModel | SplatLayers], mlps: str = "gl"
+    ) -> None:
+        if mlps not in MLPS:
+            raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
+        self._arena = arena
+        made: dict[int, Layers | Networks | Evaluator] = {}
+        for model in models:
+            if id(model) in made:
+                continue
+            if isinstance(model, SplatLayers):
+                made[id(model)] = Layers(gpu, model)
+            elif mlps == "gl":
+                made[id(model)] = Networks(gpu, model)
+            else:
+                made[id(model)] = Evaluator(model)
+        self._models = [made[id(model)] for model in models]
+        for i, on_gpu in enumerate(self._models):
+            if isinstance(on_gpu, Layers):
+                on_gpu.place(arena, i)
+
+    def geometry(self, i: int, x: float) -> None:
+        """Means, covariances and opacities of object i at control value x."""
+        model, arena = self._models[i], self._arena
+        if isinstance(model, Evaluator):
+            arena.write_geometry(i, *model.geometry(x))
+        else:
+            model.geometry(arena, arena.starts[i], x)
+
+    def color(self, i: int, x: float, eye: np.ndarray) -> None:
+        """Colours of object i at x towards an eye (3,) in the object's frame; after geometry."""
+        model, arena = self._models[i], self._arena
+        if isinstance(model, Evaluator):
+            arena.write_color(i, model.color(x, eye))
+        elif isinstance(model, Layers):
+            model.color(arena, arena.starts[i], eye)
+        else:
+            model.color(arena, arena.starts[i], x, eye)
+
+    def release(self) -> None:
+        for model in self._models:
+            if not isinstance(model, Evaluator):
+                model.release()
+        self._models.clear()
+
+    def __enter__(self) -> "Decoder":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()

@@ -1,0 +1,88 @@
+"""One GL context with what the passes share: its limits, its programs, a count of allocations."""
+
+import moderngl
+import numpy as np
+
+from renderer import shader
+from runtime_models.model import BadFile
+
+LARGEST_INT = 2**31 - 1  # a driver that says more, or less than nothing, has no such limit
+
+
+class TooLarge(BadFile):
+    """A scene does not fit the driver's buffers.  The message says which limit and what fits."""
+
+
+class Gpu:
+    """Makes buffers and programs.  `allocations` counts every buffer and texture ever made."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self.ctx = ctx
+        self.allocations = 0
+        told = ctx.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
+        self.max_block = told if 0 < told <= LARGEST_INT else LARGEST_INT  # bytes
+        self.max_groups = ctx.info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]
+        self.max_uniforms = ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]  # bytes
+        self._programs: dict[tuple, moderngl.ComputeShader | moderngl.Program] = {}
+
+    def reserve(self, size: int, what: str = "buffer") -> moderngl.Buffer:
+        """A buffer of `size` bytes (at least one uint), zeroed; TooLarge names `what`."""
+        if size > self.max_block:
+            raise TooLarge(
+                f"{what} needs {size:,} bytes; this driver's storage blocks hold "
+                f"{self.max_block:,} (GL_MAX_SHADER_STORAGE_BLOCK_SIZE)."
+            )
+        self.allocations += 1
+        buffer = self.ctx.buffer(reserve=max(size, 4))
+        buffer.clear()
+        return buffer
+
+    def upload(self, array: np.ndarray, what: str = "buffer") -> moderngl.Buffer:
+        """A buffer with the bytes of an array."""
+        array = np.ascontiguousarray(array)
+        buffer = self.reserve(array.nbytes, what)
+        if array.nbytes:
+            buffer.write(array)
+        return buffer
+
+    def target(self, size: tuple[int, int], dtype: str) -> moderngl.Framebuffer:
+        """A framebuffer with one RGBA texture; dtype "f2" or "f4"."""
+        self.allocations += 1
+        return self.ctx.framebuffer([self.ctx.texture(size, 4, dtype=dtype)])
+
+    def compute(self, name: str, **defines: object) -> moderngl.ComputeShader:
+        """The program of a .comp file, compiled once for the same defines."""
+        key = (name, *sorted(defines.items()))
+        if key not in self._programs:
+            self._programs[key] = shader.compile_compute(self.ctx, name, **defines)
+        return self._programs[key]
+
+    def program(self, vertex: str, fragment: str) -> moderngl.Program:
+        """The program of two stages, compiled once."""
+        key = (vertex, fragment)
+        if key not in self._programs:
+            self._programs[key] = shader.compile_program(self.ctx, vertex, fragment)
+        return self._programs[key]
+
+    def run(self, program: moderngl.ComputeShader, groups: int, **uniforms: object) -> None:
+        """Sets uniforms and runs the groups; what they write is seen by all that follows."""
+        for name, value in uniforms.items():
+            program[name].value = value
+        program.run(groups)
+        self.ctx.memory_barrier()
+
+    def release(self) -> None:
+        for program in self._programs.values():
+            program.release()
+        self._programs.clear()
+
+    def __enter__(self) -> "Gpu":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()
+
+
+def groups_for(count: int, size: int) -> int:
+    """Work groups of `size` invocations that cover `count`."""
+    return -(-count // size)

@@ -1,0 +1,63 @@
+"""SplatLayers on the GPU: opacity weighed by x, harmonics to colour; no CPU work a view."""
+
+import numpy as np
+
+from renderer import layout
+from renderer.buffers import Arena, bind
+from renderer.gpu import Gpu, groups_for
+from runtime_models.model import SplatLayers
+
+SH_ALIGN = 64  # splats; keeps parts of the coefficients to whole work groups
+
+
+class Layers:
+    """One model's coefficients, opacities and layers; the rest lies in the arena."""
+
+    def __init__(self, gpu: Gpu, model: SplatLayers) -> None:
+        self._gpu, self._model = gpu, model
+        self._weigh = gpu.compute("weigh.comp")
+        self._shade = gpu.compute("shade_sh.comp")
+        count, coefficients, _ = model.sh.shape
+        self._coefficients = coefficients
+        self._opacity = gpu.upload(np.asarray(model.opacity, np.float32))
+        self._layer = gpu.upload(np.asarray(model.layer, np.uint32))
+        self._weights = gpu.reserve(4 * len(model.stops))
+        # Coefficients of many splats pass the driver's block limit: in parts, each (M * 3, n), so
+        # that neighbouring invocations read neighbouring floats.
+        fit = max(gpu.max_block // (12 * coefficients) // SH_ALIGN * SH_ALIGN, SH_ALIGN)
+        self._parts = []  # (first splat, splats, buffer)
+        for first in range(0, count, fit):
+            rows = np.asarray(model.sh[first : first + fit], np.float32)
+            buffer = gpu.upload(rows.reshape(len(rows), -1).T, "spherical harmonics")
+            self._parts.append((first, len(rows), buffer))
+
+    def place(self, arena: Arena, i: int) -> None:
+        """Means and covariances of object i, which never change."""
+        model = self._model
+        arena.write_geometry(i, model.means, model.scales, model.wxyz, model.opacity)
+
+    def geometry(self, arena: Arena, start: int, x: float) -> None:
+        """Opacities of the layers that there are at x -> rows start... of the arena."""
+        count = self._model.splat_count
+        self._weights.write(self._model.weights(x))
+        bind(mean_opacity=arena.mean_opacity, layer=self._layer)
+        bind(layer_weights=self._weights, own_opacity=self._opacity)
+        groups = groups_for(count, layout.WORKGROUP)
+        self._gpu.run(self._weigh, groups, count=count, start=start)
+
+    def color(self, arena: Arena, start: int, eye: np.ndarray) -> None:
+        """Colours towards an eye (3,) in the object's frame -> rows start... of the arena."""
+        self._shade["eye"].value = tuple(float(v) for v in eye)
+        bind(mean_opacity=arena.mean_opacity, color=arena.color)
+        for first, count, coefficients in self._parts:
+            bind(sh=coefficients)
+            self._gpu.run(
+                self._shade, groups_for(count, layout.WORKGROUP),
+                count=count, start=start + first, coefficients=self._coefficients,
+            )  # fmt: skip
+
+    def release(self) -> None:
+        for buffer in (self._opacity, self._layer, self._weights):
+            buffer.release()
+        for _, _, buffer in self._parts:
+            buffer.release()

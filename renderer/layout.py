@@ -1,0 +1,72 @@
+"""Every number that Python and GLSL share: slots, work groups, limits; GLSL sees #defines."""
+
+WORKGROUP = 256  # invocations; the radix sort counts one 8-bit digit an invocation
+DECODE_WORKGROUP = 64  # the networks keep a whole layer a invocation: fewer fit on a GPU's unit
+SORT_BLOCKS = 16  # blocks of WORKGROUP keys that one group of the sort walks through
+RADIX = 256  # values of a digit
+CULLED_KEY = 0xFFFFFFFF  # sorts behind every depth
+
+RECORD_VECS = 2  # uvec4 a projected splat
+COVARIANCE_VECS = 2  # vec4 a splat: xx xy xz yy | yz zz 0 0
+POSE_ROWS = 3  # vec4 rows of eye_from_object
+
+MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
+JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the view the projection counts as flat
+HALF_MAX = 60000.0  # below 65504, where packHalf2x16 turns to infinity
+HUGE = 1e18  # stands for "no limit"; its square is still a float
+
+# Storage slots, below 8 because GL promises no more; each pass binds its own before it runs.
+SLOTS = {
+    # project
+    "MEAN_OPACITY": 0,  # vec4 (N,)      xyz metres in the object, w opacity
+    "COVARIANCE": 1,  # vec4 (N, 2)    m^2, in the object
+    "COLOR": 2,  # vec4 (N,)      display sRGB
+    "OBJECT": 3,  # uint (N,)      which pose
+    "POSES": 4,  # vec4 (O, 3)    rows of eye_from_object
+    "RECORDS": 5,  # uvec4 (N, 2)   screen ellipses
+    "KEYS": 6,  # uint (N,)      depth as float bits, or CULLED_KEY
+    "COUNTS": 7,  # uint (8,)      as COUNTS below
+    # sort
+    "KEYS_OUT": 0,
+    "ORDER_IN": 1,
+    "ORDER_OUT": 2,
+    "HISTOGRAM": 3,  # uint (groups, RADIX)
+    "COMMAND": 4,  # uint (5,)      one indexed indirect draw
+    # splat
+    "ORDER": 1,  # uint (N,)      indices, near to far
+    # decode
+    "ANCHORS": 2,  # vec4 (A,)      metres in the object
+    "FEATURES": 3,  # vec4 (A, F / 4)
+    "OUTPUT": 4,  # float          a head's numbers
+    "WEIGHTS": 5,  # vec4           of a head that does not fit a uniform block
+    "STAGING": 4,  # float          means or offsets, scales, rotations, opacities
+    "SH": 3,  # float (M * 3, n)
+    "LAYER": 4,  # uint (n,)      which layer a plain splat is of
+    "LAYER_WEIGHTS": 5,  # float          how much of each layer there is
+    "OWN_OPACITY": 6,  # float (n,)     before the weight
+}
+WEIGHTS_BLOCK = 0  # uniform block
+
+# Rows of the counts buffer.  The first gate that a splat fails counts it.
+COUNTS = {
+    "DRAWN": 0,
+    "OPACITY": 1,
+    "DISTANCE": 2,
+    "FRUSTUM": 3,
+    "SIZE": 4,
+    "NEAREST": 5,  # float bits of metres
+    "FARTHEST": 6,
+}
+COUNTS_SIZE = 8
+
+
+def defines() -> dict[str, int | float]:
+    """What every shader is compiled with."""
+    numbers = {
+        "WORKGROUP": WORKGROUP, "DECODE_WORKGROUP": DECODE_WORKGROUP, "SORT_BLOCKS": SORT_BLOCKS,
+        "RADIX": RADIX, "CULLED_KEY": f"{CULLED_KEY:#x}u", "MAX_ALPHA": MAX_ALPHA,
+        "JACOBIAN_MARGIN": JACOBIAN_MARGIN, "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK,
+    }  # fmt: skip
+    slots = {f"SLOT_{name}": slot for name, slot in SLOTS.items()}
+    counts = {f"COUNT_{name}": row for name, row in COUNTS.items()}
+    return numbers | slots | counts

@@ -1,0 +1,79 @@
+"""resolve: a float image over a background, palette applied, into any framebuffer."""
+
+import moderngl
+import numpy as np
+
+from renderer.gpu import Gpu
+
+STEPS = 256  # colours of a palette
+
+
+class Resolve:
+    """Shows images: GL textures of the splatter, or arrays from elsewhere."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._program = gpu.program("resolve.vert", "resolve.frag")
+        self._triangle = gpu.ctx.vertex_array(self._program, [])
+        self._palette = gpu.ctx.texture((STEPS, 1), 3, dtype="f4")
+        self._palette.repeat_x = False
+        self._palette_now: np.ndarray | None = None
+        self._uploaded: moderngl.Texture | None = None
+        gpu.allocations += 1
+
+    def draw(
+        self,
+        source: moderngl.Texture | np.ndarray,
+        framebuffer: moderngl.Framebuffer,
+        background: tuple[float, float, float],
+        palette: np.ndarray | None = None,
+        weight: float = 0.0,
+    ) -> None:
+        """Fills the framebuffer's viewport: palette applied, over the background.
+
+        source: premultiplied; a texture has row 0 at the bottom, an array (H, W, 4) on top.
+        palette: (256, 3) display sRGB; weight 0..1, 0 leaves the colours alone.
+        """
+        from_array = isinstance(source, np.ndarray)
+        texture = self._upload(source) if from_array else source
+        same_size = texture.size == tuple(framebuffer.viewport[2:])
+        texture.filter = (moderngl.NEAREST,) * 2 if same_size else (moderngl.LINEAR,) * 2
+        texture.repeat_x = texture.repeat_y = False
+        use_palette = palette is not None and weight > 0
+        if use_palette and palette is not self._palette_now:
+            self._palette.write(np.ascontiguousarray(palette, np.float32))
+            self._palette_now = palette
+        texture.use(0)
+        self._palette.use(1)
+        program = self._program
+        program["image"].value, program["palette"].value = 0, 1
+        program["weight"].value = weight if use_palette else 0.0
+        program["background"].value = tuple(background)
+        program["top_first"].value = from_array
+        framebuffer.use()
+        self._gpu.ctx.enable_only(moderngl.NOTHING)
+        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+
+    def _upload(self, image: np.ndarray) -> moderngl.Texture:
+        """The array as a texture; made anew only when the size changes."""
+        size = (image.shape[1], image.shape[0])
+        if self._uploaded is None or self._uploaded.size != size:
+            if self._uploaded is not None:
+                self._uploaded.release()
+            self._uploaded = self._gpu.ctx.texture(size, 4, dtype="f4")
+            self._gpu.allocations += 1
+        self._uploaded.write(np.ascontiguousarray(image, np.float32))
+        return self._uploaded
+
+    def release(self) -> None:
+        self._triangle.release()
+        self._palette.release()
+        if self._uploaded is not None:
+            self._uploaded.release()
+            self._uploaded = None
+
+    def __enter__(self) -> "Resolve":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()

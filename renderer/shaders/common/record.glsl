@@ -1,0 +1,30 @@
+// Reads:   nothing.
+// Defines: struct Ellipse; uvec4[2] pack_record(Ellipse); Ellipse unpack_record(uvec4, uvec4)
+// Units:   pixels from lower left; axes are one sigma; colour is display sRGB.
+// Halves carry axes and colour (0.05 %): docs of the splat test say what that costs in dB.
+
+struct Ellipse {
+    vec2 center;
+    vec2 major, minor;  // half axes, orthogonal
+    vec3 color;
+    float opacity;
+    float cut;  // sigmas to where alpha falls to the least that is drawn
+};
+
+uvec4[2] pack_record(Ellipse e) {
+    return uvec4[2](
+        uvec4(floatBitsToUint(e.center), packHalf2x16(e.major), packHalf2x16(e.minor)),
+        uvec4(packHalf2x16(e.color.rg), packHalf2x16(vec2(e.color.b, 0.0)),
+              floatBitsToUint(e.opacity), floatBitsToUint(e.cut)));
+}
+
+Ellipse unpack_record(uvec4 first, uvec4 second) {
+    Ellipse e;
+    e.center = uintBitsToFloat(first.xy);
+    e.major = unpackHalf2x16(first.z);
+    e.minor = unpackHalf2x16(first.w);
+    e.color = vec3(unpackHalf2x16(second.x), unpackHalf2x16(second.y).x);
+    e.opacity = uintBitsToFloat(second.z);
+    e.cut = uintBitsToFloat(second.w);
+    return e;
+}

@@ -1,0 +1,29 @@
+// sort_scan: digit counts of all groups -> where each group's first key of a digit goes.
+// One group, one invocation a digit: digits in order, within a digit groups in order.
+layout(local_size_x = RADIX) in;
+
+layout(std430, binding = SLOT_HISTOGRAM) buffer Histogram { uint histogram[]; };
+uniform uint group_count;
+
+shared uint totals[RADIX];
+
+void main() {
+    uint digit = gl_LocalInvocationID.x;
+    uint total = 0u;
+    for (uint group = 0u; group < group_count; group++) total += histogram[group * RADIX + digit];
+    totals[digit] = total;
+    barrier();
+    // Inclusive prefix sum (Hillis and Steele).
+    for (uint reach = 1u; reach < RADIX; reach <<= 1) {
+        uint before = digit >= reach ? totals[digit - reach] : 0u;
+        barrier();
+        totals[digit] += before;
+        barrier();
+    }
+    uint next = totals[digit] - total;
+    for (uint group = 0u; group < group_count; group++) {
+        uint here = histogram[group * RADIX + digit];
+        histogram[group * RADIX + digit] = next;
+        next += here;
+    }
+}

@@ -1,0 +1,87 @@
+"""splat: draws the sorted ellipses back to front into a float target, one a view."""
+
+import moderngl
+import numpy as np
+
+from renderer.buffers import Arena, bind
+from renderer.gpu import Gpu
+
+TARGETS = {"rgba16f": "f2", "rgba32f": "f4"}
+
+
+class Splatter:
+    """Owns the float images of the views; colour in them is premultiplied over nothing."""
+
+    def __init__(self, gpu: Gpu, target: str = "rgba16f") -> None:
+        if target not in TARGETS:
+            raise ValueError(f"there is no target {target!r}; choose {' or '.join(TARGETS)}.")
+        self._gpu = gpu
+        self._dtype = TARGETS[target]
+        self._program = gpu.program("splat.vert", "splat.frag")
+        self._targets: dict[int, moderngl.Framebuffer] = {}
+        self._quads: moderngl.VertexArray | None = None
+        self._quads_of: Arena | None = None
+
+    def draw(self, arena: Arena, i: int, size: tuple[int, int], min_alpha: float) -> None:
+        """Draws the arena as it was last projected and sorted, into the image of view i."""
+        target = self._target(i, size)
+        target.use()
+        target.clear(0.0, 0.0, 0.0, 0.0)
+        if not arena.count:
+            return
+        ctx = self._gpu.ctx
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_func = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+        bind(order=arena.order, records=arena.records, counts=arena.counts)
+        self._program["size"].value = size
+        self._program["min_alpha"].value = min_alpha
+        self._vertex_array(arena).render_indirect(arena.command, moderngl.TRIANGLES, count=1)
+
+    def texture(self, i: int) -> moderngl.Texture:
+        """The image of view i on the GPU, row 0 at the bottom."""
+        return self._targets[i].color_attachments[0]
+
+    def image(self, i: int) -> np.ndarray:
+        """(H, W, 4) float32 of view i, row 0 on top: the one place where GL's rows are turned."""
+        texture = self.texture(i)
+        width, height = texture.size
+        pixels = np.frombuffer(texture.read(), texture.dtype).reshape(height, width, 4)
+        return np.ascontiguousarray(pixels[::-1], np.float32)
+
+    def _target(self, i: int, size: tuple[int, int]) -> moderngl.Framebuffer:
+        target = self._targets.get(i)
+        if target is None or target.size != tuple(size):
+            if target is not None:
+                _release_target(target)
+            target = self._targets[i] = self._gpu.target(size, self._dtype)
+        return target
+
+    def _vertex_array(self, arena: Arena) -> moderngl.VertexArray:
+        """No attributes: an index buffer alone; the shader pulls what it draws from the arena."""
+        if self._quads_of is not arena:
+            if self._quads is not None:
+                self._quads.release()
+            self._quads = self._gpu.ctx.vertex_array(
+                self._program, [], index_buffer=arena.quads, index_element_size=4
+            )
+            self._quads_of = arena
+        return self._quads
+
+    def release(self) -> None:
+        for target in self._targets.values():
+            _release_target(target)
+        self._targets.clear()
+        if self._quads is not None:
+            self._quads.release()
+        self._quads = self._quads_of = None
+
+    def __enter__(self) -> "Splatter":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()
+
+
+def _release_target(target: moderngl.Framebuffer) -> None:
+    target.color_attachments[0].release()
+    target.release()
