@@ -57,7 +57,7 @@ class Renderer:
             from renderer.quads import QuadsDrawing
 
             self._drawing = QuadsDrawing(self._gpu, mlps, sort, target)
-        self._timer = PassTimer(ctx if drawing == "quads" else None)
+        self._timer = PassTimer(ctx)
         self._scene = Scene(())
         self._decoded: list[_Decoded] = []
         self._drawing.allocate([])

@@ -12,21 +12,23 @@ from renderer.context import is_software
 class PassTimer:
     """Collects milliseconds by pass name; a name timed twice in a frame (two eyes) is summed.
 
-    On a GPU the commands of a pass run later than Python issues them, so the driver's timer
-    queries count there and wait for the GPU when the frame's times are read; elsewhere wall time.
+    A GPU runs the commands of a pass after Python has issued them: the driver's timer queries
+    count there, and take() waits for them.  Software GL is finished after every pass, since its
+    threads would do the work of one pass in the time of the next; else it is wall time as it is.
     """
 
     def __init__(self, ctx: moderngl.Context | None) -> None:
-        self._ctx = ctx if ctx is not None and not is_software(ctx) else None
+        self._software = ctx if ctx is not None and is_software(ctx) else None
+        self._gpu = None if self._software else ctx
         self._unused: list[moderngl.Query] = []
         self._asked: list[tuple[str, moderngl.Query]] = []
         self._ms: dict[str, float] = {}
 
     @contextmanager
     def time(self, name: str, on_gpu: bool = True) -> Iterator[None]:
-        """Times the body as pass `name`; `on_gpu` is False for passes that issue no GL commands."""
-        if self._ctx is not None and on_gpu:
-            query = self._unused.pop() if self._unused else self._ctx.query(time=True)
+        """Times the body as pass `name`; `on_gpu` is False for passes whose work is the CPU's."""
+        if self._gpu is not None and on_gpu:
+            query = self._unused.pop() if self._unused else self._gpu.query(time=True)
             with query:
                 yield
             self._asked.append((name, query))
@@ -34,6 +36,8 @@ class PassTimer:
             return
         start = time.perf_counter()
         yield
+        if self._software is not None:
+            self._software.finish()
         self._add(name, (time.perf_counter() - start) * 1e3)
 
     def take(self) -> dict[str, float]:
