@@ -1,0 +1,66 @@
+"""Small random models that tests share."""
+
+import numpy as np
+
+from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp, Stop
+
+STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0, "thermal", "ironbow", (15.0, 95.0), "°C"))
+HEAD = {
+    "offset": ("tanh", None, 0.1),
+    "scale": ("exp", (-6.0, 3.0), 0.02),
+    "rotation": ("none", None, 1.0),
+    "opacity": ("tanh", None, 1.0),
+    "color": ("sigmoid", None, 1.0),
+}
+
+
+def make_random_model(
+    anchors: int = 100,
+    k: int = 5,
+    seed: int = 0,
+    features: int = 16,
+    hidden: tuple[int, ...] = (32,),
+    encoding: ControlEncoding | None = None,
+) -> AnchorModel:
+    """Anchors in the unit ball, weights of N(0, 0.3); every head as training exports it."""
+    rng = np.random.default_rng(seed)
+    encoding = encoding or ControlEncoding()
+    networks = {}
+    for name in HEADS:
+        inputs = ("feature", "direction", "control") if name == "color" else ("feature", "control")
+        first = features + encoding.d + (3 if name == "color" else 0)
+        widths = [first, *hidden, k * SIZE_PER_SPLAT[name]]
+        pairs = list(zip(widths, widths[1:], strict=False))  # noqa: RUF007
+        weights = [rng.normal(0, 0.3, (b, a)).astype(np.float32) for a, b in pairs]
+        biases = [rng.normal(0, 0.1, b).astype(np.float32) for _, b in pairs]
+        head, clip, gain = HEAD[name]
+        networks[name] = Mlp(tuple(weights), tuple(biases), head, inputs, clip, gain)
+    points = rng.normal(size=(anchors, 3))
+    points *= (rng.uniform(size=anchors) ** (1 / 3) / np.linalg.norm(points, axis=1))[:, None]
+    return AnchorModel(
+        points.astype(np.float32),
+        rng.normal(size=(anchors, features)).astype(np.float32),
+        networks,
+        k,
+        encoding,
+        STOPS,
+        {"seed": seed},
+    )
+
+
+def run_in_numpy(mlp: Mlp, rows: np.ndarray) -> np.ndarray:
+    """The slow twin of every way to run a network: (N, inputs) to (N, outputs) in float64."""
+    value = rows.astype(np.float64)
+    for i, (weight, bias) in enumerate(zip(mlp.weights, mlp.biases, strict=True)):
+        value = (np.maximum(value, 0) if i else value) @ weight.T.astype(np.float64) + bias
+    if mlp.clip is not None:
+        value = np.clip(value, *mlp.clip)
+    with np.errstate(over="ignore"):
+        head = {
+            "none": lambda z: z,
+            "tanh": np.tanh,
+            "sigmoid": lambda z: 1 / (1 + np.exp(-z)),
+            "softplus": lambda z: np.logaddexp(0, z),
+            "exp": np.exp,
+        }[mlp.head]
+    return mlp.gain * head(value)

@@ -1,0 +1,126 @@
+"""Evaluation by onnxruntime against a float64 twin, and the properties of the control encoding."""
+
+import numpy as np
+import pytest
+
+from runtime_models.evaluate import BATCH, Evaluator, directions, evaluate
+from runtime_models.model import SIZE_PER_SPLAT, ControlEncoding, SplatLayers, Stop
+from runtime_models.rotation import covariance, normalize, rotation_matrices
+from runtime_models.spherical_harmonics import C0, HALF_TURN_SIGNS, basis, shade
+from tests.models import make_random_model, run_in_numpy
+
+
+def twin(model, x, eye):
+    """The whole evaluation in float64 numpy, straight from the paper's section 3.2."""
+    count, k = len(model.anchors), model.splats_per_anchor
+    delta = model.anchors.astype(np.float64) - eye
+    length = np.linalg.norm(delta, axis=1, keepdims=True)
+    t = np.arange(model.encoding.d) * model.encoding.spacing
+    psi = np.exp(-((t - x) ** 2) / (2 * model.encoding.sigma**2))
+    parts = {
+        "feature": model.features,
+        "direction": np.divide(delta, length, out=np.zeros_like(delta), where=length > 0),
+        "control": np.tile(psi, (count, 1)),
+    }
+    out = {}
+    for name, mlp in model.networks.items():
+        rows = np.concatenate([parts[p] for p in mlp.inputs], axis=1)
+        out[name] = run_in_numpy(mlp, rows).reshape(count * k, SIZE_PER_SPLAT[name])
+    out["offset"] = out["offset"] + np.repeat(model.anchors, k, axis=0)
+    return out
+
+
+@pytest.mark.parametrize("hidden", [(), (32,), (7, 64, 9)])
+@pytest.mark.parametrize("anchors", [1, 2, 513])
+def test_evaluation_equals_its_float64_twin(anchors, hidden):
+    model = make_random_model(anchors, k=3, features=5, hidden=hidden, seed=anchors)
+    eye = np.array([0.3, -2.0, 1.0])
+    for x in (0.0, 0.37, 1.0):
+        got, want = evaluate(model, x, eye), twin(model, x, eye)
+        np.testing.assert_allclose(got.means, want["offset"], atol=1e-5)
+        np.testing.assert_allclose(got.scales, want["scale"], atol=1e-5)
+        np.testing.assert_allclose(got.opacity, want["opacity"][:, 0], atol=1e-5)
+        np.testing.assert_allclose(got.color, want["color"], atol=1e-5)
+        np.testing.assert_allclose(got.wxyz, normalize(want["rotation"]), atol=2e-4)
+
+
+def test_batches_join_without_a_seam():
+    model = make_random_model(BATCH + 1, k=1, features=2, hidden=(4,))
+    few = evaluate(model, 0.5, np.zeros(3))
+    want = twin(model, 0.5, np.zeros(3))
+    for rows in (slice(0, 3), slice(BATCH - 2, BATCH + 1)):
+        np.testing.assert_allclose(few.means[rows], want["offset"][rows], atol=1e-5)
+
+
+def test_the_direction_at_the_anchor_itself_is_zero_and_the_colour_finite():
+    model = make_random_model(10)
+    assert (directions(model.anchors, model.anchors[3])[3] == 0).all()
+    assert np.isfinite(evaluate(model, 0.5, model.anchors[3]).color).all()
+
+
+def test_only_the_colour_sees_the_eye_and_all_heads_see_x():
+    model = make_random_model(20)
+    evaluator = Evaluator(model)
+    a, b = evaluator.geometry(0.0), evaluator.geometry(1.0)
+    assert all(np.abs(p - q).max() > 1e-4 for p, q in zip(a, b, strict=True))
+    near, far = evaluator.color(0.0, np.ones(3)), evaluator.color(0.0, -np.ones(3))
+    assert np.abs(near - far).max() > 1e-3
+
+
+def test_gaussian_encodings_move_apart_steadily_and_frequency_encodings_do_not():
+    """The paper's reason for the Gaussian encoding: no far x comes near again."""
+    xs = np.linspace(0, 1, 101)
+    gauss = np.stack([ControlEncoding().encode(x) for x in xs]).astype(float)
+    waves = 2.0 ** np.arange(8) * np.pi
+    frequency = np.concatenate([np.sin(np.outer(xs, waves)), np.cos(np.outer(xs, waves))], axis=1)
+
+    def largest_fall(codes):
+        distance = np.linalg.norm(codes - codes[0], axis=1)
+        return (np.maximum.accumulate(distance) - distance).max() / distance.max()
+
+    # The Gaussians ripple by 3 %: between two of them the code is a little shorter than on one.
+    assert largest_fall(gauss) < 0.05 < 0.3 < largest_fall(frequency)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_covariance_is_equation_1_and_positive(seed):
+    rng = np.random.default_rng(seed)
+    scales, wxyz = rng.uniform(0.01, 2, (50, 3)), rng.normal(size=(50, 4))
+    packed = covariance(scales, wxyz)
+    full = np.empty((50, 3, 3))
+    for i, (row, column) in enumerate([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]):
+        full[:, row, column] = full[:, column, row] = packed[:, i]
+    r = rotation_matrices(normalize(wxyz))
+    s = np.stack([np.diag(v) for v in scales])
+    np.testing.assert_allclose(full, r @ s @ s.swapaxes(1, 2) @ r.swapaxes(1, 2), atol=1e-12)
+    np.testing.assert_allclose(np.sort(np.linalg.eigvalsh(full)), np.sort(scales**2), rtol=1e-8)
+
+
+def test_a_quaternion_of_zero_length_is_no_rotation():
+    np.testing.assert_array_equal(normalize(np.zeros((2, 4))), [[1, 0, 0, 0]] * 2)
+
+
+def test_harmonics_are_orthonormal_up_to_degree_3():
+    """Monte Carlo over the sphere: the mean of Y_i Y_j is delta_ij / (4 pi)."""
+    rng = np.random.default_rng(0)
+    d = rng.normal(size=(400_000, 3))
+    y = basis(d / np.linalg.norm(d, axis=1, keepdims=True), 16)
+    np.testing.assert_allclose(y.T @ y / len(y) * 4 * np.pi, np.eye(16), atol=0.02)
+
+
+def test_half_turn_signs_equal_turned_directions():
+    d = np.random.default_rng(1).normal(size=(100, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    np.testing.assert_allclose(basis(d * [1, -1, -1], 16), basis(d, 16) * HALF_TURN_SIGNS)
+
+
+def test_layers_fade_by_opacity_alone_and_shade_is_never_negative():
+    one = np.ones((2, 3), np.float32)
+    sh = np.array([[[0.5 / C0, 0.0, -9.0]]] * 2, np.float32)
+    stops = (Stop("a", 0.0), Stop("b", 1.0))
+    wxyz, opacity = np.eye(4, dtype=np.float32)[[0, 0]], np.float32([0.5, 0.8])
+    layers = SplatLayers(one, one, wxyz, opacity, sh, np.int32([0, 1]), stops)
+    evaluator = Evaluator(layers)
+    np.testing.assert_allclose(evaluator.geometry(0.25)[3], [0.5, 0.2])
+    np.testing.assert_allclose(evaluator.color(0.0, np.zeros(3)), [[1.0, 0.5, 0.0]] * 2, atol=1e-6)
+    assert shade(sh, directions(one, np.ones(3, np.float32))).min() == 0

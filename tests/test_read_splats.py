@@ -1,0 +1,161 @@
+"""Plain splat files: exact round trips, our axes, real captures, and a sentence for broken ones."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from runtime_models.evaluate import Evaluator
+from runtime_models.model import BadFile
+from runtime_models.read_layers import read_layers
+from runtime_models.read_ply import PlainSplats, read_ply, turn_half
+from runtime_models.read_scene import describe, read_model
+from runtime_models.read_splat import ROW, read_splat
+from runtime_models.rotation import covariance
+from runtime_models.spherical_harmonics import shade
+from runtime_models.write_ply import write_ply
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+def some_splats(count=20, coefficients=16, seed=0):
+    rng = np.random.default_rng(seed)
+    wxyz = rng.normal(size=(count, 4))
+    arrays = (
+        rng.normal(size=(count, 3)),
+        rng.uniform(0.01, 1, (count, 3)),
+        wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
+        rng.uniform(0.01, 0.99, count),
+        rng.normal(size=(count, coefficients, 3)),
+    )
+    return PlainSplats(*(a.astype(np.float32) for a in arrays))
+
+
+@pytest.mark.parametrize("coefficients", [1, 4, 9, 16])
+@pytest.mark.parametrize("count", [1, 20])
+def test_ply_round_trip(tmp_path, count, coefficients):
+    splats = some_splats(count, coefficients)
+    write_ply(splats, tmp_path / "a.ply")
+    back = read_ply(tmp_path / "a.ply")
+    np.testing.assert_array_equal(back.means, splats.means)
+    np.testing.assert_array_equal(back.sh, splats.sh)
+    np.testing.assert_allclose(back.scales, splats.scales, rtol=1e-6)
+    np.testing.assert_allclose(back.opacity, splats.opacity, rtol=1e-5)
+    assert (np.abs((back.wxyz * splats.wxyz).sum(1)) > 1 - 1e-6).all()
+
+
+def test_turning_turns_places_shapes_and_colours_together():
+    splats, turn = some_splats(), np.diag([1.0, -1, -1])
+    turned = turn_half(splats)
+    np.testing.assert_allclose(turned.means, splats.means @ turn.T, atol=1e-6)
+    c, t = covariance(splats.scales, splats.wxyz), covariance(turned.scales, turned.wxyz)
+    np.testing.assert_allclose(t, c * [1, -1, -1, 1, 1, 1], atol=1e-5)  # xy, xz change sign
+    d = np.random.default_rng(3).normal(size=(20, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    np.testing.assert_allclose(shade(turned.sh, d @ turn.T), shade(splats.sh, d), atol=1e-5)
+
+
+def test_unknown_columns_are_ignored_and_broken_rows_dropped(tmp_path):
+    splats = some_splats(4, 1)
+    splats.means[1, 0] = np.nan
+    splats.sh[2, 0, 1] = np.inf
+    write_ply(splats, tmp_path / "a.ply")
+    data = (tmp_path / "a.ply").read_bytes()
+    assert b"property float nx" in data  # not one that the reader needs
+    back = read_ply(tmp_path / "a.ply")
+    assert (len(back.means), back.dropped) == (2, 2)
+    np.testing.assert_array_equal(back.means, splats.means[[0, 3]])
+    assert read_layers([tmp_path / "a.ply"]).provenance["dropped_rows"] == 2
+
+
+def test_infinite_logit_is_opaque_and_infinitely_small_scale_stays(tmp_path):
+    write_ply(some_splats(3, 1), tmp_path / "a.ply")
+    data = bytearray((tmp_path / "a.ply").read_bytes())
+    start = data.index(b"end_header\n") + 11
+    table = np.frombuffer(data, "<f4", offset=start).reshape(3, -1).copy()
+    table[0, 9], table[1, 10] = np.inf, -np.inf  # opacity, scale_0
+    (tmp_path / "a.ply").write_bytes(bytes(data[:start]) + table.tobytes())
+    back = read_ply(tmp_path / "a.ply")
+    assert back.dropped == 0 and back.opacity[0] == 1 and back.scales[1, 0] == 0
+
+
+def change_header(old, new):
+    return lambda data: data.replace(old, new, 1)
+
+
+BROKEN = {
+    "cut off": (lambda d: d[:-1], "promises 20 splats of 68 bytes, the file holds 19"),
+    "lying count": (change_header(b"vertex 20", b"vertex 99999999"), "promises 99999999"),
+    "no end": (lambda d: d[:40], "header is missing or never ends"),
+    "ascii": (change_header(b"binary_little_endian", b"ascii"), "not a binary little-endian"),
+    "point cloud": (change_header(b"opacity", b"opacitx"), "has no opacity: a point cloud"),
+    "odd f_rest": (change_header(b" nx", b" f_rest_0"), "has 1 f_rest columns"),
+    "twice": (change_header(b"float ny", b"float nx"), "names a property twice"),
+    "lists": (change_header(b"float nx", b"list uchar"), "a property of a type|one element"),
+    "no splats": (change_header(b"vertex 20", b"vertex 0"), "promises 0"),
+    "more elements": (change_header(b"property", b"element face 2\nproperty"), "one element"),
+}
+
+
+@pytest.mark.parametrize("how", BROKEN)
+def test_broken_ply_is_one_sentence(tmp_path, how):
+    write_ply(some_splats(20, 1), tmp_path / "a.ply")
+    damage, words = BROKEN[how]
+    (tmp_path / "a.ply").write_bytes(damage((tmp_path / "a.ply").read_bytes()))
+    with pytest.raises(BadFile, match=words) as failure:
+        read_model(tmp_path / "a.ply")
+    assert "\n" not in str(failure.value)
+
+
+def test_splat_rows_by_hand(tmp_path):
+    row = np.zeros(2, ROW)
+    row["mean"], row["scale"] = [1, 2, 3], [0.1, 0.2, 0.3]
+    row["rgba"], row["wxyz"] = [255, 0, 128, 51], [255, 128, 128, 128]
+    row.tofile(tmp_path / "a.splat")
+    splats = read_splat(tmp_path / "a.splat")
+    np.testing.assert_allclose(splats.means[0], [1, -2, -3])
+    np.testing.assert_allclose(splats.opacity, 0.2)
+    color = shade(splats.sh, np.eye(3, dtype=np.float32)[:2])
+    np.testing.assert_allclose(color[0], [1, 0, 128 / 255], atol=1e-6)
+    np.testing.assert_allclose(splats.wxyz[0], [0, 1, 0, 0], atol=1e-6)  # the half turn alone
+
+
+@pytest.mark.parametrize("size", [0, 1, 31, 33])
+def test_splat_of_a_wrong_size_is_one_sentence(tmp_path, size):
+    (tmp_path / "a.splat").write_bytes(b"\1" * size)
+    with pytest.raises(BadFile, match=f"has {size} bytes, expected a multiple of 32"):
+        read_model(tmp_path / "a.splat")
+
+
+@pytest.mark.parametrize("name", ["a.txt", "a.ply", "a.shift"])
+def test_what_is_no_scene_is_one_sentence(tmp_path, name):
+    (tmp_path / name).write_text("hello")
+    with pytest.raises(BadFile, match="no known format; wanted is a package"):
+        read_model(tmp_path / name)
+
+
+def test_empty_folder_is_one_sentence(tmp_path):
+    with pytest.raises(BadFile, match="holds nothing to show"):
+        read_model(tmp_path)
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="no shared data beside the project")
+def test_the_leg_is_three_layers_with_a_stop_each():
+    path = DATA / "anatomy_leg_ml3dgs"
+    leg = read_model(path)
+    facts = describe(leg, path)
+    assert (facts["format"], facts["splats"], facts["sh_degree"]) == ("splats", 136605, 3)
+    assert [s["x"] for s in facts["stops"]] == [0, 0.5, 1]
+    np.testing.assert_array_equal(np.bincount(leg.layer), [57454, 64690, 14461])
+    alive = [(Evaluator(leg).geometry(x)[3] > 0).sum() for x in (0.0, 0.5, 1.0)]
+    np.testing.assert_array_equal(alive, np.cumsum([57454, 64690, 14461]))
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="no shared data beside the project")
+def test_the_plant_stands_upright():
+    """Leaves above, the light pot below: the top half is greener."""
+    plant = read_model(DATA / "splats_marcelpadilla/plant/plant.splat")
+    color = Evaluator(plant).color(0.0, np.zeros(3))
+    green = color[:, 1] - color[:, [0, 2]].mean(1)
+    top = plant.means[:, 1] > np.median(plant.means[:, 1])
+    assert green[top].mean() > green[~top].mean() + 0.05
