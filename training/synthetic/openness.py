@@ -10,7 +10,7 @@ import numpy as np
 from training.synthetic.solids import length
 from training.synthetic.tracer import Hits, Place
 
-FAR = 0.2  # metres; more free space than this makes no difference
+FAR = 0.15  # metres; more free space than this makes no difference
 STEPS = ((0.012, 0.3), (0.03, 0.3), (0.07, 0.25), (0.14, 0.15))  # metres above, weight
 
 
@@ -30,15 +30,23 @@ class Clearance:
 
     @staticmethod
     def of(place: Place, low: tuple, high: tuple, cell: float = 0.01) -> "Clearance":
-        shape = tuple(np.ceil((np.array(high) - low) / cell).astype(int) + 1)
-        points = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).reshape(-1, 3)
-        points = np.asarray(low) + cell * points
-        nearest = np.full(len(points), FAR)
+        low = np.asarray(low, float)
+        shape = np.ceil((high - low) / cell).astype(int) + 1
+        grid = np.full(shape, FAR)
         for solid in place.solids:
+            # Only cells that are nearer than FAR to the ball round the solid can change.
+            around = solid.shape.reach + FAR
+            first = np.clip(np.floor((solid.centre - around - low) / cell), 0, shape).astype(int)
+            last = np.clip(np.ceil((solid.centre + around - low) / cell) + 1, 0, shape).astype(int)
+            block = grid[tuple(map(slice, first, last))]
+            cells = np.stack(np.meshgrid(*map(np.arange, first, last), indexing="ij"), -1)
+            points = low + cell * cells.reshape(-1, 3)
             bound = length(points - solid.centre) - solid.shape.reach
-            close = np.flatnonzero(bound < nearest)
+            close = np.flatnonzero(bound < block.ravel())
+            nearest = block.ravel()
             nearest[close] = np.minimum(nearest[close], solid.distance(points[close]))
-        return Clearance(np.asarray(low, float), cell, nearest.reshape(shape))
+            block[...] = nearest.reshape(block.shape)
+        return Clearance(low, cell, grid)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n,) metres, trilinear; outside the grid as at its border."""

@@ -144,8 +144,11 @@ def make_workshop(
             mask_path = folder / "masks" / name / path.name
             jobs.append((view, stop.name, path, mask_path))
             photos.append(Photo(view, path, stop.name, None, split))
-    with get_context("spawn").Pool(processes) as pool:
-        list(pool.imap_unordered(take, jobs, chunksize=4))
+    if processes == 1:
+        list(map(take, jobs))
+    else:
+        with get_context("spawn").Pool(processes) as pool:
+            list(pool.imap_unordered(take, jobs, chunksize=4))
     points, colors = colored_points(size)
     capture = Capture(
         folder,
