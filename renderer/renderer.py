@@ -1,5 +1,7 @@
 """Draws scenes: the passes of a frame in order.  The file to read first in renderer/."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import moderngl
@@ -47,6 +49,7 @@ class Renderer:
     ) -> None:
         drawing, mlps, sort = _choose(ctx, drawing, mlps, sort)
         self.settings = RenderSettings()
+        self._ctx = ctx
         self._gpu = Gpu(ctx) if ctx is not None else None
         self._resolve = Resolve(self._gpu) if ctx is not None else None
         if drawing == "tiles":
@@ -99,8 +102,9 @@ class Renderer:
         moved.  Counts of splats in the result are those of the last view.
         """
         self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
-        for i, view in enumerate(views):
-            self._drawing.draw(i, view, self.settings, self._timer)
+        with self._framebuffer_kept():
+            for i, view in enumerate(views):
+                self._drawing.draw(i, view, self.settings, self._timer)
         if target is not None:
             with self._timer.time("resolve"):
                 for i, framebuffer in enumerate(target if isinstance(target, list) else [target]):
@@ -142,7 +146,16 @@ class Renderer:
         name, weight, _ = thermal_blend(self._scene)
         palette = palette_colors(name) if name else None
         image = self._drawing.presentable(i)
-        self._resolve.draw(image, framebuffer, self.settings.background, palette, weight)
+        with self._framebuffer_kept():
+            self._resolve.draw(image, framebuffer, self.settings.background, palette, weight)
+
+    @contextmanager
+    def _framebuffer_kept(self) -> Iterator[None]:
+        """Leaves bound what was bound: a window's, or none of ours that close() deletes."""
+        bound = self._ctx.fbo if self._ctx is not None else None
+        yield
+        if bound is not None:
+            bound.use()
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
