@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rasterizer.device import Device
-from rasterizer.project import LEAST_CHUNK, Projected
+from rasterizer.project import LOW_BITS, Found, Projected, chunks_of, grid_of
 from rasterizer.sort import prefix_sums, sort_pairs
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
 
 KERNELS = Path(__file__).parent / "kernels"
-TILE = 16  # pixels
-LOW_BITS = 12  # of a depth key: the first pass of the sort, counted while the tiles are found
+SPARE = 16  # as in bin.cl
 MOST_BINS = 1 << 14  # of one pass: its table must stay in the second cache
 
 
@@ -25,7 +24,7 @@ class Tiles:
 
     grid: tuple[int, int]  # tiles across, tiles down
     starts: "Array"  # (tiles + 2,) int32: where each tile's list starts in `instances`
-    instances: "Array"  # (I + 1,) int32 splat indices
+    instances: "Array"  # (I or more,) int32 splat indices
     places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
     order: "Array"  # (visible,) int32: the visible splats by depth, stable
     count: int  # I
@@ -49,7 +48,7 @@ def bin_tiles(
 
     form: "cpu" or "gpu", by default the device's kind.  Both give the same lists.
     """
-    grid = (-(-size[0] // TILE), -(-size[1] // TILE))
+    grid = grid_of(size)
     bin_form = {"cpu": _bin_chunks, "gpu": _bin_groups}[form or device.kind]
     return bin_form(device, projected, grid)
 
@@ -87,46 +86,43 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
 def _bin_chunks(device: Device, projected: Projected, grid: tuple[int, int]) -> Tiles:
     """The CPU form: a work-item owns a chunk of splats and a table of counts."""
     kernels = device.program(KERNELS / "bin.cl")
-    count = projected.depth.shape[0]
-    chunks = max(1, min(2 * device.units, count // LEAST_CHUNK))
-    chunk = -(-count // chunks)
-
-    places = device.empty((count, 2), np.uint32)
-    keys, splats = device.empty(count, np.uint32), device.empty(count, np.int32)
-    table = device.empty((chunks, 1 << LOW_BITS), np.int32)
-    status = device.empty((chunks, 4), np.uint32)
-    device.launch(
-        kernels["find_places"], chunks, 1,
-        count, chunk, grid[0], grid[1], projected.record, projected.depth, places, keys, splats,
-        table, status,
-    )  # fmt: skip
-    per_chunk = device.view(status)
-    visible, total = (int(n) for n in per_chunk[:, :2].sum(axis=0, dtype=np.int64))
-    least, most = int(per_chunk[:, 2].min()), int(per_chunk[:, 3].max())
-    order = _sort(device, kernels, (keys, splats, table, status), visible, chunk, (least, most))
-    starts, instances = _scatter_tiles(device, kernels, order, places, grid, visible, total)
-    return Tiles(grid, starts, instances, places, order, total)
+    found = projected.found
+    if found is None or found.grid != grid:
+        found = Found.empty(device, projected.depth.shape[0], grid)
+        device.launch(
+            kernels["find_places"], found.status.shape[0], 1,
+            projected.depth.shape[0], found.chunk, *grid, projected.record, projected.depth,
+            *found.arrays(),
+        )  # fmt: skip
+    status = device.view(found.status)
+    visible, total = (int(n) for n in status[:, :2].sum(axis=0, dtype=np.int64))
+    order = _sort(device, kernels, found, visible, int(status[:, 2].min()), int(status[:, 3].max()))
+    starts, instances = _scatter_tiles(device, kernels, order, found.places, grid, visible, total)
+    return Tiles(grid, starts, instances, found.places, order, total)
 
 
-def _sort(device: Device, kernels: dict, packed: tuple, visible: int, chunk: int, span: tuple):
-    """(visible,) splat indices by depth: a counting sort by the low digit, then the high ones."""
-    keys, splats, table, status = packed
-    least, most = span
-    if visible == 0:
-        return device.empty(0, np.int32)
-    passes = [(0, 0, 1 << LOW_BITS)]  # origin, shift, bins
+def _digits(least: int, most: int) -> list[tuple[int, int, int]]:
+    """(origin, shift, bins) of each pass of the sort of keys from `least` to `most`."""
+    passes = [(0, 0, 1 << LOW_BITS)]
     origin = least >> LOW_BITS << LOW_BITS
     high_bins = (most - origin >> LOW_BITS) + 1
-    if high_bins <= MOST_BINS:
-        passes += [(origin, LOW_BITS, high_bins)] * (high_bins > 1)
-    else:
+    if high_bins > MOST_BINS:
         half = ((high_bins - 1).bit_length() + 1) // 2
-        highest = LOW_BITS + half
-        passes += [(origin, LOW_BITS, 1 << half), (origin, highest, (high_bins >> half) + 1)]
-    for number, (origin, shift, bins) in enumerate(passes):
-        first = number == 0
-        if not first:
-            chunks = max(1, min(2 * device.units, visible // LEAST_CHUNK))
+        passes.append((origin, LOW_BITS, 1 << half))
+        passes.append((origin, LOW_BITS + half, (high_bins >> half) + 1))
+    elif high_bins > 1:
+        passes.append((origin, LOW_BITS, high_bins))
+    return passes
+
+
+def _sort(device: Device, kernels: dict, found: Found, visible: int, least: int, most: int):
+    """(visible,) splat indices by depth: a counting sort by the low digit, then the high ones."""
+    if visible == 0:
+        return device.empty(0, np.int32)
+    keys, splats, table, chunk = found.keys, found.splats, found.table, found.chunk
+    for number, (origin, shift, bins) in enumerate(_digits(least, most)):
+        if number > 0:  # the first digit was counted while the places were found
+            chunks = chunks_of(device, visible)
             chunk = -(-visible // chunks)
             table = device.empty((chunks, bins), np.int32)
             device.launch(
@@ -138,8 +134,8 @@ def _sort(device: Device, kernels: dict, packed: tuple, visible: int, chunk: int
         to_keys, to_splats = device.empty(visible, np.uint32), device.empty(visible, np.int32)
         device.launch(
             kernels["scatter_digits"], table.shape[0], 1,
-            visible, chunk, bins, np.uint32(origin), shift, int(first), status, keys, splats, table,
-            to_keys, to_splats,
+            visible, chunk, bins, np.uint32(origin), shift, int(number == 0), found.status,
+            keys, splats, table, to_keys, to_splats,
         )  # fmt: skip
         keys, splats = to_keys, to_splats
     return splats
@@ -148,13 +144,17 @@ def _sort(device: Device, kernels: dict, packed: tuple, visible: int, chunk: int
 def _scatter_tiles(device, kernels, order, places, grid, visible: int, total: int) -> tuple:
     """(tiles + 1,) starts and (total,) instances from the splats in depth order."""
     tiles = grid[0] * grid[1]
-    chunks = max(1, min(2 * device.units, visible // LEAST_CHUNK))
+    chunks = chunks_of(device, visible)
     chunk = -(-visible // chunks)
-    # One tile and one instance to spare: where the branch-free walk sends what is not touched.
+    # One tile and a few instances to spare: the branch-free walk sends there what is not touched.
     table = device.empty((chunks, tiles + 1), np.int32)
-    starts, instances = device.empty(tiles + 2, np.int32), device.empty(total + 1, np.int32)
-    shared = (visible, chunk, grid[0], tiles, order, places, table)
-    device.launch(kernels["count_tiles"], chunks, 1, *shared)
+    starts, instances = (
+        device.empty(tiles + 2, np.int32),
+        device.empty(total + SPARE * chunks, np.int32),
+    )
+    near_to_far = device.empty((visible, 2), np.uint32)  # places
+    shared = (visible, chunk, grid[0], tiles, order)
+    device.launch(kernels["count_tiles"], chunks, 1, *shared, places, near_to_far, table)
     device.launch(kernels["scan_table"], 1, 1, tiles + 1, chunks, table, starts)
-    device.launch(kernels["scatter_tiles"], chunks, 1, *shared, instances)
+    device.launch(kernels["scatter_tiles"], chunks, 1, *shared, near_to_far, table, instances)
     return starts, instances

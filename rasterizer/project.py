@@ -49,6 +49,50 @@ class Camera:
         return np.concatenate([rows, lens, self.limits()]).astype(np.float32)
 
 
+TILE = 16  # pixels
+LOW_BITS = 12  # of a depth key: the first pass of the sort, counted while the tiles are found
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where splats lie in the grid of tiles: what find_places and project_arena leave for `bin`."""
+
+    places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
+    keys: "Array"  # (N,) uint32 depth keys of the visible splats, packed at each chunk's start
+    splats: "Array"  # (N,) int32 their indices
+    table: "Array"  # (chunks, 1 << LOW_BITS) int32 histograms of the keys' low digit
+    status: "Array"  # (chunks, 4) uint32: visible splats, instances, least and most key
+    chunk: int  # splats a chunk
+    grid: tuple[int, int]  # tiles across, tiles down
+
+    @staticmethod
+    def empty(device: Device, count: int, grid: tuple[int, int]) -> "Found":
+        """Arrays to be filled for `count` splats, in as many chunks as keep the device busy."""
+        chunks = chunks_of(device, count)
+        return Found(
+            device.empty((count, 2), np.uint32),
+            device.empty(count, np.uint32),
+            device.empty(count, np.int32),
+            device.empty((chunks, 1 << LOW_BITS), np.int32),
+            device.empty((chunks, 4), np.uint32),
+            -(-count // chunks),
+            grid,
+        )
+
+    def arrays(self) -> tuple:
+        return self.places, self.keys, self.splats, self.table, self.status
+
+
+def chunks_of(device: Device, count: int) -> int:
+    """How many work-items share `count` splats in the CPU form."""
+    return max(1, min(2 * device.units, count // LEAST_CHUNK))
+
+
+def grid_of(size: tuple[int, int]) -> tuple[int, int]:
+    """Tiles across and down that cover an image."""
+    return (-(-size[0] // TILE), -(-size[1] // TILE))
+
+
 @dataclass(frozen=True)
 class Projected:
     """Splats on the screen.  Both arrays lie on the device."""
@@ -57,6 +101,7 @@ class Projected:
     depth: "Array"  # (N,) float32 metres along the view, 1e30 where culled
     low_pass: float = LOW_PASS  # px^2
     culled_counts: "Array | None" = None  # (chunks, 4) int32, CULL_REASONS
+    found: Found | None = None  # in the grid of the camera's image
 
     def culled(self, device: Device) -> dict[str, int]:
         """How many splats each gate kept out; empty where it was not counted."""
@@ -116,17 +161,19 @@ def project_arena(
     """
     count = mean_opacity.shape[0]
     record, depth = device.empty((count, RECORD)), device.empty(count)
-    chunks = max(1, min(4 * device.units, count // LEAST_CHUNK))
-    counts = device.zeros((chunks, 4), np.int32)
+    found = Found.empty(device, count, grid_of(camera.size))
+    chunks = found.status.shape[0]
+    counts = device.empty((chunks, 4), np.int32)
     width, height = camera.size
     device.launch(
-        device.program(KERNELS / "project_arena.cl")["project_arena"], chunks if count else 0, 1,
-        count, -(-count // chunks), width, height, float(camera.near), float(min_alpha),
+        device.program(KERNELS / "project_arena.cl")["project_arena"], chunks, 1,
+        count, found.chunk, width, height, float(camera.near), float(min_alpha),
         float(max_pixels), float(max_distance), float(low_pass), device.upload(camera.packed()),
         mean_opacity, covariance, color, object_index,
         device.upload(_camera_from_object(camera, world_from_object)), record, depth, counts,
+        *found.grid, *found.arrays(),
     )  # fmt: skip
-    return Projected(record, depth, low_pass, counts)
+    return Projected(record, depth, low_pass, counts, found)
 
 
 def _camera_from_object(camera: Camera, world_from_object) -> np.ndarray:

@@ -1,9 +1,8 @@
 // bin: splats -> a list of instances (splat, tile) a tile, in depth order.  CPU form.
 // A work-item owns a contiguous chunk of splats, counts into a table of its own, and scatters from
 // its row of the scanned table: parallel, stable, and the same list for any number of chunks.
-#include "common/tiles.cl"
-#define LOW_BITS 12
-#define LOW_BINS (1 << LOW_BITS)
+#include "common/places_of_eight.cl"
+#define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
 // Per splat its tiles; per chunk the (depth key, index) pairs of its visible splats, packed at the
 // chunk's start, and the histogram of their low digits.  status: visible, instances, key range.
@@ -13,31 +12,31 @@ __kernel void find_places(int count, int chunk, int tiles_x, int tiles_y,
                           __global int* histogram, __global uint4* status) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
-  __global int* bins = histogram + c * LOW_BINS;
-  for (int b = 0; b < LOW_BINS; b++) bins[b] = 0;
-  int visible = first;
-  uint instances = 0, least = 0xffffffffu, most = 0;
-  for (int i = first; i < last; i++) {
-    __global const float* s = record + (size_t)RECORD * i;
-    uint2 place = 0;
-    if (s[EXTENT_X] > 0) {
-      float copy[RECORD];
-      vstore8(vload8(0, s), 0, copy);
-      vstore4(vload4(0, s + 8), 0, copy + 8);
-      place = place_of(copy, tiles_x, tiles_y);
+  Chunk mine = open_chunk(first, places, keys, splats, histogram + c * LOW_BINS);
+  for (int i = first; i < last; i += LANES) {
+    const int n = min(LANES, last - i);
+    float column[8][LANES], z[LANES];
+    for (int lane = 0; lane < LANES; lane++) {
+      const size_t from = i + min(lane, n - 1);
+      __global const float* s = record + RECORD * from;
+      for (int k = 0; k < 5; k++) column[k][lane] = s[k];
+      for (int k = 5; k < 8; k++) column[k][lane] = s[k + 4];
+      z[lane] = depth[from];
     }
-    places[i] = place;
-    if (place.x >= MASKED) {
-      const uint key = as_uint(depth[i]);  // positive floats sort as their bits
-      keys[visible] = key;
-      splats[visible++] = i;
-      bins[key & (LOW_BINS - 1)]++;
-      instances += tiles_at(place);
-      least = min(least, key);
-      most = max(most, key);
-    }
+    Ellipses e;
+    e.x = vload8(0, column[0]);
+    e.y = vload8(0, column[1]);
+    e.a = vload8(0, column[2]);
+    e.b = vload8(0, column[3]);
+    e.c = vload8(0, column[4]);
+    e.half_x = vload8(0, column[5]);
+    e.half_y = vload8(0, column[6]);
+    e.cut = vload8(0, column[7]);
+    e.seen = (e.half_x > 0.0f) & ((int8)(0, 1, 2, 3, 4, 5, 6, 7) < n);
+    const Places p = places_of_eight(&e, tiles_x, tiles_y);
+    enter_eight(&mine, i, n, &p, vload8(0, z));
   }
-  status[c] = (uint4)(visible - first, instances, least, most);
+  status[c] = close_chunk(&mine, first);
 }
 
 // Counts (chunks, bins) -> places to write to, bin by bin and in it chunk by chunk.
@@ -104,30 +103,33 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
 // table (chunks, tiles + 1): how often each tile is touched; the last column is the spare tile.
 __kernel void count_tiles(int count, int chunk, int tiles_x, int tiles,
                           __global const int* order, __global const uint2* places,
-                          __global int* table) {
+                          __global uint2* sorted_places, __global int* table) {
   const int c = get_global_id(0);
   __global int* mine = table + c * (tiles + 1);
   for (int t = 0; t <= tiles; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
+    const uint2 place = places[order[i]];
+    sorted_places[i] = place;  // side by side for the next pass
 #define VISIT(tile) mine[tile]++
-    FOR_EACH_TILE(places[order[i]], tiles_x, tiles)
+    FOR_EACH_TILE(place, tiles_x, tiles)
 #undef VISIT
   }
   mine[tiles] = 0;
 }
 
-// instances has one entry more than the lists need: what is sent to the spare tile goes there.
+// instances is longer than the lists by a cache line a chunk: what is sent to the spare tile.
 __kernel void scatter_tiles(int count, int chunk, int tiles_x, int tiles,
-                            __global const int* order, __global const uint2* places,
+                            __global const int* order, __global const uint2* sorted_places,
                             __global int* table, __global int* instances) {
   const int c = get_global_id(0);
   __global int* next = table + c * (tiles + 1);
+  next[tiles] += SPARE * c;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     const int splat = order[i];
 #define VISIT(tile) instances[next[tile]] = splat, next[tile] += (tile) != tiles
-    FOR_EACH_TILE(places[splat], tiles_x, tiles)
+    FOR_EACH_TILE(sorted_places[i], tiles_x, tiles)
 #undef VISIT
   }
 }

@@ -1,8 +1,8 @@
-// project_arena: splats of many posed objects -> records and depths, for drawing alone.
-// A work-item owns a chunk and takes eight splats at a time as vectors.
-#include "common/record.cl"
+// project_arena: splats of many posed objects -> records, depths and tiles, for drawing alone.
+// A work-item owns a chunk and takes eight splats at a time as vectors.  Memory is the limit here:
+// the tiles are found while the ellipses are at hand (bin.cl's find_places reads them again).
 #include "common/camera.cl"
-#include "common/vector.cl"
+#include "common/places_of_eight.cl"
 
 typedef struct {
   float8 x, y, z, opacity;            // mean in the object, metres
@@ -12,49 +12,59 @@ typedef struct {
 } Eight;
 
 // Rows of four or eight floats, one a splat -> one vector a column.
-inline void load_eight(Eight* s, const float* mean, const float* cov, const float* color) {
-  const float16 p = vload16(0, mean), q = vload16(1, mean);
-  s->x = (float8)(p.s048c, q.s048c);
-  s->y = (float8)(p.s159d, q.s159d);
-  s->z = (float8)(p.s26ae, q.s26ae);
-  s->opacity = (float8)(p.s37bf, q.s37bf);
-  const float16 a = vload16(0, cov), b = vload16(1, cov), c = vload16(2, cov), d = vload16(3, cov);
-  s->xx = (float8)(a.s08, b.s08, c.s08, d.s08);
-  s->xy = (float8)(a.s19, b.s19, c.s19, d.s19);
-  s->xz = (float8)(a.s2a, b.s2a, c.s2a, d.s2a);
-  s->yy = (float8)(a.s3b, b.s3b, c.s3b, d.s3b);
-  s->yz = (float8)(a.s4c, b.s4c, c.s4c, d.s4c);
-  s->zz = (float8)(a.s5d, b.s5d, c.s5d, d.s5d);
-  const float16 g = vload16(0, color), h = vload16(1, color);
-  s->red = (float8)(g.s048c, h.s048c);
-  s->green = (float8)(g.s159d, h.s159d);
-  s->blue = (float8)(g.s26ae, h.s26ae);
-}
+#define LOAD_EIGHT(into, mean, covariance, color)                                        \
+  {                                                                                      \
+    const float16 p = vload16(0, mean), q = vload16(1, mean);                            \
+    into.x = (float8)(p.s048c, q.s048c);                                                 \
+    into.y = (float8)(p.s159d, q.s159d);                                                 \
+    into.z = (float8)(p.s26ae, q.s26ae);                                                 \
+    into.opacity = (float8)(p.s37bf, q.s37bf);                                           \
+    const float16 a = vload16(0, covariance), b = vload16(1, covariance);                \
+    const float16 c = vload16(2, covariance), d = vload16(3, covariance);                \
+    into.xx = (float8)(a.s08, b.s08, c.s08, d.s08);                                      \
+    into.xy = (float8)(a.s19, b.s19, c.s19, d.s19);                                      \
+    into.xz = (float8)(a.s2a, b.s2a, c.s2a, d.s2a);                                      \
+    into.yy = (float8)(a.s3b, b.s3b, c.s3b, d.s3b);                                      \
+    into.yz = (float8)(a.s4c, b.s4c, c.s4c, d.s4c);                                      \
+    into.zz = (float8)(a.s5d, b.s5d, c.s5d, d.s5d);                                      \
+    const float16 g = vload16(0, color), h = vload16(1, color);                          \
+    into.red = (float8)(g.s048c, h.s048c);                                               \
+    into.green = (float8)(g.s159d, h.s159d);                                             \
+    into.blue = (float8)(g.s26ae, h.s26ae);                                              \
+  }
 
-// Poses of eight splats: nearly always the same object's.
-inline void load_poses(Eight* s, const int* object, __global const float* poses) {
-  bool same = true;
-  for (int lane = 1; lane < LANES; lane++) same &= object[lane] == object[0];
-  if (same) {
-    for (int k = 0; k < 12; k++) s->m[k] = poses[12 * object[0] + k];
+// Poses of eight splats: nearly always one object's, and the one of the eight before.
+inline void load_poses(Eight* s, int8 object, int* current, __global const float* poses) {
+  if (all(object == object.s0)) {
+    if (object.s0 != *current)
+      for (int k = 0; k < 12; k++) s->m[k] = poses[12 * object.s0 + k];
+    *current = object.s0;
     return;
   }
+  *current = -1;
+  int index[LANES];
+  vstore8(object, 0, index);
   for (int k = 0; k < 12; k++) {
     float column[LANES];
-    for (int lane = 0; lane < LANES; lane++) column[lane] = poses[12 * object[lane] + k];
+    for (int lane = 0; lane < LANES; lane++) column[lane] = poses[12 * index[lane] + k];
     s->m[k] = vload8(0, column);
   }
 }
 
-// Four vectors -> eight rows of four.
+// Four vectors -> eight rows of four, into column `at` of the records.
 inline void store_rows(float* rows, int at, float8 a, float8 b, float8 c, float8 d) {
-  float p[LANES], q[LANES], r[LANES], t[LANES];
-  vstore8(a, 0, p);
-  vstore8(b, 0, q);
-  vstore8(c, 0, r);
-  vstore8(d, 0, t);
-  for (int lane = 0; lane < LANES; lane++)
-    vstore4((float4)(p[lane], q[lane], r[lane], t[lane]), 0, rows + RECORD * lane + at);
+  const float8 ab_lo = (float8)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3);
+  const float8 ab_hi = (float8)(a.s4, b.s4, a.s5, b.s5, a.s6, b.s6, a.s7, b.s7);
+  const float8 cd_lo = (float8)(c.s0, d.s0, c.s1, d.s1, c.s2, d.s2, c.s3, d.s3);
+  const float8 cd_hi = (float8)(c.s4, d.s4, c.s5, d.s5, c.s6, d.s6, c.s7, d.s7);
+  vstore4((float4)(ab_lo.s01, cd_lo.s01), 0, rows + at);
+  vstore4((float4)(ab_lo.s23, cd_lo.s23), 0, rows + at + RECORD);
+  vstore4((float4)(ab_lo.s45, cd_lo.s45), 0, rows + at + RECORD * 2);
+  vstore4((float4)(ab_lo.s67, cd_lo.s67), 0, rows + at + RECORD * 3);
+  vstore4((float4)(ab_hi.s01, cd_hi.s01), 0, rows + at + RECORD * 4);
+  vstore4((float4)(ab_hi.s23, cd_hi.s23), 0, rows + at + RECORD * 5);
+  vstore4((float4)(ab_hi.s45, cd_hi.s45), 0, rows + at + RECORD * 6);
+  vstore4((float4)(ab_hi.s67, cd_hi.s67), 0, rows + at + RECORD * 7);
 }
 
 inline int kept(int8 lanes) {  // how many lanes are true (-1)
@@ -64,7 +74,7 @@ inline int kept(int8 lanes) {  // how many lanes are true (-1)
 }
 
 // rows: 8 records.  depth: 8.  culled: counts of opacity, size, distance, frustum so far.
-inline void project_eight(const Eight* s, int8 valid, __constant float* camera, int width,
+inline Ellipses project_eight(const Eight* s, int8 valid, __constant float* camera, int width,
                           int height, float near, float least_alpha, float most_pixels,
                           float most_distance, float low_pass, float* rows, float* depth,
                           int4* culled) {
@@ -116,6 +126,8 @@ inline void project_eight(const Eight* s, int8 valid, __constant float* camera, 
   store_rows(rows, 4, a * per, s->opacity, s->red, s->green);
   store_rows(rows, 8, s->blue, select(none, half_x, small), select(none, half_y, small), cut);
   vstore8(select((float8)(CULLED_DEPTH), z, small), 0, depth);
+  const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, cut, small};
+  return out;
 }
 
 __kernel void project_arena(int count, int chunk, int width, int height, float near,
@@ -124,32 +136,48 @@ __kernel void project_arena(int count, int chunk, int width, int height, float n
                             __global const float* mean_opacity, __global const float* covariance,
                             __global const float* color, __global const int* object_index,
                             __global const float* poses, __global float* record,
-                            __global float* depth, __global int4* culled) {
+                            __global float* depth, __global int4* culled, int tiles_x, int tiles_y,
+                            __global uint2* places, __global uint* keys, __global int* splats,
+                            __global int* histogram, __global uint4* status) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
   int4 counts = 0;
+  int current = -1;  // the object whose pose s.m holds
+  Eight s;
+  Chunk mine = open_chunk(first, places, keys, splats, histogram + c * LOW_BINS);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
-    float mean[4 * LANES], cov[8 * LANES], rgb[4 * LANES], rows[RECORD * LANES], z[LANES];
-    int object[LANES], valid[LANES];
-    for (int lane = 0; lane < LANES; lane++) {
-      const size_t from = i + min(lane, n - 1);
-      vstore4(vload4(from, mean_opacity), lane, mean);
-      vstore8(vload8(from, covariance), lane, cov);
-      vstore4(vload4(from, color), lane, rgb);
-      object[lane] = object_index[from];
-      valid[lane] = lane < n ? -1 : 0;
+    float rows[RECORD * LANES], z[LANES];
+    int8 object, valid = -1;
+    if (n == LANES) {
+      LOAD_EIGHT(s, mean_opacity + (size_t)4 * i, covariance + (size_t)8 * i, color + (size_t)4 * i)
+      object = vload8(0, object_index + i);
+    } else {  // the last few: the last one again for those that are missing
+      float mean[4 * LANES], cov[8 * LANES], rgb[4 * LANES];
+      int index[LANES];
+      for (int lane = 0; lane < LANES; lane++) {
+        const size_t from = i + min(lane, n - 1);
+        vstore4(vload4(from, mean_opacity), lane, mean);
+        vstore8(vload8(from, covariance), lane, cov);
+        vstore4(vload4(from, color), lane, rgb);
+        index[lane] = object_index[from];
+      }
+      LOAD_EIGHT(s, mean, cov, rgb)
+      object = vload8(0, index);
+      valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
     }
-    Eight s;
-    load_eight(&s, mean, cov, rgb);
-    load_poses(&s, object, poses);
-    project_eight(&s, vload8(0, valid), camera, width, height, near, least_alpha, most_pixels,
-                  most_distance, low_pass, rows, z, &counts);
+    load_poses(&s, object, &current, poses);
+    const Ellipses e =
+        project_eight(&s, valid, camera, width, height, near, least_alpha, most_pixels,
+                      most_distance, low_pass, rows, z, &counts);
     for (int lane = 0; lane < n; lane++) {
       vstore8(vload8(0, rows + RECORD * lane), 0, record + (size_t)RECORD * (i + lane));
       vstore4(vload4(0, rows + RECORD * lane + 8), 0, record + (size_t)RECORD * (i + lane) + 8);
       depth[i + lane] = z[lane];
     }
+    const Places p = places_of_eight(&e, tiles_x, tiles_y);
+    enter_eight(&mine, i, n, &p, vload8(0, z));
   }
   culled[c] = counts;
+  status[c] = close_chunk(&mine, first);
 }

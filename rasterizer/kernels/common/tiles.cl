@@ -1,7 +1,7 @@
 // Which tiles of 16x16 pixels a splat touches: its place, a uint2.
 //   x: first column | first row << 12 | kind (0 culled, MASKED, BOX)
 //   y: MASKED: bit 8 row + column for each touched tile of a grid of 8 x 4
-//      BOX: columns | rows << 16, all touched (one row or column, or larger than the grid)
+//      BOX: columns | rows << 16, all of a box larger than that grid
 #include "common/record.cl"
 #define TILE 16
 #define MASKED (1u << 24)
@@ -32,7 +32,7 @@ inline uint2 place_of(const float* s, int tiles_x, int tiles_y) {
   if (!(columns > 0 && rows > 0)) return (uint2)(0);
   const uint corner = (uint)x0 | (uint)y0 << 12;
   if (columns == 1 && rows == 1) return (uint2)(corner | MASKED, 1);
-  if (columns == 1 || rows == 1 || columns > 8 || rows > 4)
+  if (columns > 8 || rows > 4)
     return (uint2)(corner | BOX, (uint)columns | (uint)rows << 16);
   const float cut = s[CUT] * 1.0001f;  // float rounding must not lose a pixel
   uint mask = 0;

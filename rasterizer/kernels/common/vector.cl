@@ -36,3 +36,9 @@ inline float8 sums8(float8 a, float8 b, float8 c, float8 d, float8 e, float8 f, 
   const float16 pairs = (float16)(ab.even + ab.odd, eh.even + eh.odd);
   return pairs.even + pairs.odd;
 }
+
+inline int max_int8(int8 a) {
+  const int4 b = max(a.lo, a.hi);
+  const int2 c = max(b.lo, b.hi);
+  return max(c.x, c.y);
+}

@@ -1,0 +1,126 @@
+// place_of of tiles.cl for eight splats at once, and their entries in the packed lists of a chunk.
+#include "common/tiles.cl"
+#include "common/vector.cl"
+#define LOW_BITS 12  // of a depth key: the digit of the first sorting pass
+#define LOW_BINS (1 << LOW_BITS)
+
+// Eight ellipses on the screen, pixels; `seen` is -1 where there is one.
+typedef struct {
+  float8 x, y, a, b, c, half_x, half_y, cut;
+  int8 seen;
+} Ellipses;
+
+typedef struct {
+  uint8 corner, mask;  // the two words of a place
+  int8 count;          // tiles touched
+} Places;
+
+// What a chunk gathers: its visible splats, packed at its start, and a histogram of low digits.
+typedef struct {
+  __global uint2* places;
+  __global uint* keys;
+  __global int* splats;
+  __global int* bins;
+  int next;            // where its next visible splat goes
+  int8 instances;      // of each lane, summed at the end; so with the range of keys
+  uint8 least, most;
+} Chunk;
+
+inline Chunk open_chunk(int first, __global uint2* places, __global uint* keys,
+                        __global int* splats, __global int* bins) {
+  const Chunk chunk = {places, keys, splats, bins, first, 0, 0xffffffffu, 0};
+  for (int b = 0; b < LOW_BINS; b++) bins[b] = 0;
+  return chunk;
+}
+
+// visible splats, instances, least and most key.
+inline uint4 close_chunk(const Chunk* chunk, int first) {
+  const int4 sum = chunk->instances.lo + chunk->instances.hi;
+  const uint4 least = min(chunk->least.lo, chunk->least.hi);
+  const uint4 most = max(chunk->most.lo, chunk->most.hi);
+  return (uint4)(chunk->next - first, sum.x + sum.y + sum.z + sum.w,
+                 min(min(least.x, least.y), min(least.z, least.w)),
+                 max(max(most.x, most.y), max(most.z, most.w)));
+}
+
+inline Places places_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
+  const float8 zero = 0;
+  const float8 x = select(zero, e->x, e->seen), y = select(zero, e->y, e->seen);
+  const float8 ex = select(zero, e->half_x, e->seen), ey = select(zero, e->half_y, e->seen);
+  // Pixel centres lie at +0.5: the first and last pixels whose centre is inside the box.
+  const int8 x0 = convert_int8(ceil(fmax(x - ex, zero) - 0.5f)) / TILE;
+  const int8 y0 = convert_int8(ceil(fmax(y - ey, zero) - 0.5f)) / TILE;
+  const int8 x1 = convert_int8(floor(fmin(x + ex, (float8)(TILE * tiles_x)) - 0.5f)) >> 4;
+  const int8 y1 = convert_int8(floor(fmin(y + ey, (float8)(TILE * tiles_y)) - 0.5f)) >> 4;
+  const int8 columns = x1 + 1 - x0, rows = y1 + 1 - y0;
+  const int8 present = e->seen & (columns > 0) & (rows > 0);
+  const int8 box = present & ((columns > 8) | (rows > 4));
+  const int8 masked = present & ~box;
+
+  // Tests of the ellipse against the tiles of the largest grid among the eight.
+  const int8 tested = masked & ((columns > 1) | (rows > 1));
+  const int8 wide = tested & columns, high = tested & rows;
+  const int most_columns = max_int8(wide), most_rows = max_int8(high);
+  const float8 cut = e->cut * 1.0001f;  // float rounding must not lose a pixel
+  const float8 tilt_x = -e->b / e->a, tilt_y = -e->b / e->c;
+  uint8 mask = select((uint8)(1), (uint8)(0), as_uint8(tested));
+  for (int row = 0; row < most_rows; row++) {
+    const float8 top = convert_float8((y0 + row) * TILE) + 0.5f - y, bottom = top + (TILE - 1);
+    const float8 dy = fmin(fmax(zero, top), bottom), on_y = e->c * dy * dy;
+    const float8 lean_x = tilt_x * dy;
+    for (int column = 0; column < most_columns; column++) {
+      const float8 left = convert_float8((x0 + column) * TILE) + 0.5f - x;
+      const float8 right = left + (TILE - 1);
+      const float8 dx = fmin(fmax(zero, left), right);
+      const float8 near_x = fmin(fmax(lean_x, left), right);
+      const float8 near_y = fmin(fmax(tilt_y * dx, top), bottom);
+      const float8 across = e->a * near_x * near_x + 2.0f * e->b * near_x * dy + on_y;
+      const float8 along = e->a * dx * dx + 2.0f * e->b * dx * near_y + e->c * near_y * near_y;
+      // Inside in x (dx = 0) the face across y is the near one, and the other way round.
+      const float8 out_y = select(along, fmin(along, across), dy != 0.0f);
+      const float8 r = select(across, out_y, dx != 0.0f);
+      const int8 hit = tested & (r <= cut) & (column < columns) & (row < rows);
+      mask |= as_uint8(hit) & (1u << (8 * row + column));
+    }
+  }
+  const int8 touched = present & as_int8(mask != 0u);
+  Places out;
+  const uint8 corner = as_uint8(x0) | as_uint8(y0) << 12;
+  out.corner = as_uint8(touched) & (corner | select((uint8)(MASKED), (uint8)(BOX), as_uint8(box)));
+  const uint8 size = as_uint8(columns) | as_uint8(rows) << 16;
+  out.mask = as_uint8(touched) & select(mask, size, as_uint8(box));
+  out.count = touched & select(as_int8(popcount(mask)), columns * rows, box);
+  return out;
+}
+
+// Enters `n` splats from number i on; depth: their eight depths.
+inline void enter_eight(Chunk* chunk, int i, int n, const Places* p, float8 depth) {
+  const uint8 c = p->corner, m = p->mask, key = as_uint8(depth);  // depths > 0 sort as their bits
+  const int8 visible = p->count > 0;
+  chunk->instances += p->count;
+  chunk->least = min(chunk->least, key | ~as_uint8(visible));
+  chunk->most = max(chunk->most, key & as_uint8(visible));
+  if (n == LANES && all(visible)) {
+    vstore8(key, 0, chunk->keys + chunk->next);
+    vstore8((int8)(0, 1, 2, 3, 4, 5, 6, 7) + i, 0, chunk->splats + chunk->next);
+    vstore16((uint16)(c.s0, m.s0, c.s1, m.s1, c.s2, m.s2, c.s3, m.s3, c.s4, m.s4, c.s5, m.s5, c.s6,
+                      m.s6, c.s7, m.s7), 0, (__global uint*)(chunk->places + i));
+    chunk->next += LANES;
+    uint low[LANES];
+    vstore8(key & (LOW_BINS - 1), 0, low);
+    for (int lane = 0; lane < LANES; lane++) chunk->bins[low[lane]]++;
+    return;
+  }
+  uint keys[LANES], corner[LANES], mask[LANES];
+  vstore8(key, 0, keys);
+  vstore8(c, 0, corner);
+  vstore8(m, 0, mask);
+  for (int lane = 0; lane < n; lane++) {
+    chunk->places[i + lane] = (uint2)(corner[lane], mask[lane]);
+    chunk->keys[chunk->next] = keys[lane];  // written over by the next one unless visible
+    chunk->splats[chunk->next] = i + lane;
+    const int here = corner[lane] >= MASKED;
+    chunk->next += here;
+    chunk->bins[keys[lane] & (LOW_BINS - 1)] += here;
+  }
+}
