@@ -36,7 +36,7 @@ class Options:
     preset: Literal["fast", "paper"] = "fast"
     """fast: minutes on a CPU.  paper: the numbers of the paper."""
     resume: bool = False
-    """Go on from the checkpoint with its settings; a longer --iterations or --seconds may be given."""
+    """Go on from the checkpoint and its settings; --iterations or --seconds may be longer."""
     seed: int | None = None
     """Of everything random."""
     grow: bool | None = None

@@ -6,7 +6,8 @@ import pytest
 from rasterizer.device import open_device
 from training.gaussians import Gaussians
 from training.losses import ImageLoss, regularise
-from training.metrics import psnr, ssim, ssim_map, weighted_mean
+from training.metrics import psnr, ssim, weighted_mean
+from training.reference import image_loss_reference
 
 
 @pytest.fixture(scope="module")
@@ -21,14 +22,6 @@ def photo_and_image(width, height, seed=0):
     rgba[..., 3] = 255
     image = rgba[..., :3] / 255 + rng.normal(size=(height, width, 3)) * 0.2
     return rgba, image.astype(np.float32)
-
-
-def plain_loss(image, photo, share, weight=None):
-    if weight is not None:
-        image = photo + weight[..., None] * (image - photo)
-    values = 3 * (image.shape[0] * image.shape[1] if weight is None else weight.sum())
-    l1 = np.abs(image - photo).sum() / values
-    return (1 - share) * l1 + share * (1 - ssim_map(image, photo)).sum() / values
 
 
 def planar(image):
@@ -48,7 +41,7 @@ def test_value_and_gradient(device, size, share):
     grad = device.download(loss.compare(device.upload(planar(image)), target, share))
     grad = grad.transpose(1, 2, 0)
     plain = image.astype(np.float64)
-    assert loss.value() == pytest.approx(plain_loss(plain, photo, share), abs=2e-6)
+    assert loss.value() == pytest.approx(image_loss_reference(plain, photo, share), abs=2e-6)
     check_gradient(grad, plain, photo, share)
 
 
@@ -68,7 +61,9 @@ def check_gradient(grad, plain, photo, share, weight=None):
             up, down = plain.copy(), plain.copy()
             up[y, x, channel] += step
             down[y, x, channel] -= step
-            numeric = plain_loss(up, photo, share, weight) - plain_loss(down, photo, share, weight)
+            numeric = image_loss_reference(up, photo, share, weight) - image_loss_reference(
+                down, photo, share, weight
+            )
             assert abs(grad[y, x, channel] - numeric / (2 * step)) < 1e-5 * largest
 
 
@@ -108,7 +103,9 @@ def test_weights_leave_pixels_out(device, share):
     on_device = device.upload(planar(image))
     grad = device.download(loss.compare(on_device, target, share)).transpose(1, 2, 0)
     plain = image.astype(np.float64)
-    assert loss.value() == pytest.approx(plain_loss(plain, photo, share, weight), abs=3e-6)
+    assert loss.value() == pytest.approx(
+        image_loss_reference(plain, photo, share, weight), abs=3e-6
+    )
     assert not grad[weight == 0].any()
     check_gradient(grad, plain, photo, share, weight)
     image[weight == 0] = 1e6  # what is left out has no say, not even through a window

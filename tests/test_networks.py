@@ -5,8 +5,9 @@ import pytest
 
 from rasterizer.device import open_device
 from runtime_models.model import HEADS, SIZE_PER_SPLAT
-from training.gaussians import REACH, SCALE_CLIP, UNIT, Activation, Gaussians
+from training.gaussians import Activation, Gaussians
 from training.networks import HeadLayout, Heads, initial_weights, padded
+from training.reference import activate_reference, directions, head_inputs, heads_reference
 
 VOXEL = 0.05
 EYE = np.array([2.0, 1.0, 1.5])
@@ -27,22 +28,10 @@ def model(layout: HeadLayout, count: int, seed: int = 0):
     return initial_weights(layout, rng), anchors, features, control
 
 
-def inputs_of(name, layout, anchors, features, control):
-    direction = anchors - EYE
-    direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    repeated = np.repeat(control[None].astype(np.float64), len(anchors), axis=0)
-    parts = [features[:, : layout.features]]
-    return np.concatenate([*parts, *([direction] if name == "color" else []), repeated], axis=1)
-
-
 def plain_heads(layout, networks, anchors, features, control):
     """(hidden, raw) of every head by name, float64."""
-    out = {}
-    for name in HEADS:
-        w1, b1, w2, b2 = (np.asarray(a, np.float64) for a in networks[name])
-        hidden = np.maximum(inputs_of(name, layout, anchors, features, control) @ w1.T + b1, 0)
-        out[name] = (hidden, hidden @ w2.T + b2)
-    return out
+    real = features[:, : layout.features].astype(np.float64)
+    return heads_reference(networks, real, directions(anchors, EYE), control)
 
 
 def raw_of(raw, layout, name):
@@ -114,7 +103,9 @@ def test_backward_equals_plain_numpy(device, layout, count):
         w1, _, w2, _ = (a.astype(np.float64) for a in networks[name])
         d_out = raw_of(grad_raw, layout, name).astype(np.float64)
         d_hidden = (d_out @ w2) * (plain[name][0] > 0)
-        inputs = inputs_of(name, layout, anchors, features, control)
+        inputs = head_inputs(
+            name, features[:, : layout.features], directions(anchors, EYE), control
+        )
         wanted = (d_hidden.T @ inputs, d_hidden.sum(0), d_out.T @ plain[name][0], d_out.sum(0))
         for got, want in zip(found[name], wanted, strict=True):
             assert relative(got, want) < 5e-6, name
@@ -159,16 +150,8 @@ def test_an_eye_at_an_anchor_is_finite(device):
 
 def activated(layout, raw, anchors):
     """Splats of raw outputs (A, RAW) in float64, fields in the order of Gaussians."""
-    per = {n: raw_of(raw.astype(np.float64), layout, n) for n in HEADS}
-    size = len(anchors) * layout.splats
-    offset = REACH * VOXEL * np.tanh(per["offset"].reshape(size, 3))
-    return (
-        np.repeat(anchors, layout.splats, axis=0) + offset,
-        UNIT * VOXEL * np.exp(np.clip(per["scale"].reshape(size, 3), *SCALE_CLIP)),
-        per["rotation"].reshape(size, 4),
-        np.tanh(per["opacity"].reshape(size)),
-        1 / (1 + np.exp(-per["color"].reshape(size, 3))),
-    )
+    raw = raw.astype(np.float64)
+    return activate_reference({n: raw_of(raw, layout, n) for n in HEADS}, anchors, VOXEL)
 
 
 @pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere

@@ -3,7 +3,8 @@
 import numpy as np
 
 LEAST_VISIBLE = 0.01  # of the largest share of splats that this modality has had on screen
-EVERY = 10  # steps between looks
+LEAST_SHOWN = 0.02  # of the contrast to the background that the photo has
+EVERY = 5  # rounds between looks; a round is one step of every modality
 SNAPSHOT_EVERY = 100  # steps
 KEPT = 3  # snapshots
 
@@ -19,10 +20,18 @@ class Guard:
         self.most_visible: dict[str, float] = {}
         self.trips = 0
 
-    def healthy(self, modality: str, loss: float, visible: float) -> bool:
-        """`visible` is the share of all splats that were on screen in this step, 0..1."""
+    def expect(self, modality: str, visible: float) -> None:
+        """`visible` is the share of all splats that are on screen in a healthy state, 0..1."""
         self.most_visible[modality] = max(self.most_visible.get(modality, 0.0), visible)
-        return bool(np.isfinite(loss)) and visible > LEAST_VISIBLE * self.most_visible[modality]
+
+    def healthy(self, modality: str, loss: float, visible: float, shown: float) -> bool:
+        """`shown` is the picture's mean contrast to the background over the photo's.
+
+        Splats that have shrunk to black dots are on screen, but show nothing.
+        """
+        self.expect(modality, visible)
+        enough = visible > LEAST_VISIBLE * self.most_visible[modality] and shown > LEAST_SHOWN
+        return bool(np.isfinite(loss)) and enough
 
     def remember(self, state: dict[str, np.ndarray]) -> None:
         self.snapshots = [*self.snapshots, state][-KEPT:]

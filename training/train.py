@@ -25,11 +25,12 @@ from training.photos import (
 )
 from training.schedule import Budget, Schedule, choose_background
 from training.settings import Rates, TrainSettings
-from training.step import Step
+from training.step import Color, Step
 
 GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
 PACE_STEPS = 20  # steps after which the length of a timed run is known
+EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background
 FEATURE_SPREAD = 0.1  # standard deviation of the first features
 
 
@@ -83,12 +84,13 @@ class Trainer:
             settings.splats_per_anchor, settings.features, settings.hidden, settings.control
         )
         self.targets = Targets(device)
+        self.contrast: dict[tuple, float] = {}
         if resume is None:
             self.start(photos)
         else:
             self.go_on(*resume)
         self.step = Step(device, self.layout, self.voxel, self.adam)
-        self.guard = Guard(self.adam.state())
+        self.guard, self.next_snapshot = Guard(self.adam.state()), self.iteration + SNAPSHOT_EVERY
 
     def start(self, photos: list[LoadedPhoto]) -> None:
         """Anchors, features and weights of a new run."""
@@ -163,17 +165,19 @@ class Trainer:
             yield Progress(self.iteration, fraction, loss, self.anchors_count, fell_back)
 
     def warm_up(self) -> None:
-        """Compile every kernel for every photo size, outside of the time that is counted."""
+        """Compile every kernel for every photo size, outside of the time that is counted.
+
+        On the way the guard learns what a healthy picture of every modality has on screen.
+        """
         before, evidence = self.adam.state(), self.evidence.state()
-        sizes = {}
-        for photos in self.schedule.photos.values():
-            sizes |= {p.view.size: p for p in photos}
-        for photo in sizes.values():
-            self.step.update(self.learn(photo, BLACK), 0.0)
+        for modality, photos in self.schedule.photos.items():
+            for photo in {p.view.size: p for p in photos}.values():
+                self.step.update(self.learn(photo, BLACK), 0.0)
+                self.guard.expect(modality, self.visible())
         self.adam.load(before)
         self.evidence.load(evidence)
 
-    def learn(self, photo: LoadedPhoto, background) -> dict[str, object]:
+    def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
         settings = self.settings
         target = self.targets.target(photo, background)
         self.drawing = self.step.draw(photo.view, self.control(photo.modality), background)
@@ -191,9 +195,10 @@ class Trainer:
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
         self.iteration += 1
         loss, fell_back = None, False
-        if self.iteration % GUARD_EVERY == 0:
+        rounds = -(-self.iteration // len(self.stops))
+        if rounds % GUARD_EVERY == 0:  # every modality in turn, however many there are
             loss = self.targets.loss(photo).value()
-            fell_back = self.look_after(photo.modality, loss)
+            fell_back = self.look_after(photo, background, loss)
         if self.run_length is None and self.iteration == PACE_STEPS:
             self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
             self.adam.set_rates(self.all_rates())
@@ -202,13 +207,32 @@ class Trainer:
                 self.grow()
         return loss, fell_back
 
-    def look_after(self, modality: str, loss: float) -> bool:
+    def visible(self) -> float:
+        """The share of all splats that the last drawing has on screen."""
+        return float((self.device.view(self.drawing.projected.record)[:, 9] > 0).mean())
+
+    def shown(self, photo: LoadedPhoto, background: Color) -> float:
+        """Contrast of the last drawing to its background, over that of its photo."""
+        behind = np.asarray(background, np.float32)
+        key = (photo.modality, photo.name)
+        contrast = self.contrast.get(key)
+        if contrast is None:
+            contrast = float(np.abs(photo.over(background) - behind).mean())
+            if self.schedule.background is not None or not photo.see_through:
+                self.contrast[key] = contrast
+        if not contrast > EMPTY_PHOTO:
+            return 1.0
+        image = self.device.view(self.drawing.frame.image)
+        return float(np.abs(image - behind[:, None, None]).mean()) / contrast
+
+    def look_after(self, photo: LoadedPhoto, background: Color, loss: float) -> bool:
         """The guard's look at the last step; True when it turned the run back."""
-        record = self.device.download(self.drawing.projected.record)
-        visible = float((record[:, 9] > 0).mean())
-        if self.guard.healthy(modality, loss, visible):
-            if self.iteration % SNAPSHOT_EVERY == 0:
+        shown = self.shown(photo, background)
+        if self.guard.healthy(photo.modality, loss, self.visible(), shown):
+            last = photo.modality == self.stops[-1].name
+            if self.iteration >= self.next_snapshot and last:
                 self.guard.remember(self.adam.state())
+                self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
         self.adam.load(self.guard.fall_back())
         self.evidence = Evidence(self.device, self.layout, self.anchors_count)

@@ -1,0 +1,65 @@
+"""The whole step against finite differences in float64: every weight, feature and anchor."""
+
+import numpy as np
+import pytest
+
+from rasterizer.device import open_device
+from rasterizer.reference import finite_differences
+from scene.pose import View, look_at, perspective
+from training.losses import ImageLoss
+from training.networks import HeadLayout, initial_weights
+from training.optimizer import Adam
+from training.reference import decode_reference, step_loss_reference
+from training.step import Step, camera_of
+
+LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
+VOXEL = 0.5
+SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
+BACKGROUND = (0.2, 0.5, 0.9)
+SHARES = (0.2, 0.05, 0.03)  # D-SSIM, lambda_alpha, lambda_S
+
+
+@pytest.fixture(scope="module")
+def device():
+    return open_device("cpu")
+
+
+def situation(seed: int):
+    """(parameters, control, view, rgba): a few large splats, some absent, all heads active."""
+    rng = np.random.default_rng(seed)
+    parameters = {
+        "weights": (2 * initial_weights(LAYOUT, rng)).astype(np.float32),
+        "anchors": rng.uniform(-0.6, 0.6, (5, 3)).astype(np.float32),
+        "features": rng.normal(size=(5, 8)).astype(np.float32),
+    }
+    control = rng.random(4).astype(np.float32)
+    eye = look_at(np.array([0.5, 0.7, 3.0]), np.zeros(3))
+    view = View(eye, perspective(np.deg2rad(40), SIZE), 0.05, 100.0, SIZE)
+    rgba = rng.integers(0, 256, (SIZE[1], SIZE[0], 4)).astype(np.uint8)
+    rgba[..., 3] = 255
+    return parameters, control, view, rgba
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_every_gradient(device, seed):
+    parameters, control, view, rgba = situation(seed)
+    rates = {name: np.ones(1) for name in parameters}
+    adam = Adam(device, parameters, rates)
+    step = Step(device, LAYOUT, VOXEL, adam)
+    loss = ImageLoss(device, SIZE)
+    target = loss.target(device.upload(rgba), BACKGROUND)
+    drawing = step.draw(view, control, BACKGROUND)
+    grads = step.gradients(drawing, loss, target, *SHARES)
+    photo, camera = rgba[..., :3] / 255, camera_of(view)
+
+    def loss_with(name: str, values: np.ndarray) -> float:
+        changed = {**parameters, name: values}
+        splats = decode_reference(LAYOUT, changed, control, view.world_from_eye.position, VOXEL)
+        return step_loss_reference(splats, camera, photo, BACKGROUND, SHARES)
+
+    for name, found in grads.items():
+        values = parameters[name].astype(np.float64)
+        wanted = finite_differences(lambda v, name=name: loss_with(name, v), values)
+        difference = np.abs(device.download(found) - wanted).max() / np.abs(wanted).max()
+        # float32 all the way, sums of some hundred terms: a few units in the seventh digit each
+        assert difference < 1e-5, (name, difference)

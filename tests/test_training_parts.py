@@ -1,0 +1,258 @@
+"""The parts of training that are plain numpy: first points, photos, growing, schedule, Adam."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from rasterizer.device import open_device
+from runtime_models.model import BadFile, Stop
+from scene.capture import Capture, Photo
+from scene.pose import View, look_at, perspective
+from training.density import Newcomers, changed_state, given_up, newcomers
+from training.guard import Guard
+from training.initial import choose_voxel, initial_points, median_neighbour, voxel_centres
+from training.optimizer import Adam
+from training.photos import LoadedPhoto, choose_downscale, load_photos
+from training.schedule import Budget, Schedule, choose_background
+from training.settings import PAPER, TrainSettings, preset
+
+RNG = np.random.default_rng
+
+
+def test_voxel_centres_are_unique_and_near():
+    points = RNG(0).uniform(-1, 1, (5000, 3))
+    centres = voxel_centres(points, 0.2)
+    assert len(np.unique(centres, axis=0)) == len(centres)
+    distance = np.abs(points[:, None] - centres[None]).max(axis=2).min(axis=1)
+    assert distance.max() <= 0.1 + 1e-6
+
+
+@pytest.mark.parametrize("most", [10, 300, 4000])
+def test_the_voxel_gives_about_as_many_anchors_as_wanted(most):
+    points = RNG(0).uniform(-1, 1, (5000, 3))
+    found = len(voxel_centres(points, choose_voxel(points, most, RNG(1))))
+    assert 0.8 * most <= found <= most
+
+
+def test_median_neighbour_of_a_grid_is_its_spacing():
+    axis = np.arange(10) * 0.3
+    grid = np.stack(np.meshgrid(axis, axis, axis), -1).reshape(-1, 3)
+    assert median_neighbour(grid, RNG(0)) == pytest.approx(0.3)
+
+
+def sphere_photos(background, alpha: bool) -> list[LoadedPhoto]:
+    """Twelve pictures of a ball of radius 0.5 at the origin, seen from 3 m."""
+    size, photos = (64, 64), []
+    for turn in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        eye = 3 * np.array([np.cos(turn), 0.6 * np.sin(2 * turn), np.sin(turn)])
+        view = View(look_at(eye, np.zeros(3)), perspective(0.7, size), 0.05, 100.0, size)
+        axis = (np.arange(64) + 0.5) / 32 - 1
+        tangent = np.hypot(*np.meshgrid(axis, axis)) * np.tan(0.35)
+        inside = tangent < np.tan(np.arcsin(0.5 / np.linalg.norm(eye)))
+        rgba = np.zeros((64, 64, 4), np.uint8)
+        rgba[..., :3] = np.where(inside[..., None], (200, 80, 20), np.array(background) * 255)
+        rgba[..., 3] = np.where(inside, 255, 0) if alpha else 255
+        photos.append(LoadedPhoto(view, "RGB", rgba, None, f"{turn:.2f}"))
+    return photos
+
+
+@pytest.mark.parametrize("alpha", [True, False])
+def test_the_visual_hull_of_a_ball_is_nearly_a_ball(tmp_path, alpha):
+    capture = Capture(tmp_path, (Stop("RGB", 0.0),), (), background=(1.0, 1.0, 1.0))
+    points, origin = initial_points(capture, sphere_photos((1, 1, 1), alpha), RNG(0))
+    radius = np.linalg.norm(points, axis=1)
+    assert origin == "hull" and len(points) > 500
+    assert 0.44 < np.percentile(radius, 5) and np.percentile(radius, 95) < 0.62
+
+
+def test_photos_that_tell_nothing_give_random_points_where_cameras_look(tmp_path):
+    capture = Capture(tmp_path, (Stop("RGB", 0.0),), ())
+    points, origin = initial_points(capture, sphere_photos((1, 1, 1), False), RNG(0))
+    assert origin == "random" and len(points) > 1000
+    assert np.abs(points).max() < 4 and np.abs(np.median(points, axis=0)).max() < 0.2
+
+
+def test_masks_without_a_common_volume_are_refused(tmp_path):
+    photos = sphere_photos((0, 0, 0), True)
+    for photo in photos:
+        photo.rgba[..., 3] = 0
+    with pytest.raises(BadFile, match="no volume in common"):
+        initial_points(Capture(tmp_path, (), ()), photos, RNG(0))
+
+
+def capture_of(tmp_path, image: np.ndarray, mask: np.ndarray | None = None) -> Capture:
+    """One photo, its file of `image` (H, W, 3 or 4) uint8."""
+    size = (image.shape[1], image.shape[0])
+    Image.fromarray(image).save(tmp_path / "a.png")
+    if mask is not None:
+        Image.fromarray(mask).save(tmp_path / "m.png")
+    view = View(look_at(np.ones(3), np.zeros(3)), perspective(0.7, size), 0.05, 100.0, size)
+    place = tmp_path / "m.png" if mask is not None else None
+    photo = Photo(view, tmp_path / "a.png", "RGB", place)
+    return Capture(tmp_path, (Stop("RGB", 0.0),), (photo,))
+
+
+def test_photos_are_made_smaller_with_their_view(tmp_path):
+    image = RNG(0).integers(0, 256, (9, 13, 3)).astype(np.uint8)
+    capture = capture_of(tmp_path, image)
+    small = load_photos(capture, "train", 3, "object")[0]
+    assert small.view.size == (4, 3) and small.rgba.shape == (3, 4, 4)
+    assert small.view.tangents == capture.photos[0].view.tangents
+    whole = load_photos(capture, "train", 1, "object")[0]
+    np.testing.assert_array_equal(whole.rgba[..., :3], image)
+    assert not whole.see_through
+
+
+def test_large_photos_are_halved_by_default(tmp_path):
+    for side, factor in ((640, 1), (641, 2), (1280, 2), (1281, 3)):
+        capture = capture_of(tmp_path, np.zeros((5, side, 3), np.uint8))
+        assert choose_downscale(capture.photos) == factor
+
+
+@pytest.mark.parametrize("masks", ["object", "valid", "ignore"])
+def test_what_masks_mean(tmp_path, masks):
+    image = RNG(0).integers(1, 256, (8, 8, 3)).astype(np.uint8)
+    mask = np.zeros((8, 8), np.uint8)
+    mask[2:6, 2:6] = 255
+    photo = load_photos(capture_of(tmp_path, image, mask), "train", 1, masks)[0]
+    np.testing.assert_array_equal(photo.rgba[..., :3], image)
+    if masks == "object":
+        np.testing.assert_array_equal(photo.rgba[..., 3], mask)
+    assert (photo.weight is not None) == (masks == "valid")
+    if masks == "valid":
+        np.testing.assert_array_equal(photo.weight, mask / 255)
+
+
+def test_alpha_is_taken_from_the_file(tmp_path):
+    image = RNG(0).integers(100, 256, (6, 6, 4)).astype(np.uint8)
+    photo = load_photos(capture_of(tmp_path, image), "train", 1, "object")[0]
+    assert np.abs(photo.rgba.astype(int) - image).max() <= 1
+
+
+def schedule(count: int, names=("RGB", "Thermal")) -> Schedule:
+    photos = sphere_photos((1, 1, 1), True)[:count]
+    return Schedule({name: photos for name in names}, seed=3, background=None)
+
+
+def test_every_photo_comes_once_an_epoch_and_modalities_take_turns():
+    plan = schedule(5)
+    for epoch in range(3):
+        for which in range(2):
+            steps = range(epoch * 10 + which, epoch * 10 + 10, 2)
+            names = [plan.photo(i).name for i in steps]
+            assert sorted(names) == sorted(p.name for p in plan.photos["RGB"])
+    orders = [[plan.photo(i).name for i in range(e * 10, e * 10 + 10)] for e in range(3)]
+    assert orders[0] != orders[1]
+
+
+def test_random_backgrounds_only_where_they_show():
+    plan = schedule(2)
+    photo = plan.photo(0)
+    first, second = plan.background_of(0, photo), plan.background_of(1, photo)
+    assert first != second and first == plan.background_of(0, photo)
+    photo.rgba[..., 3] = 255
+    assert plan.background_of(0, photo) == (0, 0, 0)
+    assert choose_background("auto", (1, 1, 1)) == (1, 1, 1)
+    assert choose_background("random", (1, 1, 1)) is None
+    with pytest.raises(ValueError, match="no background 'pink'"):
+        choose_background("pink", None)
+
+
+def test_budget_follows_whichever_ends_first():
+    assert Budget(100, None).fraction(25, 1e9) == 0.25
+    assert Budget(None, 20.0).fraction(10**9, 5.0) == 0.25
+    assert Budget(100, 20.0).fraction(10, 15.0) == 0.75
+    with pytest.raises(ValueError, match="needs an end"):
+        Budget.of(TrainSettings(iterations=None))
+
+
+def test_presets():
+    paper = preset("paper")
+    assert paper.rates(30000) is PAPER and paper.splats_per_anchor == 10
+    assert (paper.features, paper.control, paper.sigma) == (16, 16, 0.04)
+    assert preset("fast").rates(600) is not preset("fast").rates(2000)
+    with pytest.raises(ValueError, match="no preset 'slow'"):
+        preset("slow")
+
+
+def test_new_anchors_stand_free_under_the_splats_that_pull():
+    anchors = np.array([[0, 0, 0], [1, 0, 0]], np.float32)
+    means = np.array([[0.02, 0, 0], [0.6, 0, 0], [1.01, 0, 0], [1.3, 0.3, 0]])  # k = 2
+    gradient = np.array([[90, 30], [90, 30], [90, 30], [9, 30]], float)  # pulls 3, 3, 3, 0.3
+    new = newcomers(anchors, [means], gradient, voxel=0.2, threshold=1.0, room=10)
+    assert new.parents.tolist() == [0] * len(new.parents) and len(new.anchors)
+    assert np.allclose(new.anchors[0], [0.6, 0, 0])
+    assert len(np.unique(np.round(np.concatenate([anchors, new.anchors]), 4), axis=0)) == 2 + len(
+        new.anchors
+    )
+    assert not len(newcomers(anchors, [means], gradient, 0.2, 1.0, room=0).anchors)
+    gradient[:, 1] = 5  # too rarely seen
+    assert not len(newcomers(anchors, [means], gradient, 0.2, 1.0, room=10).anchors)
+
+
+def test_anchors_that_show_nothing_are_given_up():
+    opacity = np.array([0.0, 100.0, 0.4])
+    assert given_up(opacity, 100, 2, 0.005).tolist() == [True, False, True]
+    assert not given_up(opacity, 10, 2, 0.005).any()
+
+
+def test_changing_anchors_keeps_the_others_moments():
+    state = {"weights.value": np.ones(3)}
+    for name, width in (("anchors", 3), ("features", 8)):
+        for part in ("value", "mean", "square"):
+            state[f"{name}.{part}"] = RNG(0).normal(size=(4, width)).astype(np.float32)
+    new = Newcomers(np.full((2, 3), 9, np.float32), np.array([3, 0]))
+    keep = np.array([True, False, True, True])
+    out = changed_state(state, keep, new)
+    np.testing.assert_array_equal(out["features.mean"][:3], state["features.mean"][keep])
+    np.testing.assert_array_equal(out["features.value"][3:], state["features.value"][[3, 0]])
+    assert not out["anchors.square"][3:].any() and (out["anchors.value"][3:] == 9).all()
+    assert out["weights.value"] is state["weights.value"]
+
+
+def test_the_guard_goes_further_back_each_time():
+    guard = Guard({"a": np.array(0)})
+    for i in range(1, 6):
+        guard.remember({"a": np.array(i)})
+    assert [int(guard.fall_back()["a"]) for _ in range(4)] == [5, 4, 3, 3]
+
+
+@pytest.mark.parametrize(
+    ("loss", "visible", "shown", "healthy"),
+    [
+        (0.1, 0.5, 1.0, True), (np.nan, 0.5, 1.0, False), (np.inf, 0.5, 1.0, False),
+        (0.1, 0.0, 1.0, False), (0.1, 0.009, 1.0, False), (0.1, 0.011, 1.0, True),
+        (0.1, 0.5, 0.0, False), (0.1, 0.5, np.nan, False), (0.1, np.nan, 1.0, False),
+    ],
+)  # fmt: skip
+def test_what_the_guard_calls_healthy(loss, visible, shown, healthy):
+    guard = Guard({})
+    guard.expect("RGB", 1.0)
+    assert guard.healthy("RGB", loss, visible, shown) == healthy
+
+
+def test_adam_equals_its_definition():
+    device = open_device("cpu")
+    rng = RNG(0)
+    start = {"a": rng.normal(size=(7, 3)), "b": rng.normal(size=70)}
+    start = {n: v.astype(np.float32) for n, v in start.items()}
+    rates = {"a": np.array([0.01]), "b": rng.random(70)}
+    adam = Adam(device, start, rates)
+    value = {n: v.astype(np.float64) for n, v in start.items()}
+    mean, square = ({n: np.zeros_like(v) for n, v in value.items()} for _ in range(2))
+    for t in range(1, 20):
+        grads = {n: rng.normal(size=v.shape).astype(np.float32) for n, v in start.items()}
+        if t == 5:
+            grads["a"][:] = 0  # a gradient of nothing must not divide by zero
+        adam.step({n: device.upload(g) for n, g in grads.items()}, 0.5)
+        for n, g in grads.items():
+            mean[n] = 0.9 * mean[n] + 0.1 * g
+            square[n] = 0.999 * square[n] + 0.001 * g.astype(np.float64) ** 2
+            root = np.sqrt(square[n] / (1 - 0.999**t)) + 1e-15
+            value[n] -= 0.5 * rates[n] * mean[n] / (1 - 0.9**t) / root
+    for n in value:
+        np.testing.assert_allclose(device.download(adam[n]), value[n], atol=1e-5)
+    copy = Adam(device, start, rates)
+    copy.load(adam.state())
+    for name, array in adam.state().items():
+        np.testing.assert_array_equal(copy.state()[name], array)

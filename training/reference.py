@@ -1,0 +1,80 @@
+"""The slow twin of a training step: heads, activations and losses in plain numpy float64."""
+
+import numpy as np
+
+from rasterizer.project import Camera
+from rasterizer.reference import render_reference
+from runtime_models.model import HEADS
+from training.gaussians import REACH, SCALE_CLIP, UNIT
+from training.metrics import ssim_map
+from training.networks import HeadLayout
+
+
+def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """(A, 3) unit vectors from the eye to the anchors (eq. 4)."""
+    away = anchors - eye
+    return away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-8)
+
+
+def head_inputs(
+    name: str, features: np.ndarray, direction: np.ndarray, control: np.ndarray
+) -> np.ndarray:
+    """(A, in): feature and Psi, and for colour the direction between them (eq. 5)."""
+    repeated = np.repeat(np.asarray(control, np.float64)[None], len(features), axis=0)
+    middle = [direction] if name == "color" else []
+    return np.concatenate([features, *middle, repeated], axis=1)
+
+
+def heads_reference(networks: dict, features, direction, control) -> dict[str, tuple]:
+    """(hidden (A, H), raw (A, out)) of every head; networks as HeadLayout.unpack gives them."""
+    out = {}
+    for name in HEADS:
+        w1, b1, w2, b2 = (np.asarray(a, np.float64) for a in networks[name])
+        hidden = np.maximum(head_inputs(name, features, direction, control) @ w1.T + b1, 0)
+        out[name] = (hidden, hidden @ w2.T + b2)
+    return out
+
+
+def activate_reference(raw: dict[str, np.ndarray], anchors: np.ndarray, voxel: float) -> tuple:
+    """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head."""
+    splats_per_anchor = raw["opacity"].shape[1]
+    offset = REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
+    return (
+        np.repeat(anchors, splats_per_anchor, axis=0) + offset,
+        UNIT * voxel * np.exp(np.clip(raw["scale"].reshape(-1, 3), *SCALE_CLIP)),
+        raw["rotation"].reshape(-1, 4),
+        np.tanh(raw["opacity"].ravel()),
+        1 / (1 + np.exp(-raw["color"].reshape(-1, 3))),
+    )
+
+
+def decode_reference(
+    layout: HeadLayout, parameters: dict[str, np.ndarray], control, eye, voxel: float
+) -> tuple:
+    """The splats of an optimiser's values: weights (flat), anchors (A, 3), features (A, F)."""
+    anchors = np.asarray(parameters["anchors"], np.float64)
+    features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
+    networks = layout.unpack(parameters["weights"])
+    heads = heads_reference(networks, features, directions(anchors, eye), control)
+    return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel)
+
+
+def image_loss_reference(image, photo, share: float, weight=None) -> float:
+    """(1 - share) L1 + share (1 - SSIM) of (H, W, 3) images, over the pixels that count."""
+    values = 3 * photo.shape[0] * photo.shape[1]
+    if weight is not None:
+        image = photo + weight[..., None] * (image - photo)
+        values = 3 * weight.sum()
+    l1 = np.abs(image - photo).sum() / values
+    return (1 - share) * l1 + share * (1 - ssim_map(image, photo)).sum() / values
+
+
+def step_loss_reference(
+    splats: tuple, camera: Camera, photo, background, shares: tuple[float, float, float]
+) -> float:
+    """Eq. 8 and 9 of drawn splats; shares: of D-SSIM, lambda_alpha, lambda_S."""
+    ssim_share, opacity_share, scale_share = shares
+    image, _ = render_reference(splats, camera, background)
+    image_loss = image_loss_reference(image.transpose(1, 2, 0), photo, ssim_share)
+    regularisers = opacity_share * np.abs(splats[3]).mean() + scale_share * splats[1].mean()
+    return float(image_loss + regularisers)
