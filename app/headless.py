@@ -3,6 +3,7 @@
 import json
 import sys
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
@@ -61,7 +62,7 @@ def draw_sheet(renderer, model, size: tuple[int, int], out: Path) -> None:
     from scene.scene import Scene, SceneObject
 
     stops = [stop.x for stop in model.stops]
-    middles = [(a + b) / 2 for a, b in zip(stops, stops[1:], strict=False)]
+    middles = [(a + b) / 2 for a, b in pairwise(stops)]
     controls = sorted(stops + middles)
     centre, radius = frame_points(*model_points(model))
     views = [default_view(model, size), orbit_path(3, centre, radius, size)[1]]

@@ -58,8 +58,8 @@ def run(options: Options) -> int:
     taken = [p for p in paths if p.exists()]
     if taken and not options.overwrite:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
-    make_folder(options.out)
     with open_renderer(options.context, options.drawing) as (renderer, _):
+        make_folder(options.out)
         renderer.settings = replace(renderer.settings, background=options.background)
         draw_all(renderer, model, pairs, paths, options.stereo)
     print(f"{len(paths)} pictures in {options.out}", file=sys.stderr)
