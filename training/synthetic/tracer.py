@@ -179,20 +179,17 @@ def pattern_at(place: Place, hits: Hits, name: str, width: int) -> np.ndarray:
 
 
 def lit_share(place: Place, hits: Hits, light: Light) -> np.ndarray:
-    """(n,) 0..1: how much of the key light arrives; four rays over its disc make a soft edge."""
+    """(n,) 0..1: how much of the key light arrives; three rays over its disc make a soft edge."""
     here = np.flatnonzero(hits.index >= 0)
     towards = unit(np.array(light.towards))
     side = unit(np.cross(towards, (0.0, 0.0, 1.0)))
-    turns = np.arange(4) * np.pi / 2 + 0.4 if light.spread else np.zeros(1)
-    share = np.zeros(len(hits.index))
-    for turn in turns:
-        swing = np.cos(turn) * side + np.sin(turn) * np.cross(towards, side)
-        ray = unit(towards + light.spread * swing)
-        facing = here[hits.normals[here] @ ray > 0]
-        start = hits.points[facing] + LIFT * hits.normals[facing]
-        free = ~blocked(place, start, np.broadcast_to(ray, start.shape))
-        share[facing[free]] += 1 / len(turns)
-    return share
+    turns = np.arange(3) * 2 * np.pi / 3 + 0.4 if light.spread else np.zeros(1)
+    swing = np.cos(turns)[:, None] * side + np.sin(turns)[:, None] * np.cross(towards, side)
+    to_light = unit(towards + light.spread * swing)  # (rays a point, 3)
+    which, point = np.nonzero((hits.normals[here] @ to_light.T).T > 0)
+    start = hits.points[here[point]] + LIFT * hits.normals[here[point]]
+    free = ~blocked(place, start, to_light[which])
+    return np.bincount(here[point], free / len(turns), minlength=len(hits.index))
 
 
 def shade(
@@ -244,10 +241,11 @@ def photograph(
 
     image, index = sample(columns, rows)
     fine = np.flatnonzero(at_edges(image.reshape(height, width, 4), index.reshape(height, width)))
-    steps = (np.arange(samples) + 0.5) / samples - 0.5
     if samples > 1 and len(fine):
-        total = sum(sample(columns[fine] + x, rows[fine] + y)[0] for x in steps for y in steps)
-        image[fine] = total / samples**2
+        steps = (np.arange(samples) + 0.5) / samples - 0.5
+        x, y = (g.reshape(-1, 1) for g in np.meshgrid(steps, steps))
+        inner, _ = sample((columns[fine] + x).ravel(), (rows[fine] + y).ravel())
+        image[fine] = inner.reshape(samples**2, -1, 4).mean(axis=0)
     image = image.reshape(height, width, 4).astype(np.float32)
     return image[..., :3], image[..., 3]
 

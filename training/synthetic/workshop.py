@@ -118,7 +118,7 @@ def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
 def take(job: tuple[View, str, Path, Path]) -> None:
     """One photo and its mask, written to their files."""
     view, stop, path, mask_path = job
-    image, mask = photograph(view, radiance(stop), samples=3)
+    image, mask = photograph(view, radiance(stop))
     save_png(path, image)
     save_png(mask_path, mask)
 
