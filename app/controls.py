@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scene.framing import FAR_RADII, FOV_Y, NEAR_RADII
-from scene.pose import Pose, View, perspective
+from scene.pose import Pose, View
 
 POLE = 1.5  # radians of pitch; straight up or down would lose which way is right
 MIN_RADII, MAX_RADII = 0.02, 20.0  # the orbit distance stays within these, in scene radii
@@ -16,6 +16,8 @@ BRAKE_S = 0.09  # so does the flying speed follow the keys
 SPEED_RADII = 0.8  # metres a second with a key held, in scene radii
 FAST, SLOW = 5.0, 0.2  # Shift, Ctrl
 STILL = 2e-4  # radians, or scene radii: less is not seen, the camera counts as at rest
+
+Box = tuple[float, float, float, float]  # left, top, right, bottom
 
 # A camera is six numbers, so that its goal, and how far the picture lags behind, can be subtracted.
 ANCHOR, YAW, PITCH, LOG_DISTANCE = slice(0, 3), 3, 4, 5
@@ -80,8 +82,12 @@ class Camera:
         metres = np.abs(np.r_[self._lag[ANCHOR], self._velocity * BRAKE_S]).max()
         return bool(metres > STILL * self.radius or np.abs(self._lag[3:]).max() > STILL)
 
-    def view(self, size: tuple[int, int]) -> View:
-        """What the eye sees now in size (W, H) pixels."""
+    def view(self, size: tuple[int, int], free: Box | None = None) -> View:
+        """What the eye sees now in size (W, H) pixels.
+
+        The field of view fits `free` (left, top, right, bottom in pixels), the part of the picture
+        that nothing covers, with the line of sight in its middle; around it more can be seen.
+        """
         shown = self._goal - self._lag
         right, up, forward = axes_of(shown[YAW], shown[PITCH])
         world_from_eye = np.eye(4)
@@ -90,7 +96,7 @@ class Camera:
         distance = float(np.exp(shown[LOG_DISTANCE]))
         near, far = NEAR_RADII * self.radius, FAR_RADII * self.radius + distance
         pose = Pose.from_matrix(world_from_eye)
-        return View(pose, perspective(self.fov_y, size), near, far, size)
+        return View(pose, _tangents(self.fov_y, size, free or (0, 0, *size)), near, far, size)
 
     def turn(self, yaw: float, pitch: float) -> None:
         """Orbits around the anchor, or looks about when flying, by radians."""
@@ -204,6 +210,15 @@ class Camera:
     def _bounded(self, log_distance: float) -> float:
         low, high = np.log(np.array([MIN_RADII, MAX_RADII]) * self.radius)
         return float(np.clip(log_distance, low, high))
+
+
+def _tangents(fov_y: float, size: tuple[int, int], free: Box) -> tuple[float, float, float, float]:
+    """Tangents of the whole picture when `fov_y` is the height of its free part."""
+    left, top, right, bottom = free
+    per_pixel = 2 * float(np.tan(fov_y / 2)) / (bottom - top)
+    x, y = (left + right) / 2, (top + bottom) / 2
+    width, height = size
+    return (-x * per_pixel, (width - x) * per_pixel, (y - height) * per_pixel, y * per_pixel)
 
 
 def _half_turn_at_most(angle: float) -> float:

@@ -1,7 +1,5 @@
 """The viewer: a window loop that draws only when something has changed."""
 
-import os
-import tempfile
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,11 +8,11 @@ from typing import Annotated, Literal
 import glfw
 import numpy as np
 import tyro
-from PIL import Image
-from runtime_models.read_scene import read_model
 
-from app.controls import FAST, SLOW, Camera, Push
-from app.panel import Readings, draw_note, draw_panel, draw_problem
+from app.controls import FAST, SLOW, SMOOTH_S, Camera, Push
+from app.errors import UsageError
+from app.headless_drawing import make_folder, parse_size, save_png
+from app.panel import Readings, draw_note, draw_panel, draw_problem, free_area
 from app.scale_bar import draw_scale_bar
 from app.slider import draw_slider_bar
 from app.stage import Stage
@@ -22,6 +20,8 @@ from app.window import DoubleClick, Drag, Drop, Event, KeyDown, Wheel, Window
 from renderer.context import describe
 from renderer.renderer import Renderer
 from runtime_models.model import BadFile
+from runtime_models.read_scene import read_model
+from scene.pose import View
 
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
 TURN = 0.006  # radians a logical pixel of mouse movement
@@ -51,24 +51,18 @@ class Options:
 
 
 def run(options: Options) -> int:
-    """Opens the window and stays until it is closed; 0.  BadFile and NoContext say why not."""
+    """Opens the window and stays until it is closed; 0.  Errors for people say why not."""
     size = parse_size(options.size)
     if options.x is not None and not 0 <= options.x <= 1:
-        raise BadFile(f"--x is {options.x}, it must lie in 0..1.")
+        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    if options.frames < 1:
+        raise UsageError(f"--frames is {options.frames}, expected 1 or more.")
     stage = Stage(read_model)
     stage.open(options.scenes or (DEMO,), options.x)
     with Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             Viewer(window, renderer, stage, options).loop()
     return 0
-
-
-def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) of "1280x720"; BadFile says what was wrong."""
-    parts = text.lower().split("x")
-    if len(parts) != 2 or not all(part.isdecimal() and int(part) > 0 for part in parts):
-        raise BadFile(f"--size is {text!r}; write it as WIDTHxHEIGHT in pixels, such as 1280x720.")
-    return int(parts[0]), int(parts[1])
 
 
 class Viewer:
@@ -81,11 +75,13 @@ class Viewer:
         self.readings = Readings(
             machine={key.replace("_", " "): str(v) for key, v in names.items()}
         )
+        self._free = self._free_wanted()  # where the picture's middle is; follows the overlay
         self.camera = self._first_camera()
         self._drawn: tuple | None = None  # what the splats on screen were drawn from
         self._note_until = 0.0
         self._wanted: Drop | None = None  # files to be opened once the note about them is seen
         self._frames = 0
+        self._overlay_ms = 0.0
         self._save_picture = False
 
     def loop(self) -> None:
@@ -113,9 +109,12 @@ class Viewer:
             self.take(event)
         self.stage.advance(seconds)
         self.camera.step(seconds, self._push())
+        self._follow_overlay(seconds)
         fresh = self._draw_splats()
+        drawn = time.perf_counter()
         self._draw_overlay()
         self.window.end_frame()
+        self._overlay_ms = (time.perf_counter() - drawn) * 1e3
         self._frames += 1
         self._save_pictures()
         self.window.swap()
@@ -153,7 +152,30 @@ class Viewer:
         """Whether the next frame is due without waiting for input."""
         moving = self.camera.moving or self._push().any
         waiting = self._wanted is not None or self.options.screenshot is not None
-        return moving or waiting or self.stage.playing or self._frames == 0
+        sliding = not np.array_equal(self._free, self._free_wanted())
+        return moving or waiting or sliding or self.stage.playing or self._frames == 0
+
+    def _free_wanted(self) -> np.ndarray:
+        """(4,) pixels: the part of the window that the overlay leaves free."""
+        window = self.window
+        pixels = window.ui_scale * window.size[0] / max(window.logical_size[0], 1)
+        if not self.overlay:
+            return np.array([0.0, 0.0, *window.size])
+        return np.array(free_area(window.size, len(self.stage.sliders), pixels))
+
+    def _follow_overlay(self, seconds: float) -> None:
+        """The picture moves over when the overlay comes or goes, in the same soft way."""
+        wanted = self._free_wanted()
+        self._free = wanted + (self._free - wanted) * np.exp(-seconds / SMOOTH_S)
+        if np.abs(self._free - wanted).max() < 0.5 or self._frames == 0:
+            self._free = wanted
+
+    def _view(self) -> View:
+        return self.camera.view(self.window.size, tuple(self._free))
+
+    def _free_size(self) -> tuple[int, int]:
+        left, top, right, bottom = self._free_wanted()
+        return int(right - left), int(bottom - top)
 
     def _note_ends(self, now: float) -> bool:
         """True once when the note's time is over; it is taken away then."""
@@ -163,7 +185,7 @@ class Viewer:
         return over
 
     def _first_camera(self) -> Camera:
-        view = self.stage.first_view(self.window.size)
+        view = self.stage.first_view(self._free_size())
         return Camera(view, self.stage.centre, self.stage.radius)
 
     def _pans(self, drag: Drag) -> bool:
@@ -190,7 +212,8 @@ class Viewer:
             case glfw.KEY_F if event.shift:
                 camera.reset()
             case glfw.KEY_F:
-                camera.frame(stage.centre, stage.fit(camera.view(self.window.size)))
+                distance = stage.fit(self._view(), camera.fov_y, self._free_size())
+                camera.frame(stage.centre, distance)
             case glfw.KEY_SPACE:
                 stage.toggle_play()
             case glfw.KEY_H | glfw.KEY_TAB:
@@ -202,7 +225,7 @@ class Viewer:
 
     def _focus(self, across: float, down: float) -> None:
         """Centres what lies under a place of the picture, both in 0..1 from the top left."""
-        view = self.camera.view(self.window.size)
+        view = self._view()
         left, right, low, high = view.tangents
         in_eye = np.array([left + (right - left) * across, high + (low - high) * down, -1.0])
         world_from_eye = view.world_from_eye.matrix()
@@ -212,19 +235,22 @@ class Viewer:
 
     def _draw_splats(self) -> bool:
         """Draws the scene into the window; True when the splats had to be drawn anew."""
-        view = self.camera.view(self.window.size)
+        view = self._view()
         pose, settings = view.world_from_eye, self.stage.settings
         quality = replace(settings, background=(0.0, 0.0, 0.0))  # the background needs no splats
         wanted = (
-            self.stage.scene, pose.position.tobytes(), pose.wxyz.tobytes(), view.size, quality
+            self.stage.scene, pose.position.tobytes(), pose.wxyz.tobytes(), view.tangents,
+            view.size, quality,
         )  # fmt: skip
         self.renderer.settings = settings
         fresh = self._drawn != wanted or self.options.screenshot is not None
         if fresh:
             self.renderer.update(self.stage.scene)
-            self.readings.stats = self.renderer.draw([view])
+            self.readings.stats = self.renderer.draw([view], self.window.screen())
+            self.readings.stats.ms["overlay"] = self._overlay_ms  # of the frame before
             self._drawn = wanted
-        self.renderer.present(self.window.screen())
+        else:
+            self.renderer.present(self.window.screen())
         return fresh
 
     def _draw_overlay(self) -> None:
@@ -268,17 +294,14 @@ class Viewer:
 
 
 def write_png(picture: np.ndarray, path: Path) -> None:
-    """Writes (H, W, 3) uint8 whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "wb") as file:
-        Image.fromarray(picture).save(file, format="PNG")
-    os.replace(name, path)
+    """Writes (H, W, 3) uint8 whole or not at all, with the folder that it needs."""
+    make_folder(path.parent)
+    save_png(picture / 255, path)
 
 
 def write_numbered_png(picture: np.ndarray, folder: Path) -> Path:
     """Writes shapeshift-0001.png or the next free number; never over a file that is there."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     number = 1
     while True:
         path = folder / f"shapeshift-{number:04}.png"

@@ -15,6 +15,9 @@ from renderer.settings import FrameStats
 Vec = imgui.ImVec2
 WIDTH = 268.0  # logical pixels
 MARGIN = 16.0
+BAR_HEIGHT = 92.0  # of the slider bar with one row, with what lies below it
+BAR_FIRST, BAR_ROW = 46.0, 71.0  # a row without and with the name of its object
+MIN_FREE = 0.5  # of the window's width and height
 MAX_LAMBDA = 512.0  # pixels; the slider's end means no limit
 FAR_RADII = 12.0  # scene radii; the distance slider's end means no limit
 KEYS = (
@@ -73,6 +76,20 @@ def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     box = theme.window_box()
     imgui.end()
     return box
+
+
+def free_area(size: tuple[int, int], rows: int, pixels: float) -> Box:
+    """The part of the window, in pixels, that panel and slider bar leave free.
+
+    `rows` is the number of sliders, `pixels` what a unit of the overlay has.  In a window so small
+    that little would be left it is all of the window.
+    """
+    width, height = size
+    left = (WIDTH + 1.5 * MARGIN) * pixels
+    bar = (0.0, BAR_HEIGHT)[rows] if rows < 2 else BAR_ROW * rows + BAR_HEIGHT - BAR_FIRST
+    bottom = height - bar * pixels
+    enough = width - left > MIN_FREE * width and bottom > MIN_FREE * height
+    return (left, 0.0, float(width), bottom) if enough else (0.0, 0.0, float(width), float(height))
 
 
 def draw_note(text: str, ui_scale: float) -> None:

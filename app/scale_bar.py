@@ -21,7 +21,7 @@ def nice_ticks(low: float, high: float, count: int = TICKS) -> list[float]:
     power = 10.0 ** np.floor(np.log10(raw))
     step = power * min((1, 2, 5, 10), key=lambda m: abs(np.log(m * power / raw)))
     first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-    return [float(i * step) for i in np.arange(first, last + 1)]
+    return [float(i * step) + 0.0 for i in np.arange(first, last + 1)]  # no minus zero
 
 
 def tick_text(values: list[float]) -> list[str]:

@@ -17,7 +17,7 @@ ROW = 46.0
 
 def draw_slider_bar(stage: Stage, ui_scale: float) -> Box:
     """One row an object at the lower edge: moves x, starts and stops playing; returns its box."""
-    rows = list(enumerate(stage.scene.objects))
+    rows = stage.sliders
     if not rows:
         return (0.0, 0.0, 0.0, 0.0)
     screen = imgui.get_io().display_size
@@ -26,10 +26,10 @@ def draw_slider_bar(stage: Stage, ui_scale: float) -> Box:
     imgui.set_next_window_size(Vec(width, 0))
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move
     imgui.begin("##modality", None, flags | imgui.WindowFlags_.no_saved_settings)
-    for index, thing in rows:
+    for index in rows:
         imgui.push_id(index)
         if len(rows) > 1:
-            imgui.text_disabled(thing.name)
+            imgui.text_disabled(stage.scene.objects[index].name)
         _row(stage, index, ui_scale)
         imgui.pop_id()
     box = theme.window_box()
@@ -41,10 +41,8 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     """Play button, track, value of one object."""
     thing, sweep = stage.scene.objects[index], stage.sweeps[index]
     height = ROW * ui_scale
-    imgui.begin_disabled(not sweep.period > 0)
     if _play_button(sweep.playing, height):
         stage.toggle_play(index)
-    imgui.end_disabled()
     imgui.same_line(0, 16 * ui_scale)
     value_width = imgui.calc_text_size("x 0.000").x + 20 * ui_scale
     x, held = _track(thing.model.stops, thing.x, imgui.get_content_region_avail().x - value_width)

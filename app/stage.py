@@ -17,7 +17,7 @@ from scene.framing import (
     point_under,
     scene_points,
 )
-from scene.pose import View
+from scene.pose import View, perspective
 from scene.scene import Scene, SceneObject
 
 Model = AnchorModel | SplatLayers
@@ -74,10 +74,10 @@ class Stage:
             return default_view(self.scene.objects[0].model, size)
         return framing_view(*self._points, size)
 
-    def fit(self, view: View) -> float:
-        """Metres from the centre at which all is seen in the direction of a view."""
+    def fit(self, view: View, fov_y: float, size: tuple[int, int]) -> float:
+        """Metres from the centre at which all fits size (W, H), looking as the view does."""
         axes = view.world_from_eye.matrix()
-        return fit_points(*self._points, self.centre, axes, view.tangents)
+        return fit_points(*self._points, self.centre, axes, perspective(fov_y, size))
 
     def point_under(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
         """The world point (3,) that a ray meets, or None."""
@@ -102,6 +102,11 @@ class Stage:
         start = not any(sweep.playing for sweep in chosen)
         for sweep in chosen:
             sweep.playing = start and sweep.period > 0
+
+    @property
+    def sliders(self) -> list[int]:
+        """Indices of the objects that have somewhere to go: two stops or more."""
+        return [index for index, sweep in enumerate(self.sweeps) if sweep.period > 0]
 
     @property
     def playing(self) -> bool:

@@ -90,6 +90,8 @@ class Window:
         self.ui_scale = max(1.0, glfw.get_window_content_scale(self._handle)[0] / density)
         theme.apply(self.ui_scale, density)
         self._overlay = ModernGLRenderer(wnd=None, ctx=self.ctx, display_size=self.logical_size)
+        self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
+        self._popup = False  # a list or a box is open, and the next click is for it
         self._raw: list[Event] = []
         self._pressed: str | None = None  # the button whose drag the scene owns
         self._last_click = (0.0, 0.0, -1.0)  # x, y, seconds
@@ -162,6 +164,7 @@ class Window:
 
     def end_frame(self) -> None:
         """Draws the overlay over whatever the scene has drawn into `screen()`."""
+        self._popup = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
         imgui.render()
         self.screen().use()
         self._overlay.render(imgui.get_draw_data())
@@ -248,15 +251,13 @@ class Window:
         self._note(Drop(tuple(Path(path) for path in paths)))
 
     def _over_overlay(self, x: float, y: float) -> bool:
-        """Whether the overlay covers that place.
+        """Whether the overlay takes input at that place.
 
-        ImGui's own answer is of its last frame, which may be 100 ms old where there is no GPU.
+        Not ImGui's want_capture_mouse: it is of the last frame and of the place where the mouse
+        was then, which may be 100 ms ago where there is no GPU.
         """
-        if imgui.get_io().want_capture_mouse:
-            return True
-        return any(left <= x < right and top <= y < low for left, top, right, low in self.covered)
-
-    covered: tuple[tuple[float, float, float, float], ...] = ()  # left, top, right, bottom
+        inside = (left <= x < right and top <= y < low for left, top, right, low in self.covered)
+        return self._popup or any(inside)
 
 
 def _open(title: str, size: tuple[int, int]) -> GlfwWindow:

@@ -14,6 +14,8 @@ PERCENTILES = (2, 98)
 ROUND_ENOUGH = 1.3  # length over depth below which no side is the long one
 FAR_RADII = 200.0
 NEAR_RADII = 0.01
+RAY_POINTS = 24
+RAY_REACH = 0.05  # tangent of the angle up to which a point can be meant by a ray
 FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
 
 
@@ -170,19 +172,21 @@ def point_under(
     opacity: np.ndarray,
     origin: np.ndarray,
     direction: np.ndarray,
-    half_angle: float = 0.012,
 ) -> np.ndarray | None:
     """The point (3,) that a ray meets first in a cloud (N, 3), or None where it meets nothing.
 
-    Points within `half_angle` (radians) of the ray count; the depth is their 10th percentile, so
-    that one floater before the surface does not win.
+    Of the RAY_POINTS nearest to the ray the first ones give the depth: works for sparse and for
+    dense clouds, and a floater or two before the surface do not win.
     """
     ray = np.asarray(direction, np.float64)
     ray = ray / np.linalg.norm(ray)
     to_point = means - origin  # (N, 3)
     depth = to_point @ ray  # (N,) metres
     off = np.linalg.norm(to_point - depth[:, None] * ray, axis=1)
-    near = (depth > 0) & (off < depth * np.tan(half_angle)) & (opacity > MIN_OPACITY)
-    if not near.any():
+    ahead = np.flatnonzero((depth > 0) & (off < depth * RAY_REACH) & (opacity > MIN_OPACITY))
+    if not len(ahead):
         return None
-    return np.asarray(origin) + float(np.percentile(depth[near], 10)) * ray
+    if len(ahead) > RAY_POINTS:
+        ahead = ahead[np.argpartition(off[ahead], RAY_POINTS)[:RAY_POINTS]]
+    first = float(np.percentile(depth[ahead], 15, method="lower"))  # between two is on neither
+    return np.asarray(origin) + first * ray

@@ -1,0 +1,106 @@
+"""The viewer as a person starts it, under Xvfb or without a display: pictures and sentences."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from desktop_stand import ball
+from PIL import Image
+
+from app.window import Window
+from renderer.context import NoContext
+
+pytest_plugins = ["desktop_fixtures"]  # its fixture display
+ROOT = Path(__file__).resolve().parents[2]
+ACCENT = np.array([242, 161, 69])  # app/theme.py
+
+
+def start(display: str | None, *arguments, code: str | None = None) -> subprocess.CompletedProcess:
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    if display:
+        environment["DISPLAY"] = display
+    program = ["-c", code] if code else ["-m", "app.cli"]
+    return subprocess.run(
+        [sys.executable, *program, *map(str, arguments)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=120,
+    )
+
+
+def assert_one_sentence(done, code: int, *words: str) -> None:
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr and len(done.stderr.strip().splitlines()) == 1
+    for word in words:
+        assert word in done.stderr
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory) -> Path:
+    from runtime_models.read_ply import PlainSplats
+    from runtime_models.write_ply import write_ply
+
+    path = tmp_path_factory.mktemp("scene") / "ball.ply"
+    b = ball()
+    write_ply(PlainSplats(b.means, b.scales, b.wxyz, b.opacity, b.sh), path)
+    return path
+
+
+def test_screenshot_of_the_whole_window(display, scene_file, tmp_path):
+    out = tmp_path / "sub" / "window.png"
+    done = start(display, "view", scene_file, "--screenshot", out, "--frames", 2)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    picture = np.asarray(Image.open(out)).astype(int)
+    assert picture.shape == (720, 1280, 3)
+    green = (picture[..., 1] > 120) & (picture[..., 0] < 90) & (picture[..., 2] < 90)
+    _, columns = np.nonzero(green)
+    assert 0.1 < green.mean() < 0.6
+    assert abs(columns.mean() - (292 + 1280) / 2) < 12  # in the middle of what the panel leaves
+    panel = np.abs(picture[:500, :290] - ACCENT).max(axis=2) < 12
+    assert panel.sum() > 40  # the title and the bars of the passes
+    assert out.parent.exists() and [p.name for p in out.parent.iterdir()] == ["window.png"]
+
+
+def test_no_display_is_one_sentence(scene_file):
+    assert_one_sentence(start(None, "view", scene_file), 2, "no window with OpenGL 4.3", "headless")
+    assert_one_sentence(start(":9999", "view", scene_file), 2, "no window with OpenGL 4.3")
+
+
+def test_bad_input_is_one_sentence_before_any_window_opens(scene_file, tmp_path):
+    broken = tmp_path / "broken.ply"
+    broken.write_bytes(b"ply\nnothing")
+    assert_one_sentence(start(None, "view", broken), 2, "broken.ply")
+    assert_one_sentence(start(None, "view", scene_file, "--size", "12"), 2, "--size")
+    assert_one_sentence(start(None, "view", scene_file, "--x", "nan"), 2, "--x")
+    assert_one_sentence(start(None, "view", scene_file, "--frames", "0"), 2, "--frames")
+
+
+def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_file, tmp_path):
+    code = (
+        "import sys\nfrom app import window, cli\n"
+        "def crash(self, event=None):\n    raise ZeroDivisionError('the callback broke')\n"
+        "window.Window._note = crash\n"
+        "old = window.Window.begin_frame\n"
+        "def begin(self):\n    self._window.size = (700, 500)\n    return old(self)\n"
+        "window.Window.begin_frame = begin\n"
+        "sys.exit(cli.main(sys.argv[1:]))"
+    )
+    out = tmp_path / "never.png"
+    done = start(display, "view", scene_file, "--screenshot", out, "--frames", 200, code=code)
+    assert_one_sentence(done, 3, "the callback broke")
+    assert not out.exists()
+    Path(done.stderr.rsplit(" in ", 1)[1].strip().rstrip(".")).unlink()  # the log
+
+
+def test_no_context_is_the_error_of_the_window(monkeypatch):
+    monkeypatch.setattr(
+        "app.window.GlfwWindow", lambda **_: (_ for _ in ()).throw(ValueError("no"))
+    )
+    with pytest.raises(NoContext, match=r"no window with OpenGL 4.3 could be opened \(no\)"):
+        Window("a", (10, 10))

@@ -1,0 +1,21 @@
+"""The ticks of the thermal scale: round values, inside the range, written with one precision."""
+
+import pytest
+
+from app.scale_bar import nice_ticks, tick_text
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "want"),
+    [
+        (18.0, 84.0, ["20", "30", "40", "50", "60", "70", "80"]),
+        (0.0, 1.0, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]),
+        (-20.0, 30.0, ["−20", "−10", "0", "10", "20", "30"]),
+        (0.001, 0.004, ["0.0010", "0.0015", "0.0020", "0.0025", "0.0030", "0.0035", "0.0040"]),
+        (5.0, 5.0, ["5"]),
+    ],
+)
+def test_scale_ticks_are_round_and_inside(low, high, want):
+    values = nice_ticks(low, high)
+    assert tick_text(values) == want
+    assert all(low - 1e-9 <= value <= high + 1e-9 for value in values)
