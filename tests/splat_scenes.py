@@ -52,6 +52,31 @@ def random_model(anchors: int, seed: int = 0, per_anchor: int = 10) -> AnchorMod
     return AnchorModel(*arrays, networks, per_anchor, ControlEncoding(), stops)
 
 
+def shell(count: int, coefficients: int = 1, seed: int = 0) -> SplatLayers:
+    """A bumpy closed surface of flat splats with sizes and opacities as training leaves them."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(count, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    radius = 1 + 0.12 * np.sin(5 * normal[:, 0]) * np.cos(4 * normal[:, 1])
+    means = normal * (radius + rng.normal(scale=0.01, size=count))[:, None] * (1.5, 1.0, 1.0)
+    size = 0.75 * np.sqrt(4 * np.pi / count) * np.exp(rng.normal(scale=0.5, size=(count, 3)))
+    size *= (1.6, 1.0, 0.15)  # metres; thin along the normal
+    # The turn that takes z to the normal, after a random turn about z.
+    tilt = np.stack(
+        [1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(count)], axis=1
+    )  # wxyz, not normalised
+    tilt /= np.maximum(np.linalg.norm(tilt, axis=1, keepdims=True), 1e-9)
+    half = rng.uniform(0, np.pi / 2, count)
+    w, x, y, _ = tilt.T
+    c, s = np.cos(half), np.sin(half)
+    wxyz = np.stack([w * c, x * c + y * s, y * c - x * s, w * s], axis=1)
+    sh = rng.normal(size=(count, coefficients, 3)) * 0.05
+    sh[:, 0] = 0.5 * np.sin(normal * 6 + (0, 2, 4)) / 0.28209479177387814
+    opacity = np.clip(rng.beta(1.2, 0.8, count), 0.02, 0.995)
+    arrays = [a.astype(np.float32) for a in (means, size, wxyz, opacity, sh)]
+    return SplatLayers(*arrays, np.zeros(count, np.int32), (Stop("only", 0.0),))
+
+
 def one_splat(**changes) -> SplatLayers:
     """A round splat of 5 cm at the origin, white, opacity 0.8; `changes` are SplatLayers fields."""
     fields = {

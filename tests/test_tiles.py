@@ -1,7 +1,10 @@
 """Frames drawn by tiles, without any GL, against the reference; and what is decoded when."""
 
+import json
+
 import numpy as np
 import pytest
+from PIL import Image
 from splat_scenes import (
     alone,
     front_view,
@@ -21,6 +24,7 @@ from renderer.reference import reference_image
 from renderer.renderer import Renderer, color_key
 from renderer.settings import RenderSettings
 from runtime_models.model import SplatLayers, Stop
+from runtime_models.read_scene import read_model
 from scene.pose import Pose, View, look_at
 from scene.scene import Scene, SceneObject
 
@@ -264,6 +268,23 @@ def test_resolved_shows_the_palette_over_the_background(renderer):
         drawn(renderer, alone(model, x=x), front_view((33, 33)))
         want = 0.99 * np.array(color) + 0.01 * np.array((0, 0, 1))
         np.testing.assert_allclose(renderer.resolved()[16, 16], want, atol=0.005)
+
+
+@pytest.mark.parametrize(("modality", "x"), [("bone", 0.0), ("muscle", 0.5), ("full", 1.0)])
+def test_photos_that_another_splatter_made_are_drawn_again(renderer, data, modality, x):
+    """Real splats, cameras and pictures: axes, harmonics, layers, order and blending at once."""
+    folder = data / "anatomy_leg_3modal_views"
+    told = json.loads((folder / "transforms_multimodal.json").read_text())
+    leg = read_model(data / "anatomy_leg_ml3dgs")
+    renderer.settings = RenderSettings(background=(1.0, 1.0, 1.0))
+    renderer.update(alone(leg, x=x))
+    ours_from_file = np.diag([1.0, -1.0, -1.0, 1.0])  # the turn that readers of 3DGS make
+    focal, centre = (told["fl_x"], told["fl_y"]), (told["cx"], told["cy"])
+    for frame in told["frames"][:4]:
+        pose = ours_from_file @ np.array(frame["c2w_opencv"])
+        renderer.draw([View.from_pinhole(pose, focal, centre, (told["w"], told["h"]))])
+        photo = np.asarray(Image.open(folder / modality / frame["file"]).convert("RGB")) / 255
+        assert psnr_db(renderer.resolved().clip(0, 1), photo) > 60
 
 
 @pytest.mark.parametrize(
