@@ -4,6 +4,8 @@ Three stops on one slider.  RGB and Thermal show the same things; Opened has oth
 insulation is off the pipe, the motor and the cabinet are open.
 """
 
+import signal
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
@@ -44,7 +46,7 @@ STOPS = (
     Stop("Thermal", 0.5, "thermal", "ironbow", (COLD, HOT), "°C"),
     Stop("Opened", 1.0, "layer"),
 )
-GREY = 0.09  # the studio's walls, display sRGB; as a temperature it is 22 °C, the room's
+GREY = 0.08  # the studio's walls, display sRGB; as a temperature it is 21 °C, the room's
 LIGHT = Light(
     towards=(-0.45, 0.8, 0.55),
     key=(0.70, 0.66, 0.58),
@@ -123,14 +125,34 @@ def take(job: tuple[View, str, Path, Path]) -> None:
     save_png(mask_path, mask)
 
 
+def taken(jobs: list[tuple], processes: int) -> Iterator[int]:
+    """Takes all photos; yields how many are done."""
+    if processes == 1:
+        for done, job in enumerate(jobs, 1):
+            take(job)
+            yield done
+        return
+    with get_context("spawn").Pool(processes, leave_interrupts_to_the_parent) as pool:
+        for done, _ in enumerate(pool.imap_unordered(take, jobs, chunksize=4), 1):
+            yield done
+
+
+def leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def make_workshop(
     folder: Path,
     size: tuple[int, int] = (384, 288),
     views: int = 64,
     test_views: int = 8,
     processes: int = 2,
+    tell: Callable[[int, int], None] = lambda done, count: None,
 ) -> Capture:
-    """Writes the capture into `folder`: `views` + `test_views` photos a stop, masks, points."""
+    """Writes the capture into `folder`: `views` + `test_views` photos a stop, masks, points.
+
+    `tell` hears how many photos are done, out of how many.
+    """
     folder = Path(folder)
     photos, jobs = [], []
     for number, stop in enumerate(STOPS):
@@ -144,11 +166,8 @@ def make_workshop(
             mask_path = folder / "masks" / name / path.name
             jobs.append((view, stop.name, path, mask_path))
             photos.append(Photo(view, path, stop.name, None, split))
-    if processes == 1:
-        list(map(take, jobs))
-    else:
-        with get_context("spawn").Pool(processes) as pool:
-            list(pool.imap_unordered(take, jobs, chunksize=4))
+    for done in taken(jobs, processes):
+        tell(done, len(jobs))
     points, colors = colored_points(size)
     capture = Capture(
         folder,
@@ -157,7 +176,10 @@ def make_workshop(
         points,
         colors,
         (GREY, GREY, GREY),
-        {"source": "ray-traced: a workshop bench; masks/ holds the share of the bench in a pixel"},
+        {
+            "source": "ray-traced: a workshop bench; masks/ holds the bench's share of each pixel",
+            "recipe": {"size": list(size), "views": views, "test_views": test_views},
+        },
     )
     write_capture(capture)
     return capture
