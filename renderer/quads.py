@@ -84,3 +84,4 @@ class QuadsDrawing:
         for part in (self._decoder, self._arena):
             if part is not None:
                 part.release()
+        self._decoder = self._arena = None

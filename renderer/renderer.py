@@ -80,8 +80,7 @@ class Renderer:
         """Takes over poses and control values; decodes only what is new or has another x."""
         with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
             if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
-                self._drawing.allocate([o.model for o in scene.objects])
-                self._decoded = [_Decoded(o.model) for o in scene.objects]
+                self._rebuild(scene)
             for i, (thing, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
                 if thing.visible and decoded.x != thing.x:
                     self._drawing.decode_geometry(i, thing.x)
@@ -90,6 +89,17 @@ class Renderer:
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
         self._drawing.place(poses)
         self._scene = scene
+
+    def _rebuild(self, scene: Scene) -> None:
+        """A new arena for another set of objects; an empty one if the set does not fit."""
+        models = [o.model for o in scene.objects]
+        self._scene, self._decoded = Scene(()), []
+        try:
+            self._drawing.allocate(models)
+        except ValueError:
+            self._drawing.allocate([])
+            raise
+        self._decoded = [_Decoded(model) for model in models]
 
     def draw(
         self,
@@ -101,13 +111,16 @@ class Renderer:
         Colours are computed once a frame, for the centre of the views' eyes, and only when it
         moved.  Counts of splats in the result are those of the last view.
         """
+        targets = [target] if isinstance(target, moderngl.Framebuffer) else target
+        if not views or (targets is not None and len(targets) != len(views)):
+            raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
         with self._framebuffer_kept():
             for i, view in enumerate(views):
                 self._drawing.draw(i, view, self.settings, self._timer)
-        if target is not None:
+        if targets is not None:
             with self._timer.time("resolve"):
-                for i, framebuffer in enumerate(target if isinstance(target, list) else [target]):
+                for i, framebuffer in enumerate(targets):
                     self.present(framebuffer, i)
         culled = self._drawing.counts()
         drawn = culled.pop("drawn")

@@ -126,3 +126,16 @@ def test_a_failing_pass_does_not_break_the_timer():
     with pytest.raises(ValueError, match="in the pass"), timer.time("splat"):
         raise ValueError("in the pass")
     assert timer.take() == {}
+
+
+def test_the_drivers_timer_counts_what_the_driver_does(ctx):
+    timer = PassTimer(ctx)
+    timer._gpu, timer._software = ctx, None  # as on a GPU
+    target = ctx.framebuffer([ctx.texture((512, 512), 4, dtype="f4")])
+    for _ in range(2):  # queries are used again
+        for name, on_gpu in (("decode", False), ("splat", True), ("splat", True)):
+            with timer.time(name, on_gpu):
+                target.clear(0.5, 0.5, 0.5, 1.0)
+        took = timer.take()
+        assert list(took) == ["decode", "splat"] and all(ms >= 0 for ms in took.values())
+    assert len(timer._unused) == 2

@@ -20,7 +20,7 @@ from renderer.palette import thermal_blend
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
-from runtime_models.model import SplatLayers, Stop
+from runtime_models.model import BadFile, SplatLayers, Stop
 from runtime_models.read_scene import read_model
 from scene.framing import default_view
 from scene.pose import Pose, View, look_at
@@ -259,6 +259,38 @@ def test_limits_and_counts_agree_between_the_back_ends(opened):
         assert stats[drawing].drawn + sum(stats[drawing].culled.values()) == scene.splat_count
     drawn_by = [s.drawn for s in stats.values()]
     assert abs(drawn_by[0] - drawn_by[1]) <= 2, "rounding at a limit alone may differ"
+
+
+def test_a_scene_that_does_not_fit_is_refused_and_the_old_one_still_drawn(opened):
+    renderer, view = opened("quads"), front_view((32, 32))
+    small, large = alone(random_layers(100)), alone(random_layers(5000))
+    image = drawn(renderer, small, view)
+    limit, renderer._gpu.max_block = renderer._gpu.max_block, 32 * 1000
+    with pytest.raises(BadFile, match="5,000 splats and this driver draws 1,000 at most"):
+        renderer.update(large)
+    assert renderer.draw([view]).splats == 0, "drawing goes on, with nothing"
+    np.testing.assert_array_equal(drawn(renderer, small, view), image)
+    renderer._gpu.max_block = limit
+
+
+@pytest.mark.parametrize("drawing", DRAWINGS)
+def test_views_and_framebuffers_must_match(opened, ctx, drawing):
+    renderer = opened(drawing)
+    shown = ctx.framebuffer([ctx.texture((8, 8), 4)])
+    for views, target in (([], None), (stereo_views((8, 8)), shown), ([front_view()], [])):
+        with pytest.raises(ValueError, match="at least one view, and no or one framebuffer a view"):
+            renderer.draw(views, target)
+
+
+@pytest.mark.parametrize("drawing", DRAWINGS)
+def test_the_bound_framebuffer_stays_bound(opened, ctx, drawing):
+    renderer = opened(drawing)
+    mine = ctx.framebuffer([ctx.texture((8, 8), 4)])
+    mine.use()
+    renderer.update(alone(random_layers(20)))
+    renderer.draw([front_view((16, 16))], ctx.framebuffer([ctx.texture((8, 8), 4)]))
+    assert ctx.fbo is mine
+    ctx.screen.use()
 
 
 def test_software_gl_takes_the_cpu_back_ends(opened, ctx):
