@@ -105,14 +105,14 @@ def test_resuming_equals_never_having_stopped(device, balls, tmp_path):
         assert same_bits(resumed.adam.state(), whole.adam.state()), stop
 
 
-@pytest.mark.parametrize("factor", [50.0, 1000.0])
+@pytest.mark.parametrize("factor", [50.0, 400.0])
 def test_the_guard_rescues_a_poisoned_learning_rate(device, balls, factor):
-    settings = replace(SETTINGS, iterations=150, rate_scale=factor)
+    settings = replace(SETTINGS, iterations=250, rate_scale=factor)
     trainer = run(Trainer(device, balls, settings))
     assert trainer.guard.trips > 0
     assert trainer.rate_scale < factor
     psnr = trainer.held_out_psnr(most=99)
-    assert psnr["RGB"] > 18 and psnr["Thermal"] > 22, psnr
+    assert psnr["RGB"] > 22 and psnr["Thermal"] > 27, psnr
 
 
 def test_the_guard_rescues_weights_that_are_not_numbers(device, balls):

@@ -218,17 +218,32 @@ def test_the_guard_goes_further_back_each_time():
 
 
 @pytest.mark.parametrize(
-    ("loss", "visible", "shown", "healthy"),
+    ("visible", "shown", "healthy"),
     [
-        (0.1, 0.5, 1.0, True), (np.nan, 0.5, 1.0, False), (np.inf, 0.5, 1.0, False),
-        (0.1, 0.0, 1.0, False), (0.1, 0.009, 1.0, False), (0.1, 0.011, 1.0, True),
-        (0.1, 0.5, 0.0, False), (0.1, 0.5, np.nan, False), (0.1, np.nan, 1.0, False),
+        (0.5, 1.0, True), (0.0, 1.0, False), (0.009, 1.0, False), (0.011, 1.0, True),
+        (0.5, 0.29, False), (0.5, 0.31, True), (0.5, np.nan, False), (np.nan, 1.0, False),
     ],
 )  # fmt: skip
-def test_what_the_guard_calls_healthy(loss, visible, shown, healthy):
+def test_what_the_guard_calls_healthy(visible, shown, healthy):
     guard = Guard({})
-    guard.expect("RGB", 1.0)
-    assert guard.healthy("RGB", loss, visible, shown) == healthy
+    guard.expect("RGB", 0.5, 1.0, 1.2)
+    looks = [guard.healthy("RGB", 0.1, visible, shown) for _ in range(4)]
+    assert looks == ([True] * 4 if healthy else [True, True, False, False])
+    assert guard.sure == healthy
+    guard.fall_back()
+    assert guard.healthy("RGB", 0.1, visible, shown)
+    for loss in (np.nan, np.inf, -np.inf):
+        assert not Guard({}).healthy("RGB", loss, 0.5, 1.0)
+
+
+@pytest.mark.parametrize(("loss", "healthy"), [(0.29, True), (0.31, False), (np.nan, False)])
+def test_after_falling_back_the_loss_has_to_fall(loss, healthy):
+    guard = Guard({})
+    guard.expect("RGB", 0.5, 1.0, 1.0)
+    assert all(guard.healthy("RGB", 0.6, 1.0, 1.0) for _ in range(50))  # never fell: no demands
+    guard.fall_back()
+    looks = [guard.healthy("RGB", loss, 1.0, 1.0) for _ in range(8)]
+    assert looks[-1] == healthy
 
 
 def test_adam_equals_its_definition():

@@ -91,6 +91,8 @@ class Trainer:
             self.go_on(*resume)
         self.step = Step(device, self.layout, self.voxel, self.adam)
         self.guard, self.next_snapshot = Guard(self.adam.state()), self.iteration + SNAPSHOT_EVERY
+        if resume is not None:
+            self.guard.first_loss = dict(resume[1]["first_loss"])
 
     def start(self, photos: list[LoadedPhoto]) -> None:
         """Anchors, features and weights of a new run."""
@@ -130,7 +132,7 @@ class Trainer:
         notes = {
             "voxel": self.voxel, "origin": self.origin, "iteration": self.iteration,
             "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
-            "run_length": self.run_length, "settings": self.settings.as_dict(),
+            "run_length": self.run_length, "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
         }  # fmt: skip
         return self.adam.state() | self.evidence.state(), notes
 
@@ -170,10 +172,12 @@ class Trainer:
         On the way the guard learns what a healthy picture of every modality has on screen.
         """
         before, evidence = self.adam.state(), self.evidence.state()
+        background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
             for photo in {p.view.size: p for p in photos}.values():
-                self.step.update(self.learn(photo, BLACK), 0.0)
-                self.guard.expect(modality, self.visible())
+                self.step.update(self.learn(photo, background), 0.0)
+                loss = self.targets.loss(photo).value()
+                self.guard.expect(modality, loss, self.visible(), self.shown(photo, background))
         self.adam.load(before)
         self.evidence.load(evidence)
 
@@ -214,7 +218,7 @@ class Trainer:
     def shown(self, photo: LoadedPhoto, background: Color) -> float:
         """Contrast of the last drawing to its background, over that of its photo."""
         behind = np.asarray(background, np.float32)
-        key = (photo.modality, photo.name)
+        key = (photo.name, background)
         contrast = self.contrast.get(key)
         if contrast is None:
             contrast = float(np.abs(photo.over(background) - behind).mean())
@@ -230,7 +234,7 @@ class Trainer:
         shown = self.shown(photo, background)
         if self.guard.healthy(photo.modality, loss, self.visible(), shown):
             last = photo.modality == self.stops[-1].name
-            if self.iteration >= self.next_snapshot and last:
+            if self.iteration >= self.next_snapshot and last and self.guard.sure:
                 self.guard.remember(self.adam.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
