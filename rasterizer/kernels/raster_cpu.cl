@@ -5,41 +5,60 @@
 // below STOP everywhere are dropped from the mask every BATCH instances; a tile ends with its last.
 #include "common/vector.cl"
 #include "common/tiles.cl"
-#ifndef BLOCK_W
-#define BLOCK_W 4
-#endif
-#define BLOCK_H (LANES / BLOCK_W)
+#define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
+#define BLOCK_H 2
 #define DOWN (TILE / BLOCK_H)   // blocks in a column
 #define ACROSS (TILE / BLOCK_W)  // columns
 #define BLOCKS (DOWN * ACROSS)   // 32: one bit each
 #define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
+#define EVERY_COLUMN 0x01010101u  // the first bit of each column
+#define SHIFT_W 2                // log2 of BLOCK_W and BLOCK_H
+#define SHIFT_H 1
 #define BATCH 32
 #define STOP 1e-4f
 #define HALF_LOG2E 0.72134752044f
 
-#if BLOCK_W == 8
-#define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 4.5f, 5.5f, 6.5f, 7.5f)
-#define LANE_Y 0.5f
-#else
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
-#endif
 
-// Bits of the blocks of a column that rows [top, bottom] of the tile touch.
-inline uint rows_mask(float top, float bottom) {
-  const int first = max(0, (int)ceil(top - 0.5f)) / BLOCK_H;
-  const int last = min(TILE - 1, (int)floor(bottom - 0.5f)) / BLOCK_H;
-  return first > last ? 0 : (COLUMN_BITS >> (DOWN - 1 - last + first)) << first;
-}
+// A batch of instances of one tile.
+typedef struct {
+  float splats[BATCH * RECORD];
+  uint blocks[BATCH];  // the blocks that the splat's box touches
+} Batch;
 
-// Copies a batch of records side by side: independent loads, so that their misses overlap.
-inline int fetch(int p, int end, __global const int* instances, __global const float* record,
-                 float* batch) {
+// Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
+// independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
+// use: a mask that is late makes every mispredicted end of a block loop dear.
+inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
+                 __global const float* record, Batch* batch) {
   const int n = min(BATCH, end - p);
+  float mean_x[BATCH], mean_y[BATCH], half_x[BATCH], half_y[BATCH];
   for (int j = 0; j < n; j++) {
-    __global const float* s = record + (size_t)RECORD * instances[p + j];
-    vstore8(vload8(0, s), 0, batch + RECORD * j);
-    vstore4(vload4(0, s + 8), 0, batch + RECORD * j + 8);
+    __global const float* from = record + (size_t)RECORD * instances[p + j];
+    float* s = batch->splats + RECORD * j;
+    vstore8(vload8(0, from), 0, s);
+    vstore4(vload4(0, from + 8), 0, s + 8);
+    mean_x[j] = s[MEAN_X];
+    mean_y[j] = s[MEAN_Y];
+    half_x[j] = s[EXTENT_X];
+    half_y[j] = s[EXTENT_Y];
+  }
+  for (int g = 0; g * LANES < n; g++) {
+    const float8 x = vload8(g, mean_x) - (x0 + 0.5f), y = vload8(g, mean_y) - (y0 + 0.5f);
+    const float8 ex = vload8(g, half_x), ey = vload8(g, half_y);
+    // First and last pixel of the tile inside the box; beyond it by one at most, for the shifts.
+    const float8 low = -1, high = TILE;
+    const int8 left = convert_int8(ceil(fmin(fmax(x - ex, 0.0f), high))) / BLOCK_W;
+    const int8 right = convert_int8(floor(fmin(fmax(x + ex, low), high - 1))) >> SHIFT_W;
+    const int8 top = convert_int8(ceil(fmin(fmax(y - ey, 0.0f), high))) / BLOCK_H;
+    const int8 bottom = convert_int8(floor(fmin(fmax(y + ey, low), high - 1))) >> SHIFT_H;
+    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
+                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom));
+    // In two halves: a shift by all 32 bits is not defined.
+    const uint8 from = as_uint8(left * (DOWN / 2)), to = as_uint8((ACROSS - 1 - right) * (DOWN / 2));
+    const uint8 columns = ((uint8)(0xffffffffu) << from << from) & ((uint8)(0xffffffffu) >> to >> to);
+    vstore8(rows * EVERY_COLUMN & columns, g, batch->blocks);
   }
   return n;
 }
@@ -50,6 +69,8 @@ inline float8 inside(int k, int x0, int y0, int width, int height) {
   const float8 y = LANE_Y + (float)(y0 + k % DOWN * BLOCK_H);
   return select((float8)(0), (float8)(1), isless(x, (float8)(width)) & isless(y, (float8)(height)));
 }
+
+inline int lowest(uint bits) { return popcount(~bits & (bits - 1)); }  // number of the lowest bit
 
 inline uint still_open(uint open, const float8* T) {
   for (int k = 0; k < BLOCKS; k++)
@@ -63,43 +84,35 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
                         __global float* transmittance, __global int* tile_end) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
-  float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
+  float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
+    block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
+    block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
     T[k] = inside(k, x0, y0, width, height);
     R[k] = G[k] = B[k] = 0;
   }
-  float batch[RECORD * BATCH];
+  Batch batch;
   uint open = 0xffffffffu;
   int p = tile_start[tile];
   const int end = tile_start[tile + 1];
   while (p < end && open) {
-    const int n = fetch(p, end, instances, record, batch);
+    const int n = fetch(p, end, x0, y0, instances, record, &batch);
     for (int j = 0; j < n; j++) {
-      const float* s = batch + RECORD * j;
-      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0, ex = s[EXTENT_X];
-      const uint rows = rows_mask(my - s[EXTENT_Y], my + s[EXTENT_Y]);
-      const int first = max(0, (int)ceil(mx - ex - 0.5f)) / BLOCK_W;
-      const int last = min(TILE - 1, (int)floor(mx + ex - 0.5f)) / BLOCK_W;
+      const float* s = batch.splats + RECORD * j;
+      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
       const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[CUT];
-      for (int column = first; column <= last; column++) {
-        const float8 dx = LANE_X + (BLOCK_W * column - mx);
-        const float8 along = qa * dx * dx, slope = qb * dx;
-        uint left = open >> (column * DOWN) & rows;
-        while (left) {
-          const int row = 31 - clz(left);
-          left ^= 1u << row;
-          const float8 dy = LANE_Y + (BLOCK_H * row - my);
-          const float8 power = fma(dy, fma(qc, dy, slope), along);
-          const int k = column * DOWN + row;
-          float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
-          alpha = select((float8)(0), alpha, isgreaterequal(power, (float8)(least)));
-          const float8 w = alpha * T[k];
-          R[k] = fma(w, s[RED], R[k]);
-          G[k] = fma(w, s[GREEN], G[k]);
-          B[k] = fma(w, s[BLUE], B[k]);
-          T[k] -= w;
-        }
+      for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
+        const int k = lowest(left);
+        const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
+        const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
+        alpha = select((float8)(0), alpha, power >= least);
+        const float8 w = alpha * T[k];
+        R[k] = fma(w, s[RED], R[k]);
+        G[k] = fma(w, s[GREEN], G[k]);
+        B[k] = fma(w, s[BLUE], B[k]);
+        T[k] -= w;
       }
     }
     p += n;
@@ -148,7 +161,10 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
   const size_t plane = (size_t)width * height;
   float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
+  float8 block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
+    block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
+    block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
     float r[LANES], g[LANES], b[LANES], d[LANES];
     for (int lane = 0; lane < LANES; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
@@ -168,63 +184,46 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
     grad_b[k] = vload8(0, b);
     rest[k] = vload8(0, d);
   }
-  float batch[RECORD * BATCH];
+  Batch batch;
   uint open = 0xffffffffu;
   const int end = tile_end[tile], last_instance = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end; p += BATCH) {
-    const int n = fetch(p, end, instances, record, batch);
+    const int n = fetch(p, end, x0, y0, instances, record, &batch);
     for (int j = 0; j < n; j++) {
-      const float* s = batch + RECORD * j;
-      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0, ex = s[EXTENT_X];
-      const uint rows = rows_mask(my - s[EXTENT_Y], my + s[EXTENT_Y]);
-      const int first = max(0, (int)ceil(mx - ex - 0.5f)) / BLOCK_W;
-      const int last = min(TILE - 1, (int)floor(mx + ex - 0.5f)) / BLOCK_W;
+      const float* s = batch.splats + RECORD * j;
+      const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[CUT];
       float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
       float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, absolute_x = 0, absolute_y = 0;
-      for (int column = first; column <= last; column++) {
-        const float8 dx = LANE_X + (BLOCK_W * column - mx);
-        const float8 along = qa * dx * dx, slope = qb * dx;
-        const float8 ax = A * dx, bx = B * dx;
-        float8 column_p = 0, column_y = 0;
-        uint left = open >> (column * DOWN) & rows;
-        while (left) {
-          const int row = 31 - clz(left);
-          left ^= 1u << row;
-          const float8 dy = LANE_Y + (BLOCK_H * row - my);
-          const float8 power = fma(dy, fma(qc, dy, slope), along);
-          const int k = column * DOWN + row;
-          const float8 raw = s[OPACITY] * exp2_8(power);
-          const int8 counts = isgreaterequal(power, (float8)(least));
-          const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), counts);
-          const float8 before = T[k];
-          const float8 w = alpha * before;
-          const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
-          const float8 behind = fma(-w, given, rest[k]);
-          rest[k] = behind;
-          T[k] = before - w;
-          sum_r = fma(w, grad_r[k], sum_r);
-          sum_g = fma(w, grad_g[k], sum_g);
-          sum_b = fma(w, grad_b[k], sum_b);
-          const float8 grad_alpha = fma(before, given, -behind / (1.0f - alpha));
-          // d alpha / d power = alpha; none where the 0.99 holds it.
-          const float8 g =
-              select(alpha * grad_alpha, (float8)(0), isgreater(raw, (float8)(MAX_ALPHA)));
-          const float8 gy = g * dy;
-          column_p += g;
-          column_y += gy;
-          sum_yy = fma(gy, dy, sum_yy);
-          absolute_x += fabs(g * fma(dy, B, ax));
-          absolute_y += fabs(g * fma(dy, C, bx));
-        }
-        const float8 gx = column_p * dx;
-        sum_p += column_p;
-        sum_y += column_y;
+      for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
+        const int k = lowest(left);
+        const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
+        const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        const float8 raw = s[OPACITY] * exp2_8(power);
+        const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), power >= least);
+        const float8 before = T[k];
+        const float8 w = alpha * before;
+        const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
+        const float8 behind = fma(-w, given, rest[k]);
+        rest[k] = behind;
+        T[k] = before - w;
+        sum_r = fma(w, grad_r[k], sum_r);
+        sum_g = fma(w, grad_g[k], sum_g);
+        sum_b = fma(w, grad_b[k], sum_b);
+        const float8 grad_alpha = fma(before, given, -behind / (1.0f - alpha));
+        // d alpha / d power = alpha; none where the 0.99 holds it.
+        const float8 g = select(alpha * grad_alpha, (float8)(0), raw > MAX_ALPHA);
+        const float8 gx = g * dx, gy = g * dy;
+        sum_p += g;
         sum_x += gx;
+        sum_y += gy;
         sum_xx = fma(gx, dx, sum_xx);
-        sum_xy = fma(column_y, dx, sum_xy);
+        sum_xy = fma(gx, dy, sum_xy);
+        sum_yy = fma(gy, dy, sum_yy);
+        absolute_x += fabs(fma(B, gy, A * gx));
+        absolute_y += fabs(fma(C, gy, B * gx));
       }
       const int splat = instances[p + j];
       const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
