@@ -1,5 +1,7 @@
 """Splats of a model at one x and one eye, by onnxruntime: the check of every faster path."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from runtime_models.model import SIZE_PER_SPLAT, AnchorModel, Mlp, SplatLayers, Splats
@@ -7,29 +9,42 @@ from runtime_models.rotation import normalize
 from runtime_models.spherical_harmonics import shade
 from runtime_models.write_onnx import write_onnx
 
-BATCH = 65536  # anchors a run: bounds the memory of the widest input
+BATCH = 16384  # anchors a run: bounds the memory; half and twice as many are no faster
 
 
 def evaluate(model: AnchorModel | SplatLayers, x: float, eye: np.ndarray) -> Splats:
-    """The splats at control x seen from `eye` (3,), metres in the object's frame."""
-    evaluator = Evaluator(model)
+    """The splats at control x seen from `eye` (3,), metres in the object's frame.
+
+    Runs the networks as a package holds them, on every input, Psi(x) too: the plain twin of
+    Evaluator, which is for one set of splats after the other.
+    """
+    evaluator = Evaluator(model, fold=False)
     return Splats(*evaluator.geometry(x), evaluator.color(x, eye))
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """(A, 3) from the eye to each anchor, unit length (paper eq. 4); zero at the anchor itself."""
     delta = anchors - np.asarray(eye, np.float32)
-    length = np.linalg.norm(delta, axis=1, keepdims=True)
+    length = np.sqrt(np.einsum("ac,ac->a", delta, delta))[:, None]
     return delta / np.where(length > 0, length, 1)
 
 
 class Evaluator:
-    """The networks of one model, made ready once."""
+    """The networks of one model, made ready once.
 
-    def __init__(self, model: AnchorModel | SplatLayers, threads: int = 1) -> None:
+    Psi(x) is the same for every anchor, so with `fold` its product with the first layer goes into
+    that layer's bias: exact, and 1.6 times faster than to hand it to every anchor.
+    """
+
+    def __init__(
+        self, model: AnchorModel | SplatLayers, threads: int = 1, fold: bool = True
+    ) -> None:
         self.model = model
+        self._networks: dict[str, FoldedNetwork | WholeNetwork] = {}
         if isinstance(model, AnchorModel):
-            self.sessions = {n: open_session(n, m, threads) for n, m in model.networks.items()}
+            kind = FoldedNetwork if fold else WholeNetwork
+            for name, mlp in model.networks.items():
+                self._networks[name] = kind(name, mlp, model, threads)
 
     def geometry(self, x: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,) negative = absent."""
@@ -37,11 +52,11 @@ class Evaluator:
         if isinstance(model, SplatLayers):
             opacity = model.opacity * model.weights(x)[model.layer]
             return model.means, model.scales, model.wxyz, opacity
-        offsets = self._run("offset", x, None)  # (A, k, 3)
-        means = (model.anchors[:, None] + offsets).reshape(-1, 3)
-        scales = self._run("scale", x, None).reshape(-1, 3)
-        wxyz = normalize(self._run("rotation", x, None).reshape(-1, 4))
-        return means, scales, wxyz, self._run("opacity", x, None).reshape(-1)
+        means = self._run("offset", x)  # (A, k * 3), from the anchor
+        means += np.tile(model.anchors, model.splats_per_anchor)
+        scales, wxyz = self._run("scale", x), self._run("rotation", x)
+        opacity = self._run("opacity", x).reshape(-1)
+        return means.reshape(-1, 3), scales.reshape(-1, 3), normalize(wxyz.reshape(-1, 4)), opacity
 
     def color(self, x: float, eye: np.ndarray) -> np.ndarray:
         """(N, 3) display sRGB seen from `eye` (3,), metres in the object's frame."""
@@ -49,31 +64,62 @@ class Evaluator:
             return shade(self.model.sh, directions(self.model.means, eye))
         return self._run("color", x, directions(self.model.anchors, eye)).reshape(-1, 3)
 
-    def _run(self, name: str, x: float, direction: np.ndarray | None) -> np.ndarray:
-        """(A, k, size) output of one network."""
-        model, count = self.model, len(self.model.anchors)
-        control = model.encoding.encode(x)
-        out = []
+    def _run(self, name: str, x: float, direction: np.ndarray | None = None) -> np.ndarray:
+        """(A, k * size) output of one network, the splats of one anchor side by side."""
+        model, network = self.model, self._networks[name]
+        psi, count = model.encoding.encode(x), len(model.anchors)
+        out = np.empty((count, model.splats_per_anchor * SIZE_PER_SPLAT[name]), np.float32)
         for start in range(0, count, BATCH):
-            rows = slice(start, min(start + BATCH, count))
-            parts = {
-                "feature": model.features[rows],
-                "control": np.broadcast_to(control, (rows.stop - start, len(control))),
-            }
-            if direction is not None:
-                parts["direction"] = direction[rows]
-            columns = [parts[part] for part in model.networks[name].inputs]
-            inputs = {"input": np.concatenate(columns, axis=1, dtype=np.float32)}
-            out.append(self.sessions[name].run(["output"], inputs)[0])
-        return np.concatenate(out).reshape(count, model.splats_per_anchor, SIZE_PER_SPLAT[name])
+            rows = slice(start, start + BATCH)
+            seen = None if direction is None else direction[rows]
+            out[rows] = network.run(model.features[rows], seen, psi)
+        return out
 
 
-def open_session(name: str, mlp: Mlp, threads: int):
+class WholeNetwork:
+    """One network as its ONNX file holds it: every input for every anchor."""
+
+    def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
+        self._inputs = mlp.inputs
+        self._session = open_session(write_onnx(mlp, name), threads)
+
+    def run(self, feature: np.ndarray, direction: np.ndarray | None, psi: np.ndarray) -> np.ndarray:
+        """(n, k * size) of features (n, F), directions (n, 3) and Psi(x) (d,)."""
+        control = np.broadcast_to(psi, (len(feature), len(psi)))
+        parts = {"feature": feature, "direction": direction, "control": control}
+        rows = np.concatenate([parts[part] for part in self._inputs], axis=1)
+        return self._session.run(["output"], {"input": rows})[0]
+
+
+class FoldedNetwork:
+    """The same network with Psi(x) in its first bias: only what differs from anchor to anchor."""
+
+    def __init__(self, name: str, mlp: Mlp, model: AnchorModel, threads: int) -> None:
+        widths = {"feature": model.features.shape[1], "direction": 3, "control": model.encoding.d}
+        is_control = np.repeat(
+            [part == "control" for part in mlp.inputs], [widths[part] for part in mlp.inputs]
+        )
+        first = mlp.weights[0]  # (hidden, inputs)
+        self._bias = mlp.biases[0].astype(np.float64)
+        self._control = first[:, is_control].astype(np.float64)  # (hidden, d), or (hidden, 0)
+        self._inputs = [part for part in mlp.inputs if part != "control"]
+        rest = replace(mlp, weights=(first[:, ~is_control], *mlp.weights[1:]))
+        self._session = open_session(write_onnx(rest, name, first_bias="input"), threads)
+
+    def run(self, feature: np.ndarray, direction: np.ndarray | None, psi: np.ndarray) -> np.ndarray:
+        """As WholeNetwork.run."""
+        bias = self._bias + (self._control @ psi if self._control.shape[1] else 0)  # (hidden,)
+        parts = {"feature": feature, "direction": direction}
+        columns = [parts[part] for part in self._inputs]
+        rows = columns[0] if len(columns) == 1 else np.concatenate(columns or [feature[:, :0]], 1)
+        return self._session.run(["output"], {"input": rows, "bias": bias.astype(np.float32)})[0]
+
+
+def open_session(data: bytes, threads: int):
+    """An onnxruntime session on the CPU of an ONNX file's bytes."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads  # 1 measured fastest for these small networks
     options.log_severity_level = 3
-    return onnxruntime.InferenceSession(
-        write_onnx(mlp, name), options, providers=["CPUExecutionProvider"]
-    )
+    return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])

@@ -34,7 +34,9 @@ def basis(direction: np.ndarray, count: int) -> np.ndarray:
 
 def shade(sh: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """(N, 3) display sRGB, at least 0, of coefficients (N, M, 3) seen along directions (N, 3)."""
-    return np.maximum(np.einsum("nm,nmc->nc", basis(direction, sh.shape[1]), sh) + 0.5, 0)
+    out = (basis(direction, sh.shape[1])[:, None] @ sh)[:, 0]
+    out += 0.5
+    return np.maximum(out, 0, out=out)
 
 
 # Turning the world by half a turn about x takes y, z to -y, -z: a function changes its sign

@@ -1,19 +1,25 @@
 """A network to the bytes of an ONNX file that runs alone in onnxruntime on (N, inputs)."""
 
 import numpy as np
-from onnx import TensorProto, checker, helper, numpy_helper
 
 from runtime_models.model import Mlp
 
 OPSET = 17
+IR_VERSION = 8  # what opset 17 came with; older runtimes open it, too
 HEAD_NODE = {"tanh": "Tanh", "sigmoid": "Sigmoid", "softplus": "Softplus", "exp": "Exp"}
 
 
-def write_onnx(mlp: Mlp, name: str) -> bytes:
-    """Gemm, Relu, ..., Gemm, then Clip, the head and Mul where the network has them."""
+def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
+    """Gemm, Relu, ..., Gemm, then Clip, the head and Mul where the network has them.
+
+    With first_bias="input" the first layer's bias (hidden,) is not stored: it is a second input
+    "bias" of the graph.
+    """
+    from onnx import TensorProto, checker, helper, numpy_helper
+
     constants, nodes = [], []
 
-    def constant(label: str, value: np.ndarray) -> str:
+    def constant(label: str, value: np.ndarray | float) -> str:
         constants.append(numpy_helper.from_array(np.asarray(value, np.float32, order="C"), label))
         return label
 
@@ -25,26 +31,27 @@ def write_onnx(mlp: Mlp, name: str) -> bytes:
     for i, (weight, bias) in enumerate(zip(mlp.weights, mlp.biases, strict=True)):
         if i:
             value = apply("Relu", value)
-        arrays = constant(f"weight{i}", weight), constant(f"bias{i}", bias)
-        value = apply("Gemm", value, *arrays, transB=1)
+        from_outside = i == 0 and first_bias == "input"
+        label = "bias" if from_outside else constant(f"bias{i}", bias)
+        value = apply("Gemm", value, constant(f"weight{i}", weight), label, transB=1)
     if mlp.clip is not None:
-        bounds = [
-            constant(n, np.float32(v)) for n, v in zip(("low", "high"), mlp.clip, strict=True)
-        ]
-        value = apply("Clip", value, *bounds)
+        value = apply("Clip", value, constant("low", mlp.clip[0]), constant("high", mlp.clip[1]))
     if mlp.head != "none":
         value = apply(HEAD_NODE[mlp.head], value)
     if mlp.gain != 1.0:
-        value = apply("Mul", value, constant("gain", np.float32(mlp.gain)))
+        value = apply("Mul", value, constant("gain", mlp.gain))
     nodes[-1].output[0] = "output"
+
+    def shaped(label: str, *shape):
+        return helper.make_tensor_value_info(label, TensorProto.FLOAT, shape)
+
+    inputs = [shaped("input", "N", mlp.width_in)]
+    if first_bias == "input":
+        inputs.append(shaped("bias", len(mlp.biases[0])))
     graph = helper.make_graph(
-        nodes,
-        name,
-        [helper.make_tensor_value_info("input", TensorProto.FLOAT, ["N", mlp.width_in])],
-        [helper.make_tensor_value_info("output", TensorProto.FLOAT, ["N", mlp.width_out])],
-        constants,
+        nodes, name, inputs, [shaped("output", "N", mlp.width_out)], constants
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)])
-    model.ir_version = 8
+    model.ir_version = IR_VERSION
     checker.check_model(model)
     return model.SerializeToString()

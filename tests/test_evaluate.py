@@ -1,12 +1,17 @@
 """Evaluation by onnxruntime against a float64 twin, and the properties of the control encoding."""
 
+from dataclasses import replace
+
 import numpy as np
+import onnxruntime
 import pytest
 
 from runtime_models.evaluate import BATCH, Evaluator, directions, evaluate
-from runtime_models.model import SIZE_PER_SPLAT, ControlEncoding, SplatLayers, Stop
+from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, SplatLayers, Stop
+from runtime_models.read_package import read_package
 from runtime_models.rotation import covariance, normalize, rotation_matrices
 from runtime_models.spherical_harmonics import C0, HALF_TURN_SIGNS, basis, shade
+from runtime_models.write_package import write_package
 from tests.models import make_random_model, run_in_numpy
 
 
@@ -35,8 +40,12 @@ def twin(model, x, eye):
 def test_evaluation_equals_its_float64_twin(anchors, hidden):
     model = make_random_model(anchors, k=3, features=5, hidden=hidden, seed=anchors)
     eye = np.array([0.3, -2.0, 1.0])
+    folded = Evaluator(model)
     for x in (0.0, 0.37, 1.0):
         got, want = evaluate(model, x, eye), twin(model, x, eye)
+        fast = (*folded.geometry(x), folded.color(x, eye))
+        for name, values in zip(("means", "scales", "wxyz", "opacity", "color"), fast, strict=True):
+            np.testing.assert_allclose(values, getattr(got, name), atol=2e-5, err_msg=name)
         np.testing.assert_allclose(got.means, want["offset"], atol=1e-5)
         np.testing.assert_allclose(got.scales, want["scale"], atol=1e-5)
         np.testing.assert_allclose(got.opacity, want["opacity"][:, 0], atol=1e-5)
@@ -50,6 +59,60 @@ def test_batches_join_without_a_seam():
     want = twin(model, 0.5, np.zeros(3))
     for rows in (slice(0, 3), slice(BATCH - 2, BATCH + 1)):
         np.testing.assert_allclose(few.means[rows], want["offset"][rows], atol=1e-5)
+
+
+INPUTS = [("control",), ("feature",), ("control", "feature"), ("feature", "control")]
+SEEN = [("direction",), ("control", "direction", "feature"), ("direction", "control")]
+
+
+@pytest.mark.parametrize("inputs", INPUTS + SEEN)
+def test_inputs_may_stand_in_any_order_and_may_be_absent(inputs):
+    model = make_random_model(7, k=2)
+    name = "color" if "direction" in inputs else "offset"
+    width = sum({"feature": 16, "direction": 3, "control": 16}[part] for part in inputs)
+    old = model.networks[name]
+    first = np.random.default_rng(1).normal(0, 0.3, (32, width)).astype(np.float32)
+    changed = replace(old, weights=(first, *old.weights[1:]), inputs=inputs)
+    model = replace(model, networks=model.networks | {name: changed})
+    eye, want = np.ones(3), twin(model, 0.3, np.ones(3))
+    for fold in (True, False):
+        evaluator = Evaluator(model, fold=fold)
+        np.testing.assert_allclose(evaluator.geometry(0.3)[0], want["offset"], atol=1e-5)
+        np.testing.assert_allclose(evaluator.color(0.3, eye), want["color"], atol=1e-5)
+
+
+def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path):
+    """No code of ours between the bytes on disk and the numbers."""
+    model = make_random_model(30, k=4)
+    write_package(model, tmp_path / "scene", "float32")
+    x, eye = 0.61, np.array([2.0, 0.5, -1.0])
+    direction = model.anchors - np.float32(eye)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    control = np.tile(model.encoding.encode(x), (30, 1))
+    out = {}
+    for name in HEADS:
+        parts = (
+            [model.features, direction, control] if name == "color" else [model.features, control]
+        )
+        session = onnxruntime.InferenceSession(
+            tmp_path / "scene" / f"{name}.onnx", providers=["CPUExecutionProvider"]
+        )
+        rows = np.concatenate(parts, axis=1).astype(np.float32)
+        out[name] = session.run(["output"], {"input": rows})[0].reshape(30, 4, -1)
+    got = Evaluator(read_package(tmp_path / "scene"))
+    means, scales, wxyz, opacity = got.geometry(x)
+    np.testing.assert_allclose(
+        means.reshape(30, 4, 3), model.anchors[:, None] + out["offset"], atol=1e-6
+    )
+    np.testing.assert_allclose(scales, out["scale"].reshape(-1, 3), atol=1e-6)
+    np.testing.assert_allclose(wxyz, normalize(out["rotation"].reshape(-1, 4)), atol=1e-5)
+    np.testing.assert_allclose(opacity, out["opacity"].reshape(-1), atol=1e-6)
+    np.testing.assert_allclose(got.color(x, eye), out["color"].reshape(-1, 3), atol=1e-6)
+
+
+def test_no_anchors_give_no_splats():
+    splats = evaluate(make_random_model(0, k=3), 0.5, np.zeros(3))
+    assert (splats.means.shape, splats.color.shape) == ((0, 3), (0, 3))
 
 
 def test_the_direction_at_the_anchor_itself_is_zero_and_the_colour_finite():
@@ -67,19 +130,31 @@ def test_only_the_colour_sees_the_eye_and_all_heads_see_x():
     assert np.abs(near - far).max() > 1e-3
 
 
-def test_gaussian_encodings_move_apart_steadily_and_frequency_encodings_do_not():
+def largest_fall(codes: np.ndarray) -> float:
+    """How much nearer a further x can be than a nearer one, as a part of the largest distance.
+
+    codes (n, d) of even steps in x.  Every x is tried as the place to walk away from.
+    """
+    worst = 0.0
+    for i, start in enumerate(codes):
+        for way in (codes[i:], codes[i::-1]):
+            distance = np.linalg.norm(way - start, axis=1)
+            worst = max(worst, (np.maximum.accumulate(distance) - distance).max())
+    return worst / np.linalg.norm(codes[:, None] - codes[None], axis=2).max()
+
+
+def test_gaussian_encodings_move_apart_until_they_saturate_and_frequency_encodings_do_not():
     """The paper's reason for the Gaussian encoding: no far x comes near again."""
     xs = np.linspace(0, 1, 101)
     gauss = np.stack([ControlEncoding().encode(x) for x in xs]).astype(float)
     waves = 2.0 ** np.arange(8) * np.pi
     frequency = np.concatenate([np.sin(np.outer(xs, waves)), np.cos(np.outer(xs, waves))], axis=1)
-
-    def largest_fall(codes):
-        distance = np.linalg.norm(codes - codes[0], axis=1)
-        return (np.maximum.accumulate(distance) - distance).max() / distance.max()
-
     # The Gaussians ripple by 3 %: between two of them the code is a little shorter than on one.
     assert largest_fall(gauss) < 0.05 < 0.3 < largest_fall(frequency)
+    near = np.stack([np.linalg.norm(gauss[i : 96 + i] - gauss[:96], axis=1) for i in range(6)])
+    assert (np.diff(near, axis=0) > 0).all()  # up to 0.05 apart strictly, from every x
+    far = np.linalg.norm(gauss[50:] - gauss[0], axis=1)
+    assert np.ptp(far) < 0.03 * far.max()  # saturated
 
 
 @pytest.mark.parametrize("seed", range(5))
