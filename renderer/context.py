@@ -8,7 +8,10 @@ import moderngl
 
 NEEDED = 430  # compute shaders and storage buffers
 KINDS = ("egl", "surfaceless", "osmesa")  # the order of "auto": a GPU comes first where one is
-SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr ", "software rasterizer")
+SOFTWARE = (
+    "llvmpipe", "softpipe", "swrast", "swr ", "software rasterizer",
+    "gdi generic", "basic render driver",  # Windows without a graphics driver
+)  # fmt: skip
 INSTALL = {
     "libEGL.so.1": "apt install libegl1 libegl-mesa0 libgl1-mesa-dri",
     "libOSMesa.so.8": "apt install libosmesa6",

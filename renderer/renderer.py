@@ -19,6 +19,7 @@ from scene.scene import Scene
 
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
 CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
+TARGETS = ("rgba16f", "rgba32f")
 
 
 @dataclass
@@ -48,6 +49,8 @@ class Renderer:
         target: str = "rgba16f",
     ) -> None:
         drawing, mlps, sort = _choose(ctx, drawing, mlps, sort)
+        if target not in TARGETS:
+            raise ValueError(f"there is no target {target!r}; choose {' or '.join(TARGETS)}.")
         self.settings = RenderSettings()
         self._ctx = ctx
         self._gpu = Gpu(ctx) if ctx is not None else None
@@ -156,6 +159,8 @@ class Renderer:
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
         """Fills a GL framebuffer with view i as resolved() shows it."""
+        if self._resolve is None:
+            raise ValueError("this renderer has no GL context to present with; use resolved().")
         name, weight, _ = thermal_blend(self._scene)
         palette = palette_colors(name) if name else None
         image = self._drawing.presentable(i)
@@ -166,9 +171,11 @@ class Renderer:
     def _framebuffer_kept(self) -> Iterator[None]:
         """Leaves bound what was bound: a window's, or none of ours that close() deletes."""
         bound = self._ctx.fbo if self._ctx is not None else None
-        yield
-        if bound is not None:
-            bound.use()
+        try:
+            yield
+        finally:
+            if bound is not None:
+                bound.use()
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""

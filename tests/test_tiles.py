@@ -293,12 +293,18 @@ def test_photos_that_another_splatter_made_are_drawn_again(renderer, data, modal
         ({"drawing": "quads"}, "quads are drawn with GL; open a context, or draw tiles"),
         ({"mlps": "gl"}, "tiles decode and sort without GL"),
         ({"sort": "gl"}, "tiles decode and sort without GL"),
+        ({"target": "rgba8"}, "there is no target 'rgba8'; choose rgba16f or rgba32f"),
         ({"drawing": "rays"}, "there is no drawing 'rays'; choose auto, quads, tiles"),
     ],
 )
 def test_what_cannot_work_is_refused_in_a_sentence(ask, answer):
     with pytest.raises(ValueError, match=answer):
         Renderer(None, **ask)
+
+
+def test_without_gl_there_is_nothing_to_present_with(renderer):
+    with pytest.raises(ValueError, match="no GL context to present with"):
+        renderer.present(None)
 
 
 def test_the_names_of_what_is_in_use(renderer):

@@ -65,6 +65,8 @@ def test_two_contexts_live_side_by_side():
         ("softpipe", True),
         ("SWR (LLVM 12.0)", True),
         ("Software Rasterizer", True),
+        ("GDI Generic", True),
+        ("D3D12 (Microsoft Basic Render Driver)", True),
         ("NVIDIA GeForce RTX 4090/PCIe/SSE2", False),
         ("AMD Radeon RX 7900 XTX (radeonsi, navi31)", False),
         ("Mesa Intel(R) Arc(tm) A770 Graphics", False),
