@@ -26,6 +26,7 @@ from scene.pose import View
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
 TURN = 0.006  # radians a logical pixel of mouse movement
 LOOK = 0.003
+WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
 NOTE_S = 3.0  # how long a note stays
 SLEEP_S = 0.5  # longest wait for input while nothing moves
 LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took long
@@ -153,7 +154,7 @@ class Viewer:
         moving = self.camera.moving or self._push().any
         waiting = self._wanted is not None or self.options.screenshot is not None
         sliding = not np.array_equal(self._free, self._free_wanted())
-        return moving or waiting or sliding or self.stage.playing or self._frames == 0
+        return moving or waiting or sliding or self.stage.playing or self._frames < WARM_UP
 
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
@@ -244,6 +245,7 @@ class Viewer:
         )  # fmt: skip
         self.renderer.settings = settings
         fresh = self._drawn != wanted or self.options.screenshot is not None
+        fresh = fresh or self._frames < WARM_UP
         if fresh:
             self.renderer.update(self.stage.scene)
             self.readings.stats = self.renderer.draw([view], self.window.screen())
@@ -263,7 +265,8 @@ class Viewer:
                 draw_panel(self.stage, self.readings, scale),
                 draw_slider_bar(self.stage, scale),
             ]
-        draw_note(self.readings.note, scale)
+        if not self._save_picture:  # a note is no part of a picture
+            draw_note(self.readings.note, scale)
         draw_problem(self.stage, scale)
         self.window.covered = tuple(covered)
 

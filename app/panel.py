@@ -1,6 +1,6 @@
 """The panel at the left: frame times, splat counts, quality, palette, machine, keys, messages."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,9 +26,10 @@ KEYS = (
     ("wheel", "nearer, farther"),
     ("double click", "centre that place"),
     ("V", "orbit / fly"),
-    ("W A S D  Q E", "move; Shift fast, Ctrl slow"),
+    ("WASD QE", "move; Shift fast, Ctrl slow"),
     ("F, Shift+F", "frame all, first view"),
-    ("Space, 1\u20139", "play, go to stop"),
+    ("Space", "play, pause"),
+    ("1 \u2013 9", "go to a stop"),
     ("Alt", "slider without snapping"),
     ("P, F12", "save a picture"),
     ("H, Tab", "hide all this"),
@@ -70,9 +71,9 @@ def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     if _section("Quality", open_first=True):
         _quality(stage, ui_scale)
     if _section("Machine"):
-        _rows(readings.machine.items(), wrap=True)
+        _rows(readings.machine.items(), share=0.34)
     if _section("Keys"):
-        _rows(KEYS, wrap=True)
+        _rows(KEYS, share=0.40)
     box = theme.window_box()
     imgui.end()
     return box
@@ -114,7 +115,8 @@ def draw_problem(stage: Stage, ui_scale: float) -> None:
     """The message box of a file that could not be opened; the scene stays as it was."""
     if not stage.problem:
         return
-    imgui.open_popup("Not opened")
+    if not imgui.is_popup_open("Not opened"):
+        imgui.open_popup("Not opened")
     screen = imgui.get_io().display_size
     imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
     imgui.set_next_window_size(Vec(min(460 * ui_scale, screen.x * 0.9), 0))
@@ -236,12 +238,12 @@ def _quality(stage: Stage, ui_scale: float) -> None:
         stage.settings = settings
 
 
-def _rows(rows, wrap: bool = False) -> None:
-    """Two columns: muted names, values; long values wrap instead of standing at the right."""
+def _rows(rows: Iterable[tuple[str, str]], share: float = 0.0) -> None:
+    """Muted names, values: at the right, or from a `share` of the width on, where they wrap."""
     for name, value in rows:
         imgui.text_disabled(name)
-        if wrap:
-            imgui.same_line(imgui.get_content_region_avail().x * 0.36)
+        if share:
+            imgui.same_line(imgui.get_window_size().x * share)
             imgui.push_text_wrap_pos(0)
             imgui.text_unformatted(value)
             imgui.pop_text_wrap_pos()

@@ -76,5 +76,7 @@ def _colors() -> dict:
         col.plot_histogram: (ACCENT, 0.75),
         col.separator: (TRACK, 0.5),
         col.title_bg_active: (RAISED, 1),
-        col.modal_window_dim_bg: ((0, 0, 0), 0.45),
+        # No dimming behind boxes: ImGui reorders its commands for it, which moderngl-window's
+        # renderer does not follow, so that the box itself would be dimmed.
+        col.modal_window_dim_bg: ((0, 0, 0), 0),
     }

@@ -12,6 +12,7 @@ MARGIN = 1.08  # of the distance at which the bounding sphere just fits
 MIN_OPACITY = 0.1  # fainter splats are mostly floaters; they do not count for the bounds
 PERCENTILES = (2, 98)
 ROUND_ENOUGH = 1.3  # length over depth below which no side is the long one
+OUTLYING = 1.25  # times the distance for 98 % of the splats: more only floaters ask for
 FAR_RADII = 200.0
 NEAR_RADII = 0.01
 RAY_POINTS = 24
@@ -56,7 +57,8 @@ def fit_points(
 ) -> float:
     """Metres from the centre, seen along the axes of (4, 4), at which the splats fill the picture.
 
-    Tighter than `fit_distance` for what is long or flat; a few floaters may be cut off.
+    Tighter than `fit_distance` for what is long or flat.  All splats are in the picture unless the
+    last few would need a much larger distance: those are floaters.
     """
     points = _seen(means, opacity)
     if not len(points):
@@ -64,7 +66,7 @@ def fit_points(
     in_eye = (points - centre) @ world_from_eye[:3, :3]  # (P, 3) right, up, towards the eye
     half = np.minimum([tangents[1], tangents[3]], [-tangents[0], -tangents[2]])
     needed = in_eye[:, 2] + np.max(MARGIN * np.abs(in_eye[:, :2]) / half, axis=1)
-    return float(np.percentile(needed, 99.5))
+    return float(min(needed.max(), OUTLYING * np.percentile(needed, PERCENTILES[1])))
 
 
 def broadside(means: np.ndarray, opacity: np.ndarray) -> float:

@@ -228,6 +228,7 @@ def test_a_dropped_bad_file_is_told_and_the_old_scene_stays(viewer):
     viewer.stage.problem = ""
     run_frames(viewer, 3)
     assert bright(boxed, (250, 250, 650, 400)) > 0.02
+    assert boxed[270:370, 230:670].max() > 200  # readable, not dimmed
 
 
 def test_a_dropped_good_file_is_shown(viewer):
@@ -249,6 +250,8 @@ def test_pictures_are_numbered_and_never_overwritten(viewer):
     with Image.open(folder / "shapeshift-0002.png") as picture:
         assert picture.size == viewer.window.size and picture.mode == "RGB"
     assert "shapeshift-0003.png" in viewer.readings.note
+    one, two = ((folder / f"shapeshift-000{n}.png").read_bytes() for n in (2, 3))
+    assert one == two  # the note about the first is not in the second
 
 
 def test_the_scale_bar_comes_with_the_thermal_stop(viewer):
