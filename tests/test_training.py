@@ -124,7 +124,7 @@ def test_the_guard_rescues_weights_that_are_not_numbers(device, balls):
             trainer.adam.load(state)
         if now.iteration == 120:
             break
-    assert trainer.guard.trips == 1
+    assert trainer.guard.trips > 0
     assert all(np.isfinite(a).all() for a in trainer.adam.state().values())
 
 

@@ -5,7 +5,7 @@ import numpy as np
 LEAST_VISIBLE = 0.01  # of the largest share of splats that this modality has had on screen
 LEAST_SHOWN = 0.3  # of the contrast to the background that the photo has, or the first picture had
 IN_A_ROW = 3  # looks that show nothing: one alone may be a camera inside of something
-PROBATION = 8  # looks after falling back, in which the loss has to come down to ...
+PROBATION = 8  # looks after falling back, over which the mean loss has to come down to ...
 GAINED = 0.6  # ... this share of an untrained model's
 EVERY = 5  # rounds between looks; a round is one step of every modality
 SNAPSHOT_EVERY = 100  # steps

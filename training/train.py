@@ -132,7 +132,8 @@ class Trainer:
         notes = {
             "voxel": self.voxel, "origin": self.origin, "iteration": self.iteration,
             "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
-            "run_length": self.run_length, "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
+            "run_length": self.run_length, "first_loss": self.guard.first_loss,
+            "settings": self.settings.as_dict(),
         }  # fmt: skip
         return self.adam.state() | self.evidence.state(), notes
 
