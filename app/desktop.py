@@ -261,9 +261,10 @@ class Viewer:
         covered = []
         if self.overlay:
             draw_scale_bar(self.stage.scene, scale)
+            left = free_area(self.window.logical_size, len(self.stage.sliders), scale)[0]
             covered = [
                 draw_panel(self.stage, self.readings, scale),
-                draw_slider_bar(self.stage, scale),
+                draw_slider_bar(self.stage, left, scale),
             ]
         if not self._save_picture:  # a note is no part of a picture
             draw_note(self.readings.note, scale)

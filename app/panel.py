@@ -51,7 +51,10 @@ class Readings:
 def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     """The whole left panel; changes the stage's settings and palette.  Returns where it is."""
     imgui.set_next_window_pos(Vec(MARGIN * ui_scale, MARGIN * ui_scale))
-    limit = imgui.get_io().display_size.y - 2 * MARGIN * ui_scale
+    screen = imgui.get_io().display_size
+    beside = free_area((screen.x, screen.y), len(stage.sliders), ui_scale)[0] > 0
+    bar = 0.0 if beside else bar_height(len(stage.sliders))  # else the panel ends above it
+    limit = screen.y - (2 * MARGIN + bar) * ui_scale
     imgui.set_next_window_size_constraints(
         Vec(WIDTH * ui_scale, 0), Vec(WIDTH * ui_scale, max(limit, 1.0))
     )
@@ -79,7 +82,12 @@ def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     return box
 
 
-def free_area(size: tuple[int, int], rows: int, pixels: float) -> Box:
+def bar_height(rows: int) -> float:
+    """Logical pixels that the slider bar takes at the lower edge."""
+    return (0.0, BAR_HEIGHT)[rows] if rows < 2 else BAR_ROW * rows + BAR_HEIGHT - BAR_FIRST
+
+
+def free_area(size: tuple[float, float], rows: int, pixels: float) -> Box:
     """The part of the window, in pixels, that panel and slider bar leave free.
 
     `rows` is the number of sliders, `pixels` what a unit of the overlay has.  In a window so small
@@ -87,8 +95,7 @@ def free_area(size: tuple[int, int], rows: int, pixels: float) -> Box:
     """
     width, height = size
     left = (WIDTH + 1.5 * MARGIN) * pixels
-    bar = (0.0, BAR_HEIGHT)[rows] if rows < 2 else BAR_ROW * rows + BAR_HEIGHT - BAR_FIRST
-    bottom = height - bar * pixels
+    bottom = height - bar_height(rows) * pixels
     enough = width - left > MIN_FREE * width and bottom > MIN_FREE * height
     return (left, 0.0, float(width), bottom) if enough else (0.0, 0.0, float(width), float(height))
 
@@ -142,7 +149,9 @@ def _title(stage: Stage) -> None:
     imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Shapeshift")
     if names:
         imgui.same_line()
-        imgui.text(names)
+        imgui.push_text_wrap_pos(0)
+        imgui.text_unformatted(names)
+        imgui.pop_text_wrap_pos()
     else:
         imgui.text_wrapped("Drop a scene on the window: a package, a .shift, .ply or .splat file.")
 

@@ -15,14 +15,18 @@ MAX_WIDTH = 760.0  # logical pixels
 ROW = 46.0
 
 
-def draw_slider_bar(stage: Stage, ui_scale: float) -> Box:
-    """One row an object at the lower edge: moves x, starts and stops playing; returns its box."""
+def draw_slider_bar(stage: Stage, left: float, ui_scale: float) -> Box:
+    """One row an object at the lower edge: moves x, starts and stops playing; returns its box.
+
+    It lies in the middle of what is right of `left`, logical pixels.
+    """
     rows = stage.sliders
     if not rows:
         return (0.0, 0.0, 0.0, 0.0)
     screen = imgui.get_io().display_size
-    width = min(MAX_WIDTH * ui_scale, screen.x * 0.92)
-    imgui.set_next_window_pos(Vec(screen.x / 2, screen.y - 18 * ui_scale), 0, Vec(0.5, 1.0))
+    width = min(MAX_WIDTH * ui_scale, (screen.x - left) * 0.94)
+    middle = (left + screen.x) / 2
+    imgui.set_next_window_pos(Vec(middle, screen.y - 18 * ui_scale), 0, Vec(0.5, 1.0))
     imgui.set_next_window_size(Vec(width, 0))
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move
     imgui.begin("##modality", None, flags | imgui.WindowFlags_.no_saved_settings)
