@@ -61,7 +61,8 @@ class Arena:
         self.mean_opacity = gpu.reserve(16 * n)
         self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * n)
         self.color = gpu.reserve(16 * n)
-        self.object = gpu.upload(np.repeat(np.arange(len(counts), dtype=np.uint32), counts))
+        objects = np.repeat(np.arange(len(counts), dtype=np.uint32), np.array(counts, np.int64))
+        self.object = gpu.upload(objects)
         self.poses = gpu.reserve(16 * layout.POSE_ROWS * len(counts))
         self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
         self.keys, self.keys_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
@@ -74,14 +75,15 @@ class Arena:
         quads = np.arange(n, dtype=np.uint32)[:, None] * 4 + corners  # (N, 6)
         self.quads = gpu.ctx.buffer(quads if n else corners)  # an index buffer: no block limit
         gpu.allocations += 1
-        self.staged = min(max(counts, default=0), STAGED_SPLATS)
+        fit = min(STAGED_SPLATS, gpu.max_block // (4 * STAGED_FLOATS))
+        self.staged = min(max(counts, default=0), fit)
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
 
     def place(self, world_from_objects: list[np.ndarray] | np.ndarray) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
-        self.world_from_object[:] = world_from_objects
+        self.world_from_object[:] = np.reshape(world_from_objects, (-1, 4, 4))
 
     def staging_at(self, part: str) -> int:
         """The float of the staging buffer where a part ("offset", "scale", ...) begins."""

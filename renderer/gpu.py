@@ -1,5 +1,8 @@
 """One GL context with what the passes share: its limits, its programs, a count of allocations."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import moderngl
 import numpy as np
 
@@ -70,6 +73,18 @@ class Gpu:
             program[name].value = value
         program.run(groups)
         self.ctx.memory_barrier()
+
+    @contextmanager
+    def drawing_into(self, framebuffer: moderngl.Framebuffer) -> Iterator[None]:
+        """Binds a framebuffer for the body; then again what was bound, so that a window stays the
+        target, and one of ours can be deleted without being it.
+        """
+        before = self.ctx.fbo
+        framebuffer.use()
+        try:
+            yield
+        finally:
+            before.use()
 
     def release(self) -> None:
         for program in self._programs.values():

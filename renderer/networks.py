@@ -79,7 +79,7 @@ def pack_mlp(mlp: Mlp, features: int, d: int) -> PackedMlp:
         # (out vec, in vec, input, output): four rows are the mat4 of an output and an input vec4
         parts.append(padded.reshape(outs, 4, ins, 4).transpose(0, 2, 3, 1).reshape(-1, 4))
     widest = max(vecs(max(w.shape)) for w in weights)
-    rows = np.concatenate(parts).astype(np.float32)
+    rows = np.ascontiguousarray(np.concatenate(parts), np.float32)
     return PackedMlp(rows, np.asarray(mlp.biases[0], np.float64), control, len(weights), widest)
 
 

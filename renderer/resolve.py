@@ -50,9 +50,9 @@ class Resolve:
         program["weight"].value = weight if use_palette else 0.0
         program["background"].value = tuple(background)
         program["top_first"].value = from_array
-        framebuffer.use()
-        self._gpu.ctx.enable_only(moderngl.NOTHING)
-        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        with self._gpu.drawing_into(framebuffer):
+            self._gpu.ctx.enable_only(moderngl.NOTHING)
+            self._triangle.render(moderngl.TRIANGLES, vertices=3)
 
     def _upload(self, image: np.ndarray) -> moderngl.Texture:
         """The array as a texture; made anew only when the size changes."""

@@ -25,10 +25,12 @@ class Splatter:
     def draw(self, arena: Arena, i: int, size: tuple[int, int], min_alpha: float) -> None:
         """Draws the arena as it was last projected and sorted, into the image of view i."""
         target = self._target(i, size)
-        target.use()
-        target.clear(0.0, 0.0, 0.0, 0.0)
-        if not arena.count:
-            return
+        with self._gpu.drawing_into(target):
+            target.clear(0.0, 0.0, 0.0, 0.0)
+            if arena.count:
+                self._draw_quads(arena, size, min_alpha)
+
+    def _draw_quads(self, arena: Arena, size: tuple[int, int], min_alpha: float) -> None:
         ctx = self._gpu.ctx
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_func = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
@@ -36,6 +38,7 @@ class Splatter:
         self._program["size"].value = size
         self._program["min_alpha"].value = min_alpha
         self._vertex_array(arena).render_indirect(arena.command, moderngl.TRIANGLES, count=1)
+        ctx.memory_barrier()  # the next view's project overwrites what this draw still reads
 
     def texture(self, i: int) -> moderngl.Texture:
         """The image of view i on the GPU, row 0 at the bottom."""

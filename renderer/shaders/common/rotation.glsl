@@ -2,8 +2,10 @@
 // Defines: mat3 rotation(vec4 wxyz)   columns are the local axes; any length, zero = identity.
 
 mat3 rotation(vec4 wxyz) {
-    float length2 = dot(wxyz, wxyz);
-    vec4 q = length2 > 0.0 ? wxyz * inversesqrt(length2) : vec4(1.0, 0.0, 0.0, 0.0);
+    // Divided by the largest first: squares of very small or large numbers leave the floats.
+    float largest = max(max(abs(wxyz.x), abs(wxyz.y)), max(abs(wxyz.z), abs(wxyz.w)));
+    vec4 q = wxyz == vec4(0.0) ? vec4(1.0, 0.0, 0.0, 0.0) : wxyz / largest;  // NaN stays
+    q /= length(q);
     float w = q.x, x = q.y, y = q.z, z = q.w;
     return mat3(
         1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),

@@ -1,0 +1,99 @@
+"""GLSL files: includes, defines, errors with file and line; and what holds for every shader."""
+
+import re
+
+import pytest
+
+from renderer import layout, shader
+
+FILES = sorted(p.name for p in shader.SHADERS.iterdir() if p.suffix in (".comp", ".vert", ".frag"))
+COMPUTE = [name for name in FILES if name.endswith(".comp")]
+MLP_DEFINES = {"LAYER_VECS": 16, "BLOCK_VECS": 1024, "STORED_WEIGHTS": 0}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "common").mkdir()
+    (tmp_path / "common" / "inner.glsl").write_text("int inner() { return 1; }\n")
+    (tmp_path / "common" / "outer.glsl").write_text(
+        '#include "common/inner.glsl"\nint outer() { return inner() + TWO; }\n'
+    )
+    (tmp_path / "main.comp").write_text(
+        '#include "common/outer.glsl"\n#include "common/inner.glsl" // again\nvoid main() {}\n'
+    )
+    return tmp_path
+
+
+def test_includes_come_once_and_keep_their_place(folder):
+    lines = shader.read_shader("main.comp", folder, TWO=2)
+    ours = [line for line in lines if line[0] != "<defines>"]
+    assert ours == [
+        ("common/inner.glsl", 1, "int inner() { return 1; }"),
+        ("common/outer.glsl", 2, "int outer() { return inner() + TWO; }"),
+        ("main.comp", 3, "void main() {}"),
+    ]
+    assert lines[0] == ("<defines>", 1, "#version 430")
+    assert "#define TWO 2" in shader.joined(lines)
+
+
+def test_a_missing_include_names_who_wants_it(folder):
+    (folder / "common" / "outer.glsl").write_text('\n#include "common/gone.glsl"\n')
+    with pytest.raises(shader.ShaderError, match=r"common/outer\.glsl:2 wants common/gone\.glsl"):
+        shader.read_shader("main.comp", folder)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "0:{}(5): error: `x' undeclared",  # Mesa
+        '0({}) : error C1503: undefined variable "x"',  # NVIDIA
+        "ERROR: 0:{}: 'x' : undeclared identifier",  # AMD, Intel on Windows
+    ],
+)
+def test_every_driver_s_error_is_mapped_to_file_and_line(folder, said):
+    lines = shader.read_shader("main.comp", folder)
+    flat = next(i for i, line in enumerate(lines, start=1) if line[0] == "common/outer.glsl")
+    told = shader.explain(said.format(flat), [lines])
+    assert told.startswith("common/outer.glsl:2: ") and "x" in told.splitlines()[0]
+    assert told.splitlines()[1] == "    int outer() { return inner() + TWO; }"
+
+
+def test_the_driver_in_use_names_the_line(ctx, folder, monkeypatch):
+    monkeypatch.setattr(shader, "SHADERS", folder)
+    monkeypatch.setattr(shader.read_shader, "__defaults__", (folder,))
+    with pytest.raises(shader.ShaderError, match=r"common/outer\.glsl:2: .*TWO"):
+        shader.compile_compute(ctx, "main.comp")
+
+
+def test_a_fragment_error_is_not_looked_up_in_the_vertex_file(ctx, folder, monkeypatch):
+    (folder / "a.vert").write_text("void main() { gl_Position = vec4(0); }\n")
+    (folder / "a.frag").write_text("out vec4 color;\nvoid main() { color = vec4(nowhere); }\n")
+    monkeypatch.setattr(shader.read_shader, "__defaults__", (folder,))
+    with pytest.raises(shader.ShaderError, match=r"a\.frag:2: .*nowhere"):
+        shader.compile_program(ctx, "a.vert", "a.frag")
+
+
+@pytest.mark.parametrize("name", COMPUTE)
+def test_every_compute_shader_compiles(gpu, name):
+    defines = MLP_DEFINES if name == "decode_mlp.comp" else {}
+    assert gpu.compute(name, **defines) is gpu.compute(name, **defines)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_slots_of_a_shader_are_all_different_and_low(name):
+    text = shader.joined([line for line in shader.read_shader(name) if line[0] != "<defines>"])
+    slots = re.findall(r"binding = SLOT_(\w+)", text)
+    numbers = [layout.SLOTS[slot] for slot in slots]
+    assert len(set(numbers)) == len(numbers), slots
+    assert max(numbers, default=0) < 8  # GL promises no more
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_shaders_are_plain_gl_43(name):
+    text = shader.joined([line for line in shader.read_shader(name) if line[0] != "<defines>"])
+    assert "#extension" not in text and "subgroup" not in text
+    for kind, _ in re.findall(r"buffer \w+ \{ (\w+) (\w+)\[\]; \}", text):
+        assert kind in ("float", "uint", "vec4", "uvec4")
+    assert text.count("readonly buffer") + len(re.findall(r"writeonly buffer|\) buffer", text)) == (
+        len(re.findall(r"buffer \w+ \{ \w+ \w+\[\]; \}", text))
+    )
