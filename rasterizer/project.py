@@ -17,6 +17,8 @@ LEAST_ALPHA = 1 / 255  # below it a pixel is not drawn (3DGS)
 LOW_PASS = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
 CLAMP = 1.3  # the Jacobian's x/z and y/z stay within this many times the view's tangents (3DGS)
 LEAST_CHUNK = 2048  # splats: less is not worth a work-item
+WIDTH = {"cpu": 8, "gpu": 1}  # splats a work-item of `project`
+GROUP = 64  # work-items
 CULL_REASONS = ("opacity", "size", "distance", "frustum")
 
 
@@ -112,19 +114,22 @@ class Projected:
 
 
 def project(
-    device: Device, means, scales, wxyz, opacity, color, camera: Camera, low_pass: float = LOW_PASS
-) -> Projected:
+    device: Device, means, scales, wxyz, opacity, color,
+    camera: Camera, low_pass: float = LOW_PASS, form: str | None = None,
+) -> Projected:  # fmt: skip
     """Screen ellipses and depths of N splats given as device arrays, float32.
 
     means (N, 3) world metres, scales (N, 3) metres, wxyz (N, 4) of any length, opacity (N,),
     color (N, 3).  Culled: opacity at most 1/255, z not beyond near, off the screen, not finite.
+    form: "cpu" or "gpu", by default the device's kind.
     """
     count = means.shape[0]
     record, depth = device.empty((count, RECORD)), device.empty(count)
-    kernel = device.program(KERNELS / "project.cl")["project"]
+    wide = WIDTH[form or device.kind]
+    kernel = device.program(KERNELS / "project.cl", WIDTH=wide)["project"]
     width, height = camera.size
     device.launch(
-        kernel, count, 64,
+        kernel, -(-count // wide), GROUP,
         count, width, height, float(camera.near), LEAST_ALPHA, float(low_pass),
         device.upload(camera.packed()), means, scales, wxyz, opacity, color, record, depth,
     )  # fmt: skip
@@ -133,14 +138,15 @@ def project(
 
 def project_backward(
     device: Device, means, scales, wxyz, opacity, color,
-    camera: Camera, projected: Projected, grad_record,
+    camera: Camera, projected: Projected, grad_record, form: str | None = None,
 ) -> tuple:  # fmt: skip
     """Gradients (means, scales, wxyz, opacity, color) from grad_record (N, 12), device arrays."""
     count = means.shape[0]
     grads = tuple(device.empty(a.shape) for a in (means, scales, wxyz, opacity, color))
-    kernel = device.program(KERNELS / "project.cl")["project_backward"]
+    wide = WIDTH[form or device.kind]
+    kernel = device.program(KERNELS / "project.cl", WIDTH=wide)["project_backward"]
     device.launch(
-        kernel, count, 64,
+        kernel, -(-count // wide), GROUP,
         count, float(projected.low_pass), device.upload(camera.packed()), means, scales, wxyz,
         projected.record, grad_record, *grads,
     )  # fmt: skip

@@ -23,7 +23,7 @@ BACKGROUND = (0.2, 0.5, 0.9)
 
 def draw(splats: list, camera: Camera, form: str = "cpu", background=BACKGROUND) -> tuple:
     d = device()
-    projected = project(d, *upload(splats), camera)
+    projected = project(d, *upload(splats), camera, form=form)
     tiles = bin_tiles(d, projected, camera.size, form)
     frame = rasterize(d, projected, tiles, camera.size, background, form)
     return d.download(frame.image), d.download(frame.transmittance), projected, tiles
@@ -64,7 +64,7 @@ def test_dense_and_large_splats_match_float64(form):
 def test_records_and_depths_match_float64(form):
     splats, camera = random_splats(500, seed=5), off_centre_camera((75, 66))
     d = device()
-    projected = project(d, *upload(splats), camera)
+    projected = project(d, *upload(splats), camera, form=form)
     record, depth = project_reference(*as_double(splats), camera)
     got = d.download(projected.record)
     seen = record[:, 9] > 0
@@ -80,7 +80,7 @@ def test_lists_are_complete_sorted_and_stable(count, form):
     splats, camera = random_splats(count, seed=count), off_centre_camera((100, 70))
     splats[0][: count // 3] = splats[0][:1]  # equal depths: the order of the indices decides
     d = device()
-    projected = project(d, *upload(splats), camera)
+    projected = project(d, *upload(splats), camera, form=form)
     tiles = bin_tiles(d, projected, camera.size, form)
     depth, record = d.download(projected.depth), d.download(projected.record)
     visible = np.flatnonzero(d.download(tiles.places)[:, 0] >= 1 << 24) if count else []
@@ -210,7 +210,7 @@ def test_the_early_stop_ends_lists_and_does_not_show(form):
     splats, camera = random_splats(4000, seed=6, scale=0.5, spread=0.2), off_centre_camera((64, 48))
     splats[3][:] = 0.98
     d = device()
-    projected = project(d, *upload(splats), camera)
+    projected = project(d, *upload(splats), camera, form=form)
     tiles = bin_tiles(d, projected, camera.size, form)
     frame = rasterize(d, projected, tiles, camera.size, BACKGROUND, form)
     cells = tiles.grid[0] * tiles.grid[1]

@@ -32,12 +32,12 @@ def gradients(splats: list, camera, grad_image, grad_through, form: str = "cpu")
     """The five gradients and the records' (N, 12)."""
     d = device()
     on_device = upload(splats)
-    projected = project(d, *on_device, camera)
+    projected = project(d, *on_device, camera, form=form)
     tiles = bin_tiles(d, projected, camera.size, form)
     frame = rasterize(d, projected, tiles, camera.size, BACKGROUND, form)
     grads = [d.upload(g) if g is not None else None for g in (grad_image, grad_through)]
     grad_record = rasterize_backward(d, projected, tiles, frame, *grads, form)
-    back = project_backward(d, *on_device, camera, projected, grad_record)
+    back = project_backward(d, *on_device, camera, projected, grad_record, form)
     return [d.download(g) for g in back], d.download(grad_record)
 
 

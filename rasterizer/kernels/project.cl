@@ -1,76 +1,84 @@
 // project: splats (means, scales, quaternions) -> records and depths, and the way back.
-// One work-item a splat.  EWA splatting as 3DGS does it: Sigma' = J W Sigma W^T J^T + low_pass.
+// One work-item for WIDTH splats.  EWA splatting as in 3DGS: Sigma' = J W Sigma W^T J^T + low_pass.
 #include "common/record.cl"
 #include "common/camera.cl"
+#include "common/lanes.cl"
 
 // Everything of a splat that both directions need.
 typedef struct {
-  float3 p;          // mean in the camera, metres
-  float4 q;          // unit quaternion: x y z w
-  float inverse_length;
-  float turn[9];     // camera_from_splat rotation, rows
-  float root[9];     // turn with columns times the scales: covariance = root root^T
-  float3 row_x, row_y;  // rows of J root: the screen covariance is their Gram matrix + low_pass
-  float jx, jxz, jy, jyz;  // Jacobian: d(px)/dx, d(px)/dz, d(py)/dy, d(py)/dz
-  float tan_x, tan_y;  // clamped x/z, y/z
-  float a, b, c, determinant;
+  floatn3 p;                     // mean in the camera, metres
+  floatn w, x, y, z;             // unit quaternion
+  floatn inverse_length;         // of the one given
+  floatn3 scale;
+  floatn3 turn_x, turn_y, turn_z;  // rows of the rotation camera_from_splat
+  floatn3 root_x, root_y, root_z;  // rows of turn diag(scale): covariance = root root^T
+  floatn3 row_x, row_y;          // rows of J root: the screen covariance is their Gram matrix
+  floatn jx, jxz, jy, jyz;       // Jacobian: d(px)/dx, d(px)/dz, d(py)/dy, d(py)/dz
+  floatn per_z, a, b, c, determinant;
 } Splat;
 
-inline void rotation(float4 q, float* r) {
-  r[0] = 1 - 2 * (q.y * q.y + q.z * q.z);
-  r[1] = 2 * (q.x * q.y - q.w * q.z);
-  r[2] = 2 * (q.x * q.z + q.w * q.y);
-  r[3] = 2 * (q.x * q.y + q.w * q.z);
-  r[4] = 1 - 2 * (q.x * q.x + q.z * q.z);
-  r[5] = 2 * (q.y * q.z - q.w * q.x);
-  r[6] = 2 * (q.x * q.z - q.w * q.y);
-  r[7] = 2 * (q.y * q.z + q.w * q.x);
-  r[8] = 1 - 2 * (q.x * q.x + q.y * q.y);
+inline floatn camera_row(__constant float* camera, int row, floatn3 v) {
+  __constant float* m = camera + 4 * row;
+  return m[0] * v.x + m[1] * v.y + m[2] * v.z + m[3];
 }
 
-inline Splat place(int i, __global const float* means, __global const float* scales,
-                   __global const float* wxyz, __constant float* camera, float low_pass) {
+inline floatn3 times3(floatn3 a, floatn3 b) { return make3(a.x * b.x, a.y * b.y, a.z * b.z); }
+
+inline Splat place(floatn3 mean, floatn3 scale, floatn qw, floatn qx, floatn qy, floatn qz,
+                   __constant float* camera, float low_pass) {
   Splat s;
-  const float3 mean = vload3(i, means), scale = vload3(i, scales);
-  s.p.x = camera[0] * mean.x + camera[1] * mean.y + camera[2] * mean.z + camera[3];
-  s.p.y = camera[4] * mean.x + camera[5] * mean.y + camera[6] * mean.z + camera[7];
-  s.p.z = camera[8] * mean.x + camera[9] * mean.y + camera[10] * mean.z + camera[11];
-  const float4 given = vload4(i, wxyz).yzwx;
+  s.p.x = camera_row(camera, 0, mean);
+  s.p.y = camera_row(camera, 1, mean);
+  s.p.z = camera_row(camera, 2, mean);
+  s.scale = scale;
   // By the largest entry first: neither tiny nor huge quaternions lose their length.
-  const float4 size = fabs(given);
-  const float largest = fmax(fmax(size.x, size.y), fmax(size.z, size.w));
-  const float4 scaled = given / largest;
-  const float inverse = 1 / sqrt(dot(scaled, scaled));  // not finite where there is no direction
-  s.q = scaled * inverse;
-  s.inverse_length = inverse / largest;
-  float r[9];
-  rotation(s.q, r);
-  for (int row = 0; row < 3; row++)
-    for (int column = 0; column < 3; column++)
-      s.turn[3 * row + column] = camera[4 * row] * r[column] + camera[4 * row + 1] * r[3 + column] +
-                                 camera[4 * row + 2] * r[6 + column];
+  const floatn largest = fmax(fmax(fabs(qw), fabs(qx)), fmax(fabs(qy), fabs(qz)));
+  const floatn per = 1 / largest;  // not finite where there is no direction
+  s.w = qw * per;
+  s.x = qx * per;
+  s.y = qy * per;
+  s.z = qz * per;
+  const floatn inverse = 1 / sqrt(s.w * s.w + s.x * s.x + s.y * s.y + s.z * s.z);
+  s.w *= inverse;
+  s.x *= inverse;
+  s.y *= inverse;
+  s.z *= inverse;
+  s.inverse_length = inverse * per;
+  const floatn w = s.w, x = s.x, y = s.y, z = s.z;
+  const floatn3 r0 = make3(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y));
+  const floatn3 r1 = make3(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x));
+  const floatn3 r2 = make3(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y));
+  floatn3 turn[3];
   for (int row = 0; row < 3; row++) {
-    s.root[3 * row] = s.turn[3 * row] * scale.x;
-    s.root[3 * row + 1] = s.turn[3 * row + 1] * scale.y;
-    s.root[3 * row + 2] = s.turn[3 * row + 2] * scale.z;
+    const float m0 = camera[4 * row], m1 = camera[4 * row + 1], m2 = camera[4 * row + 2];
+    turn[row] = make3(m0 * r0.x + m1 * r1.x + m2 * r2.x, m0 * r0.y + m1 * r1.y + m2 * r2.y,
+                      m0 * r0.z + m1 * r1.z + m2 * r2.z);
   }
-  const float per_z = 1 / s.p.z;
-  s.tan_x = clamp(s.p.x * per_z, camera[LEAST_X], camera[MOST_X]);
-  s.tan_y = clamp(s.p.y * per_z, camera[LEAST_Y], camera[MOST_Y]);
-  s.jx = camera[CAMERA_FX] * per_z;
-  s.jy = camera[CAMERA_FY] * per_z;
-  s.jxz = -s.jx * s.tan_x;
-  s.jyz = -s.jy * s.tan_y;
-  const float3 x = vload3(0, s.root), y = vload3(1, s.root), z = vload3(2, s.root);
-  s.row_x = s.jx * x + s.jxz * z;
-  s.row_y = s.jy * y + s.jyz * z;
-  const float a = dot(s.row_x, s.row_x), c = dot(s.row_y, s.row_y);
+  s.turn_x = turn[0];
+  s.turn_y = turn[1];
+  s.turn_z = turn[2];
+  s.root_x = times3(s.turn_x, scale);
+  s.root_y = times3(s.turn_y, scale);
+  s.root_z = times3(s.turn_z, scale);
+
+  s.per_z = 1 / s.p.z;
+  const floatn tan_x = fmin(fmax(s.p.x * s.per_z, camera[LEAST_X]), camera[MOST_X]);
+  const floatn tan_y = fmin(fmax(s.p.y * s.per_z, camera[LEAST_Y]), camera[MOST_Y]);
+  s.jx = camera[CAMERA_FX] * s.per_z;
+  s.jy = camera[CAMERA_FY] * s.per_z;
+  s.jxz = -s.jx * tan_x;
+  s.jyz = -s.jy * tan_y;
+  s.row_x = blend3(s.jx, s.root_x, s.jxz, s.root_z);
+  s.row_y = blend3(s.jy, s.root_y, s.jyz, s.root_z);
+  const floatn a = dot3(s.row_x, s.row_x), c = dot3(s.row_y, s.row_y);
   s.a = a + low_pass;
-  s.b = dot(s.row_x, s.row_y);
+  s.b = dot3(s.row_x, s.row_y);
   s.c = c + low_pass;
   // a c - b^2 cancels for long thin splats; |row_x x row_y|^2 is the same without the loss.
-  const float3 area = cross(s.row_x, s.row_y);
-  s.determinant = dot(area, area) + low_pass * (a + c) + low_pass * low_pass;
+  const floatn3 area = make3(s.row_x.y * s.row_y.z - s.row_x.z * s.row_y.y,
+                             s.row_x.z * s.row_y.x - s.row_x.x * s.row_y.z,
+                             s.row_x.x * s.row_y.y - s.row_x.y * s.row_y.x);
+  s.determinant = dot3(area, area) + low_pass * (a + c) + low_pass * low_pass;
   return s;
 }
 
@@ -79,40 +87,64 @@ __kernel void project(int count, int width, int height, float near, float least_
                       __global const float* scales, __global const float* wxyz,
                       __global const float* opacity, __global const float* color,
                       __global float* record, __global float* depth) {
-  const int i = get_global_id(0);
-  if (i >= count) return;
-  __global float* out = record + RECORD * i;
-  for (int k = 0; k < RECORD; k++) out[k] = 0;
-  out[EXTENT_X] = out[EXTENT_Y] = -1;
-  depth[i] = CULLED_DEPTH;
-  const float alpha = opacity[i];
-  if (!(alpha > least_alpha)) return;  // absent, too faint, or not a number
+  const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
+  if (n <= 0) return;
+  const Splat s = place(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
+                        LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, low_pass);
+  const floatn alpha = LOAD(opacity, 1, 0);
+  const floatn3 rgb = LOAD3(color);
+  const floatn per = 1 / s.determinant, cut = 2 * log(alpha / least_alpha);
+  const floatn half_x = sqrt(cut * s.a), half_y = sqrt(cut * s.c);
+  const floatn x = s.jx * s.p.x + camera[CAMERA_CX], y = s.jy * s.p.y + camera[CAMERA_CY];
 
-  const Splat s = place(i, means, scales, wxyz, camera, low_pass);
-  const float3 rgb = vload3(i, color);
-  if (!(s.p.z > near && s.p.z < CULLED_DEPTH)) return;
-  if (!(s.determinant > 0 && s.determinant < FLT_MAX && isfinite(rgb.x + rgb.y + rgb.z))) return;
-  const float per = 1 / s.determinant, cut = 2 * log(alpha / least_alpha);
-  const float half_x = sqrt(cut * s.a), half_y = sqrt(cut * s.c);
-  const float x = s.jx * s.p.x + camera[CAMERA_CX], y = s.jy * s.p.y + camera[CAMERA_CY];
-  const bool inside = x + half_x > 0 && x - half_x < width && y + half_y > 0 && y - half_y < height;
-  if (!(inside && half_x < FLT_MAX && half_y < FLT_MAX)) return;
-
-  vstore8((float8)(x, y, s.c * per, -s.b * per, s.a * per, alpha, rgb.x, rgb.y), 0, out);
-  vstore4((float4)(rgb.z, half_x, half_y, cut), 0, out + 8);
-  depth[i] = s.p.z;
+  // Positive tests, so that NaN fails: bright enough, in front, finite, on the screen.
+  intn seen = (alpha > least_alpha) & (s.p.z > near) & (s.p.z < CULLED_DEPTH);
+  seen &= (s.determinant > 0) & (s.determinant < FLT_MAX);
+  seen &= fabs(rgb.x + rgb.y + rgb.z) < FLT_MAX;
+  seen &= (half_x < FLT_MAX) & (half_y < FLT_MAX);
+  seen &= (x + half_x > 0) & (x - half_x < (float)width);
+  seen &= (y + half_y > 0) & (y - half_y < (float)height);
+  const floatn none = 0, culled = -1, far = CULLED_DEPTH;
+  STORE(record, RECORD, MEAN_X, select(none, x, seen));
+  STORE(record, RECORD, MEAN_Y, select(none, y, seen));
+  STORE(record, RECORD, CONIC_A, select(none, s.c * per, seen));
+  STORE(record, RECORD, CONIC_B, select(none, -s.b * per, seen));
+  STORE(record, RECORD, CONIC_C, select(none, s.a * per, seen));
+  STORE(record, RECORD, OPACITY, select(none, alpha, seen));
+  STORE(record, RECORD, RED, select(none, rgb.x, seen));
+  STORE(record, RECORD, GREEN, select(none, rgb.y, seen));
+  STORE(record, RECORD, BLUE, select(none, rgb.z, seen));
+  STORE(record, RECORD, EXTENT_X, select(culled, half_x, seen));
+  STORE(record, RECORD, EXTENT_Y, select(culled, half_y, seen));
+  STORE(record, RECORD, CUT, select(none, cut, seen));
+  STORE(depth, 1, 0, select(far, s.p.z, seen));
 }
 
-// Gradients of the quaternion from those of the rotation's entries (rows, already in the world).
-inline float4 rotation_backward(float4 q, const float* g) {
-  const float w = 2 * (-q.z * g[1] + q.y * g[2] + q.z * g[3] - q.x * g[5] - q.y * g[6] + q.x * g[7]);
-  const float x = 2 * (q.y * (g[1] + g[3]) + q.z * (g[2] + g[6]) - 2 * q.x * (g[4] + g[8]) +
-                       q.w * (g[7] - g[5]));
-  const float y = 2 * (q.x * (g[1] + g[3]) + q.z * (g[5] + g[7]) - 2 * q.y * (g[0] + g[8]) +
-                       q.w * (g[2] - g[6]));
-  const float z = 2 * (q.x * (g[2] + g[6]) + q.y * (g[5] + g[7]) - 2 * q.z * (g[0] + g[4]) +
-                       q.w * (g[3] - g[1]));
-  return (float4)(x, y, z, w);
+// Gradients of the scales and of the quaternion given, from those of root's rows.
+inline void turn_backward(const Splat* s, __constant float* camera, floatn3 gx, floatn3 gy,
+                          floatn3 gz, floatn3* grad_scale, floatn* grad_wxyz) {
+  const floatn3 tx = times3(gx, s->turn_x), ty = times3(gy, s->turn_y), tz = times3(gz, s->turn_z);
+  *grad_scale = make3(tx.x + ty.x + tz.x, tx.y + ty.y + tz.y, tx.z + ty.z + tz.z);
+  const floatn3 ux = times3(gx, s->scale), uy = times3(gy, s->scale), uz = times3(gz, s->scale);
+  floatn3 g[3];  // rows of the gradient of the rotation world_from_splat
+  for (int row = 0; row < 3; row++)
+    g[row] = make3(camera[row] * ux.x + camera[4 + row] * uy.x + camera[8 + row] * uz.x,
+                   camera[row] * ux.y + camera[4 + row] * uy.y + camera[8 + row] * uz.y,
+                   camera[row] * ux.z + camera[4 + row] * uy.z + camera[8 + row] * uz.z);
+  const floatn w = s->w, x = s->x, y = s->y, z = s->z;
+  const floatn dw = 2 * (-z * g[0].y + y * g[0].z + z * g[1].x - x * g[1].z - y * g[2].x + x * g[2].y);
+  const floatn dx = 2 * (y * (g[0].y + g[1].x) + z * (g[0].z + g[2].x) - 2 * x * (g[1].y + g[2].z) +
+                         w * (g[2].y - g[1].z));
+  const floatn dy = 2 * (x * (g[0].y + g[1].x) + z * (g[1].z + g[2].y) - 2 * y * (g[0].x + g[2].z) +
+                         w * (g[0].z - g[2].x));
+  const floatn dz = 2 * (x * (g[0].z + g[2].x) + y * (g[1].z + g[2].y) - 2 * z * (g[0].x + g[1].y) +
+                         w * (g[1].x - g[0].y));
+  // Through q = given / |given| only what is across q remains.
+  const floatn along = dw * w + dx * x + dy * y + dz * z;
+  grad_wxyz[0] = (dw - along * w) * s->inverse_length;
+  grad_wxyz[1] = (dx - along * x) * s->inverse_length;
+  grad_wxyz[2] = (dy - along * y) * s->inverse_length;
+  grad_wxyz[3] = (dz - along * z) * s->inverse_length;
 }
 
 __kernel void project_backward(int count, float low_pass, __constant float* camera,
@@ -121,68 +153,50 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
                                __global const float* grad_record, __global float* grad_means,
                                __global float* grad_scales, __global float* grad_wxyz,
                                __global float* grad_opacity, __global float* grad_color) {
-  const int i = get_global_id(0);
-  if (i >= count) return;
-  __global const float* kept = record + RECORD * i;
-  __global const float* g = grad_record + RECORD * i;
-  if (!(kept[EXTENT_X] > 0)) {
-    vstore3((float3)(0), i, grad_means);
-    vstore3((float3)(0), i, grad_scales);
-    vstore4((float4)(0), i, grad_wxyz);
-    vstore3((float3)(0), i, grad_color);
-    grad_opacity[i] = 0;
-    return;
-  }
-  const Splat s = place(i, means, scales, wxyz, camera, low_pass);
-  grad_opacity[i] = g[OPACITY];
-  vstore3((float3)(g[RED], g[GREEN], g[BLUE]), i, grad_color);
+  const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
+  if (n <= 0) return;
+  const Splat s = place(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
+                        LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, low_pass);
+  const intn seen = LOAD(record, RECORD, EXTENT_X) > 0;
+  const floatn none = 0;
+#define GRAD(column) LOAD(grad_record, RECORD, column)
+#define KEEP(value) select(none, value, seen)  // a culled splat's may be NaN
+  STORE(grad_opacity, 1, 0, KEEP(GRAD(OPACITY)));
+  STORE3(grad_color, make3(KEEP(GRAD(RED)), KEEP(GRAD(GREEN)), KEEP(GRAD(BLUE))));
 
   // conic Q = Sigma'^-1, so dSigma' = -Q dQ Q (the off-diagonal entry counts twice).
-  const float A = kept[CONIC_A], B = kept[CONIC_B], C = kept[CONIC_C];
-  const float xx = A * g[CONIC_A] + 0.5f * B * g[CONIC_B], xy = 0.5f * A * g[CONIC_B] + B * g[CONIC_C];
-  const float yx = B * g[CONIC_A] + 0.5f * C * g[CONIC_B], yy = 0.5f * B * g[CONIC_B] + C * g[CONIC_C];
-  const float grad_a = -(xx * A + xy * B), grad_b = -2 * (xx * B + xy * C);
-  const float grad_c = -(yx * B + yy * C);
-  const float3 grad_x = 2 * grad_a * s.row_x + grad_b * s.row_y;
-  const float3 grad_y = grad_b * s.row_x + 2 * grad_c * s.row_y;
+  const floatn A = LOAD(record, RECORD, CONIC_A), B = LOAD(record, RECORD, CONIC_B);
+  const floatn C = LOAD(record, RECORD, CONIC_C);
+  const floatn gA = GRAD(CONIC_A), gB = GRAD(CONIC_B), gC = GRAD(CONIC_C);
+  const floatn xx = A * gA + 0.5f * B * gB, xy = 0.5f * A * gB + B * gC;
+  const floatn yx = B * gA + 0.5f * C * gB, yy = 0.5f * B * gB + C * gC;
+  const floatn grad_a = -(xx * A + xy * B), grad_b = -2 * (xx * B + xy * C);
+  const floatn grad_c = -(yx * B + yy * C);
+  const floatn3 gx = blend3(2 * grad_a, s.row_x, grad_b, s.row_y);
+  const floatn3 gy = blend3(grad_b, s.row_x, 2 * grad_c, s.row_y);
 
   // rows of J root, with J = [jx 0 jxz; 0 jy jyz].
-  const float3 root_x = vload3(0, s.root), root_y = vload3(1, s.root), root_z = vload3(2, s.root);
-  const float grad_jx = dot(grad_x, root_x), grad_jxz = dot(grad_x, root_z);
-  const float grad_jy = dot(grad_y, root_y), grad_jyz = dot(grad_y, root_z);
-  float grad_root[9];
-  vstore3(s.jx * grad_x, 0, grad_root);
-  vstore3(s.jy * grad_y, 1, grad_root);
-  vstore3(s.jxz * grad_x + s.jyz * grad_y, 2, grad_root);
+  const floatn grad_jx = dot3(gx, s.root_x), grad_jxz = dot3(gx, s.root_z);
+  const floatn grad_jy = dot3(gy, s.root_y), grad_jyz = dot3(gy, s.root_z);
+  floatn3 grad_scale;
+  floatn grad_q[4];
+  turn_backward(&s, camera, scale3(s.jx, gx), scale3(s.jy, gy),
+                blend3(s.jxz, gx, s.jyz, gy), &grad_scale, grad_q);
+  STORE3(grad_scales, make3(KEEP(grad_scale.x), KEEP(grad_scale.y), KEEP(grad_scale.z)));
+  for (int k = 0; k < 4; k++) STORE(grad_wxyz, 4, k, KEEP(grad_q[k]));
 
   // x = fx X/Z + cx; jx = fx/Z; jxz = -fx/Z tan_x, tan_x = X/Z unless clamped.
-  const float per_z = 1 / s.p.z, tx = s.p.x * per_z, ty = s.p.y * per_z;
-  const bool free_x = tx > camera[LEAST_X] && tx < camera[MOST_X];
-  const bool free_y = ty > camera[LEAST_Y] && ty < camera[MOST_Y];
-  const float along_x = free_x ? -grad_jxz * s.jx * per_z : 0;
-  const float along_y = free_y ? -grad_jyz * s.jy * per_z : 0;
-  const float3 grad_p = (float3)(
-      g[MEAN_X] * s.jx + along_x, g[MEAN_Y] * s.jy + along_y,
-      -(g[MEAN_X] * s.jx * tx + g[MEAN_Y] * s.jy * ty) - (grad_jx * s.jx + grad_jy * s.jy) * per_z -
-          (grad_jxz * s.jxz + grad_jyz * s.jyz) * per_z - along_x * tx - along_y * ty);
-  vstore3((float3)(camera[0] * grad_p.x + camera[4] * grad_p.y + camera[8] * grad_p.z,
-                   camera[1] * grad_p.x + camera[5] * grad_p.y + camera[9] * grad_p.z,
-                   camera[2] * grad_p.x + camera[6] * grad_p.y + camera[10] * grad_p.z),
-          i, grad_means);
-
-  // root = turn scale; turn = camera rotation.
-  float grad_scale[3], grad_rotation[9];
-  const float scale[3] = {scales[3 * i], scales[3 * i + 1], scales[3 * i + 2]};
-  for (int k = 0; k < 3; k++) {
-    grad_scale[k] = grad_root[k] * s.turn[k] + grad_root[3 + k] * s.turn[3 + k] +
-                    grad_root[6 + k] * s.turn[6 + k];
-    for (int row = 0; row < 3; row++)
-      grad_rotation[3 * row + k] = (camera[row] * grad_root[k] + camera[4 + row] * grad_root[3 + k] +
-                                    camera[8 + row] * grad_root[6 + k]) * scale[k];
-  }
-  vstore3(vload3(0, grad_scale), i, grad_scales);
-  // through q = given / |given|: only what is across q remains.
-  const float4 grad_q = rotation_backward(s.q, grad_rotation);
-  const float4 across = (grad_q - dot(grad_q, s.q) * s.q) * s.inverse_length;
-  vstore4(across.wxyz, i, grad_wxyz);
+  const floatn tx = s.p.x * s.per_z, ty = s.p.y * s.per_z;
+  const intn free_x = (tx > camera[LEAST_X]) & (tx < camera[MOST_X]);
+  const intn free_y = (ty > camera[LEAST_Y]) & (ty < camera[MOST_Y]);
+  const floatn along_x = select(none, -grad_jxz * s.jx * s.per_z, free_x);
+  const floatn along_y = select(none, -grad_jyz * s.jy * s.per_z, free_y);
+  const floatn mean_x = GRAD(MEAN_X) * s.jx, mean_y = GRAD(MEAN_Y) * s.jy;
+  const floatn px = mean_x + along_x, py = mean_y + along_y;
+  const floatn jacobian =
+      grad_jx * s.jx + grad_jy * s.jy + grad_jxz * s.jxz + grad_jyz * s.jyz;
+  const floatn pz = -(px * tx + py * ty) - jacobian * s.per_z;
+  STORE3(grad_means, make3(KEEP(camera[0] * px + camera[4] * py + camera[8] * pz),
+                           KEEP(camera[1] * px + camera[5] * py + camera[9] * pz),
+                           KEEP(camera[2] * px + camera[6] * py + camera[10] * pz)));
 }
