@@ -198,6 +198,23 @@ def test_the_slider_follows_the_mouse_and_snaps(viewer):
     assert np.isclose(viewer.camera._lag, 0).all()  # the camera did not move
 
 
+def test_alt_lets_the_slider_stand_beside_a_stop(viewer, monkeypatch):
+    left, top, right, bottom = viewer.window.covered[1]
+    y = (top + bottom) / 2 + 8
+    monkeypatch.setattr(glfw, "get_key", lambda _, key: int(key == glfw.KEY_LEFT_ALT))
+    glfw_click(viewer.window, right - 120, y)
+    found = []
+    for x in np.arange(right - 100, right - 70, 1.5):
+        viewer.window._on_cursor(None, x, y)
+        run_frames(viewer, 3)
+        found.append(viewer.stage.scene.objects[0].x)
+    glfw_release(viewer.window)
+    monkeypatch.undo()
+    run_frames(viewer, 3)
+    assert any(0.981 < x < 0.9999 for x in found)
+    assert (np.diff(found) >= 0).all() and left < x
+
+
 @pytest.mark.parametrize(
     ("seconds_between", "moved", "double"), [(0.1, 0, True), (0.1, 50, False), (0.6, 0, False)]
 )
