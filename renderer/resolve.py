@@ -16,7 +16,6 @@ class Resolve:
         self._program = gpu.program("resolve.vert", "resolve.frag")
         self._triangle = gpu.ctx.vertex_array(self._program, [])
         self._palette = gpu.ctx.texture((STEPS, 1), 3, dtype="f4")
-        self._palette.repeat_x = False
         self._palette_now: np.ndarray | None = None
         self._uploaded: moderngl.Texture | None = None
         gpu.allocations += 1

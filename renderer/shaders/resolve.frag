@@ -2,7 +2,7 @@
 // The palette colours what is there and not the background: colour is divided by alpha first.
 in vec2 place;
 uniform sampler2D image;
-uniform sampler2D palette;   // 256 x 1, display sRGB, linear between entries
+uniform sampler2D palette;   // 256 x 1, display sRGB
 uniform float weight;        // 0: colours as they are, 1: palette alone
 uniform vec3 background;     // display sRGB
 uniform bool top_first;      // the image's first row is the upper one
@@ -10,12 +10,20 @@ out vec4 shown;
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);  // Rec. 709, on display values
 
+// By hand: a driver's own filter may keep 8 bits of the place between two entries.
+vec3 palette_color(float luminance) {
+    float at = luminance * 255.0;
+    int below = int(at);
+    vec3 lower = texelFetch(palette, ivec2(below, 0), 0).rgb;
+    vec3 upper = texelFetch(palette, ivec2(min(below + 1, 255), 0), 0).rgb;
+    return mix(lower, upper, at - float(below));
+}
+
 void main() {
     vec4 rgba = texture(image, top_first ? vec2(place.x, 1.0 - place.y) : place);
     if (weight > 0.0) {
         float luminance = clamp(dot(rgba.rgb, LUMINANCE) / max(rgba.a, 1e-6), 0.0, 1.0);
-        vec3 color = texture(palette, vec2((luminance * 255.0 + 0.5) / 256.0, 0.5)).rgb;
-        rgba.rgb = mix(rgba.rgb, color * rgba.a, weight);
+        rgba.rgb = mix(rgba.rgb, palette_color(luminance) * rgba.a, weight);
     }
     shown = vec4(rgba.rgb + (1.0 - rgba.a) * background, 1.0);
 }
