@@ -10,18 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-import onnxruntime
 import pytest
-from onnx import TensorProto, helper, numpy_helper
 
 from runtime_models.evaluate import evaluate
-from runtime_models.model import HEADS, BadFile, Mlp
-from runtime_models.read_onnx import read_onnx
+from runtime_models.model import HEADS, BadFile
 from runtime_models.read_package import read_package
 from runtime_models.read_scene import describe, read_model
-from runtime_models.write_onnx import write_onnx
 from runtime_models.write_package import package_files, write_package
-from tests.models import make_random_model, run_in_numpy
+from tests.models import make_random_model
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -216,57 +212,6 @@ def test_flipped_bits_in_a_zip_are_one_sentence_or_a_model(tmp_path):
         except BadFile:
             refused += 1
     assert refused > 100  # the rest hit bytes that nothing depends on
-
-
-@pytest.mark.parametrize("head", ["none", "tanh", "sigmoid", "softplus", "exp"])
-@pytest.mark.parametrize("clip", [None, (-6.0, 3.0)])
-@pytest.mark.parametrize("gain", [1.0, 0.025])
-def test_written_networks_run_alone_and_read_back(head, clip, gain):
-    rng = np.random.default_rng(0)
-    weights = tuple(rng.normal(size=s).astype(np.float32) for s in [(8, 5), (3, 8)])
-    mlp = Mlp(weights, (weights[0][:, 0], weights[1][:, 0]), head, ("feature",), clip, gain)
-    data = write_onnx(mlp, "test")
-    rows = rng.normal(size=(7, 5)).astype(np.float32)
-    session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
-    got = session.run(None, {"input": rows})[0]
-    np.testing.assert_allclose(got, run_in_numpy(mlp, rows), rtol=2e-5, atol=1e-6)
-    back = read_onnx(data, "test", ("feature",))
-    assert (back.head, back.clip) == (mlp.head, mlp.clip)
-    stored = Mlp(mlp.weights, mlp.biases, head, ("feature",), clip, float(np.float32(gain)))
-    np.testing.assert_array_equal(run_in_numpy(back, rows), run_in_numpy(stored, rows))
-
-
-def graph_of(nodes, **constants):
-    values = [numpy_helper.from_array(np.float32(v), k) for k, v in constants.items()]
-    ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, None) for n in ("input", "output")]
-    graph = helper.make_graph(nodes, "g", ends[:1], ends[1:], values)
-    return helper.make_model(graph).SerializeToString()
-
-
-def test_matmul_add_alpha_beta_and_identity_are_understood():
-    w = np.arange(6, dtype=np.float32).reshape(2, 3)
-    node = helper.make_node
-    data = graph_of(
-        [
-            node("MatMul", ["input", "w"], ["a"]),
-            node("Add", ["b", "a"], ["c"]),
-            node("Identity", ["c"], ["d"]),
-            node("Relu", ["d"], ["e"]),
-            node("Gemm", ["e", "v", "u"], ["output"], alpha=2.0, beta=3.0),
-        ],
-        w=w, b=[1, -2, 3], v=np.eye(3), u=[1, 1, 1],
-    )  # fmt: skip
-    mlp = read_onnx(data, "net", ("feature",))
-    rows = np.array([[1.0, -1.0], [0.5, 2.0]])
-    want = 2 * np.maximum(rows @ w + [1, -2, 3], 0) + 3
-    np.testing.assert_allclose(run_in_numpy(mlp, rows), want, rtol=1e-6)
-
-
-@pytest.mark.parametrize("kind", ["Conv", "LSTM", "Softmax", "Sub"])
-def test_other_nodes_are_refused_by_name(kind):
-    data = graph_of([helper.make_node(kind, ["input", "w"], ["output"])], w=[[1.0]])
-    with pytest.raises(BadFile, match=f"a node {kind} stands where none is understood"):
-        read_onnx(data, "net", ("feature",))
 
 
 def test_a_zip_that_unpacks_beyond_the_limit_is_refused(tmp_path, monkeypatch):
