@@ -207,7 +207,7 @@ def _passes(ms_of_pass: Mapping[str, float], ui_scale: float) -> None:
 
 def _splats(stats: FrameStats) -> None:
     rows = [("in the scene", stats.splats), ("drawn", stats.drawn)]
-    rows += [(f"culled: {why}", count) for why, count in stats.culled.items()]
+    rows += [(f"culled: {why}", count) for why, count in sorted(stats.culled.items())]
     _rows([(name, f"{count:,}".replace(",", "\u2009")) for name, count in rows])
 
 
