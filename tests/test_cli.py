@@ -100,3 +100,22 @@ def test_a_fault_of_ours_is_one_sentence_and_a_log(monkeypatch, capsys):
     log = Path(text.rsplit(" in ", 1)[1].strip().rstrip("."))
     assert "ZeroDivisionError" in log.read_text()
     log.unlink()
+
+
+def test_a_display_that_gives_no_window_means_headless(monkeypatch, capsys):
+    from renderer.context import NoContext
+
+    asked = []
+
+    def run_command(command, arguments):
+        asked.append(command)
+        if command == "view":
+            raise NoContext("the display :9 does not answer.")
+        return 0
+
+    monkeypatch.setattr(cli, "run_command", run_command)
+    monkeypatch.setattr(cli, "has_display", lambda: True)
+    assert cli.main([]) == 0
+    assert asked == ["view", "headless"]
+    assert "does not answer" in capsys.readouterr().err
+    assert cli.main(["view"]) == 2  # a window that was asked for is not replaced by pictures
