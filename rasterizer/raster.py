@@ -86,16 +86,19 @@ def rasterize_backward(
     grad_image: "Array",
     grad_transmittance: "Array | None" = None,
     form: str | None = None,
+    absolute: bool = True,
 ) -> "Array":
     """(N, 12) gradients of the records from those of the image (3, H, W) and transmittance (H, W).
 
-    Slots 9 and 10 hold the sums of the absolute gradients of the mean, for growing.
+    Slots 9 and 10 hold the sums of the absolute gradients of the mean, for growing; absolute=False
+    leaves them 0 and saves about a tenth of the time.
     """
     count = projected.depth.shape[0]
     _, height, width = frame.image.shape
     first_slot, slots = tiles.slots(device), device.empty((tiles.count, RECORD))
     file, _, group = FORMS[form or device.kind]
-    kernel = device.program(file)["rasterize_backward"]
+    defines = {"ABSOLUTE": 1} if absolute else {}
+    kernel = device.program(file, **defines)["rasterize_backward"]
     with_transmittance = grad_transmittance is not None
     device.launch(
         kernel, tiles.grid[0] * tiles.grid[1] * group, group,

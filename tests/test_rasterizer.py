@@ -225,6 +225,7 @@ def test_the_early_stop_ends_lists_and_does_not_show(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_rgba_is_the_same_image_premultiplied(form):
     splats, camera = random_splats(700, seed=7), off_centre_camera((83, 45))
+    splats[3][:] *= 0.2  # nothing stops early: drawing stops a little sooner than training
     image, through, projected, tiles = draw(splats, camera, form, (0, 0, 0))
     rgba = rasterize_rgba(device(), projected, tiles, camera.size, form)
     assert rgba.shape == (45, 83, 4) and not rgba.flags.writeable

@@ -28,7 +28,9 @@ BACKGROUND = (0.2, 0.5, 0.9)
 STEP = 1e-8
 
 
-def gradients(splats: list, camera, grad_image, grad_through, form: str = "cpu") -> tuple:
+def gradients(
+    splats: list, camera, grad_image, grad_through, form: str = "cpu", absolute: bool = True
+) -> tuple:
     """The five gradients and the records' (N, 12)."""
     d = device()
     on_device = upload(splats)
@@ -36,7 +38,7 @@ def gradients(splats: list, camera, grad_image, grad_through, form: str = "cpu")
     tiles = bin_tiles(d, projected, camera.size, form)
     frame = rasterize(d, projected, tiles, camera.size, BACKGROUND, form)
     grads = [d.upload(g) if g is not None else None for g in (grad_image, grad_through)]
-    grad_record = rasterize_backward(d, projected, tiles, frame, *grads, form)
+    grad_record = rasterize_backward(d, projected, tiles, frame, *grads, form, absolute)
     back = project_backward(d, *on_device, camera, projected, grad_record, form)
     return [d.download(g) for g in back], d.download(grad_record)
 
@@ -121,6 +123,32 @@ def test_absolute_sums_bound_the_gradients_of_the_mean():
     _, record = gradients(splats, camera, *random_gradients(size))
     assert np.all(record[:, 9:11] >= np.abs(record[:, :2]) * (1 - 1e-4) - 1e-6)
     assert (record[:, 9:11] > 2 * np.abs(record[:, :2])).mean() > 0.3  # signs do cancel
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_absolute_sums_can_be_left_out(form):
+    size = (40, 30)
+    splats, camera = random_splats(100, seed=4), off_centre_camera(size)
+    _, whole = gradients(splats, camera, *random_gradients(size), form)
+    _, part = gradients(splats, camera, *random_gradients(size), form, absolute=False)
+    np.testing.assert_allclose(part[:, :9], whole[:, :9], rtol=1e-5, atol=1e-6)
+    assert whole[:, 9:11].any() and not part[:, 9:].any()
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_early_stop_costs_no_more_than_rounding(form):
+    """Opaque splats in many layers: most instances lie behind the stop, the twin has none."""
+    size = (60, 44)
+    splats, camera = random_splats(400, seed=6, scale=0.25, spread=0.3), off_centre_camera(size)
+    splats[3][:] = np.maximum(splats[3], 0.5)
+    upstream = random_gradients(size)
+    got, _ = gradients(splats, camera, *upstream, form)
+    loss = loss_of(splats, 4, camera, *upstream)  # linear in the colours: any step is exact
+    direction = np.random.default_rng(1).normal(size=splats[4].shape)
+    start = as_double(splats)[4]
+    want = (loss(start + direction) - loss(start - direction)) / 2
+    have = float((got[4].astype(np.float64) * direction).sum())
+    assert abs(have - want) <= 1e-5 * np.linalg.norm(got[4]) * np.sqrt(direction.size)
 
 
 def test_culled_splats_and_those_behind_the_stop_have_zero_gradients():
