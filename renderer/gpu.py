@@ -79,7 +79,7 @@ class Gpu:
         """Binds a framebuffer for the body; then again what was bound, so that a window stays the
         target, and one of ours can be deleted without being it.
         """
-        before = self.ctx.fbo
+        before = self.ctx.fbo or self.ctx.detect_framebuffer(0)
         framebuffer.use()
         try:
             yield

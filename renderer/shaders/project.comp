@@ -1,6 +1,7 @@
 // project: splats of posed objects -> screen ellipses, depth keys, counts.  The only culling gate.
 // One invocation a splat.  Eye space has y up and looks along -z; pixels count from lower left.
 // Screen covariance: J W Sigma W^T J^T + low_pass (EWA splatting, as 3DGS).
+#include "common/finite.glsl"
 #include "common/record.glsl"
 layout(local_size_x = WORKGROUP) in;
 
@@ -30,15 +31,15 @@ uint project(uint i, out float depth) {
     depth = 0.0;
     vec4 splat = mean_opacity[i];
     float opacity = splat.w;
-    // Every gate is a positive test, so that NaN does not pass.
-    if (!(opacity >= min_alpha && opacity <= HALF_MAX)) return COUNT_OPACITY;
+    if (!(finite(opacity) && opacity >= min_alpha)) return COUNT_OPACITY;
 
     uint pose = 3u * object[i];
     vec4 row_x = eye_from_object[pose], row_y = eye_from_object[pose + 1u];
     vec4 row_z = eye_from_object[pose + 2u];
     vec4 mean = vec4(splat.xyz, 1.0);
     vec3 p = vec3(dot(row_x, mean), dot(row_y, mean), dot(row_z, mean));  // metres
-    if (!(dot(p, p) <= max_distance * max_distance)) return COUNT_DISTANCE;
+    float distance2 = dot(p, p);
+    if (!(finite(distance2) && distance2 <= max_distance * max_distance)) return COUNT_DISTANCE;
     float z = -p.z;
     if (!(z > near)) return COUNT_FRUSTUM;
 
@@ -71,8 +72,9 @@ uint project(uint i, out float depth) {
         max(bare_a * bare_c - b * b, 0.0) + low_pass * (bare_a + bare_c) + low_pass * low_pass;
     float minor = determinant / major;
     vec3 rgb = color[i].rgb;
-    bool finite = abs(rgb.r) + abs(rgb.g) + abs(rgb.b) <= HALF_MAX;
-    if (!(finite && minor > 0.0 && major <= max_pixels * max_pixels)) return COUNT_SIZE;
+    bool shaped = finite(center) && finite(vec3(major, minor, k)) && minor > 0.0;
+    bool colored = finite(rgb) && all(lessThanEqual(abs(rgb), vec3(HALF_MAX)));
+    if (!(shaped && colored && major <= max_pixels * max_pixels)) return COUNT_SIZE;
     vec2 along = off >= 0.0 ? vec2(off + root, b) : vec2(b, root - off);
     vec2 direction = root > 1e-12 * mid ? along / max(length(along), 1e-30) : vec2(1.0, 0.0);
 

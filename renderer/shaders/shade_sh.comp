@@ -1,6 +1,7 @@
 // shade_sh: spherical harmonics of degree 0 to 3 -> colour towards the eye.  One invocation a splat.
 // colour = max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of 3DGS.
 #include "common/direction.glsl"
+#include "common/finite.glsl"
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
@@ -41,7 +42,6 @@ void main() {
         rgb += 1.445305721320277 * z * (xx - yy) * coefficient(i, 14u);
         rgb -= 0.5900435899266435 * x * (xx - 3.0 * yy) * coefficient(i, 15u);
     }
-    // max(NaN, 0) is 0: project must see a colour that is not a number, so it is compared instead.
-    rgb = vec3(rgb.r < 0.0 ? 0.0 : rgb.r, rgb.g < 0.0 ? 0.0 : rgb.g, rgb.b < 0.0 ? 0.0 : rgb.b);
-    color[start + i] = vec4(rgb, 0.0);
+    // max(NaN, 0) is 0, and project must see a colour that is not a number.
+    color[start + i] = vec4(finite(rgb) ? max(rgb, vec3(0.0)) : rgb, 0.0);
 }

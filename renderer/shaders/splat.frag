@@ -6,6 +6,6 @@ out vec4 premultiplied;
 
 void main() {
     float alpha = min(MAX_ALPHA, color_opacity.a * exp(-0.5 * dot(sigmas, sigmas)));
-    if (!(alpha >= min_alpha)) discard;  // NaN too: in a float target it would stay for good
+    if (!(alpha >= min_alpha)) discard;  // project lets no NaN come here: it would stay for good
     premultiplied = vec4(color_opacity.rgb * alpha, alpha);
 }
