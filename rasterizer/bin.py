@@ -23,7 +23,7 @@ class Tiles:
     """Every (splat, tile) instance, tile by tile, near to far; forward and backward share it."""
 
     grid: tuple[int, int]  # tiles across, tiles down
-    starts: "Array"  # (tiles + 2,) int32: where each tile's list starts in `instances`
+    starts: "Array"  # (tiles + 1 or more,) int32: where each tile's list starts in `instances`
     instances: "Array"  # (I or more,) int32 splat indices
     places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
     order: "Array"  # (visible,) int32: the visible splats by depth, stable
@@ -97,7 +97,7 @@ def _bin_chunks(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     status = device.view(found.status)
     visible, total = (int(n) for n in status[:, :2].sum(axis=0, dtype=np.int64))
     order = _sort(device, kernels, found, visible, int(status[:, 2].min()), int(status[:, 3].max()))
-    starts, instances = _scatter_tiles(device, kernels, order, found.places, grid, visible, total)
+    starts, instances = _scatter_tiles(device, kernels, order, found, visible, total)
     return Tiles(grid, starts, instances, found.places, order, total)
 
 
@@ -141,20 +141,22 @@ def _sort(device: Device, kernels: dict, found: Found, visible: int, least: int,
     return splats
 
 
-def _scatter_tiles(device, kernels, order, places, grid, visible: int, total: int) -> tuple:
+def _scatter_tiles(device, kernels, order, found: Found, visible: int, total: int) -> tuple:
     """(tiles + 1,) starts and (total,) instances from the splats in depth order."""
-    tiles = grid[0] * grid[1]
+    grid, tiles = found.grid, found.grid[0] * found.grid[1]
     chunks = chunks_of(device, visible)
     chunk = -(-visible // chunks)
-    # One tile and a few instances to spare: the branch-free walk sends there what is not touched.
-    table = device.empty((chunks, tiles + 1), np.int32)
-    starts, instances = (
-        device.empty(tiles + 2, np.int32),
-        device.empty(total + SPARE * chunks, np.int32),
-    )
+    # The branch-free walk looks at a tile's right, lower and lower right neighbours, too.
+    bins = tiles + grid[0] + 1
+    table, starts = device.empty((chunks, bins), np.int32), device.empty(bins + 1, np.int32)
+    instances = device.empty(total + SPARE * chunks, np.int32)
     near_to_far = device.empty((visible, 2), np.uint32)  # places
-    shared = (visible, chunk, grid[0], tiles, order)
-    device.launch(kernels["count_tiles"], chunks, 1, *shared, places, near_to_far, table)
-    device.launch(kernels["scan_table"], 1, 1, tiles + 1, chunks, table, starts)
-    device.launch(kernels["scatter_tiles"], chunks, 1, *shared, near_to_far, table, instances)
+    shared = (visible, chunk, grid[0], bins)
+    device.launch(
+        kernels["count_tiles"], chunks, 1, *shared, order, found.places, near_to_far, table
+    )
+    device.launch(kernels["scan_table"], 1, 1, bins, chunks, table, starts)
+    device.launch(
+        kernels["scatter_tiles"], chunks, 1, *shared, total, order, near_to_far, table, instances
+    )
     return starts, instances

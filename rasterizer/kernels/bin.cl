@@ -79,57 +79,61 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   }
 }
 
-// The tiles of a place, branch free where it is within 2 x 2 tiles, as nearly all are: a tile
-// that is not touched is sent to `spare` instead.  VISIT(tile) is done for each.
-#define FOR_EACH_TILE(place, tiles_x, spare)                                              \
-  const uint2 here = (place);                                                             \
-  const int tile = PLACE_ROW(here) * (tiles_x) + PLACE_COLUMN(here);                      \
-  if (here.x & MASKED && !(here.y & ~0x303u)) {                                           \
-    VISIT(here.y & 1 ? tile : (spare));                                                   \
-    VISIT(here.y & 2 ? tile + 1 : (spare));                                               \
-    VISIT(here.y & 0x100 ? tile + (tiles_x) : (spare));                                   \
-    VISIT(here.y & 0x200 ? tile + (tiles_x) + 1 : (spare));                               \
-  } else if (here.x & MASKED) {                                                           \
-    for (uint mask = here.y; mask; mask &= mask - 1) {                                    \
-      const int bit = 31 - clz(mask & -mask);                                             \
-      VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7));                                   \
-    }                                                                                     \
-  } else {                                                                                \
-    for (uint row = 0; row < here.y >> 16; row++)                                         \
-      for (uint column = 0; column < (here.y & 0xffff); column++)                         \
-        VISIT(tile + row * (tiles_x) + column);                                           \
+// VISIT(tile, touched) for the tiles of a place: branch free where it is within 2 x 2 tiles, as
+// nearly all are; there `touched` is 0 or 1 and the tile may lie beyond the last one.
+#define FOR_EACH_TILE(place, tiles_x)                                              \
+  const uint2 here = (place);                                                      \
+  const int tile = PLACE_ROW(here) * (tiles_x) + PLACE_COLUMN(here);               \
+  if (here.x & MASKED && !(here.y & ~0x303u)) {                                    \
+    VISIT(tile, here.y & 1);                                                       \
+    VISIT(tile + 1, here.y >> 1 & 1);                                              \
+    VISIT(tile + (tiles_x), here.y >> 8 & 1);                                      \
+    VISIT(tile + (tiles_x) + 1, here.y >> 9 & 1);                                  \
+  } else if (here.x & MASKED) {                                                    \
+    for (uint mask = here.y; mask; mask &= mask - 1) {                             \
+      const int bit = popcount(~mask & (mask - 1)); /* number of the lowest */     \
+      VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7), 1);                         \
+    }                                                                              \
+  } else {                                                                         \
+    for (uint row = 0; row < here.y >> 16; row++)                                  \
+      for (uint column = 0; column < (here.y & 0xffff); column++)                  \
+        VISIT(tile + row * (tiles_x) + column, 1);                                 \
   }
 
-// table (chunks, tiles + 1): how often each tile is touched; the last column is the spare tile.
-__kernel void count_tiles(int count, int chunk, int tiles_x, int tiles,
-                          __global const int* order, __global const uint2* places,
-                          __global uint2* sorted_places, __global int* table) {
+// table (chunks, bins): how often each tile is touched; a row of tiles and more lies beyond them.
+__kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global const int* order,
+                          __global const uint2* places, __global uint2* sorted_places,
+                          __global int* table) {
   const int c = get_global_id(0);
-  __global int* mine = table + c * (tiles + 1);
-  for (int t = 0; t <= tiles; t++) mine[t] = 0;
+  __global int* mine = table + c * bins;
+  for (int t = 0; t < bins; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     const uint2 place = places[order[i]];
     sorted_places[i] = place;  // side by side for the next pass
-#define VISIT(tile) mine[tile]++
-    FOR_EACH_TILE(place, tiles_x, tiles)
+#define VISIT(tile, touched) mine[tile] += touched
+    FOR_EACH_TILE(place, tiles_x)
 #undef VISIT
   }
-  mine[tiles] = 0;
 }
 
-// instances is longer than the lists by a cache line a chunk: what is sent to the spare tile.
-__kernel void scatter_tiles(int count, int chunk, int tiles_x, int tiles,
+// instances is longer than the lists by a cache line a chunk: what touches nothing is written there.
+__kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int total,
                             __global const int* order, __global const uint2* sorted_places,
                             __global int* table, __global int* instances) {
   const int c = get_global_id(0);
-  __global int* next = table + c * (tiles + 1);
-  next[tiles] += SPARE * c;
+  __global int* next = table + c * bins;
+  const int spare = total + SPARE * c;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     const int splat = order[i];
-#define VISIT(tile) instances[next[tile]] = splat, next[tile] += (tile) != tiles
-    FOR_EACH_TILE(sorted_places[i], tiles_x, tiles)
+#define VISIT(tile, touched)                              \
+  {                                                       \
+    const int to = next[tile];                            \
+    instances[(touched) ? to : spare] = splat;            \
+    next[tile] = to + (touched);                          \
+  }
+    FOR_EACH_TILE(sorted_places[i], tiles_x)
 #undef VISIT
   }
 }
