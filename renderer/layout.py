@@ -1,7 +1,7 @@
 """Every number that Python and GLSL share: slots, work groups, limits; GLSL sees #defines."""
 
 WORKGROUP = 256  # invocations; the radix sort counts one 8-bit digit an invocation
-DECODE_WORKGROUP = 64  # the networks keep a whole layer a invocation: fewer fit on a GPU's unit
+DECODE_WORKGROUP = 64  # an invocation of the networks keeps whole layers; few fit at a time
 SORT_BLOCKS = 16  # blocks of WORKGROUP keys that one group of the sort walks through
 RADIX = 256  # values of a digit
 CULLED_KEY = 0xFFFFFFFF  # sorts behind every depth

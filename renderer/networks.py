@@ -106,6 +106,12 @@ class Networks:
         model, gpu = self._model, self._gpu
         if name != "color" and "direction" in mlp.inputs:
             raise ValueError(f"the {name} network takes the view direction; only color may.")
+        wanted = model.splats_per_anchor * SIZE_PER_SPLAT[name]
+        if mlp.width_out != wanted:
+            raise ValueError(
+                f"the {name} network gives {mlp.width_out} numbers an anchor, but "
+                f"{model.splats_per_anchor} splats take {wanted}; write one of the two anew."
+            )
         packed = pack_mlp(mlp, model.features.shape[1], len(model.encoding.encode(0.0)))
         block = min(gpu.max_uniforms, 65536)
         stored = packed.rows.nbytes > block

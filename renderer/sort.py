@@ -14,7 +14,7 @@ class Sorter:
 
     backend "gl": LSD radix, 8 bits a pass, reduce then scan; no subgroups, no read-back, any
     GL 4.3.  "numpy": reads the keys back; on software GL they are in the same memory and
-    numpy's radix sort of 16-bit keys is 5 to 40 times faster.
+    numpy's radix sort of 16-bit halves is 20 times faster (6 against 120 ms for 400,000 keys).
     """
 
     def __init__(self, gpu: Gpu, backend: str) -> None:

@@ -179,6 +179,11 @@ def test_what_cannot_be_decoded_is_refused(gpu):
             Decoder(gpu, arena, [replace(model, networks=model.networks | {"offset": seeing})])
         with pytest.raises(ValueError, match="choose gl or onnxruntime"):
             Decoder(gpu, arena, [model], "torch")
+    with (
+        Arena(gpu, [6]) as arena,
+        pytest.raises(ValueError, match="gives 30 numbers an anchor, but 3"),
+    ):
+        Decoder(gpu, arena, [replace(model, splats_per_anchor=3)])
     with pytest.raises(ValueError, match=r"takes 19 inputs, but feature \+ direction are 20"):
         pack_mlp(seeing, 17, 16)
 
