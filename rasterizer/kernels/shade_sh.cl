@@ -39,6 +39,9 @@ __kernel void shade_sh(int count, int start, float eye_x, float eye_y, float eye
   ADD(14, 1.445305721320277f * z * (xx - yy));
   ADD(15, -0.5900435899266435f * x * (xx - 3 * yy));
 #endif
-  // fmax(NaN, 0) is 0: project must see a colour that is not a number, so it is compared instead.
-  color[start + i] = (float4)(rgb.x < 0 ? 0 : rgb.x, rgb.y < 0 ? 0 : rgb.y, rgb.z < 0 ? 0 : rgb.z, 0);
+  // fmax(NaN, 0) is 0, and project must see a colour that is not a number: it is told by its bits,
+  // since a compiler may turn a comparison into fmax.
+  const uint3 bits = as_uint3(rgb) & 0x7fffffffu;
+  const bool finite = bits.x < 0x7f800000u && bits.y < 0x7f800000u && bits.z < 0x7f800000u;
+  color[start + i] = (float4)(finite ? fmax(rgb, 0.0f) : rgb, 0);
 }

@@ -107,14 +107,16 @@ def test_quads_and_tiles_draw_the_same(opened, mono):
 
 @pytest.fixture(scope="module")
 def captures(data):
-    """name: (scene, view, reference) of real captures; the leg from aside, the plant off centre."""
+    """name: (scene, view, reference): the middle of the leg, the upper left of the plant."""
     leg = alone(read_model(data / "anatomy_leg_ml3dgs"), x=0.7)
     plant = alone(read_model(data / "splats_marcelpadilla" / "plant" / "plant.splat"))
-    leg_view = default_view(leg.objects[0].model, (192, 160))
-    middle = default_view(plant.objects[0].model, (160, 160))
-    left, right, down, up = middle.tangents
+    whole = default_view(leg.objects[0].model, (160, 160))
+    inner = tuple(0.35 * t for t in whole.tangents)
+    leg_view = View(whole.world_from_eye, inner, whole.near, whole.far, whole.size)
+    whole = default_view(plant.objects[0].model, (160, 160))
+    left, right, down, up = whole.tangents
     aside = View(
-        middle.world_from_eye, (left, right * 0.4, down, up * 1.2), middle.near, 50, (144, 144)
+        whole.world_from_eye, (left * 0.6, right * 0.1, down * 0.2, up), whole.near, 50, (144, 144)
     )
     pairs = {"leg": (leg, leg_view), "plant": (plant, aside)}
     return {name: (*pair, reference_image(*pair)) for name, pair in pairs.items()}
