@@ -119,26 +119,29 @@ def _sort(device: Device, kernels: dict, found: Found, visible: int, least: int,
     """(visible,) splat indices by depth: a counting sort by the low digit, then the high ones."""
     if visible == 0:
         return device.empty(0, np.int32)
-    keys, splats, table, chunk = found.keys, found.splats, found.table, found.chunk
-    for number, (origin, shift, bins) in enumerate(_digits(least, most)):
-        if number > 0:  # the first digit was counted while the places were found
+    pairs, table, chunk = found.pairs, found.table, found.chunk
+    order = device.empty(visible, np.int32)
+    passes = _digits(least, most)
+    for number, (origin, shift, bins) in enumerate(passes):
+        first, final = number == 0, number == len(passes) - 1
+        if not first:  # the first digit was counted while the places were found
             chunks = chunks_of(device, visible)
             chunk = -(-visible // chunks)
             table = device.empty((chunks, bins), np.int32)
             device.launch(
                 kernels["count_digits"], chunks, 1,
-                visible, chunk, bins, np.uint32(origin), shift, keys, table,
+                visible, chunk, bins, np.uint32(origin), shift, pairs, table,
             )  # fmt: skip
         starts = device.empty(bins + 1, np.int32)
         device.launch(kernels["scan_table"], 1, 1, bins, table.shape[0], table, starts)
-        to_keys, to_splats = device.empty(visible, np.uint32), device.empty(visible, np.int32)
+        sorted_pairs = None if final else device.empty((visible, 2), np.uint32)
         device.launch(
             kernels["scatter_digits"], table.shape[0], 1,
-            visible, chunk, bins, np.uint32(origin), shift, int(number == 0), found.status,
-            keys, splats, table, to_keys, to_splats,
+            visible, chunk, bins, np.uint32(origin), shift, int(first), int(final), found.status,
+            pairs, table, sorted_pairs, order,
         )  # fmt: skip
-        keys, splats = to_keys, to_splats
-    return splats
+        pairs = sorted_pairs
+    return order
 
 
 def _scatter_tiles(device, kernels, order, found: Found, visible: int, total: int) -> tuple:

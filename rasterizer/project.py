@@ -60,8 +60,7 @@ class Found:
     """Where splats lie in the grid of tiles: what find_places and project_arena leave for `bin`."""
 
     places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
-    keys: "Array"  # (N,) uint32 depth keys of the visible splats, packed at each chunk's start
-    splats: "Array"  # (N,) int32 their indices
+    pairs: "Array"  # (N, 2) uint32 splat and depth key of the visible, at each chunk's start
     table: "Array"  # (chunks, 1 << LOW_BITS) int32 histograms of the keys' low digit
     status: "Array"  # (chunks, 4) uint32: visible splats, instances, least and most key
     chunk: int  # splats a chunk
@@ -73,8 +72,7 @@ class Found:
         chunks = chunks_of(device, count)
         return Found(
             device.empty((count, 2), np.uint32),
-            device.empty(count, np.uint32),
-            device.empty(count, np.int32),
+            device.empty((count, 2), np.uint32),
             device.empty((chunks, 1 << LOW_BITS), np.int32),
             device.empty((chunks, 4), np.uint32),
             -(-count // chunks),
@@ -82,7 +80,7 @@ class Found:
         )
 
     def arrays(self) -> tuple:
-        return self.places, self.keys, self.splats, self.table, self.status
+        return self.places, self.pairs, self.table, self.status
 
 
 def chunks_of(device: Device, count: int) -> int:

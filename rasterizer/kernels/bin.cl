@@ -4,15 +4,15 @@
 #include "common/places_of_eight.cl"
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
-// Per splat its tiles; per chunk the (depth key, index) pairs of its visible splats, packed at the
+// Per splat its tiles; per chunk the (splat, depth key) pairs of its visible splats, packed at the
 // chunk's start, and the histogram of their low digits.  status: visible, instances, key range.
 __kernel void find_places(int count, int chunk, int tiles_x, int tiles_y,
                           __global const float* record, __global const float* depth,
-                          __global uint2* places, __global uint* keys, __global int* splats,
+                          __global uint2* places, __global uint2* pairs,
                           __global int* histogram, __global uint4* status) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
-  Chunk mine = open_chunk(first, places, keys, splats, histogram + c * LOW_BINS);
+  Chunk mine = open_chunk(first, places, pairs, histogram + c * LOW_BINS);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
     float column[8][LANES], z[LANES];
@@ -53,29 +53,35 @@ __kernel void scan_table(int bins, int chunks, __global int* table, __global int
   starts[bins] = sum;
 }
 
+// bins is a power of two, or more than any key needs.
+inline uint mask_of(int bins) { return (bins & (bins - 1)) ? 0xffffffffu : (uint)bins - 1; }
+
 __kernel void count_digits(int count, int chunk, int bins, uint origin, int shift,
-                           __global const uint* keys, __global int* table) {
+                           __global const uint2* pairs, __global int* table) {
   const int c = get_global_id(0);
   __global int* mine = table + c * bins;
   for (int b = 0; b < bins; b++) mine[b] = 0;
   const int last = min(count, (c + 1) * chunk);
-  for (int i = c * chunk; i < last; i++) mine[((keys[i] - origin) >> shift) % (uint)bins]++;
+  for (int i = c * chunk; i < last; i++) mine[(pairs[i].y - origin) >> shift & mask_of(bins)]++;
 }
 
-// One pass of a stable counting sort.  status: how many of each chunk count, or null for all.
+// One pass of a stable counting sort.  packed: each chunk's pairs lie at its start, as many as its
+// status says.  final: only the splats are wanted.
 __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int shift, int packed,
-                             __global const uint4* status, __global const uint* keys,
-                             __global const int* splats, __global int* table,
-                             __global uint* sorted_keys, __global int* sorted_splats) {
+                             int final, __global const uint4* status, __global const uint2* pairs,
+                             __global int* table, __global uint2* sorted_pairs,
+                             __global int* sorted_splats) {
   const int c = get_global_id(0);
   __global int* next = table + c * bins;
   const int first = c * chunk;
   const int last = packed ? first + (int)status[c].x : min(count, first + chunk);
   for (int i = first; i < last; i++) {
-    const uint key = keys[i];
-    const int to = next[((key - origin) >> shift) % (uint)bins]++;
-    sorted_keys[to] = key;
-    sorted_splats[to] = splats[i];
+    const uint2 pair = pairs[i];
+    const int to = next[(pair.y - origin) >> shift & mask_of(bins)]++;
+    if (final)
+      sorted_splats[to] = pair.x;
+    else
+      sorted_pairs[to] = pair;
   }
 }
 

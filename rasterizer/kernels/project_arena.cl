@@ -137,14 +137,14 @@ __kernel void project_arena(int count, int chunk, int width, int height, float n
                             __global const float* color, __global const int* object_index,
                             __global const float* poses, __global float* record,
                             __global float* depth, __global int4* culled, int tiles_x, int tiles_y,
-                            __global uint2* places, __global uint* keys, __global int* splats,
+                            __global uint2* places, __global uint2* pairs,
                             __global int* histogram, __global uint4* status) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
   int4 counts = 0;
   int current = -1;  // the object whose pose s.m holds
   Eight s;
-  Chunk mine = open_chunk(first, places, keys, splats, histogram + c * LOW_BINS);
+  Chunk mine = open_chunk(first, places, pairs, histogram + c * LOW_BINS);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
     float rows[RECORD * LANES], z[LANES];

@@ -18,17 +18,16 @@ typedef struct {
 // What a chunk gathers: its visible splats, packed at its start, and a histogram of low digits.
 typedef struct {
   __global uint2* places;
-  __global uint* keys;
-  __global int* splats;
+  __global uint2* pairs;  // splat, depth key
   __global int* bins;
   int next;            // where its next visible splat goes
   int8 instances;      // of each lane, summed at the end; so with the range of keys
   uint8 least, most;
 } Chunk;
 
-inline Chunk open_chunk(int first, __global uint2* places, __global uint* keys,
-                        __global int* splats, __global int* bins) {
-  const Chunk chunk = {places, keys, splats, bins, first, 0, 0xffffffffu, 0};
+inline Chunk open_chunk(int first, __global uint2* places, __global uint2* pairs,
+                        __global int* bins) {
+  const Chunk chunk = {places, pairs, bins, first, 0, 0xffffffffu, 0};
   for (int b = 0; b < LOW_BINS; b++) bins[b] = 0;
   return chunk;
 }
@@ -101,8 +100,9 @@ inline void enter_eight(Chunk* chunk, int i, int n, const Places* p, float8 dept
   chunk->least = min(chunk->least, key | ~as_uint8(visible));
   chunk->most = max(chunk->most, key & as_uint8(visible));
   if (n == LANES && all(visible)) {
-    vstore8(key, 0, chunk->keys + chunk->next);
-    vstore8((int8)(0, 1, 2, 3, 4, 5, 6, 7) + i, 0, chunk->splats + chunk->next);
+    vstore16((uint16)(i, key.s0, i + 1, key.s1, i + 2, key.s2, i + 3, key.s3, i + 4, key.s4, i + 5,
+                      key.s5, i + 6, key.s6, i + 7, key.s7),
+             0, (__global uint*)(chunk->pairs + chunk->next));
     vstore16((uint16)(c.s0, m.s0, c.s1, m.s1, c.s2, m.s2, c.s3, m.s3, c.s4, m.s4, c.s5, m.s5, c.s6,
                       m.s6, c.s7, m.s7), 0, (__global uint*)(chunk->places + i));
     chunk->next += LANES;
@@ -117,8 +117,8 @@ inline void enter_eight(Chunk* chunk, int i, int n, const Places* p, float8 dept
   vstore8(m, 0, mask);
   for (int lane = 0; lane < n; lane++) {
     chunk->places[i + lane] = (uint2)(corner[lane], mask[lane]);
-    chunk->keys[chunk->next] = keys[lane];  // written over by the next one unless visible
-    chunk->splats[chunk->next] = i + lane;
+    // Written over by the next one unless visible.
+    chunk->pairs[chunk->next] = (uint2)(i + lane, keys[lane]);
     const int here = corner[lane] >= MASKED;
     chunk->next += here;
     chunk->bins[keys[lane] & (LOW_BINS - 1)] += here;
