@@ -4,9 +4,9 @@ import zipfile
 from pathlib import Path
 
 from runtime_models.model import AnchorModel, BadFile, SplatLayers
+from runtime_models.package_files import MANIFEST
 from runtime_models.read_layers import read_layers
 from runtime_models.read_package import read_package
-from runtime_models.write_package import MANIFEST
 
 KNOWN = "a package (folder or .shift), a 3DGS .ply, a .splat, or a folder of such .ply files"
 

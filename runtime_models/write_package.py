@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import os
 import shutil
 import tempfile
@@ -11,21 +12,23 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import HEADS, AnchorModel, BadFile, Stop
+from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST, open_package
+from runtime_models.read_package import read_files
 from runtime_models.write_onnx import write_onnx
 
-FORMAT = "shapeshift 1"
-MANIFEST = "scene.json"
-ANCHORS = "anchors.npz"
+DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the same bytes
 
 
 def write_package(model: AnchorModel, path: str | Path, features: str = "float16") -> int:
     """Write the package and return its bytes on disk.  Atomic: a reader sees all or nothing.
 
-    `path` ending in .shift is a zip, anything else a folder.  Raises BadFile rather than replace
-    something that is not a package.
+    `path` ending in .shift is a zip, anything else a folder.  `features` float16 becomes float32
+    where a value is too large for it.  Raises BadFile rather than replace something that is not a
+    package, or write one that read_package would refuse.
     """
     path = Path(path)
     files = package_files(model, features)
+    read_files(files.__getitem__, path.name)  # what cannot be read back is not written
     refuse_foreign(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".shift":
@@ -37,19 +40,21 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
 
 def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
     """File name to content, the manifest first."""
+    if np.abs(model.features).max(initial=0) > np.finfo(np.dtype(features)).max:
+        features = "float32"
     arrays = io.BytesIO()
-    np.savez_compressed(
-        arrays, positions=model.anchors, features=model.features.astype(np.dtype(features))
-    )
-    heads = {
-        name: {
-            "file": f"{name}.onnx",
-            "inputs": list(model.networks[name].inputs),
-            "activation": model.networks[name].head,
-        }
-        for name in HEADS
-    }
-    manifest = {
+    stored = model.features.astype(np.dtype(features))
+    np.savez_compressed(arrays, positions=model.anchors, features=stored)
+    manifest = json.dumps(describe_model(model), indent=1, ensure_ascii=False).encode()
+    files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
+    for name in HEADS:
+        files[f"{name}.onnx"] = write_onnx(model.networks[name], name)
+    return files
+
+
+def describe_model(model: AnchorModel) -> dict:
+    """The manifest."""
+    return {
         "format": FORMAT,
         "splats_per_anchor": model.splats_per_anchor,
         "feature_width": model.features.shape[1],
@@ -59,15 +64,17 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
             "spacing": model.encoding.spacing,
         },
         "stops": [describe_stop(stop) for stop in model.stops],
-        "heads": heads,
+        "heads": {
+            name: {
+                "file": f"{name}.onnx",
+                "inputs": list(model.networks[name].inputs),
+                "activation": model.networks[name].head,
+            }
+            for name in HEADS
+        },
         "up": "+Y",
-        "provenance": model.provenance,
+        "provenance": plain(model.provenance),
     }
-    files = {MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=False).encode()}
-    files[ANCHORS] = arrays.getvalue()
-    for name in HEADS:
-        files[f"{name}.onnx"] = write_onnx(model.networks[name], name)
-    return files
 
 
 def describe_stop(stop: Stop) -> dict:
@@ -79,13 +86,38 @@ def describe_stop(stop: Stop) -> dict:
     return row
 
 
+def plain(value):
+    """What JSON can hold of notes: arrays as lists, paths as text, NaN and Inf as null."""
+    if isinstance(value, dict):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str | int) else str(value)
+
+
 def refuse_foreign(path: Path) -> None:
-    """Only a package, or an empty folder, may be replaced."""
-    if path.is_dir():
-        if path.suffix == ".shift" or (any(path.iterdir()) and not (path / MANIFEST).exists()):
-            raise BadFile(f"{path} is a folder that is no package; choose another name.")
-    elif path.exists() and not (path.suffix == ".shift" and zipfile.is_zipfile(path)):
+    """Only a package, or an empty folder, may be replaced: both lose what is in them."""
+    if not path.exists() or (path.is_dir() and not any(path.iterdir()) and path.suffix != ".shift"):
+        return
+    if path.is_dir() == (path.suffix == ".shift"):
+        raise BadFile(f"{path} exists and is no package of that kind; choose another name.")
+    try:
+        manifest = json.loads(open_package(path)(MANIFEST))
+        ours = str(manifest["format"]).startswith(FORMAT.split()[0])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        ours = False
+    if not ours:
         raise BadFile(f"{path} exists and is not a package; choose another name.")
+    if path.is_dir():
+        for file in path.iterdir():
+            if file.name not in (MANIFEST, ANCHORS) and file.suffix != ".onnx":
+                raise BadFile(
+                    f"{path} holds {file.name} beside a package; move it or choose another name."
+                )
 
 
 def write_zip(files: dict[str, bytes], path: Path) -> None:
@@ -94,10 +126,12 @@ def write_zip(files: dict[str, bytes], path: Path) -> None:
     try:
         with os.fdopen(handle, "wb") as out, zipfile.ZipFile(out, "w") as archive:
             for name, data in files.items():
-                entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+                entry = zipfile.ZipInfo(name, DATE)
                 entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.create_system = 3  # Unix, on every system
                 entry.external_attr = 0o644 << 16
                 archive.writestr(entry, data)
+        os.chmod(temporary, 0o644)  # mkstemp's is for its owner alone
         os.replace(temporary, path)
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
@@ -106,7 +140,7 @@ def write_zip(files: dict[str, bytes], path: Path) -> None:
 
 def write_folder(files: dict[str, bytes], path: Path) -> None:
     """The old folder is set aside until the new one stands, and comes back if that fails."""
-    temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=path.name))
+    temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=path.name, suffix=".part"))
     aside = temporary.with_suffix(".old")
     try:
         for name, data in files.items():
