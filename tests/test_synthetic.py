@@ -278,12 +278,13 @@ def test_workshop_points_and_views():
     surfaces = workshop.place(False)[0].solids + workshop.place(True)[0].solids
     nearest = np.min([np.abs(s.distance(points.astype(float))) for s in surfaces], axis=0)
     assert nearest.max() < 0.01
-    views = workshop.dome(64, 0.0, (64, 48))
-    heights = [v.world_from_eye.position[1] - workshop.TARGET[1] for v in views]
-    away = [np.linalg.norm(v.world_from_eye.position - workshop.TARGET) for v in views]
-    elevation = np.degrees(np.arcsin(np.array(heights) / away))
+    eyes = np.array([v.world_from_eye.position for v in workshop.dome(64, 0.0, (64, 48))])
+    from_target = eyes[np.arange(64) % 4 != 3] - workshop.TARGET
+    away = np.linalg.norm(from_target, axis=1)
+    elevation = np.degrees(np.arcsin(from_target[:, 1] / away))
     assert 8 <= elevation.min() < 14 and 55 < elevation.max() <= 66
-    assert {round(a, 6) for a in away} == set(workshop.DISTANCES)
+    assert set(away.round(6)) == set(workshop.DISTANCES)
+    assert (eyes[3::4, 2] > 0.3).all()  # the close ones stand in front
 
 
 def test_make_workshop_small(tmp_path):

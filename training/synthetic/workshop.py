@@ -18,6 +18,7 @@ from scene.pose import View, look_at
 from scene.write_capture import write_capture
 from training.synthetic.balls import save_png
 from training.synthetic.furniture import (
+    CABINET,
     MOTOR,
     base_plate,
     bench,
@@ -58,6 +59,8 @@ LIGHT = Light(
 TARGET = (0.0, 0.07, 0.0)  # metres
 FOV_X = np.deg2rad(48)
 DISTANCES = (1.55, 2.05)  # metres
+CLOSE = 0.95  # metres
+FRONT = np.deg2rad(70)  # close cameras stay within this of straight ahead
 ELEVATIONS = (8.0, 66.0)  # degrees
 GOLDEN = (5**0.5 + 1) / 2
 
@@ -101,18 +104,26 @@ def radiance(stop: str):
 
 
 def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
-    """Cameras on two domes, spread by the golden angle; `offset` turns one set against another."""
-    out = []
+    """Cameras on two domes, spread by the golden angle; `offset` turns one set against another.
+
+    Every fourth one stands closer, in front, and looks at the cabinet or at the motor: what is
+    opened there is not seen from elsewhere.
+    """
     right = np.tan(FOV_X / 2)
     up = right * size[1] / size[0]
     low, high = np.sin(np.deg2rad(ELEVATIONS))
+    out = []
     for i in range(count):
-        azimuth = 2 * np.pi * (GOLDEN * i + offset)
-        height = low + (high - low) * ((i + 0.5) * GOLDEN**2 * 0.7 % 1)
+        close = i % 4 == 3
+        number = i // 8 if close else i  # in its own sequence, or it would not spread
+        turn = GOLDEN * number + offset
+        azimuth = FRONT * (2 * (turn % 1) - 1) if close else 2 * np.pi * turn
+        height = low + (high - low) * ((number + 0.5) * GOLDEN**2 * 0.7 % 1) * (0.8 if close else 1)
         level = np.sqrt(1 - height**2)
-        away = DISTANCES[i % 2]
+        away = CLOSE if close else DISTANCES[i % 2]
+        target = np.array((CABINET, MOTOR)[i // 4 % 2] if close else TARGET)
         eye = away * np.array([level * np.sin(azimuth), height, level * np.cos(azimuth)])
-        pose = look_at(eye + TARGET, TARGET)
+        pose = look_at(eye + target, target)
         out.append(View(pose, (-right, right, -up, up), 0.05, 1000.0, size))
     return out
 
