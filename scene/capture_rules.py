@@ -13,6 +13,9 @@ from scene.photo import load_photo, open_image
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
 TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, from the first
+# Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
+# trained elsewhere from the same model then lie where the capture is.
+COLMAP_UP = (0.0, -1.0, 0.0)
 CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they do not agree
 PLAIN_BORDER = 0.5  # share of a photo's border that must have exactly one colour
 COLOR_NAMES = {"rgb", "color", "colour", "visible", "images", "photo"}

@@ -7,6 +7,7 @@ import numpy as np
 from runtime_models.model import BadFile, Stop
 from scene.capture import Capture, Photo
 from scene.capture_rules import (
+    COLMAP_UP,
     CaptureWorld,
     guess_kind,
     image_size,
@@ -41,7 +42,7 @@ def read_colmap(folder: Path) -> Capture:
     said = read_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
     stops, modality_of = modalities(said, [i.name for i in posed], folder)
     cameras = [rigid(i.cam_from_world().inverse().matrix(), f"{folder}: {i.name}") for i in posed]
-    world = CaptureWorld.of(np.array(cameras), (0, -1, 0), said.get("up"), str(folder))
+    world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
     photos = []
     for image, world_from_camera in zip(posed, cameras, strict=True):
         camera, path = model.cameras[image.camera_id], root / image.name

@@ -9,6 +9,7 @@ import numpy as np
 from runtime_models.model import BadFile, Stop
 from scene.capture import Capture, Photo
 from scene.capture_rules import (
+    COLMAP_UP,
     CaptureWorld,
     image_size,
     rigid,
@@ -47,8 +48,8 @@ def read_transforms(*files: Path) -> Capture:
             raise BadFile(f"{where}: modality {stop.name!r} has no images; add frames or drop it")
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
-        (0, -1, 0) if opencv_axes(entries[0]) else (0, 0, 1),
-        data.get("up"),
+        (0, 0, 1),
+        data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
     photos = [photo_of(shot, world, folder) for shot in shots]
