@@ -13,6 +13,7 @@ from runtime_models.spherical_harmonics import COEFFICIENTS, HALF_TURN_SIGNS
 TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1",
          "uint8": "u1", "char": "i1", "int8": "i1", "short": "<i2", "int16": "<i2", "ushort": "<u2",
          "uint16": "<u2", "int": "<i4", "int32": "<i4", "uint": "<u4", "uint32": "<u4"}  # fmt: skip
+DIGITS = re.compile(r"\d{1,15}", re.ASCII)
 LARGEST_HEADER = 1 << 16  # bytes
 GEOMETRY = ("x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2",
             "rot_0", "rot_1", "rot_2", "rot_3", "f_dc_0", "f_dc_1", "f_dc_2")  # fmt: skip
@@ -34,58 +35,70 @@ def read_ply(path: str | Path) -> PlainSplats:
     """Splats of a binary 3DGS PLY of SH degree 0 to 3.  Raises BadFile."""
     path = Path(path)
     table = read_table(path)
-    missing = [name for name in GEOMETRY if name not in table.dtype.names]
+    rest = [name for name in table.dtype.names if name.startswith("f_rest_")]
+    count = len(rest) // 3 + 1
+    if len(rest) % 3 or count not in COEFFICIENTS:
+        raise BadFile(f"{path.name} has {len(rest)} f_rest columns, expected 0, 9, 24 or 45.")
+    if set(rest) != {f"f_rest_{i}" for i in range(len(rest))}:
+        raise BadFile(f"{path.name}: its {len(rest)} f_rest columns are not numbered from 0 on.")
+    sh = np.empty((len(table), count, 3), np.float32)
+    sh[:, 0] = columns(table, "f_dc_", 3)
+    if rest:  # channel-major: all of red, then green, then blue
+        by_channel = columns(table, "f_rest_", len(rest)).reshape(-1, 3, count - 1)
+        sh[:, 1:] = by_channel.transpose(0, 2, 1)
+    with np.errstate(over="ignore"):
+        opacity = 1 / (1 + np.exp(-table["opacity"].astype(np.float32)))
+        scales = np.exp(columns(table, "scale_", 3))
+    means = np.stack([table[axis] for axis in "xyz"], 1).astype(np.float32, copy=False)
+    wxyz = columns(table, "rot_", 4)
+    return turn_half(drop_broken(means, scales, wxyz, opacity, sh, path))
+
+
+def columns(table: np.ndarray, prefix: str, count: int) -> np.ndarray:
+    """(N, count) float32 of the columns prefix0, prefix1, ...; a view where the file allows."""
+    from numpy.lib.recfunctions import structured_to_unstructured
+
+    names = [f"{prefix}{i}" for i in range(count)]
+    return structured_to_unstructured(table[names], dtype=np.float32)
+
+
+def read_table(path: Path) -> np.ndarray:
+    """(N,) records of the vertex element, memory-mapped, with every column of GEOMETRY."""
+    with path.open("rb") as file:
+        head = file.read(LARGEST_HEADER)
+    end = head.find(b"end_header")
+    start = head.find(b"\n", end) + 1  # after end_header and its \n or \r\n
+    if not head.startswith(b"ply") or end < 0 or start == 0:
+        raise BadFile(f"{path.name} is no PLY file: its header is missing or never ends.")
+    lines = [line.split() for line in head[:end].decode("ascii", "replace").splitlines()]
+    if ["format", "binary_little_endian", "1.0"] not in lines:
+        raise BadFile(f"{path.name} is not a binary little-endian PLY; convert it to that.")
+    elements = [line for line in lines if line[:1] == ["element"]]
+    stated = elements[0][2:] if elements else []
+    if [e[1:2] for e in elements] != [["vertex"]] or not DIGITS.fullmatch(" ".join(stated)):
+        raise BadFile(f"{path.name} must have the one element 'vertex'; convert it to a 3DGS PLY.")
+    fields = [line for line in lines if line[:1] == ["property"]]
+    if any(len(f) != 3 or f[1] not in TYPES for f in fields):
+        raise BadFile(f"{path.name} has a property of a type that splats do not have.")
+    names = [f[2] for f in fields]
+    if len(set(names)) != len(names):
+        raise BadFile(f"{path.name} names a property twice.")
+    missing = [name for name in GEOMETRY if name not in names]
     if missing:
         raise BadFile(
             f"{path.name} has no {missing[0]}: a point cloud or another format, not 3DGS splats; "
             "export it as a 3DGS PLY."
         )
-    rest = sum(name.startswith("f_rest_") for name in table.dtype.names)
-    count = rest // 3 + 1
-    if rest % 3 or count not in COEFFICIENTS:
-        raise BadFile(f"{path.name} has {rest} f_rest columns, expected 0, 9, 24 or 45.")
-    sh = np.empty((len(table), count, 3), np.float32)
-    for c in range(3):
-        sh[:, 0, c] = table[f"f_dc_{c}"]
-        for i in range(count - 1):  # channel-major: all of red, then green, then blue
-            sh[:, i + 1, c] = table[f"f_rest_{c * (count - 1) + i}"]
-    with np.errstate(over="ignore"):
-        opacity = 1 / (1 + np.exp(-table["opacity"].astype(np.float32)))
-        scales = np.exp(columns(table, "scale_0", "scale_1", "scale_2"))
-    means, wxyz = columns(table, "x", "y", "z"), columns(table, "rot_0", "rot_1", "rot_2", "rot_3")
-    return turn_half(drop_broken(means, scales, wxyz, opacity, sh, path))
-
-
-def columns(table: np.ndarray, *names: str) -> np.ndarray:
-    return np.stack([table[n] for n in names], 1).astype(np.float32, copy=False)
-
-
-def read_table(path: Path) -> np.ndarray:
-    """(N,) records of the vertex element, memory-mapped."""
-    with path.open("rb") as file:
-        head = file.read(LARGEST_HEADER)
-    end = head.find(b"end_header\n")
-    if not head.startswith(b"ply") or end < 0:
-        raise BadFile(f"{path.name} is no PLY file: its header is missing or never ends.")
-    lines = head[:end].decode("ascii", "replace").splitlines()
-    if "format binary_little_endian 1.0" not in lines:
-        raise BadFile(f"{path.name} is not a binary little-endian PLY; convert it to that.")
-    element = re.search(r"^element vertex (\d+)$", "\n".join(lines), re.M)
-    if not element or sum(line.startswith("element") for line in lines) != 1:
-        raise BadFile(f"{path.name} must have the one element 'vertex'; convert it to a 3DGS PLY.")
-    fields = [line.split() for line in lines if line.startswith("property")]
-    if any(len(f) != 3 or f[1] not in TYPES for f in fields):
-        raise BadFile(f"{path.name} has a property of a type that splats do not have.")
-    if len({f[2] for f in fields}) != len(fields):
-        raise BadFile(f"{path.name} names a property twice.")
-    row, start = np.dtype([(f[2], TYPES[f[1]]) for f in fields]), end + len(b"end_header\n")
-    want, found = int(element[1]) * row.itemsize, path.stat().st_size - start
-    if found < want or int(element[1]) == 0:
+    row, count = np.dtype([(f[2], TYPES[f[1]]) for f in fields]), int(stated[0])
+    found = (path.stat().st_size - start) // row.itemsize
+    if count == 0:
+        raise BadFile(f"{path.name} holds no splats; export it again.")
+    if found < count:
         raise BadFile(
-            f"{path.name}: the header promises {element[1]} splats of {row.itemsize} bytes, the "
-            f"file holds {found // max(row.itemsize, 1)}; it is cut off or its header is wrong."
+            f"{path.name}: the header promises {count} splats of {row.itemsize} bytes, the "
+            f"file holds {found}; it is cut off or its header is wrong."
         )
-    return np.memmap(path, row, "r", start, (int(element[1]),))
+    return np.memmap(path, row, "r", start, (count,))
 
 
 def drop_broken(means, scales, wxyz, opacity, sh, path: Path) -> PlainSplats:

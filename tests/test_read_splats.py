@@ -79,6 +79,47 @@ def test_infinite_logit_is_opaque_and_infinitely_small_scale_stays(tmp_path):
     assert back.dropped == 0 and back.opacity[0] == 1 and back.scales[1, 0] == 0
 
 
+def test_header_lines_may_end_as_windows_ends_them_and_hold_comments(tmp_path):
+    write_ply(some_splats(5, 4), tmp_path / "a.ply")
+    want = read_ply(tmp_path / "a.ply")
+    head, body = (tmp_path / "a.ply").read_bytes().split(b"end_header\n", 1)
+    head = head.replace(b"element", b"comment element property\nelement").replace(b"\n", b"\r\n")
+    (tmp_path / "a.ply").write_bytes(head + b"end_header\r\n" + body)
+    np.testing.assert_array_equal(read_ply(tmp_path / "a.ply").sh, want.sh)
+
+
+def test_columns_of_several_types_in_another_order(tmp_path):
+    """Written by hand, row by row: the slow twin of the reader."""
+    splats, rng = some_splats(6, 4), np.random.default_rng(5)
+    back = turn_half(splats)  # twice half a turn is none
+    names = [*"xyz", "red", "opacity", "f_dc_2", "f_dc_1", "f_dc_0"]
+    names += [f"f_rest_{i}" for i in range(9)] + [f"rot_{i}" for i in range(4)]
+    names += [f"scale_{i}" for i in range(3)]
+    names = [names[i] for i in rng.permutation(len(names))]
+    kinds = {"red": "uchar", "x": "double", "opacity": "double", "f_rest_4": "double"}
+    row = np.dtype([(n, {"uchar": "u1", "double": "<f8"}.get(kinds.get(n), "<f4")) for n in names])
+    table = np.zeros(6, row)
+    for i in range(6):
+        for a in range(3):
+            table["xyz"[a]][i] = back.means[i, a]
+            table[f"scale_{a}"][i] = np.log(back.scales[i, a])
+            table[f"f_dc_{a}"][i] = back.sh[i, 0, a]
+            for j in range(3):
+                table[f"f_rest_{3 * a + j}"][i] = back.sh[i, 1 + j, a]
+        for a in range(4):
+            table[f"rot_{a}"][i] = 2.5 * back.wxyz[i, a]  # of any length
+        table["opacity"][i] = np.log(back.opacity[i] / (1 - back.opacity[i]))
+    head = ["ply", "format binary_little_endian 1.0", "element vertex 6"]
+    head += [f"property {kinds.get(n, 'float')} {n}" for n in names] + ["end_header", ""]
+    (tmp_path / "a.ply").write_bytes("\n".join(head).encode() + table.tobytes() + b"tail")
+    read = read_ply(tmp_path / "a.ply")
+    np.testing.assert_array_equal(read.sh, splats.sh)
+    np.testing.assert_array_equal(read.means, splats.means)
+    np.testing.assert_allclose(read.scales, splats.scales, rtol=1e-5)
+    np.testing.assert_allclose(read.opacity, splats.opacity, rtol=1e-5)
+    assert (np.abs((read.wxyz * splats.wxyz).sum(1)) > 1 - 1e-6).all()
+
+
 def change_header(old, new):
     return lambda data: data.replace(old, new, 1)
 
@@ -92,7 +133,10 @@ BROKEN = {
     "odd f_rest": (change_header(b" nx", b" f_rest_0"), "has 1 f_rest columns"),
     "twice": (change_header(b"float ny", b"float nx"), "names a property twice"),
     "lists": (change_header(b"float nx", b"list uchar"), "a property of a type|one element"),
-    "no splats": (change_header(b"vertex 20", b"vertex 0"), "promises 0"),
+    "no splats": (change_header(b"vertex 20", b"vertex 0"), "holds no splats"),
+    "no number": (change_header(b"vertex 20", b"vertex -2"), "one element 'vertex'"),
+    "long number": (change_header(b"vertex 20", b"vertex " + b"9" * 5000), "one element"),
+    "no properties": (lambda d: d[: d.index(b"property")] + b"end_header\n", "has no x:"),
     "more elements": (change_header(b"property", b"element face 2\nproperty"), "one element"),
 }
 
@@ -105,6 +149,14 @@ def test_broken_ply_is_one_sentence(tmp_path, how):
     with pytest.raises(BadFile, match=words) as failure:
         read_model(tmp_path / "a.ply")
     assert "\n" not in str(failure.value)
+
+
+def test_harmonics_with_a_gap_are_refused(tmp_path):
+    write_ply(some_splats(5, 4), tmp_path / "a.ply")
+    data = (tmp_path / "a.ply").read_bytes()
+    (tmp_path / "a.ply").write_bytes(data.replace(b"f_rest_3\n", b"f_rest_9\n"))
+    with pytest.raises(BadFile, match="its 9 f_rest columns are not numbered from 0 on"):
+        read_ply(tmp_path / "a.ply")
 
 
 def test_splat_rows_by_hand(tmp_path):
