@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
-BACKGROUND = (0.075, 0.078, 0.085)  # as in the viewer
+BACKGROUND = (0.075, 0.078, 0.085)  # as in the viewer, where the scene names none
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,14 @@ def run(options: Options) -> int:
     from app.headless_drawing import make_folder, open_renderer, parse_size
     from app.measure import Measure
     from runtime_models.read_scene import read_model
+    from scene.framing import default_background
 
     size = parse_size(options.size)
     model = read_model(options.scene)
     make_folder(options.out)
     with open_renderer("auto", "auto") as (renderer, ctx):
-        renderer.settings = replace(renderer.settings, background=BACKGROUND)
+        background = default_background(model, BACKGROUND)
+        renderer.settings = replace(renderer.settings, background=background)
         draw_sheet(renderer, model, size, options.out)
         result = Measure(renderer, ctx, model, model.stops[0].x, size).all(
             options.frames, 20, (192, 128)

@@ -26,8 +26,8 @@ class Options:
     """WIDTHxHEIGHT in pixels; default 640x360, or what the camera file says."""
     stereo: float = 0.0
     """Distance of two eyes in metres; above 0 each picture holds both, side by side."""
-    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Display sRGB, 0 to 1."""
+    background: tuple[float, float, float] | None = None
+    """Display sRGB, 0 to 1; default: what the scene was trained on, else black."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
     """Drawing back end: GL quads or OpenCL tiles."""
     context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
@@ -42,12 +42,13 @@ def run(options: Options) -> int:
     from app.errors import UsageError
     from app.headless_drawing import make_folder, open_renderer, parse_controls, parse_size
     from runtime_models.read_scene import read_model
+    from scene.framing import default_background
 
     controls = parse_controls(options.x)
     size = parse_size(options.size) if options.size else None
     if options.frames < 1:
         raise UsageError(f"--frames is {options.frames}, expected at least 1.")
-    if not all(0 <= c <= 1 for c in options.background):
+    if options.background and not all(0 <= c <= 1 for c in options.background):
         raise UsageError(f"--background is {options.background}, expected three values in 0..1.")
     if not 0 <= options.stereo < 1:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
@@ -60,7 +61,8 @@ def run(options: Options) -> int:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
     with open_renderer(options.context, options.drawing) as (renderer, _):
         make_folder(options.out)
-        renderer.settings = replace(renderer.settings, background=options.background)
+        background = options.background or default_background(model, (0.0, 0.0, 0.0))
+        renderer.settings = replace(renderer.settings, background=background)
         draw_all(renderer, model, pairs, paths, options.stereo)
     print(f"{len(paths)} pictures in {options.out}", file=sys.stderr)
     return 0

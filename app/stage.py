@@ -10,6 +10,7 @@ from renderer.settings import RenderSettings
 from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
 from scene.control import Sweep
 from scene.framing import (
+    default_background,
     default_view,
     fit_points,
     frame_points,
@@ -51,6 +52,9 @@ class Stage:
     def show(self, scene: Scene) -> None:
         """Takes a scene over and frames it."""
         self.scene = scene
+        if scene.objects:
+            background = default_background(scene.objects[0].model, BACKGROUND)
+            self.settings = replace(self.settings, background=background)
         self._filed = tuple(thing.model for thing in scene.objects)
         self.palette = AS_FILED
         self.sweeps = [Sweep.over(thing.model.stops) for thing in scene.objects]

@@ -169,6 +169,18 @@ def default_view(model: AnchorModel | SplatLayers, size: tuple[int, int]) -> Vie
     return framing_view(*model_points(model), size)
 
 
+def default_background(
+    model: AnchorModel | SplatLayers, otherwise: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Display sRGB of provenance["background"], what the photos stood before, or `otherwise`."""
+    found = model.provenance.get("background")
+    if not (isinstance(found, list | tuple) and len(found) == 3):
+        return otherwise
+    if not all(isinstance(c, int | float) and 0 <= c <= 1 for c in found):
+        return otherwise
+    return tuple(map(float, found))
+
+
 def point_under(
     means: np.ndarray,
     opacity: np.ndarray,

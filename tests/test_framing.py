@@ -1,11 +1,14 @@
 """Framing: floaters do not move it, all that is seen is in the picture, edge cases are finite."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from runtime_models.model import SplatLayers, Stop
 from scene.framing import (
     broadside,
+    default_background,
     default_view,
     fit_distance,
     frame_points,
@@ -15,6 +18,7 @@ from scene.framing import (
 )
 from scene.pose import Pose
 from scene.scene import Scene, SceneObject
+from tests.models import make_random_model
 
 
 def ball(count: int = 2000, seed: int = 0) -> np.ndarray:
@@ -154,3 +158,16 @@ def test_point_under_is_none_beside_behind_and_where_all_is_faint():
     assert point_under(points, opacity, eye, np.array([1, 0, -1.0])) is None
     assert point_under(points, opacity * 0.1, eye, np.array([0, 0, -1.0])) is None
     assert point_under(points * np.nan, opacity, eye, np.array([0, 0, -1.0])) is None
+
+
+@pytest.mark.parametrize(
+    "found", [None, "white", [1, 1], [2, 0, 0], [float("nan"), 0, 0], [None] * 3]
+)
+def test_a_background_that_is_no_colour_is_passed_over(found):
+    model = replace(make_random_model(3), provenance={"background": found})
+    assert default_background(model, (0.1, 0.2, 0.3)) == (0.1, 0.2, 0.3)
+
+
+def test_the_background_of_the_photos_is_taken():
+    model = replace(make_random_model(3), provenance={"background": [1, 0.5, 0]})
+    assert default_background(model, (0.1, 0.2, 0.3)) == (1.0, 0.5, 0.0)
