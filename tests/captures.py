@@ -1,0 +1,51 @@
+"""Small captures on disk for the tests of the readers."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from scene.capture_rules import turn_upright
+from scene.pose import OPENCV_FROM_EYE, View, look_at
+
+RANDOM = np.random.default_rng(7)
+CLOUD = RANDOM.normal(0, 0.3, (20, 3))
+
+
+def save_image(path: Path, size=(16, 12), seed=0, mode="RGB") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    channels = {"RGB": 3, "RGBA": 4}.get(mode)
+    shape = (size[1], size[0]) if channels is None else (size[1], size[0], channels)
+    pixels = np.random.default_rng(seed).integers(0, 256, shape, np.uint8)
+    Image.fromarray(pixels, mode).save(path)
+    return path
+
+
+def opencv_pose(i: int, up=(0.0, -1.0, 0.0)) -> np.ndarray:
+    """(4, 4) world_from_camera of a camera on a circle round the origin in a world with that up."""
+    side = np.array([np.cos(i), 0.4, np.sin(i)]) * 3
+    eye = turn_upright(up, "test")[:3, :3].T @ side
+    return look_at(eye, np.zeros(3), up).matrix() @ OPENCV_FROM_EYE
+
+
+def projected(view: View, points: np.ndarray) -> np.ndarray:
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    p = points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+    return np.stack([fx * p[:, 0] / p[:, 2] + cx, fy * p[:, 1] / p[:, 2] + cy], axis=1)
+
+
+def write_transforms(folder: Path, frames: list[dict], **more) -> Path:
+    path = folder / "transforms.json"
+    path.write_text(json.dumps({"frames": frames} | more))
+    return path
+
+
+def simple(folder: Path, count: int = 4, **more) -> tuple[list[dict], dict]:
+    """Frames of a nerfstudio file with its images, and what it says for all of them."""
+    frames = []
+    for i in range(count):
+        save_image(folder / f"images/{i:03}.png", seed=i)
+        pose = opencv_pose(i, (0.0, 0.0, 1.0)) @ OPENCV_FROM_EYE
+        frames.append({"file_path": f"images/{i:03}.png", "transform_matrix": pose.tolist()})
+    return frames, {"fl_x": 20.0, "w": 16, "h": 12} | more
