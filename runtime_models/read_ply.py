@@ -74,9 +74,12 @@ def read_table(path: Path) -> np.ndarray:
     if ["format", "binary_little_endian", "1.0"] not in lines:
         raise BadFile(f"{path.name} is not a binary little-endian PLY; convert it to that.")
     elements = [line for line in lines if line[:1] == ["element"]]
-    stated = elements[0][2:] if elements else []
-    if [e[1:2] for e in elements] != [["vertex"]] or not DIGITS.fullmatch(" ".join(stated)):
-        raise BadFile(f"{path.name} must have the one element 'vertex'; convert it to a 3DGS PLY.")
+    named = [" ".join(element[1:2]) for element in elements]
+    if named != ["vertex"] or not DIGITS.fullmatch(" ".join(elements[0][2:])):
+        raise BadFile(
+            f"{path.name} has the elements {named}, a plain 3DGS PLY has ['vertex'] and how many "
+            "there are; a compressed PLY must be converted."
+        )
     fields = [line for line in lines if line[:1] == ["property"]]
     if any(len(f) != 3 or f[1] not in TYPES for f in fields):
         raise BadFile(f"{path.name} has a property of a type that splats do not have.")
@@ -89,7 +92,7 @@ def read_table(path: Path) -> np.ndarray:
             f"{path.name} has no {missing[0]}: a point cloud or another format, not 3DGS splats; "
             "export it as a 3DGS PLY."
         )
-    row, count = np.dtype([(f[2], TYPES[f[1]]) for f in fields]), int(stated[0])
+    row, count = np.dtype([(f[2], TYPES[f[1]]) for f in fields]), int(elements[0][2])
     found = (path.stat().st_size - start) // row.itemsize
     if count == 0:
         raise BadFile(f"{path.name} holds no splats; export it again.")

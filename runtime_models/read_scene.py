@@ -3,9 +3,9 @@
 import zipfile
 from pathlib import Path
 
-from runtime_models.model import AnchorModel, BadFile, SplatLayers
-from runtime_models.package_files import MANIFEST
-from runtime_models.read_layers import read_layers
+from runtime_models.model import AnchorModel, BadFile, Mlp, SplatLayers
+from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
+from runtime_models.read_layers import is_splat, layer_files, read_layers
 from runtime_models.read_package import read_package
 
 KNOWN = "a package (folder or .shift), a 3DGS .ply, a .splat, or a folder of such .ply files"
@@ -16,51 +16,60 @@ def read_model(path: str | Path, mode: str = "cumulative") -> AnchorModel | Spla
     path = Path(path)
     if not path.exists():
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
+    if path.name == MANIFEST:
+        path = path.parent
     if path.is_dir():
         if (path / MANIFEST).exists():
             return read_package(path)
-        layers = sorted(path.glob("*.ply")) or sorted(path.glob("*.splat"))
+        layers = layer_files(path)
         if not layers:
             raise BadFile(f"{path} holds nothing to show; wanted is {KNOWN}.")
         return read_layers(layers, mode)
     with path.open("rb") as file:
         start = file.read(4)
-    if zipfile.is_zipfile(path) or start[:2] == b"PK":
-        return read_package(path)
-    if start[:3] == b"ply" or path.suffix == ".splat":
+    if start[:3] == b"ply" or is_splat(path):
         return read_layers([path], mode)
+    if start[:2] == b"PK" or zipfile.is_zipfile(path):
+        return read_package(path)
     raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
 
 
 def describe(model: AnchorModel | SplatLayers, path: str | Path) -> dict:
-    """What `launch.py info --json` prints."""
-    path = Path(path)
-    files = [f for f in path.rglob("*") if f.is_file()] if path.is_dir() else [path]
-    out = {
-        "format": "anchors" if isinstance(model, AnchorModel) else "splats",
-        "anchors": 0,
+    """What `launch.py info --json` prints; `path` is where the model was read from."""
+    is_package = isinstance(model, AnchorModel)
+    facts = {
+        "format": FORMAT if is_package else model.provenance.get("format", "splats"),
+        "anchors": len(model.anchors) if is_package else 0,
         "splats": model.splat_count,
-        "sh_degree": None,
+        "sh_degree": None if is_package else round(model.sh.shape[1] ** 0.5) - 1,
         "stops": [{"name": s.name, "x": s.x, "kind": s.kind} for s in model.stops],
-        "bytes": sum(f.stat().st_size for f in files),
+        "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
-    if isinstance(model, SplatLayers):
-        return out | {"sh_degree": int(model.sh.shape[1] ** 0.5) - 1, "mode": model.mode}
-    return out | {
-        "anchors": len(model.anchors),
+    if not is_package:
+        return facts | {"mode": model.mode}
+    encoding = model.encoding
+    return facts | {
         "splats_per_anchor": model.splats_per_anchor,
         "feature_width": model.features.shape[1],
-        "encoding": {
-            "d": model.encoding.d,
-            "sigma": model.encoding.sigma,
-            "spacing": model.encoding.spacing,
-        },
-        "heads": {
-            name: {
-                "layers": [mlp.width_in, *(len(w) for w in mlp.weights)],
-                "inputs": list(mlp.inputs),
-                "activation": mlp.head,
-            }
-            for name, mlp in model.networks.items()
-        },
+        "encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing},
+        "heads": {name: describe_head(mlp) for name, mlp in model.networks.items()},
     }
+
+
+def describe_head(mlp: Mlp) -> dict:
+    return {
+        "layers": [mlp.width_in, *(len(w) for w in mlp.weights)],
+        "inputs": list(mlp.inputs),
+        "activation": mlp.head,
+    }
+
+
+def files_of(model: AnchorModel | SplatLayers, path: Path) -> list[Path]:
+    """What of `path` belongs to the model: a folder may hold other things, too."""
+    if path.name == MANIFEST:
+        path = path.parent
+    if not path.is_dir():
+        return [path]
+    if isinstance(model, AnchorModel):
+        return [path / MANIFEST, path / ANCHORS, *path.glob("*.onnx")]
+    return [path / name for name in model.provenance.get("files", ())]

@@ -14,6 +14,7 @@ import numpy as np
 from runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST, open_package
 from runtime_models.read_package import read_files
+from runtime_models.whole_file import write_whole
 from runtime_models.write_onnx import write_onnx
 
 DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the same bytes
@@ -32,7 +33,7 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
     refuse_foreign(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".shift":
-        write_zip(files, path)
+        write_whole(path, zip_files(files))
         return path.stat().st_size
     write_folder(files, path)
     return sum(len(data) for data in files.values())
@@ -120,22 +121,17 @@ def refuse_foreign(path: Path) -> None:
                 )
 
 
-def write_zip(files: dict[str, bytes], path: Path) -> None:
-    """The same bytes for the same model: fixed dates, fixed order."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as out, zipfile.ZipFile(out, "w") as archive:
-            for name, data in files.items():
-                entry = zipfile.ZipInfo(name, DATE)
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.create_system = 3  # Unix, on every system
-                entry.external_attr = 0o644 << 16
-                archive.writestr(entry, data)
-        os.chmod(temporary, 0o644)  # mkstemp's is for its owner alone
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+def zip_files(files: dict[str, bytes]) -> bytes:
+    """The same bytes for the same files: fixed dates, fixed order."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name, DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3  # Unix, on every system
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data)
+    return out.getvalue()
 
 
 def write_folder(files: dict[str, bytes], path: Path) -> None:

@@ -1,12 +1,11 @@
 """Plain splats to INRIA's 3DGS PLY, in COLMAP's axes: the inverse of read_ply."""
 
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.read_ply import PlainSplats, turn_half
+from runtime_models.whole_file import write_whole
 
 
 def write_ply(splats: PlainSplats, path: str | Path) -> None:
@@ -32,6 +31,4 @@ def write_ply(splats: PlainSplats, path: str | Path) -> None:
     )
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
     header += [f"property float {name}" for name in names] + ["end_header", ""]
-    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False, suffix=".part") as file:
-        file.write("\n".join(header).encode() + table.astype("<f4").tobytes())
-    os.replace(file.name, path)
+    write_whole(path, "\n".join(header).encode() + table.astype("<f4").tobytes())

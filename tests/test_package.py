@@ -38,7 +38,12 @@ def test_round_trip_is_exact(tmp_path, name):
         assert np.float32(a.gain) == np.float32(b.gain)
         for p, q in zip(a.weights + a.biases, b.weights + b.biases, strict=True):
             np.testing.assert_array_equal(p, q)
+    if name == "scene":
+        (tmp_path / "scene/notes.txt").write_text("not a part of the package")
+        assert read_model(tmp_path / "scene/scene.json").splat_count == 500  # as one drops it
     facts = describe(back, tmp_path / name)
+    assert facts["format"] == "shapeshift 1"
+    assert facts["heads"]["color"]["layers"] == [35, 32, 8, 15]
     assert facts["bytes"] == written
     assert (facts["anchors"], facts["splats"], facts["sh_degree"]) == (100, 500, None)
     assert facts["stops"][1] == {"name": "Thermal", "x": 1.0, "kind": "thermal"}

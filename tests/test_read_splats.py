@@ -132,12 +132,19 @@ BROKEN = {
     "point cloud": (change_header(b"opacity", b"opacitx"), "has no opacity: a point cloud"),
     "odd f_rest": (change_header(b" nx", b" f_rest_0"), "has 1 f_rest columns"),
     "twice": (change_header(b"float ny", b"float nx"), "names a property twice"),
-    "lists": (change_header(b"float nx", b"list uchar"), "a property of a type|one element"),
+    "lists": (change_header(b"float nx", b"list uchar"), "a property of a type"),
     "no splats": (change_header(b"vertex 20", b"vertex 0"), "holds no splats"),
-    "no number": (change_header(b"vertex 20", b"vertex -2"), "one element 'vertex'"),
-    "long number": (change_header(b"vertex 20", b"vertex " + b"9" * 5000), "one element"),
+    "no number": (change_header(b"vertex 20", b"vertex -2"), "and how many there are"),
+    "no elements": (change_header(b"element", b"comment"), r"has the elements \[\]"),
+    "long number": (
+        change_header(b"vertex 20", b"vertex " + b"9" * 5000),
+        "and how many there are",
+    ),
     "no properties": (lambda d: d[: d.index(b"property")] + b"end_header\n", "has no x:"),
-    "more elements": (change_header(b"property", b"element face 2\nproperty"), "one element"),
+    "more elements": (
+        change_header(b"property", b"element face 2\nproperty"),
+        "elements .'vertex', 'face'",
+    ),
 }
 
 
@@ -191,12 +198,57 @@ def test_empty_folder_is_one_sentence(tmp_path):
         read_model(tmp_path)
 
 
+def test_layers_of_a_folder_are_counted_as_people_count(tmp_path):
+    for name in ("layer10.ply", "layer2.ply", "layer1.ply", "other.ply"):
+        write_ply(some_splats(2, 1), tmp_path / name)
+    (tmp_path / "notes.txt").write_text("not a part of the scene")
+    model = read_model(tmp_path)
+    assert [s.name for s in model.stops] == ["layer1", "layer2", "layer10"]
+    assert [s.x for s in model.stops] == [0, 0.5, 1] and {s.kind for s in model.stops} == {"layer"}
+    sizes = [p.stat().st_size for p in tmp_path.glob("layer*.ply")]
+    assert describe(model, tmp_path)["bytes"] == sum(sizes)
+    (tmp_path / "layer2.ply").write_bytes(b"ply")
+    with pytest.raises(BadFile, match=r"layer2\.ply is no PLY file"):
+        read_model(tmp_path)
+
+
+def test_files_of_several_degrees_and_kinds_make_one_scene(tmp_path):
+    write_ply(some_splats(3, 16, seed=1), tmp_path / "a.ply")
+    write_ply(some_splats(4, 4, seed=2), tmp_path / "b.ply")
+    np.zeros(5, ROW).tofile(tmp_path / "c.splat")
+    files = [tmp_path / name for name in ("a.ply", "b.ply", "c.splat")]
+    both = {mode: read_layers(files, mode) for mode in ("cumulative", "exclusive")}
+    layers = both["cumulative"]
+    assert layers.sh.shape == (12, 16, 3) and layers.layer.tolist() == [0] * 3 + [1] * 4 + [2] * 5
+    assert (layers.sh[3:7, 4:] == 0).all() and (layers.sh[7:, 1:] == 0).all()
+    np.testing.assert_array_equal(layers.sh[3:7, :4], read_ply(files[1]).sh)
+    assert describe(layers, files[0])["format"] == "ply + splat"
+    for mode, shown in (("cumulative", [1, 1, 0]), ("exclusive", [0, 1, 0])):
+        want = np.repeat(shown, [3, 4, 5]) * layers.opacity
+        np.testing.assert_allclose(Evaluator(both[mode]).geometry(0.5)[3], want, atol=1e-7)
+
+
+def test_a_mode_of_no_meaning_and_no_files_are_one_sentence(tmp_path):
+    with pytest.raises(BadFile, match="layer mode is 'sideways', expected one of"):
+        read_layers([tmp_path / "a.ply"], "sideways")
+    with pytest.raises(BadFile, match="no files were given"):
+        read_layers([])
+
+
+def test_writing_a_ply_leaves_nothing_beside_it(tmp_path):
+    for count in (3, 5):
+        write_ply(some_splats(count, 1), tmp_path / "a.ply")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.ply"]
+    assert len(read_ply(tmp_path / "a.ply").means) == 5
+    assert (tmp_path / "a.ply").stat().st_mode & 0o777 == 0o644
+
+
 @pytest.mark.skipif(not DATA.exists(), reason="no shared data beside the project")
 def test_the_leg_is_three_layers_with_a_stop_each():
     path = DATA / "anatomy_leg_ml3dgs"
     leg = read_model(path)
     facts = describe(leg, path)
-    assert (facts["format"], facts["splats"], facts["sh_degree"]) == ("splats", 136605, 3)
+    assert (facts["format"], facts["splats"], facts["sh_degree"]) == ("ply", 136605, 3)
     assert [s["x"] for s in facts["stops"]] == [0, 0.5, 1]
     np.testing.assert_array_equal(np.bincount(leg.layer), [57454, 64690, 14461])
     alive = [(Evaluator(leg).geometry(x)[3] > 0).sum() for x in (0.0, 0.5, 1.0)]
