@@ -1,27 +1,34 @@
 """What the modes without a window share: option checks, a renderer, pictures on disk."""
 
-import math
 import os
 import re
+import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import moderngl
 import numpy as np
 
 from app.errors import UsageError
 from renderer.renderer import Renderer
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
+MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer
+MOST_VALUES = 100_000  # of x, and of views on an orbit
+SOFTWARE = "Shapeshift"  # the Software entry of our PNG files
 
 
-def parse_size(text: str) -> tuple[int, int]:
+def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
     """(width, height) of a text like 640x360."""
-    found = re.fullmatch(r"(\d+)x(\d+)", text.strip().lower())
+    found = re.fullmatch(r"([0-9]{1,20})x([0-9]{1,20})", text.strip().lower())
     if not found:
-        raise UsageError(f"--size is '{text}', expected WIDTHxHEIGHT such as 640x360.")
+        raise UsageError(f"{option} is '{text}', expected WIDTHxHEIGHT such as 640x360.")
     width, height = int(found[1]), int(found[2])
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
-        raise UsageError(f"--size is {width}x{height}; each side must be 1 to {LARGEST_SIDE}.")
+        raise UsageError(f"{option} is {width}x{height}; each side must be 1 to {LARGEST_SIDE}.")
+    if width * height > MOST_PIXELS:
+        raise UsageError(f"{option} is {width}x{height}; at most {MOST_PIXELS:,} pixels are drawn.")
     return width, height
 
 
@@ -29,9 +36,9 @@ def parse_controls(words: tuple[str, ...]) -> list[float]:
     """Control values of words that are numbers in [0, 1] or sweep:N."""
     values: list[float] = []
     for word in words:
-        if found := re.fullmatch(r"sweep:(\d+)", word):
-            if not 2 <= int(found[1]) <= 100_000:
-                raise UsageError(f"--x is '{word}'; a sweep has 2 to 100000 values.")
+        if found := re.fullmatch(r"sweep:([0-9]{1,20})", word):
+            if not 2 <= int(found[1]) <= MOST_VALUES:
+                raise UsageError(f"--x is '{word}'; a sweep has 2 to {MOST_VALUES} values.")
             values += np.linspace(0, 1, int(found[1])).tolist()
             continue
         try:
@@ -46,16 +53,11 @@ def parse_controls(words: tuple[str, ...]) -> list[float]:
     return values
 
 
-def check_positive(name: str, value: float) -> None:
-    if not (value > 0 and math.isfinite(value)):
-        raise UsageError(f"{name} is {value}, expected a number above 0.")
-
-
 @contextmanager
-def open_renderer(context: str, drawing: str):
+def open_renderer(context: str, drawing: str) -> Iterator[tuple[Renderer, moderngl.Context | None]]:
     """(Renderer, context or None) without a window; `none` draws with OpenCL tiles and no GL.
 
-    auto goes on without GL where none is to be had, unless quads were asked for.
+    auto goes on without GL where none is to be had, and says so, unless quads were asked for.
     """
     from renderer.context import NoContext, open_context
 
@@ -65,9 +67,10 @@ def open_renderer(context: str, drawing: str):
     if context != "none":
         try:
             ctx = open_context(context)
-        except NoContext:
+        except NoContext as reason:
             if context != "auto" or drawing == "quads":
                 raise
+            print(f"Drawing with OpenCL alone: {reason}", file=sys.stderr)
     try:
         with Renderer(ctx, drawing if ctx is not None else "tiles") as renderer:
             yield renderer, ctx
@@ -77,13 +80,25 @@ def open_renderer(context: str, drawing: str):
 
 
 def save_png(image: np.ndarray, path: Path) -> None:
-    """(H, W, 3) display sRGB 0..1 to a PNG, all or nothing."""
+    """(H, W, 3) display sRGB 0..1 to a PNG that says who made it, all or nothing."""
     from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
 
+    maker = PngInfo()
+    maker.add_text("Software", SOFTWARE)
     pixels = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
     temporary = path.with_name(path.name + ".part")
-    Image.fromarray(pixels).save(temporary, format="PNG")
-    os.replace(temporary, path)
+    try:
+        Image.fromarray(pixels).save(temporary, format="PNG", pnginfo=maker)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)  # after Ctrl-C or on a full disk
+
+
+def is_our_png(path: Path) -> bool:
+    """Whether `save_png` made this file: its Software entry stands before the pixels."""
+    with path.open("rb") as file:
+        return b"tEXtSoftware\0" + SOFTWARE.encode() in file.read(256)
 
 
 def make_folder(path: Path) -> None:

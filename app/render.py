@@ -19,7 +19,7 @@ class Options:
     x: tuple[str, ...] = ("0",)
     """Control values in 0..1, or sweep:N."""
     camera: str = "orbit"
-    """orbit, front, or a file: our list of cameras, transforms.json, cameras.json or COLMAP."""
+    """orbit, front, or a file: a list of cameras (ours or 3DGS's), or a capture's cameras."""
     frames: int = 1
     """Pictures on the orbit (per control value); a camera file gives its own number."""
     size: str = ""
@@ -40,14 +40,20 @@ class Options:
 
 def run(options: Options) -> int:
     from app.errors import UsageError
-    from app.headless_drawing import make_folder, open_renderer, parse_controls, parse_size
+    from app.headless_drawing import (
+        MOST_VALUES,
+        make_folder,
+        open_renderer,
+        parse_controls,
+        parse_size,
+    )
     from runtime_models.read_scene import read_model
     from scene.framing import default_background
 
     controls = parse_controls(options.x)
     size = parse_size(options.size) if options.size else None
-    if options.frames < 1:
-        raise UsageError(f"--frames is {options.frames}, expected at least 1.")
+    if not 1 <= options.frames <= MOST_VALUES:
+        raise UsageError(f"--frames is {options.frames}, expected 1 to {MOST_VALUES}.")
     if options.background and not all(0 <= c <= 1 for c in options.background):
         raise UsageError(f"--background is {options.background}, expected three values in 0..1.")
     if not 0 <= options.stereo < 1:
@@ -55,6 +61,8 @@ def run(options: Options) -> int:
     model = read_model(options.scene, options.mode)
     views = choose_views(options, model, size)
     pairs = [(x, view) for x in controls for view in views]
+    if len(pairs) > MOST_VALUES:
+        raise UsageError(f"{len(pairs)} pictures asked for, at most {MOST_VALUES} in one run.")
     paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
     taken = [p for p in paths if p.exists()]
     if taken and not options.overwrite:
@@ -64,11 +72,13 @@ def run(options: Options) -> int:
         background = options.background or default_background(model, (0.0, 0.0, 0.0))
         renderer.settings = replace(renderer.settings, background=background)
         draw_all(renderer, model, pairs, paths, options.stereo)
-    print(f"{len(paths)} pictures in {options.out}", file=sys.stderr)
+    count = "1 picture" if len(paths) == 1 else f"{len(paths)} pictures"
+    print(f"{count} in {options.out}", file=sys.stderr)
     return 0
 
 
 def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
+    """The views that --camera stands for; `size` None leaves the pixels to the camera file."""
     from scene.framing import default_view, frame_points, model_points, orbit_path
     from scene.read_cameras import read_cameras
 
@@ -81,6 +91,7 @@ def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
 
 
 def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: float) -> None:
+    """A picture for each pair of x and view; two eyes side by side where they are apart."""
     import numpy as np
     from rich.console import Console
     from rich.progress import track
