@@ -26,7 +26,8 @@ def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
     """(A, 3) from the eye to each anchor, unit length (paper eq. 4); zero at the anchor itself."""
     delta = anchors - np.asarray(eye, np.float32)
     length = np.sqrt(np.einsum("ac,ac->a", delta, delta))[:, None]
-    return delta / np.where(length > 0, length, 1)
+    known = (length > 0) & np.isfinite(length)
+    return np.divide(delta, length, out=np.zeros_like(delta), where=known)
 
 
 class Evaluator:
