@@ -9,6 +9,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+STANDARD_OUTPUT = Path("-")
+LARGEST_RESULT = 1_000_000  # bytes
+
 
 @dataclass(frozen=True)
 class Options:
@@ -20,12 +23,12 @@ class Options:
     """Write the result here; - writes it to standard output."""
     frames: int = 60
     """Frames of the orbit, mono and stereo each (after 3 that do not count)."""
-    sweep: int = 50
-    """Values of x in the sweep from 0 to 1."""
+    sweep: int = 200
+    """Values of x in the sweep from 0 to 1 (after 3 that do not count)."""
     size: str = "640x360"
     """WIDTHxHEIGHT in pixels."""
-    x: float = -1.0
-    """Control value of the orbit; below 0: the first stop."""
+    x: float | None = None
+    """Control value of the orbit, 0 to 1; default: the first stop."""
     quality_size: str = "256x144"
     """Size of the images that are compared with the float64 reference."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
@@ -42,26 +45,33 @@ def run(options: Options) -> int:
     from app.measure import Measure
     from runtime_models.read_scene import read_model
 
-    size, quality_size = parse_size(options.size), parse_size(options.quality_size)
-    for name in ("frames", "sweep"):
-        if getattr(options, name) < 2:
-            raise UsageError(f"--{name} is {getattr(options, name)}, expected at least 2.")
-    if not options.x <= 1:
+    size = parse_size(options.size)
+    quality_size = parse_size(options.quality_size, "--quality-size")
+    check_counts(options)
+    if options.x is not None and not 0 <= options.x <= 1:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    if options.json not in (None, STANDARD_OUTPUT):
+        check_result_path(options.json)
     model = read_model(options.scene, options.mode)
-    x = model.stops[0].x if options.x < 0 else options.x
+    x = model.stops[0].x if options.x is None else options.x
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
-        measure = Measure(renderer, ctx, model, x, size)
-        result = measure.all(options.frames, options.sweep, quality_size)
-    result["command"] = command_line()
-    result["scene"] = options.scene.name
+        result = measure(Measure(renderer, ctx, model, x, size), options, quality_size)
     print_table(result)
-    if options.json == Path("-"):
-        print(json.dumps(result, indent=1))
+    if options.json == STANDARD_OUTPUT:
+        print(json.dumps(result, indent=1, allow_nan=False))
     elif options.json is not None:
         write_json(options.json, result)
         print(f"written to {options.json}", file=sys.stderr)
     return 0
+
+
+def measure(work, options, quality_size: tuple[int, int]) -> dict:
+    """All rows of a Measure, with what was asked; says on stderr what it is at."""
+    from rich.console import Console
+
+    with Console(stderr=True).status("starting") as status:
+        result = work.all(options.frames, options.sweep, quality_size, status.update)
+    return result | {"command": command_line(), "scene": options.scene.name}
 
 
 def command_line() -> str:
@@ -70,10 +80,43 @@ def command_line() -> str:
     return " ".join(["python3 launch.py", *words])
 
 
+def check_counts(options) -> None:
+    """--frames and --sweep: two or more, since one frame has no percentiles."""
+    from app.errors import UsageError
+    from app.headless_drawing import MOST_VALUES
+
+    for name in ("frames", "sweep"):
+        if not 2 <= getattr(options, name) <= MOST_VALUES:
+            raise UsageError(f"--{name} is {getattr(options, name)}, expected 2 to {MOST_VALUES}.")
+
+
+def check_result_path(path: Path) -> None:
+    """Refuses, before minutes of work, a file that cannot be written or that is not a result."""
+    from app.errors import UsageError
+
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder; name the JSON file that the result goes to.")
+    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise UsageError(f"cannot write into the folder {path.parent}; choose another file.")
+    if path.exists() and not is_result(path):
+        raise UsageError(f"{path} exists and is no bench result; choose another file.")
+
+
+def is_result(path: Path) -> bool:
+    try:
+        found = json.loads(path.read_bytes()) if path.stat().st_size < LARGEST_RESULT else None
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and "frame_ms" in found
+
+
 def write_json(path: Path, result: dict) -> None:
     temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    os.replace(temporary, path)
+    try:
+        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def print_table(result: dict) -> None:
@@ -81,16 +124,34 @@ def print_table(result: dict) -> None:
     from rich.table import Table
 
     backends = ", ".join(f"{what} {name}" for what, name in result["backends"].items())
-    title = f"{result['scene']}, {result['size']}, {backends}, {result['gl_renderer']}"
-    table = Table("ms", "p50", "p95", "p99", title=title)
-    for name, row in {"frame": result["frame_ms"], **result["passes"]}.items():
+    rows = {
+        "frame": result["frame_ms"],
+        "stereo": result["stereo_ms"],
+        "x sweep": result["sweep_ms"],
+        **result["passes"],
+    }
+    table = Table("ms", "p50", "p95", "p99")
+    for name, row in rows.items():
         table.add_row(name, *(f"{row[p]:.2f}" for p in ("p50", "p95", "p99")))
-    console = Console(stderr=True)
-    console.print(table)
-    console.print(
+        if name == "x sweep":
+            table.add_section()
+    told = (
         f"PSNR to the float64 reference {result['psnr_db']:.1f} dB at {result['quality_size']} "
         f"(worst of {result['quality_images']}), {result['drawn']:,} of {result['splats']:,} "
         f"splats drawn, stereo/mono {result['stereo_over_mono']:.2f}, "
-        f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms, "
-        f"frame/draw pass {result['frame_over_draw']:.2f}"
+        f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms{frame_over_draw(result)}; "
+        f"{result['frames']} frames after {result['warm_up']} that do not count"
+    )
+    console = Console(stderr=True, highlight=False)
+    title = f"{result['scene']}, {result['size']}, {backends}, {result['gl_renderer']}"
+    console.print(title, markup=False)  # a scene's name may hold brackets
+    console.print(table)
+    console.print(told, markup=False)
+
+
+def frame_over_draw(result: dict) -> str:
+    if result["draw_pass_ratio"] is None:
+        return ""
+    return (
+        f", frame/draw pass ({' + '.join(result['draw_passes'])}) {result['draw_pass_ratio']:.2f}"
     )

@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -16,8 +16,8 @@ class Options:
     """A package, a .ply, a .splat or a folder of PLY layers."""
     json: bool = False
     """JSON on standard output instead of a table."""
-    mode: str = "cumulative"
-    """How a folder of layers adds up: cumulative or exclusive."""
+    mode: Literal["cumulative", "exclusive"] = "cumulative"
+    """How a folder of layers adds up."""
 
 
 def run(options: Options) -> int:
@@ -34,6 +34,7 @@ def run(options: Options) -> int:
 def print_table(facts: dict) -> None:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(show_header=False)
     for key, value in facts.items():
@@ -46,5 +47,5 @@ def print_table(facts: dict) -> None:
             )
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
-        table.add_row(key, "" if value is None else str(value))
+        table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets
     Console().print(table)

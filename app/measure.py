@@ -1,22 +1,30 @@
 """Measures a renderer: frame times on an orbit, mono and stereo in turns, an x sweep, the error."""
 
+import math
 import os
 import platform
 import time
+from collections.abc import Callable
+from dataclasses import asdict
 from importlib.metadata import version
+from itertools import pairwise
 
 import numpy as np
 
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from scene.framing import default_view, frame_points, model_points, orbit_path
+from scene.metrics import psnr
+from scene.pose import View
 from scene.scene import Scene, SceneObject
 from scene.stereo import stereo_pair
 
 WARM_UP = 3  # frames that do not count: first use compiles and allocates
 EYE_DISTANCE = 0.064  # of a person, metres; scaled with the scene below
 QUALITY_VIEWS = 3
-DRAW_PASSES = ("bin", "splat")  # what puts pixels on the screen; the rest prepares it
+# The draw pass: what finds the pixels of a splat and fills them.  A GL driver does both in one.
+DRAW_PASSES = ("bin", "splat")
+MOST_DB = 200.0  # for pictures that are equal: JSON has no infinity
 PERCENTILES = (50, 95, 99)
 
 
@@ -30,30 +38,45 @@ class Measure:
     def scene(self, x: float) -> Scene:
         return Scene((SceneObject("scene", self.model, x=x),))
 
-    def all(self, frames: int, sweep: int, quality_size: tuple[int, int]) -> dict:
-        """The rows that `launch.py bench` prints and writes."""
+    def all(
+        self,
+        frames: int,
+        sweep: int,
+        quality_size: tuple[int, int],
+        tell: Callable[[str], None] = lambda text: None,
+    ) -> dict:
+        """The rows that `launch.py bench` prints and writes; `tell` hears what is going on."""
+        tell(f"{frames} frames of an orbit, mono and stereo in turns")
         mono, stereo, passes, stats = self.orbit(frames)
-        drawing = sum(passes[name]["p50"] for name in DRAW_PASSES if name in passes)
+        tell(f"{sweep} frames from x = 0 to 1")
+        sweep_ms = self.sweep(sweep)
+        tell("pictures of the float64 reference")
         errors = self.errors(quality_size)
+        drawing = sum(passes[name]["p50"] for name in DRAW_PASSES if name in passes)
         return {
             "gl_renderer": gl_renderer(self.ctx),
             "frame_ms": percentiles(mono),
+            "stereo_ms": percentiles(stereo),
+            "sweep_ms": percentiles(sweep_ms),
             "passes": passes,
             "stereo_over_mono": float(np.median(stereo) / np.median(mono)),
             "psnr_db": min(errors),
-            "sweep_worst_ms": max(self.sweep(sweep)),
+            "sweep_worst_ms": max(sweep_ms),
             "splats": self.model.splat_count,
             "drawn": stats.drawn,
             "culled": stats.culled,
-            "frame_over_draw": float(np.median(mono) / drawing) if drawing else None,
+            "draw_passes": [name for name in passes if name in DRAW_PASSES],
+            "draw_pass_ratio": float(np.median(mono) / drawing) if drawing else None,
             "x": self.x,
             "size": f"{self.size[0]}x{self.size[1]}",
             "quality_size": f"{quality_size[0]}x{quality_size[1]}",
             "quality_images": len(errors),
             "frames": frames,
+            "sweep": sweep,
             "warm_up": WARM_UP,
+            "settings": finite(asdict(self.renderer.settings)),
             "backends": self.renderer.backends,
-            "machine": machine(),
+            "machine": machine(self.ctx),
         }
 
     def orbit(self, frames: int) -> tuple[list[float], list[float], dict, object]:
@@ -98,15 +121,32 @@ class Measure:
         return times
 
     def errors(self, size: tuple[int, int]) -> list[float]:
-        """PSNR in dB of small images against the float64 reference, at the same settings."""
-        psnrs = []
-        self.renderer.update(self.scene(self.x))
-        for view in orbit_path(QUALITY_VIEWS, self.centre, self.radius, size):
-            self.renderer.draw([view])
-            want = reference_image(self.scene(self.x), view, self.renderer.settings)
-            error = np.mean((self.renderer.image(0).astype(np.float64) - want) ** 2)
-            psnrs.append(float(-10 * np.log10(max(error, 1e-20))))
-        return psnrs
+        """PSNR in dB of small pictures against the float64 reference, at the same settings.
+
+        From several sides at the orbit's x, then from the first side at every stop and half way
+        between: speed at one x says nothing about the picture at another.
+        """
+        stops = sorted({stop.x for stop in self.model.stops})
+        views = orbit_path(QUALITY_VIEWS, self.centre, self.radius, size)
+        others = sorted({*stops, *((a + b) / 2 for a, b in pairwise(stops))} - {self.x})
+        return [self.error(self.x, view) for view in views] + [
+            self.error(x, views[0]) for x in others
+        ]
+
+    def error(self, x: float, view: View) -> float:
+        """PSNR in dB of the premultiplied colours and the alpha of one picture."""
+        self.renderer.update(self.scene(x))
+        self.renderer.draw([view])
+        want = reference_image(self.scene(x), view, self.renderer.settings)
+        return min(psnr(self.renderer.image(0), want), MOST_DB)
+
+
+def finite(settings: dict) -> dict:
+    """Settings as JSON can hold them: no limit is null."""
+    return {
+        name: None if isinstance(value, float) and math.isinf(value) else value
+        for name, value in settings.items()
+    }
 
 
 def percentiles(values: list[float]) -> dict[str, float]:
@@ -119,9 +159,10 @@ def gl_renderer(ctx) -> str:
     return describe(ctx)["gl_renderer"] if ctx is not None else "none (OpenCL tiles)"
 
 
-def machine() -> dict[str, object]:
+def machine(ctx) -> dict[str, object]:
     """What a reader needs in order to compare: processor, drivers, versions."""
     from rasterizer.device import NoDevice, open_device
+    from renderer.context import describe
 
     try:
         device = open_device()
@@ -133,6 +174,7 @@ def machine() -> dict[str, object]:
         "cores": os.cpu_count(),
         "system": platform.platform(terse=True),
         "python": platform.python_version(),
+        "gl_version": describe(ctx)["gl_version"] if ctx is not None else "none",
         "opencl": opencl,
         **{name: version(name) for name in ("numpy", "moderngl", "onnxruntime", "pyopencl")},
     }
