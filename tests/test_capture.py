@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from runtime_models.model import BadFile, Stop
+from runtime_models.read_layers import layer_files, read_layers
 from scene.capture import Capture, Photo
 from scene.capture_rules import spread_stops, turn_upright
 from scene.photo import load_photo
@@ -166,6 +167,20 @@ def test_leg_with_its_own_split_and_white_background():
     assert (capture.background, capture.points) == ((1.0, 1.0, 1.0), None)
     ups = [p.view.world_from_eye.matrix()[1, 1] for p in capture.photos]
     assert max(ups) < 0  # turned as its PLY files are, although its cameras hung upside down
+
+
+def test_leg_layers_and_leg_photos_are_in_one_world():
+    """The photos were rendered from these splats: their centres lie on what is not white."""
+    layers = read_layers(layer_files(real("anatomy_leg_ml3dgs")))
+    centres = layers.means[layers.opacity > 0.8].astype(float)
+    capture = read_capture(real("anatomy_leg_3modal_views"))
+    for photo in capture.of("full", "test")[:4]:
+        rgb, _ = load_photo(photo)
+        at = projected(photo.view, centres)
+        inside = ((at >= 0) & (at < photo.view.size)).all(1)
+        x, y = at[inside].astype(int).T
+        assert (rgb[y, x] < 1).any(axis=1).mean() > 0.995
+        assert (rgb < 1).any(axis=2).mean() < 0.6
 
 
 def test_plush_points_fall_on_pixels_of_their_own_colour():
