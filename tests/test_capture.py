@@ -174,13 +174,13 @@ def test_leg_layers_and_leg_photos_are_in_one_world():
     layers = read_layers(layer_files(real("anatomy_leg_ml3dgs")))
     centres = layers.means[layers.opacity > 0.8].astype(float)
     capture = read_capture(real("anatomy_leg_3modal_views"))
-    for photo in capture.of("full", "test")[:4]:
+    for photo in capture.of("full", "test")[:3]:
         rgb, _ = load_photo(photo)
         at = projected(photo.view, centres)
         inside = ((at >= 0) & (at < photo.view.size)).all(1)
         x, y = at[inside].astype(int).T
         assert (rgb[y, x] < 1).any(axis=1).mean() > 0.995
-        assert (rgb < 1).any(axis=2).mean() < 0.6
+        assert (rgb < 1).any(axis=2).mean() < 0.2  # which is not most of the photo
 
 
 def test_plush_points_fall_on_pixels_of_their_own_colour():
