@@ -135,8 +135,10 @@ def print_table(result: dict) -> None:
         table.add_row(name, *(f"{row[p]:.2f}" for p in ("p50", "p95", "p99")))
         if name == "x sweep":
             table.add_section()
+    db = result["psnr_db"]
+    quality = "NaN in a picture" if db is None else f"{db:.1f} dB"
     told = (
-        f"PSNR to the float64 reference {result['psnr_db']:.1f} dB at {result['quality_size']} "
+        f"PSNR to the float64 reference {quality} at {result['quality_size']} "
         f"(worst of {result['quality_images']}), {result['drawn']:,} of {result['splats']:,} "
         f"splats drawn, stereo/mono {result['stereo_over_mono']:.2f}, "
         f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms{frame_over_draw(result)}; "

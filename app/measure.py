@@ -60,7 +60,7 @@ class Measure:
             "sweep_ms": percentiles(sweep_ms),
             "passes": passes,
             "stereo_over_mono": float(np.median(stereo) / np.median(mono)),
-            "psnr_db": min(errors),
+            "psnr_db": worst(errors),
             "sweep_worst_ms": max(sweep_ms),
             "splats": self.model.splat_count,
             "drawn": stats.drawn,
@@ -139,6 +139,11 @@ class Measure:
         self.renderer.draw([view])
         want = reference_image(self.scene(x), view, self.renderer.settings)
         return min(psnr(self.renderer.image(0), want), MOST_DB)
+
+
+def worst(decibels: list[float]) -> float | None:
+    """The smallest; None where a picture held NaN, which is no number of decibels."""
+    return None if any(map(math.isnan, decibels)) else min(decibels)
 
 
 def finite(settings: dict) -> dict:
