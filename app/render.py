@@ -60,9 +60,10 @@ def run(options: Options) -> int:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
     model = read_model(options.scene, options.mode)
     views = choose_views(options, model, size)
+    count = len(controls) * len(views)
+    if count > MOST_VALUES:
+        raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
     pairs = [(x, view) for x in controls for view in views]
-    if len(pairs) > MOST_VALUES:
-        raise UsageError(f"{len(pairs)} pictures asked for, at most {MOST_VALUES} in one run.")
     paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
     taken = [p for p in paths if p.exists()]
     if taken and not options.overwrite:
@@ -72,8 +73,7 @@ def run(options: Options) -> int:
         background = options.background or default_background(model, (0.0, 0.0, 0.0))
         renderer.settings = replace(renderer.settings, background=background)
         draw_all(renderer, model, pairs, paths, options.stereo)
-    count = "1 picture" if len(paths) == 1 else f"{len(paths)} pictures"
-    print(f"{count} in {options.out}", file=sys.stderr)
+    print(f"{count} picture{'s' * (count > 1)} in {options.out}", file=sys.stderr)
     return 0
 
 
