@@ -8,7 +8,7 @@ from scene.pose import View
 from training.photos import LoadedPhoto
 
 COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of the box that is carved
-HULL_PHOTOS = 20  # a modality at most; more sharpen little and take as long as they are many
+HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
 BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
 RANDOM_POINTS = 20_000
 SAMPLE = 1000  # points whose nearest neighbour is looked for

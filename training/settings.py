@@ -40,7 +40,7 @@ class TrainSettings:
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
     voxel: float | None = None  # metres; None: from the points and `anchors`
-    anchors: int = 4000  # to start with at most, where voxel is None
+    anchors: int = 6000  # to start with at most, where voxel is None
     max_anchors: int = 12000  # cap of growing
     grow: bool = True
     grow_every: int = 100  # iterations

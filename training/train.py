@@ -99,8 +99,9 @@ class Trainer:
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
         points, self.origin = initial_points(self.capture, photos, rng)
-        self.voxel = settings.voxel or choose_voxel(points, settings.anchors, rng)
-        anchors = voxel_centres(points, self.voxel)[: settings.max_anchors]
+        most = min(settings.anchors, settings.max_anchors)
+        self.voxel = settings.voxel or choose_voxel(points, most, rng)
+        anchors = voxel_centres(points, self.voxel)
         features = np.zeros((len(anchors), padded(settings.features)), np.float32)
         features[:, : settings.features] = (
             rng.normal(size=(len(anchors), settings.features)) * FEATURE_SPREAD
