@@ -25,7 +25,7 @@ class Options:
     """Steps of training; the same number gives the same bits."""
     size: str = "384x288"
     """WIDTHxHEIGHT of the photos."""
-    views: int = 64
+    views: int = 72
     """Photos to train on, a stop."""
     test_views: int = 8
     """Photos held out, a stop."""

@@ -108,52 +108,16 @@ def screen(p: np.ndarray) -> np.ndarray:
     return out
 
 
-def switchgear() -> list[Solid]:
-    """What the open cabinet shows, its back plate at z = 0: breakers, contactors, terminals."""
-    white, dark = Surface((0.90, 0.90, 0.87), 30.0), Surface((0.16, 0.17, 0.19), 34.0)
-    out = [box((0, 0, 0.003), (0.1, 0.145, 0.003), Surface((0.86, 0.66, 0.22), 25.0))]
-    for k in range(5):
-        x = -0.068 + 0.034 * k
-        out.append(box((x, 0.095, 0.03), (0.0145, 0.033, 0.026), white))
-        blue = Surface((0.10, 0.35, 0.75) if k < 3 else (0.85, 0.2, 0.12), 30.0)
-        out.append(box((x, 0.098, 0.06), (0.008, 0.012, 0.008), blue))
-    for k in range(3):
-        x = -0.058 + 0.058 * k
-        out.append(box((x, 0.0, 0.033), (0.024, 0.032, 0.03), dark))
-        out.append(box((x, 0.006, 0.066), (0.014, 0.013, 0.004), Surface((0.75, 0.75, 0.70), 40.0)))
-    hues = ((0.75, 0.2, 0.15), (0.85, 0.65, 0.15), (0.2, 0.5, 0.25), (0.2, 0.35, 0.7))
-    for k in range(8):
-        at = (-0.07 + 0.02 * k, -0.09, 0.025)
-        out.append(box(at, (0.0085, 0.022, 0.02), Surface(hues[k % 4], 27.0)))
-    grey = Surface((0.55, 0.57, 0.60), 26.0)
-    out += [box((0, y, 0.02), (0.095, 0.008, 0.018), grey) for y in (0.047, -0.047, -0.13)]
-    return out
-
-
-def cabinet(opened: bool) -> list[Solid]:
-    """A control cabinet; opened, its door swings to the left and shows the switchgear."""
+def cabinet() -> list[Solid]:
+    """A control cabinet on feet."""
     paint = Surface((0.77, 0.78, 0.75), cabinet_heat, 0.15, 20.0)
     w, h, d = SHELL
-    hinge = frame((-w, 0, d))
-    turn = frame((0, 0, 0), turned("y", -97.0)) if opened else np.eye(4)
-    swung = inside(hinge @ turn @ frame((w, 0, 0)), door())
-    if opened:
-        t = 0.005
-        walls = [
-            box((0, 0, -d + t), (w, h, t), paint),
-            box((-w + t, 0, 0), (t, h, d), paint),
-            box((w - t, 0, 0), (t, h, d), paint),
-            box((0, h - t, 0), (w, t, d), paint),
-            box((0, -h + t, 0), (w, t, d), paint),
-        ]
-        walls += inside(frame((0, 0, -d + 2 * t)), switchgear())
-    else:
-        walls = [box((0, 0, 0), SHELL, paint, 0.004)]
     feet = [
         box((x, -h - 0.005, 0), (0.02, 0.005, d - 0.01), Surface((0.15, 0.15, 0.16), 22.0))
         for x in (-0.07, 0.07)
     ]
-    return inside(frame(CABINET), walls + swung + feet)
+    closed = [box((0, 0, 0), (w, h, d), paint, 0.004), *inside(frame((0, 0, d)), door())]
+    return inside(frame(CABINET), closed + feet)
 
 
 def conduit() -> list[Solid]:

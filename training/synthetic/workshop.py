@@ -1,7 +1,7 @@
 """The bundled demo's capture: a workshop bench photographed as it looks, as it radiates, opened.
 
 Three stops on one slider.  RGB and Thermal show the same things; Opened has other geometry: the
-insulation is off the pipe, the motor and the cabinet are open.
+insulation is off the pipe and the motor is cut open.
 """
 
 import signal
@@ -71,7 +71,7 @@ def place(opened: bool) -> tuple[Place, Clearance]:
     here = Place.of(
         bench()
         + pipework(opened)
-        + cabinet(opened)
+        + cabinet()
         + conduit()
         + mug()
         + tools()
@@ -106,7 +106,7 @@ def radiance(stop: str):
 def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
     """Cameras on two domes, spread by the golden angle; `offset` turns one set against another.
 
-    Every fourth one stands closer, in front, and looks at the cabinet or at the motor: what is
+    Every sixth one stands closer, in front, and looks at the cabinet or at the motor: what is
     opened there is not seen from elsewhere.
     """
     right = np.tan(FOV_X / 2)
@@ -114,14 +114,14 @@ def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
     low, high = np.sin(np.deg2rad(ELEVATIONS))
     out = []
     for i in range(count):
-        close = i % 4 == 3
-        number = i // 8 if close else i  # in its own sequence, or it would not spread
+        close = i % 6 == 5
+        number = i // 12 if close else i  # in its own sequence, or it would not spread
         turn = GOLDEN * number + offset
         azimuth = FRONT * (2 * (turn % 1) - 1) if close else 2 * np.pi * turn
         height = low + (high - low) * ((number + 0.5) * GOLDEN**2 * 0.7 % 1) * (0.8 if close else 1)
         level = np.sqrt(1 - height**2)
         away = CLOSE if close else DISTANCES[i % 2]
-        target = np.array((CABINET, MOTOR)[i // 4 % 2] if close else TARGET)
+        target = np.array((MOTOR, CABINET)[i // 6 % 2] if close else TARGET)
         eye = away * np.array([level * np.sin(azimuth), height, level * np.cos(azimuth)])
         pose = look_at(eye + target, target)
         out.append(View(pose, (-right, right, -up, up), 0.05, 1000.0, size))
@@ -155,7 +155,7 @@ def leave_interrupts_to_the_parent() -> None:
 def make_workshop(
     folder: Path,
     size: tuple[int, int] = (384, 288),
-    views: int = 64,
+    views: int = 72,
     test_views: int = 8,
     processes: int = 2,
     tell: Callable[[int, int], None] = lambda done, count: None,
