@@ -118,7 +118,7 @@ def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
         number = i // 12 if close else i  # in its own sequence, or it would not spread
         turn = GOLDEN * number + offset
         azimuth = FRONT * (2 * (turn % 1) - 1) if close else 2 * np.pi * turn
-        height = low + (high - low) * ((number + 0.5) * GOLDEN**2 * 0.7 % 1) * (0.8 if close else 1)
+        height = low + (high - low) * ((number + 0.5) * 2**0.5 % 1) * (0.8 if close else 1)
         level = np.sqrt(1 - height**2)
         away = CLOSE if close else DISTANCES[i % 2]
         target = np.array((MOTOR, CABINET)[i // 6 % 2] if close else TARGET)
