@@ -19,7 +19,8 @@ class Options:
     x: tuple[str, ...] = ("0",)
     """Control values in 0..1, or sweep:N."""
     camera: str = "orbit"
-    """orbit, front, or a file: a list of cameras (ours or 3DGS's), or a capture's cameras."""
+    """orbit, front, or a file: a JSON list of {"matrix": 4x4 world_from_eye, "fov_y": radians},
+    the cameras.json that 3DGS writes, or a capture (transforms.json, a COLMAP folder)."""
     frames: int = 1
     """Pictures on the orbit (per control value); a camera file gives its own number."""
     size: str = ""
