@@ -10,7 +10,14 @@ from scene.capture import Capture, Photo
 from scene.pose import View, look_at, perspective
 from training.density import Newcomers, changed_state, given_up, newcomers
 from training.guard import Guard
-from training.initial import choose_voxel, initial_points, median_neighbour, voxel_centres
+from training.initial import (
+    choose_voxel,
+    filler_points,
+    initial_points,
+    median_neighbour,
+    pixel_of,
+    voxel_centres,
+)
 from training.optimizer import Adam
 from training.photos import LoadedPhoto, choose_downscale, load_photos
 from training.schedule import Budget, Schedule, choose_background
@@ -271,3 +278,21 @@ def test_adam_equals_its_definition():
     copy.load(adam.state())
     for name, array in adam.state().items():
         np.testing.assert_array_equal(copy.state()[name], array)
+
+
+def test_guesses_stand_where_photos_have_no_points(tmp_path):
+    photos = sphere_photos((1, 1, 1), False)[:1]
+    view = photos[0].view
+    world_from_eye = view.world_from_eye.matrix()
+    across = np.stack(np.meshgrid(np.linspace(-0.36, 0, 40), np.linspace(-0.36, 0.36, 80)), -1)
+    eye = np.concatenate([across, np.full((80, 40, 1), -1.0), np.full((80, 40, 1), 0.5)], axis=2)
+    points = (eye.reshape(-1, 4) * [2, 2, 2, 2] @ world_from_eye.T)[:, :3]  # 2 m away, left half
+    guesses = filler_points(points, photos, RNG(0))
+    pixel, inside = pixel_of(view, guesses)
+    assert inside.all() and (pixel[:, 0] > 32).all() and len(guesses) >= 16 * 7
+    distance = (guesses - view.world_from_eye.position) @ -world_from_eye[:3, 2]
+    assert (distance >= 1.99).all() and (distance <= 2.61).all()
+    known = Capture(tmp_path, (), (), points=points, background=(0.0, 0.0, 0.0))
+    assert initial_points(known, photos, RNG(0))[1] == "points"
+    unknown = Capture(tmp_path, (), (), points=points)
+    assert initial_points(unknown, photos, RNG(0))[1] == "points and guesses"

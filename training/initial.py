@@ -9,6 +9,7 @@ from training.photos import LoadedPhoto
 
 COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of the box that is carved
 HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
+FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
 BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
 RANDOM_POINTS = 20_000
 SAMPLE = 1000  # points whose nearest neighbour is looked for
@@ -134,12 +135,46 @@ def hull_points(photos: list[LoadedPhoto], background: tuple | None) -> np.ndarr
     return found
 
 
+def filler_points(
+    points: np.ndarray, photos: list[LoadedPhoto], rng: np.random.Generator
+) -> np.ndarray:
+    """(P, 3) guesses for what has no points: walls without texture, the sky.
+
+    A photo is cut into cells; through each that no point falls into goes a ray, with one guess
+    between the median and the far end of what the photo sees.  Without them the splats that there
+    are blow up until they cover the wall.
+    """
+    found = []
+    for photo in photos[:: -(-len(photos) // FILLER_PHOTOS)]:
+        view = photo.view
+        pixel, inside = pixel_of(view, points)
+        if not inside.any():
+            continue
+        camera_from_world, fx, fy, cx, cy = view.pinhole()
+        depth = points[inside] @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        cells = np.floor(pixel[inside] / view.size * FILLER_CELLS).astype(int)
+        empty = np.ones((FILLER_CELLS, FILLER_CELLS), bool)
+        empty[cells[:, 1], cells[:, 0]] = False
+        row, column = np.nonzero(empty)
+        x, y = (np.stack([column, row]) + rng.random((2, len(row)))) / FILLER_CELLS
+        near, far = np.percentile(depth, [50, 99])
+        z = 1 / rng.uniform(1 / (1.3 * far), 1 / near, len(row))
+        eye = np.stack(
+            [(x * view.size[0] - cx) / fx * z, (y * view.size[1] - cy) / fy * z, z, np.ones_like(z)]
+        )
+        found.append((np.linalg.inv(camera_from_world) @ eye)[:3].T)
+    return np.concatenate(found) if found else np.zeros((0, 3))
+
+
 def initial_points(
     capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
 ) -> tuple[np.ndarray, str]:
     """(P, 3) metres and where they come from: points, hull or random.  Raises BadFile."""
     if capture.points is not None and len(capture.points):
-        return np.asarray(capture.points, np.float64), "points"
+        points = np.asarray(capture.points, np.float64)
+        if capture.background is not None or any(p.see_through for p in photos):
+            return points, "points"
+        return np.concatenate([points, filler_points(points, photos, rng)]), "points and guesses"
     hull = hull_points(photos, capture.background)
     if hull is not None and len(hull):
         return hull, "hull"
