@@ -73,10 +73,12 @@ class Options:
 
 def run(options: Options) -> int:
     from rasterizer.device import open_device
+    from runtime_models.write_package import refuse_foreign
     from scene.read_capture import read_capture
     from training.checkpoint import checkpoint_path, read_checkpoint
     from training.train import Trainer
 
+    refuse_foreign(options.out)  # now, not after the training
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options, resume[1]["settings"] if resume else None)
@@ -95,9 +97,9 @@ def run(options: Options) -> int:
 def settings_of(options: Options, before: dict | None) -> "TrainSettings":
     """The preset with what was asked for; or those of a checkpoint, with another budget.
 
-    Raises BadFile when a resumed run is asked for anything but another budget.
+    Raises UsageError, also when a resumed run is asked for anything but another budget.
     """
-    from runtime_models.model import BadFile
+    from app.errors import UsageError
     from training.settings import TrainSettings, preset
 
     names = {f.name for f in fields(TrainSettings)} - {"preset"}
@@ -107,7 +109,7 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
     if before is not None:
         other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
         if other:
-            raise BadFile(
+            raise UsageError(
                 f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
                 f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
             )
@@ -115,7 +117,10 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
         asked["iterations"] = None
     elif "iterations" in asked and "seconds" not in asked:
         asked["seconds"] = None
-    return replace(settings, **asked)
+    try:
+        return replace(settings, **asked)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def say(text: str) -> None:

@@ -169,8 +169,20 @@ def test_budget_follows_whichever_ends_first():
     assert Budget(100, None).fraction(25, 1e9) == 0.25
     assert Budget(None, 20.0).fraction(10**9, 5.0) == 0.25
     assert Budget(100, 20.0).fraction(10, 15.0) == 0.75
-    with pytest.raises(ValueError, match="needs an end"):
-        Budget.of(TrainSettings(iterations=None))
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"iterations": None}, "needs an end"), ({"iterations": 0}, "iterations is 0"),
+        ({"seconds": float("nan")}, "seconds is nan"), ({"ssim_share": 1.1}, "0 to 1"),
+        ({"hidden": -3}, "at least 1"), ({"voxel": 0.0}, "voxel is 0.0"), ({"seed": -1}, "seed"),
+        ({"rate_scale": float("inf")}, "rate_scale is inf"),
+    ],
+)  # fmt: skip
+def test_settings_that_cannot_be_are_refused(changes, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        TrainSettings(**changes)
 
 
 def test_presets():

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from training.photos import BLACK, LoadedPhoto
-from training.settings import TrainSettings
 
 NAMED_BACKGROUNDS = {"black": BLACK, "white": (1.0, 1.0, 1.0), "gray": (0.5, 0.5, 0.5)}
 
@@ -57,12 +56,6 @@ class Budget:
 
     iterations: int | None
     seconds: float | None
-
-    @staticmethod
-    def of(settings: TrainSettings) -> "Budget":
-        if settings.iterations is None and settings.seconds is None:
-            raise ValueError("A run needs an end: give --iterations or --seconds.")
-        return Budget(settings.iterations, settings.seconds)
 
     def fraction(self, iteration: int, elapsed: float) -> float:
         """0 at the start, 1 or more at the end; learning rates and growing follow it."""

@@ -54,6 +54,23 @@ class TrainSettings:
     background: str = "auto"  # auto: the capture's, else random where photos have alpha | black ...
     rate_scale: float = 1.0  # times every learning rate
 
+    def __post_init__(self) -> None:
+        """Raises ValueError naming the first number that cannot be."""
+        least = {
+            "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
+            "hidden": 1, "control": 2, "anchors": 1, "max_anchors": 1, "grow_every": 1,
+            "downscale": 1, "ssim_share": 0, "opacity_share": 0, "scale_share": 0,
+            "rate_scale": 0, "voxel": 1e-6,
+        }  # fmt: skip
+        for name, low in least.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value < float("inf"):
+                raise ValueError(f"{name} is {value}; it has to be at least {low}.")
+        if not self.ssim_share <= 1:
+            raise ValueError(f"ssim_share is {self.ssim_share}; it is a share, 0 to 1.")
+        if self.iterations is None and self.seconds is None:
+            raise ValueError("A run needs an end: give iterations or seconds.")
+
     def rates(self, iterations: int) -> Rates:
         """The learning rates of a run of so many iterations."""
         if self.preset == "paper":

@@ -66,7 +66,7 @@ class Trainer:
     ) -> None:
         """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller."""
         self.device, self.capture, self.settings = device, capture, settings
-        self.budget = Budget.of(settings)
+        self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
         self.stops = capture.stops
         photos = load_photos(capture, "train", self.factor, settings.masks)

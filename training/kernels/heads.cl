@@ -13,7 +13,6 @@
 #define INPUTS (FEATURES + CONTROL + 3)
 #define HIDDEN8 (HIDDEN / 8)
 #define FEATURES8 (FEATURES / 8)
-#define MAX_OUT8 (MAX_OUT / 8)
 #define COLOR 4
 #define BLOCK 8  // anchors that share one pass over the weights in the backward kernel
 
@@ -96,6 +95,106 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
   }
 }
 
+// What a head's backward pass knows of its block of anchors; rows beyond the end add nothing.
+typedef struct {
+  float input[BLOCK][FEATURES], unit[BLOCK][HIDDEN], d_out[BLOCK][MAX_OUT], d_unit[BLOCK][HIDDEN];
+  float8 d_input[BLOCK][FEATURES8];
+  float4 direction[BLOCK];  // unit vector, 1 / distance
+} Block;
+
+inline void load_anchors(Block *k, int base, int count, float3 eye, __global const float *anchors,
+                         __global const float *features) {
+  for (int b = 0; b < BLOCK; b++) {
+    int a = base + min(b, count - 1);
+    for (int i = 0; i < FEATURES; i++) k->input[b][i] = features[a * FEATURES + i];
+    for (int i = 0; i < FEATURES8; i++) k->d_input[b][i] = 0;
+    k->direction[b] = direction_and_inverse(eye, anchors + 3 * a);
+  }
+}
+
+inline void load_head(Block *k, int m, int base, int count, __global const float *hidden,
+                      __global const float *grad_raw) {
+  for (int b = 0; b < BLOCK; b++) {
+    int a = base + min(b, count - 1);
+    float live = b < count ? 1.0f : 0.0f;
+    for (int c = 0; c < OUT[m] / 8; c++)
+      vstore8(live * vload8(c, grad_raw + a * RAW + OUT_AT[m]), c, k->d_out[b]);
+    for (int j = 0; j < HIDDEN8; j++)
+      vstore8(vload8(j, hidden + (a * 5 + m) * HIDDEN), j, k->unit[b]);
+  }
+}
+
+// b2 and W2 of a head with `outs` outputs.
+inline void second_layer_gradient(Block *k, int outs, __global float *grad) {
+  for (int c = 0; c < outs / 8; c++) {
+    float8 d[BLOCK], sum = vload8(c, grad + HIDDEN * outs);
+    for (int b = 0; b < BLOCK; b++) { d[b] = vload8(c, k->d_out[b]); sum += d[b]; }
+    vstore8(sum, c, grad + HIDDEN * outs);
+    for (int j = 0; j < HIDDEN; j++) {
+      float8 g = vload8(c, grad + j * outs);
+      for (int b = 0; b < BLOCK; b++) g += k->unit[b][j] * d[b];
+      vstore8(g, c, grad + j * outs);
+    }
+  }
+}
+
+// Through the ReLU into the hidden units, and b1 and W1 of the features (and of the direction).
+inline void first_layer_gradient(Block *k, int m, __global const float *second_t,
+                                 __global float *grad) {
+  for (int j = 0; j < HIDDEN8; j++) {
+    float8 d[BLOCK], sum = vload8(j, grad + INPUTS * HIDDEN);
+    for (int b = 0; b < BLOCK; b++) d[b] = 0;
+    for (int c = 0; c < OUT[m]; c++) {
+      float8 w = vload8(j, second_t + c * HIDDEN);
+      for (int b = 0; b < BLOCK; b++) d[b] += k->d_out[b][c] * w;
+    }
+    for (int b = 0; b < BLOCK; b++) {
+      d[b] = select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
+      sum += d[b];
+      vstore8(d[b], j, k->d_unit[b]);
+    }
+    vstore8(sum, j, grad + INPUTS * HIDDEN);
+    for (int i = 0; i < FEATURES; i++) {
+      float8 g = vload8(j, grad + i * HIDDEN);
+      for (int b = 0; b < BLOCK; b++) g += k->input[b][i] * d[b];
+      vstore8(g, j, grad + i * HIDDEN);
+    }
+    if (m != COLOR) continue;
+    for (int i = 0; i < 3; i++) {
+      float8 g = vload8(j, grad + (DIRECTION_ROW + i) * HIDDEN);
+      for (int b = 0; b < BLOCK; b++) {
+        float4 u = k->direction[b];
+        g += (i == 0 ? u.x : i == 1 ? u.y : u.z) * d[b];
+      }
+      vstore8(g, j, grad + (DIRECTION_ROW + i) * HIDDEN);
+    }
+  }
+}
+
+inline void add_input_gradient(Block *k, __global const float *first_t) {
+  for (int j = 0; j < HIDDEN; j++)
+    for (int i = 0; i < FEATURES8; i++) {
+      float8 w = vload8(i, first_t + j * FEATURES);
+      for (int b = 0; b < BLOCK; b++) k->d_input[b][i] += k->d_unit[b][j] * w;
+    }
+}
+
+// The colour's view direction turns when its anchor moves: d direction / d anchor = (I - u u^T) / r.
+inline void add_direction_gradient(Block *k, int base, int count, __global const float *first,
+                                   __global float *grad_anchors) {
+  for (int b = 0; b < count; b++) {
+    float g[3];
+    for (int i = 0; i < 3; i++) {
+      g[i] = 0;
+      for (int j = 0; j < HIDDEN; j++)
+        g[i] += k->d_unit[b][j] * first[(DIRECTION_ROW + i) * HIDDEN + j];
+    }
+    float3 u = k->direction[b].xyz, by_direction = (float3)(g[0], g[1], g[2]);
+    float3 flow = (by_direction - u * dot(by_direction, u)) * k->direction[b].w;
+    vstore3(vload3(base + b, grad_anchors) + flow, base + b, grad_anchors);
+  }
+}
+
 // One work-item a chunk of anchors, with weight gradients of its own that sum_chunks adds up in a
 // fixed order: no atomics, the same bits for any number of threads.
 // grad_anchors already holds the gradient through the means and gets that of the direction added.
@@ -111,94 +210,22 @@ __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float e
   for (int i = 0; i < WEIGHTS; i++) grad[i] = 0;
   float3 eye = (float3)(eye_x, eye_y, eye_z);
   int from = (long)anchors_count * chunk / chunks, to = (long)anchors_count * (chunk + 1) / chunks;
+  Block k;
   for (int base = from; base < to; base += BLOCK) {
     int count = min(BLOCK, to - base);
-    float input[BLOCK][FEATURES];
-    float8 grad_input[BLOCK][FEATURES8];
-    float4 direction[BLOCK];
-    for (int b = 0; b < BLOCK; b++) {  // beyond the end: zeros, which add nothing
-      int a = base + min(b, count - 1);
-      for (int i = 0; i < FEATURES; i++) input[b][i] = features[a * FEATURES + i];
-      for (int i = 0; i < FEATURES8; i++) grad_input[b][i] = 0;
-      direction[b] = direction_and_inverse(eye, anchors + 3 * a);
-    }
+    load_anchors(&k, base, count, eye, anchors, features);
     for (int m = 0; m < 5; m++) {
-      __global const float *first = weights + WEIGHTS_AT[m];
       __global float *g_first = grad + WEIGHTS_AT[m];
-      __global float *g_second = g_first + (INPUTS + 1) * HIDDEN;
-      __global const float *my_first_t = first_t + m * HIDDEN * FEATURES;
-      __global const float *my_second_t = second_t + OUT_AT[m] * HIDDEN;
-      int outs = OUT[m], outs8 = OUT[m] / 8;
-      float unit[BLOCK][HIDDEN], d_out[BLOCK][MAX_OUT], d_unit[BLOCK][HIDDEN];
-      for (int b = 0; b < BLOCK; b++) {
-        int a = base + min(b, count - 1);
-        float live = b < count ? 1.0f : 0.0f;
-        for (int c = 0; c < outs8; c++)
-          vstore8(live * vload8(c, grad_raw + a * RAW + OUT_AT[m]), c, d_out[b]);
-        for (int j = 0; j < HIDDEN8; j++)
-          vstore8(vload8(j, hidden + (a * 5 + m) * HIDDEN), j, unit[b]);
-      }
-      // second layer: b2, W2, and what flows on into the hidden units through the ReLU
-      for (int c = 0; c < outs8; c++) {
-        float8 d[BLOCK], sum = vload8(c, g_second + HIDDEN * outs);
-        for (int b = 0; b < BLOCK; b++) { d[b] = vload8(c, d_out[b]); sum += d[b]; }
-        vstore8(sum, c, g_second + HIDDEN * outs);
-        for (int j = 0; j < HIDDEN; j++) {
-          float8 g = vload8(c, g_second + j * outs);
-          for (int b = 0; b < BLOCK; b++) g += unit[b][j] * d[b];
-          vstore8(g, c, g_second + j * outs);
-        }
-      }
-      for (int j = 0; j < HIDDEN8; j++) {
-        float8 d[BLOCK];
-        for (int b = 0; b < BLOCK; b++) d[b] = 0;
-        for (int c = 0; c < outs; c++) {
-          float8 w = vload8(j, my_second_t + c * HIDDEN);
-          for (int b = 0; b < BLOCK; b++) d[b] += d_out[b][c] * w;
-        }
-        float8 sum = vload8(j, g_first + INPUTS * HIDDEN);
-        for (int b = 0; b < BLOCK; b++) {
-          d[b] = select((float8)(0.0f), d[b], isgreater(vload8(j, unit[b]), (float8)(0.0f)));
-          sum += d[b];
-          vstore8(d[b], j, d_unit[b]);
-        }
-        vstore8(sum, j, g_first + INPUTS * HIDDEN);
-        // first layer: W1 of the features (and of the direction)
-        for (int i = 0; i < FEATURES; i++) {
-          float8 g = vload8(j, g_first + i * HIDDEN);
-          for (int b = 0; b < BLOCK; b++) g += input[b][i] * d[b];
-          vstore8(g, j, g_first + i * HIDDEN);
-        }
-        if (m == COLOR)
-          for (int i = 0; i < 3; i++) {
-            float8 g = vload8(j, g_first + (DIRECTION_ROW + i) * HIDDEN);
-            for (int b = 0; b < BLOCK; b++)
-              g += (i == 0 ? direction[b].x : i == 1 ? direction[b].y : direction[b].z) * d[b];
-            vstore8(g, j, g_first + (DIRECTION_ROW + i) * HIDDEN);
-          }
-      }
-      for (int j = 0; j < HIDDEN; j++)
-        for (int i = 0; i < FEATURES8; i++) {
-          float8 w = vload8(i, my_first_t + j * FEATURES);
-          for (int b = 0; b < BLOCK; b++) grad_input[b][i] += d_unit[b][j] * w;
-        }
+      load_head(&k, m, base, count, hidden, grad_raw);
+      second_layer_gradient(&k, OUT[m], g_first + (INPUTS + 1) * HIDDEN);
+      first_layer_gradient(&k, m, second_t + OUT_AT[m] * HIDDEN, g_first);
+      add_input_gradient(&k, first_t + m * HIDDEN * FEATURES);
       if (m == COLOR)
-        for (int b = 0; b < count; b++) {
-          float g[3];
-          for (int i = 0; i < 3; i++) {
-            g[i] = 0;
-            for (int j = 0; j < HIDDEN; j++)
-              g[i] += d_unit[b][j] * first[(DIRECTION_ROW + i) * HIDDEN + j];
-          }
-          float3 u = direction[b].xyz, gu = (float3)(g[0], g[1], g[2]);
-          float3 flow = (gu - u * dot(gu, u)) * direction[b].w;
-          __global float *out = grad_anchors + 3 * (base + b);
-          out[0] += flow.x; out[1] += flow.y; out[2] += flow.z;
-        }
+        add_direction_gradient(&k, base, count, weights + WEIGHTS_AT[m], grad_anchors);
     }
     for (int b = 0; b < count; b++)
       for (int i = 0; i < FEATURES8; i++)
-        vstore8(grad_input[b][i], i, grad_features + (base + b) * FEATURES);
+        vstore8(k.d_input[b][i], i, grad_features + (base + b) * FEATURES);
   }
 }
 
