@@ -16,9 +16,9 @@ class Options:
     """Photograph the workshop (minutes), train it (minutes), write its package."""
 
     out: Path = Path("out/workshop")
-    """Folder for the capture and, unless --package says otherwise, workshop.shift."""
+    """Folder for the capture, workshop.shift and its checkpoint."""
     package: Path | None = None
-    """Where the package goes; the bundled one is assets/workshop.shift."""
+    """Copy the package there too when it is done; the bundled one is assets/workshop.shift."""
     seconds: float | None = None
     """Train for so long instead of a fixed number of steps."""
     iterations: int = ITERATIONS
@@ -44,7 +44,7 @@ def run(options: Options) -> int:
         say(f"Using the photos that are in {folder}; delete it to trace them again.")
     else:
         photograph(folder, size, options)
-    package = options.package or options.out / "workshop.shift"
+    package = options.out / "workshop.shift"
     limited = options.seconds is not None
     code = train.run(
         train.Options(
@@ -56,12 +56,25 @@ def run(options: Options) -> int:
             max_anchors=MOST_ANCHORS,
         )
     )
-    size_mb = package.stat().st_size / 1e6
-    say(f"{package}: {size_mb:.2f} MB")
-    if package.stat().st_size > MOST_BYTES:
-        say(f"That is more than the {MOST_BYTES / 1e6:.0f} MB that the repository takes.")
-        return 1
+    if code == 0 and options.package is not None:
+        publish(package, options.package)
     return code
+
+
+def publish(package: Path, target: Path) -> None:
+    """The finished package to where it is wanted, whole or not at all."""
+    from app.errors import UsageError
+
+    data = package.read_bytes()
+    if len(data) > MOST_BYTES:
+        raise UsageError(
+            f"{package} has {len(data):,} bytes, more than the {MOST_BYTES:,} that a bundled "
+            "package may have; lower MOST_ANCHORS"
+        )
+    beside = target.with_name(target.name + ".part")
+    beside.write_bytes(data)
+    os.replace(beside, target)
+    say(f"{target}: {len(data) / 1e6:.2f} MB")
 
 
 def made_before(folder: Path, recipe: dict) -> bool:
