@@ -40,8 +40,8 @@ class Options:
 
 
 def run(options: Options) -> int:
+    from app.drawing import open_renderer, parse_size
     from app.errors import UsageError
-    from app.headless_drawing import open_renderer, parse_size
     from app.measure import Measure
     from runtime_models.read_scene import read_model
 
@@ -82,8 +82,8 @@ def command_line() -> str:
 
 def check_counts(options) -> None:
     """--frames and --sweep: two or more, since one frame has no percentiles."""
+    from app.drawing import MOST_VALUES
     from app.errors import UsageError
-    from app.headless_drawing import MOST_VALUES
 
     for name in ("frames", "sweep"):
         if not 2 <= getattr(options, name) <= MOST_VALUES:

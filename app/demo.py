@@ -35,7 +35,7 @@ class Options:
 
 def run(options: Options) -> int:
     from app import train
-    from app.headless_drawing import parse_size
+    from app.drawing import parse_size
 
     size = parse_size(options.size)
     folder = options.out / "capture"

@@ -10,8 +10,8 @@ import numpy as np
 import tyro
 
 from app.controls import FAST, SLOW, SMOOTH_S, Camera, Push
+from app.drawing import make_folder, parse_size, save_png
 from app.errors import UsageError
-from app.headless_drawing import make_folder, parse_size, save_png
 from app.panel import Readings, draw_note, draw_panel, draw_problem, free_area
 from app.scale_bar import draw_scale_bar
 from app.slider import draw_slider_bar

@@ -1,7 +1,6 @@
 """launch.py eval: PSNR and SSIM of a scene on the held-out photos of a capture."""
 
 import json
-import os
 import sys
 import time
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ class Options:
 
 
 def run(options: Options) -> int:
+    from app.bench import write_json
     from rasterizer.device import open_device
     from runtime_models.read_scene import read_model
     from scene.read_capture import read_capture
@@ -47,12 +47,6 @@ def run(options: Options) -> int:
     elif options.json is not None:
         write_json(options.json, result)
     return 0
-
-
-def write_json(path: Path, result: dict) -> None:
-    temporary = path.with_name(path.name + ".partial")
-    temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    os.replace(temporary, path)
 
 
 def print_table(result: dict) -> None:

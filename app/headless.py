@@ -30,8 +30,8 @@ class Options:
 
 def run(options: Options) -> int:
     from app.bench import check_counts, check_result_path, measure, print_table, write_json
+    from app.drawing import make_folder, open_renderer, parse_size
     from app.errors import UsageError
-    from app.headless_drawing import make_folder, open_renderer, parse_size
     from app.measure import Measure
     from runtime_models.read_scene import read_model
     from scene.framing import default_background
@@ -65,7 +65,7 @@ def draw_sheet(renderer, model, size: tuple[int, int], out: Path) -> None:
     """A row a viewpoint; columns are the stops and the middles between them."""
     import numpy as np
 
-    from app.headless_drawing import save_png
+    from app.drawing import save_png
     from scene.scene import Scene, SceneObject
 
     stops = sorted({stop.x for stop in model.stops})
@@ -85,8 +85,8 @@ def draw_sheet(renderer, model, size: tuple[int, int], out: Path) -> None:
 
 def check_ours(paths: list[Path]) -> None:
     """Pictures of an earlier run are replaced, anybody else's files are not."""
+    from app.drawing import is_our_png
     from app.errors import UsageError
-    from app.headless_drawing import is_our_png
 
     for path in paths:
         if path.exists() and not (path.is_file() and is_our_png(path)):

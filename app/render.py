@@ -40,14 +40,14 @@ class Options:
 
 
 def run(options: Options) -> int:
-    from app.errors import UsageError
-    from app.headless_drawing import (
+    from app.drawing import (
         MOST_VALUES,
         make_folder,
         open_renderer,
         parse_controls,
         parse_size,
     )
+    from app.errors import UsageError
     from runtime_models.read_scene import read_model
     from scene.framing import default_background
 
@@ -97,7 +97,7 @@ def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: floa
     from rich.console import Console
     from rich.progress import track
 
-    from app.headless_drawing import save_png
+    from app.drawing import save_png
     from scene.scene import Scene, SceneObject
     from scene.stereo import stereo_pair
 

@@ -8,14 +8,14 @@ import pytest
 from PIL import Image
 
 from app import cli
-from app.errors import UsageError
-from app.headless_drawing import (
+from app.drawing import (
     is_our_png,
     open_renderer,
     parse_controls,
     parse_size,
     save_png,
 )
+from app.errors import UsageError
 from renderer.palette import palette_colors
 from renderer.reference import reference_image
 from runtime_models.read_scene import read_model

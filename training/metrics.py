@@ -1,33 +1,8 @@
-"""PSNR and SSIM of a picture against a photo, in numpy: what is reported, and the losses' twin."""
+"""PSNR and SSIM of a picture against a photo of which not every pixel need count."""
 
 import numpy as np
 
-
-def window() -> np.ndarray:
-    """(11,) the Gaussian of sigma 1.5 that SSIM is usually measured with, sum 1."""
-    taps = np.exp(-((np.arange(11) - 5.0) ** 2) / (2 * 1.5**2))
-    return taps / taps.sum()
-
-
-def windowed(image: np.ndarray) -> np.ndarray:
-    """(H, W, C) means under the window, zeros beyond the border."""
-    taps = window()
-    rows = np.pad(image, ((5, 5), (0, 0), (0, 0)))
-    image = sum(t * rows[i : i + len(image)] for i, t in enumerate(taps))
-    columns = np.pad(image, ((0, 0), (5, 5), (0, 0)))
-    return sum(t * columns[:, i : i + image.shape[1]] for i, t in enumerate(taps))
-
-
-def ssim_map(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(H, W, 3) float64 structural similarity (Wang et al., 2004) of images in 0..1."""
-    a, b = a.astype(np.float64), b.astype(np.float64)
-    mean_a, mean_b = windowed(a), windowed(b)
-    var_a, var_b = windowed(a * a) - mean_a**2, windowed(b * b) - mean_b**2
-    covariance = windowed(a * b) - mean_a * mean_b
-    c1, c2 = 0.01**2, 0.03**2
-    return ((2 * mean_a * mean_b + c1) * (2 * covariance + c2)) / (
-        (mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2)
-    )
+from scene.metrics import ssim_map
 
 
 def weighted_mean(values: np.ndarray, weight: np.ndarray | None) -> float:

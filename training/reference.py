@@ -5,8 +5,8 @@ import numpy as np
 from rasterizer.project import Camera
 from rasterizer.reference import render_reference
 from runtime_models.model import HEADS
+from scene.metrics import ssim_map
 from training.gaussians import REACH, SCALE_CLIP, UNIT
-from training.metrics import ssim_map
 from training.networks import HeadLayout
 
 

@@ -1,4 +1,4 @@
-"""What the modes without a window share: option checks, a renderer, pictures on disk."""
+"""What the modes that draw share: option checks, a renderer without a window, pictures on disk."""
 
 import os
 import re
