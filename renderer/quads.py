@@ -54,8 +54,12 @@ class QuadsDrawing:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
         self._arena.place(np.reshape(world_from_objects, (-1, 4, 4)))
 
-    def draw(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
-        """Draws view number i."""
+    def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
+        """Draws every view; view i is then image(i)."""
+        for i, view in enumerate(views):
+            self._draw_view(i, view, settings, timer)
+
+    def _draw_view(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
         with timer.time("project"):
             self._projector.project(self._arena, view, settings)
         with timer.time("sort", on_gpu=self._sorter.backend == "gl"):

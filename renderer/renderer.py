@@ -119,8 +119,7 @@ class Renderer:
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
         with self._framebuffer_kept():
-            for i, view in enumerate(views):
-                self._drawing.draw(i, view, self.settings, self._timer)
+            self._drawing.draw(views, self.settings, self._timer)
         if targets is not None:
             with self._timer.time("resolve"):
                 for i, framebuffer in enumerate(targets):

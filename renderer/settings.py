@@ -1,18 +1,66 @@
 """What a frame may be asked for and what it tells afterwards: RenderSettings in, FrameStats out."""
 
+import math
 from dataclasses import dataclass, field
+
+ORDERS = ("depth", "distance")
+KEY_BITS = (16, 32)
+STEREO_SORTS = ("shared", "each")
+TARGETS = ("rgba8", "rgba16f", "rgba32f")
+DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object")
+# Why a splat is not drawn, in the order of the gates: the first that it fails counts it.
+CULL_REASONS = ("opacity", "distance", "frustum", "size", "footprint", "faded")
 
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """The quality of a frame.  Defaults are the exact setting: nothing is left out."""
+    """The quality of a frame.  Defaults are the exact setting: nothing is left out.
 
+    docs/bench charts what each shortcut saves and what it costs in the picture.
+    """
+
+    # The pixel
     min_alpha: float = 1 / 255  # a pixel's alpha below this is not drawn (3DGS)
-    max_pixels: float = float("inf")  # tau_lambda: largest screen axis of a splat, pixels
-    max_distance: float = float("inf")  # tau_dist: metres from the eye
     low_pass: float = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
-    key_bits: int = 32  # depth order: 32 exact, 16 over the tight range of the frame
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)  # display sRGB
+    target: str = "rgba16f"  # what quads blend into; tiles blend float32 in registers
+    render_scale: float = 1.0  # of the view's width and height, then shown at full size
+
+    # Culls
+    max_pixels: float = math.inf  # tau_lambda: one sigma of a splat's longer axis, pixels
+    max_distance: float = math.inf  # tau_dist: metres from the eye
+    min_pixels: float = 0.0  # footprint: half the quad's longer side, pixels (cut included)
+    fade: float = 0.0  # part of each of these three limits over which opacity goes to 0
+
+    # Order
+    order: str = "depth"  # along the view (3DGS) or "distance" to the eye (KHR_gaussian_splatting)
+    key_bits: int = 32  # 32 exact, 16 over the tight range of the frame
+    stereo_sort: str = "shared"  # one sort for parallel eyes; more than 1 degree apart: "each"
+    resort_frames: int = 1  # sort every n-th frame; 0: never because of the number of frames
+    resort_degrees: float = 0.0  # and as soon as the view has turned by so much; 0: whenever
+
+    # Colour
+    recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
+    skip_unseen: bool = False  # no colours for anchors that no view can see
+
+    debug: str = ""  # one of DEBUG_VIEWS instead of the picture
+
+    def __post_init__(self) -> None:
+        for name, choices in (
+            ("order", ORDERS), ("key_bits", KEY_BITS), ("stereo_sort", STEREO_SORTS),
+            ("target", TARGETS), ("debug", DEBUG_VIEWS),
+        ):  # fmt: skip
+            if getattr(self, name) not in choices:
+                told = ", ".join(repr(c) for c in choices)
+                raise ValueError(f"{name} is {getattr(self, name)!r}; choose one of {told}.")
+        for name, least, most in (
+            ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
+            ("max_pixels", 0.0, math.inf), ("max_distance", 0.0, math.inf),
+            ("min_pixels", 0.0, math.inf), ("fade", 0.0, 1.0), ("resort_frames", 0, 1_000_000),
+            ("resort_degrees", 0.0, 180.0), ("recolor_degrees", 0.0, 180.0),
+        ):  # fmt: skip
+            if not least <= getattr(self, name) <= most:
+                raise ValueError(f"{name} is {getattr(self, name)}, expected {least} to {most}.")
 
 
 @dataclass
@@ -22,6 +70,8 @@ class FrameStats:
     ms: dict[str, float] = field(default_factory=dict)  # per named pass: decode, project, ...
     splats: int = 0
     drawn: int = 0
-    culled: dict[str, int] = field(default_factory=dict)  # opacity, size, distance, frustum
+    culled: dict[str, int] = field(default_factory=dict)  # CULL_REASONS
     geometry_runs: int = 0  # objects whose four geometry networks ran for this frame
     color_runs: int = 0  # objects whose colour network ran for this frame
+    sorts: int = 0  # how often this frame sorted: 0 with an order kept, 1, or 1 a view
+    order_age: int = 0  # frames since the order in use was made

@@ -90,8 +90,12 @@ class TilesDrawing:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
         self._world_from_objects = np.reshape(world_from_objects, (-1, 4, 4))
 
-    def draw(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
-        """Draws view number i."""
+    def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
+        """Draws every view; view i is then image(i)."""
+        for i, view in enumerate(views):
+            self._draw_view(i, view, settings, timer)
+
+    def _draw_view(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
         if not self.splats:
             self._images[i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
             return
