@@ -10,11 +10,11 @@ The life of the passes, in the order of the calls:
     decoder.geometry(i, x)                           # when the control value of object i changed
     decoder.color(i, x, eye_object)                  # then, and when the eye moved
     arena.place(world_from_objects)                  # (4, 4) each, NaN hides; any time
+    projector.project(arena, views, settings, sort_from_world)    # one or two views at once
+    sorter.sort(arena, settings.key_bits)
     for i, view in enumerate(views):
-        projector.project(arena, view, settings)
-        sorter.sort(arena, settings.key_bits)
         splatter.draw(arena, i, view.size, settings.min_alpha)
-        projector.counts(arena)                      # waits for the GPU: {drawn, opacity, ...}
+        projector.counts(arena, i)                   # waits for the GPU: {drawn, opacity, ...}
     resolve.draw(splatter.texture(i), framebuffer, background, palette, weight)
     splatter.image(i)                                # (H, W, 4) float32
 
@@ -63,7 +63,7 @@ class Arena:
         self.color = gpu.reserve(16 * n)
         objects = np.repeat(np.arange(len(counts), dtype=np.uint32), np.array(counts, np.int64))
         self.object = gpu.upload(objects)
-        self.poses = gpu.reserve(16 * layout.POSE_ROWS * len(counts))
+        self.poses = gpu.reserve(16 * layout.POSE_ROWS * (layout.MOST_VIEWS + 1) * len(counts))
         self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
         self.keys, self.keys_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
         self.order, self.order_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
@@ -80,6 +80,17 @@ class Arena:
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
+
+    def holds_views(self, views: int) -> bool:
+        """Whether the records of so many views at once fit this driver's storage blocks."""
+        return 16 * layout.RECORD_VECS * self.count * views <= self.gpu.max_block
+
+    def make_room(self, views: int) -> None:
+        """Records of so many views from now on; what they held is gone when they had to grow."""
+        size = 16 * layout.RECORD_VECS * self.count * views
+        if size > self.records.size:
+            self.records.release()
+            self.records = self.gpu.reserve(size, "records of two views")
 
     def place(self, world_from_objects: list[np.ndarray] | np.ndarray) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""

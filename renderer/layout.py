@@ -9,6 +9,7 @@ CULLED_KEY = 0xFFFFFFFF  # sorts behind every depth
 RECORD_VECS = 2  # uvec4 a projected splat
 COVARIANCE_VECS = 2  # vec4 a splat: xx xy xz yy | yz zz 0 0
 POSE_ROWS = 3  # vec4 rows of eye_from_object
+MOST_VIEWS = 2  # that one dispatch of project handles
 
 MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
 JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the view the projection counts as flat
@@ -22,10 +23,10 @@ SLOTS = {
     "COVARIANCE": 1,  # vec4 (N, 2)    m^2, in the object
     "COLOR": 2,  # vec4 (N,)      display sRGB
     "OBJECT": 3,  # uint (N,)      which pose
-    "POSES": 4,  # vec4 (O, 3)    rows of eye_from_object
-    "RECORDS": 5,  # uvec4 (N, 2)   screen ellipses
-    "KEYS": 6,  # uint (N,)      depth as float bits, or CULLED_KEY
-    "COUNTS": 7,  # uint (8,)      as COUNTS below
+    "POSES": 4,  # vec4 (O, V + 1, 3)    rows of eye_from_object of each view; sort_from_object
+    "RECORDS": 5,  # uvec4 (V, N, 2)   screen ellipses
+    "KEYS": 6,  # uint (N,)      depth or distance as float bits, or CULLED_KEY
+    "COUNTS": 7,  # uint (20,)     as COUNTS below
     # sort
     "KEYS_OUT": 0,
     "ORDER_IN": 1,
@@ -47,17 +48,23 @@ SLOTS = {
 }
 WEIGHTS_BLOCK = 0  # uniform block
 
-# Rows of the counts buffer.  The first gate that a splat fails counts it.
+# Rows of the counts buffer.  Those of view v start at v * COUNTS_STRIDE: the splats drawn, then the
+# reasons of settings.CULL_REASONS; the first gate that a splat fails counts it.
+COUNTS_STRIDE = 8
 COUNTS = {
     "DRAWN": 0,
     "OPACITY": 1,
     "DISTANCE": 2,
     "FRUSTUM": 3,
     "SIZE": 4,
-    "NEAREST": 5,  # float bits of metres
-    "FARTHEST": 6,
+    "FOOTPRINT": 5,
+    "FADED": 6,
+    # of all views together
+    "SORTED": MOST_VIEWS * COUNTS_STRIDE,  # keys that are not CULLED_KEY
+    "NEAREST": MOST_VIEWS * COUNTS_STRIDE + 1,  # least of them: float bits of metres
+    "FARTHEST": MOST_VIEWS * COUNTS_STRIDE + 2,
 }
-COUNTS_SIZE = 8
+COUNTS_SIZE = MOST_VIEWS * COUNTS_STRIDE + 4
 
 
 def defines() -> dict[str, int | float]:
@@ -66,6 +73,7 @@ def defines() -> dict[str, int | float]:
         "WORKGROUP": WORKGROUP, "DECODE_WORKGROUP": DECODE_WORKGROUP, "SORT_BLOCKS": SORT_BLOCKS,
         "RADIX": RADIX, "CULLED_KEY": f"{CULLED_KEY:#x}u", "MAX_ALPHA": MAX_ALPHA,
         "JACOBIAN_MARGIN": JACOBIAN_MARGIN, "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK,
+        "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",
     }  # fmt: skip
     slots = {f"SLOT_{name}": slot for name, slot in SLOTS.items()}
     counts = {f"COUNT_{name}": row for name, row in COUNTS.items()}

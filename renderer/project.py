@@ -1,11 +1,11 @@
-"""project: splats -> screen ellipses and depth keys; the only culling gate."""
+"""project: splats -> screen ellipses and keys to sort by; the only culling gate."""
 
 import numpy as np
 
 from renderer import layout
 from renderer.buffers import Arena, bind
 from renderer.gpu import Gpu, groups_for
-from renderer.settings import RenderSettings
+from renderer.settings import CULL_REASONS, RenderSettings
 from scene.pose import View
 
 NO_COUNTS = np.zeros(layout.COUNTS_SIZE, np.uint32)
@@ -13,43 +13,61 @@ NO_COUNTS[layout.COUNTS["NEAREST"]] = layout.CULLED_KEY
 
 
 class Projector:
-    """Writes the records, keys and counts of an arena for one view after the other."""
+    """Writes the records, keys and counts of an arena, for one view or for two at once."""
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._program = gpu.compute("project.comp")
+        gpu.compute("project.comp", VIEWS=1, SORT_FRAME=0)  # a broken shader is told at the start
 
-    def project(self, arena: Arena, view: View, settings: RenderSettings) -> None:
-        """Projects all objects with their poses, under the limits of the settings."""
-        if not settings.min_alpha > 0:
-            raise ValueError(f"min_alpha is {settings.min_alpha}; it must be above 0 (say 1/255).")
+    def project(
+        self,
+        arena: Arena,
+        views: list[View],
+        settings: RenderSettings,
+        sort_from_world: np.ndarray | None = None,
+        keep_outside: bool = False,
+    ) -> None:
+        """Projects all objects with their poses, under the limits of the settings.
+
+        Row v * N + i of arena.records is splat i in view v; arena.keys[i] its depth (or distance,
+        settings.order) in the frame sort_from_world (4, 4), by default the first view's eye.
+        keep_outside: the order is to outlive this frame, or did outlive another: every splat that
+        is not absent has a key, and every record is written; those of culled ones have no area.
+        """
+        if not 1 <= len(views) <= layout.MOST_VIEWS:
+            raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
         arena.counts.write(NO_COUNTS)
         if not arena.count:
             return
+        arena.make_room(len(views))
+        frames = [view.eye_from_world() for view in views]
+        if sort_from_world is not None:
+            frames.append(np.asarray(sort_from_world, np.float64))
         # In float64 on the CPU: a far world origin must not eat the digits of a near splat.
-        eye_from_object = view.eye_from_world() @ arena.world_from_object
-        arena.poses.write(np.ascontiguousarray(eye_from_object[:, :3], np.float32))
+        poses = np.stack([frame @ arena.world_from_object for frame in frames], axis=1)
+        arena.poses.write(np.ascontiguousarray(poses[:, :, :3], np.float32))
         bind(
             mean_opacity=arena.mean_opacity, covariance=arena.covariance, color=arena.color,
             object=arena.object, poses=arena.poses, records=arena.records, keys=arena.keys,
             counts=arena.counts,
         )  # fmt: skip
+        program = self._gpu.compute(
+            "project.comp", VIEWS=len(views), SORT_FRAME=len(frames) - len(views)
+        )
         self._gpu.run(
-            self._program, groups_for(arena.count, layout.WORKGROUP),
-            count=arena.count, tangents=view.tangents, size=view.size, near=view.near,
-            min_alpha=settings.min_alpha, low_pass=settings.low_pass,
-            max_pixels=min(settings.max_pixels, layout.HUGE),
-            max_distance=min(settings.max_distance, layout.HUGE),
+            program, groups_for(arena.count, layout.WORKGROUP),
+            count=arena.count, by_distance=settings.order == "distance", keep_outside=keep_outside,
+            tangents=_each(v.tangents for v in views), size=_each(v.size for v in views),
+            near=_each(v.near for v in views), **limits(settings),
         )  # fmt: skip
 
-    def counts(self, arena: Arena) -> dict[str, int]:
-        """Splats of the last projection: drawn, and culled by opacity, distance, frustum, size.
+    def counts(self, arena: Arena, i: int = 0) -> dict[str, int]:
+        """Splats of view i at the last projection: drawn, then CULL_REASONS.
 
         Waits for the GPU.
         """
-        rows = np.frombuffer(arena.counts.read(), np.uint32)
-        names = ("drawn", "opacity", "distance", "frustum", "size")
-        return {name: int(rows[layout.COUNTS[name.upper()]]) for name in names}
+        rows = np.frombuffer(arena.counts.read(), np.uint32)[i * layout.COUNTS_STRIDE :]
+        return {name: int(rows[layout.COUNTS[name.upper()]]) for name in ("drawn", *CULL_REASONS)}
 
     def release(self) -> None:
         """Nothing of its own: programs belong to the Gpu."""
@@ -59,3 +77,27 @@ class Projector:
 
     def __exit__(self, *failure) -> None:
         self.release()
+
+
+def limits(settings: RenderSettings) -> dict[str, object]:
+    """The uniforms that stand for the settings' limits; infinite ones as large floats.
+
+    A ramp of the fade is clamp((limit - value) * slope, 0, 1); without one it is 1 everywhere.
+    """
+    largest = min(settings.max_pixels, layout.HUGE)
+    farthest = min(settings.max_distance, layout.HUGE)
+    ends, slopes = [layout.HUGE, layout.HUGE, -layout.HUGE], [1.0, 1.0, 1.0]
+    for i, limit in enumerate((largest, farthest, settings.min_pixels)):
+        if settings.fade > 0 and 0 < limit < layout.HUGE:
+            ends[i], slopes[i] = limit, min(1 / (settings.fade * limit), layout.HUGE)
+    return {
+        "min_alpha": settings.min_alpha, "low_pass": settings.low_pass, "max_pixels": largest,
+        "max_distance": farthest, "min_pixels": min(settings.min_pixels, layout.HUGE),
+        "fade_ends": tuple(ends), "fade_slopes": tuple(slopes),
+    }  # fmt: skip
+
+
+def _each(values) -> object:
+    """One value a view, as a uniform array wants them: an array of one is a plain uniform."""
+    values = list(values)
+    return values[0] if len(values) == 1 else values

@@ -61,7 +61,7 @@ class QuadsDrawing:
 
     def _draw_view(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
         with timer.time("project"):
-            self._projector.project(self._arena, view, settings)
+            self._projector.project(self._arena, [view], settings)
         with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
             self._sorter.sort(self._arena, settings.key_bits)
         with timer.time("splat"):

@@ -97,7 +97,7 @@ def test_groups_cover():
 def test_an_empty_scene_is_a_scene(gpu):
     with Arena(gpu, []) as arena, Splatter(gpu) as splatter:
         arena.place([])
-        Projector(gpu).project(arena, make_view(), RenderSettings())
+        Projector(gpu).project(arena, [make_view()], RenderSettings())
         Sorter(gpu, "gl").sort(arena)
         splatter.draw(arena, 0, (8, 4), 1 / 255)
         assert not splatter.image(0).any() and splatter.image(0).shape == (4, 8, 4)
@@ -119,7 +119,7 @@ def test_a_sweep_of_200_steps_allocates_nothing(gpu, mlps, sort):
             for i in range(2):
                 decoder.geometry(i, x)
                 decoder.color(i, x, np.array([0.0, x, 3.0]))
-            projector.project(arena, view, RenderSettings())
+            projector.project(arena, [view], RenderSettings())
             sorter.sort(arena, 32)
             splatter.draw(arena, 0, view.size, 1 / 255)
             splatter.draw(arena, 1, view.size, 1 / 255)

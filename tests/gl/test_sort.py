@@ -35,7 +35,7 @@ def set_keys(arena: Arena, keys: np.ndarray) -> None:
     arena.keys.write(keys)
     drawn = keys[keys != layout.CULLED_KEY]
     counts = np.zeros(layout.COUNTS_SIZE, np.uint32)
-    counts[layout.COUNTS["DRAWN"]] = len(drawn)
+    counts[layout.COUNTS["SORTED"]] = len(drawn)
     counts[layout.COUNTS["NEAREST"]] = drawn.min(initial=layout.CULLED_KEY)
     counts[layout.COUNTS["FARTHEST"]] = drawn.max(initial=0)
     arena.counts.write(counts)

@@ -45,7 +45,7 @@ def draw(
             decoder.geometry(i, thing.x)
             decoder.color(i, thing.x, eye[:3])
         arena.place(poses)
-        Projector(gpu).project(arena, view, settings)
+        Projector(gpu).project(arena, [view], settings)
         Sorter(gpu, sort).sort(arena, settings.key_bits)
         splatter.draw(arena, 0, view.size, settings.min_alpha)
         return splatter.image(0)
@@ -192,7 +192,7 @@ def test_what_is_not_a_number_never_reaches_the_target(gpu):
             scales[3] = bad
             arena.write_geometry(0, means, scales, good.wxyz, opacity)
             arena.write_color(0, f32(np.where(color == -np.inf, np.nan, color)))
-            Projector(gpu).project(arena, FRONT, SETTINGS)
+            Projector(gpu).project(arena, [FRONT], SETTINGS)
             Sorter(gpu, "gl").sort(arena)
             splatter.draw(arena, 0, FRONT.size, SETTINGS.min_alpha)
             image = splatter.image(0)
@@ -209,7 +209,7 @@ def test_views_have_images_of_their_own_and_change_size(gpu):
         projector, sorter = Projector(gpu), Sorter(gpu, "gl")
         with Splatter(gpu) as splatter:
             for i, view in enumerate((FRONT, far, FRONT)):
-                projector.project(arena, view, SETTINGS)
+                projector.project(arena, [view], SETTINGS)
                 sorter.sort(arena)
                 splatter.draw(arena, i % 2, view.size, SETTINGS.min_alpha)
             assert splatter.image(0).shape == (64, 64, 4)
