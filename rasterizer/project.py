@@ -19,7 +19,7 @@ CLAMP = 1.3  # the Jacobian's x/z and y/z stay within this many times the view's
 LEAST_CHUNK = 2048  # splats: less is not worth a work-item
 WIDTH = {"cpu": 8, "gpu": 1}  # splats a work-item of `project`
 GROUP = 64  # work-items
-CULL_REASONS = ("opacity", "size", "distance", "frustum")
+CULL_REASONS = ("opacity", "distance", "frustum", "size", "footprint", "faded")  # gates in order
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,10 @@ class Found:
     """Where splats lie in the grid of tiles: what find_places and project_arena leave for `bin`."""
 
     places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
-    pairs: "Array"  # (N, 2) uint32 splat and depth key of the visible, at each chunk's start
-    table: "Array"  # (chunks, 1 << LOW_BITS) int32 histograms of the keys' low digit
-    status: "Array"  # (chunks, 4) uint32: visible splats, instances, least and most key
+    # None where an order from before is used: nothing is to be sorted.
+    pairs: "Array | None"  # (N, 2) uint32 splat and sort key of the visible, at each chunk's start
+    table: "Array | None"  # (chunks, 1 << LOW_BITS) int32 histograms of the keys' low digit
+    status: "Array"  # (chunks, 4) uint32: pairs, instances, least and most key
     chunk: int  # splats a chunk
     grid: tuple[int, int]  # tiles across, tiles down
 
@@ -100,7 +101,7 @@ class Projected:
     record: "Array"  # (N, 12) float32, see kernels/common/record.cl; extents <= 0: culled
     depth: "Array"  # (N,) float32 metres along the view, 1e30 where culled
     low_pass: float = LOW_PASS  # px^2
-    culled_counts: "Array | None" = None  # (chunks, 4) int32, CULL_REASONS
+    culled_counts: "Array | None" = None  # (chunks, 6) int32, CULL_REASONS
     found: Found | None = None  # in the grid of the camera's image
 
     def culled(self, device: Device) -> dict[str, int]:
@@ -149,42 +150,3 @@ def project_backward(
         projected.record, grad_record, *grads,
     )  # fmt: skip
     return grads
-
-
-def project_arena(
-    device: Device, mean_opacity, covariance, color, object_index, world_from_object,
-    camera: Camera, min_alpha: float = LEAST_ALPHA, max_pixels: float = float("inf"),
-    max_distance: float = float("inf"), low_pass: float = LOW_PASS,
-) -> Projected:  # fmt: skip
-    """For drawing: N splats of O posed objects, device arrays; counts what each gate keeps out.
-
-    mean_opacity (N, 4) object frame metres and 0..1; covariance (N, 8) m^2, object frame, xx xy xz
-    yy yz zz and two unused; color (N, 4), last unused; object_index (N,) int32.
-    world_from_object: numpy (O, 3 or 4, 4) or (O, 12) rows, rigid.  max_pixels: one sigma of the
-    longer screen axis.  max_distance: metres from the eye.
-    """
-    count = mean_opacity.shape[0]
-    record, depth = device.empty((count, RECORD)), device.empty(count)
-    found = Found.empty(device, count, grid_of(camera.size))
-    chunks = found.status.shape[0]
-    counts = device.empty((chunks, 4), np.int32)
-    width, height = camera.size
-    device.launch(
-        device.program(KERNELS / "project_arena.cl")["project_arena"], chunks, 1,
-        count, found.chunk, width, height, float(camera.near), float(min_alpha),
-        float(max_pixels), float(max_distance), float(low_pass), device.upload(camera.packed()),
-        mean_opacity, covariance, color, object_index,
-        device.upload(_camera_from_object(camera, world_from_object)), record, depth, counts,
-        *found.grid, *found.arrays(),
-    )  # fmt: skip
-    return Projected(record, depth, low_pass, counts, found)
-
-
-def _camera_from_object(camera: Camera, world_from_object) -> np.ndarray:
-    """(O, 12) float32 rows of each object's matrix into the camera."""
-    poses = np.asarray(world_from_object, np.float64)
-    poses = poses.reshape(-1, poses.size // max(1, len(poses)) // 4, 4)[:, :3]  # (O, 3, 4)
-    camera_from_world = np.asarray(camera.camera_from_world, np.float64)
-    chained = camera_from_world[:3, :3] @ poses
-    chained[:, :, 3] += camera_from_world[:3, 3]
-    return chained.reshape(-1, 12).astype(np.float32)

@@ -10,7 +10,8 @@ import numpy as np
 from rasterizer.bin import bin_tiles
 from rasterizer.device import Device, open_device
 from rasterizer.pack import pack
-from rasterizer.project import CULL_REASONS, Camera, project_arena
+from rasterizer.project import CULL_REASONS, Camera
+from rasterizer.project_arena import Limits, project_arena
 from rasterizer.raster import rasterize_rgba
 from rasterizer.shade_sh import shade_sh, upload_sh
 from renderer.settings import RenderSettings
@@ -92,40 +93,37 @@ class TilesDrawing:
 
     def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
         """Draws every view; view i is then image(i)."""
-        for i, view in enumerate(views):
-            self._draw_view(i, view, settings, timer)
-
-    def _draw_view(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
         if not self.splats:
-            self._images[i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
+            for i, view in enumerate(views):
+                self._images[i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
             return
         device = self.device
-        with timer.time("project", on_gpu=False):
-            self._projected = project_arena(
-                device,
-                self._mean_opacity,
-                self._covariance,
-                self._color,
-                self._object_index,
-                self._world_from_objects,
-                Camera(*view.pinhole(), view.size, view.near),
-                settings.min_alpha,
-                settings.max_pixels,
-                settings.max_distance,
-                settings.low_pass,
-            )
-            device.queue.finish()
-        with timer.time("bin", on_gpu=False):
-            tiles = bin_tiles(device, self._projected, view.size)
-            device.queue.finish()
-        with timer.time("splat", on_gpu=False):
-            self._images[i] = rasterize_rgba(device, self._projected, tiles, view.size)
+        for first in range(0, len(views), 2):
+            pair = views[first : first + 2]
+            with timer.time("project", on_gpu=False):
+                self._projected = project_arena(
+                    device,
+                    self._mean_opacity,
+                    self._covariance,
+                    self._color,
+                    self._object_index,
+                    self._world_from_objects,
+                    [Camera(*view.pinhole(), view.size, view.near) for view in pair],
+                    limits_of(settings),
+                )
+                device.queue.finish()
+            for i, (view, projected) in enumerate(zip(pair, self._projected, strict=True), first):
+                with timer.time("bin", on_gpu=False):
+                    tiles = bin_tiles(device, projected, view.size)
+                    device.queue.finish()
+                with timer.time("splat", on_gpu=False):
+                    self._images[i] = rasterize_rgba(device, projected, tiles, view.size)
 
     def counts(self) -> dict[str, int]:
-        """{drawn, opacity, size, distance, frustum} of the view drawn last."""
+        """{drawn, opacity, distance, ...} of the view drawn last: gates in their order."""
         if not self.splats:
             return dict.fromkeys(("drawn", *CULL_REASONS), 0)
-        culled = self._projected.culled(self.device)
+        culled = self._projected[-1].culled(self.device)
         return {"drawn": self.splats - sum(culled.values()), **culled}
 
     def presentable(self, i: int) -> np.ndarray:
@@ -139,3 +137,15 @@ class TilesDrawing:
     def close(self) -> None:
         self._slots.clear()
         self._images.clear()
+
+
+def limits_of(settings: RenderSettings) -> Limits:
+    """The culls of the settings as projection takes them."""
+    return Limits(
+        settings.min_alpha,
+        settings.max_pixels,
+        settings.max_distance,
+        settings.min_pixels,
+        settings.fade,
+        settings.low_pass,
+    )

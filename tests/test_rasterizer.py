@@ -13,7 +13,8 @@ from rasterizer_scenes import (
 )
 
 from rasterizer.bin import bin_tiles
-from rasterizer.project import LEAST_ALPHA, Camera, project, project_arena
+from rasterizer.project import LEAST_ALPHA, Camera, project
+from rasterizer.project_arena import project_arena
 from rasterizer.raster import rasterize, rasterize_rgba
 from rasterizer.reference import project_reference, rasterize_reference
 
@@ -150,7 +151,7 @@ def test_broken_numbers_are_left_out_and_harm_nobody(group, value):
     image, through, projected, _ = draw(splats, camera)
     assert np.isfinite(image).all() and np.isfinite(through).all()
     d = device()
-    for other in (projected, project_arena(d, *arena_of_any(splats), np.eye(4)[None], camera)):
+    for other in (projected, project_arena(d, *arena_of_any(splats), np.eye(4)[None], [camera])[0]):
         record, depth = d.download(other.record), d.download(other.depth)
         drawn = record[:, 9] > 0
         assert np.isfinite(record[drawn]).all() and np.all(depth[drawn] < 1e30)

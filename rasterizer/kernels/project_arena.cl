@@ -1,91 +1,94 @@
-// project_arena: splats of many posed objects -> records, depths and tiles, for drawing alone.
+// project_arena: splats of many posed objects -> records, tiles and sort keys, for drawing alone.
 // A work-item owns a chunk and takes eight splats at a time as vectors.  Memory is the limit here:
-// the tiles are found while the ellipses are at hand (bin.cl's find_places reads them again).
+// a splat is read once for all views, the tiles are found while the ellipses are at hand (bin.cl's
+// find_places reads them again), and what no view can see is dropped before its covariance is read.
+// Needs: VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
 #include "common/camera.cl"
+#include "common/limits.cl"
+#include "common/eight_rows.cl"
 #include "common/places_of_eight.cl"
 
 typedef struct {
-  float8 x, y, z, opacity;            // mean in the object, metres
-  float8 xx, xy, xz, yy, yz, zz;      // covariance in the object, m^2
+  float8 x, y, z, opacity;        // mean in the object, metres
+  float8 xx, xy, xz, yy, yz, zz;  // covariance in the object, m^2
   float8 red, green, blue;
-  float8 m[12];                       // camera_from_object, rows
+  float8 cut;                     // 2 ln(opacity / least alpha)
 } Eight;
 
-// Rows of four or eight floats, one a splat -> one vector a column.
-#define LOAD_EIGHT(into, mean, covariance, color)                                        \
-  {                                                                                      \
-    const float16 p = vload16(0, mean), q = vload16(1, mean);                            \
-    into.x = (float8)(p.s048c, q.s048c);                                                 \
-    into.y = (float8)(p.s159d, q.s159d);                                                 \
-    into.z = (float8)(p.s26ae, q.s26ae);                                                 \
-    into.opacity = (float8)(p.s37bf, q.s37bf);                                           \
-    const float16 a = vload16(0, covariance), b = vload16(1, covariance);                \
-    const float16 c = vload16(2, covariance), d = vload16(3, covariance);                \
-    into.xx = (float8)(a.s08, b.s08, c.s08, d.s08);                                      \
-    into.xy = (float8)(a.s19, b.s19, c.s19, d.s19);                                      \
-    into.xz = (float8)(a.s2a, b.s2a, c.s2a, d.s2a);                                      \
-    into.yy = (float8)(a.s3b, b.s3b, c.s3b, d.s3b);                                      \
-    into.yz = (float8)(a.s4c, b.s4c, c.s4c, d.s4c);                                      \
-    into.zz = (float8)(a.s5d, b.s5d, c.s5d, d.s5d);                                      \
-    const float16 g = vload16(0, color), h = vload16(1, color);                          \
-    into.red = (float8)(g.s048c, h.s048c);                                               \
-    into.green = (float8)(g.s159d, h.s159d);                                             \
-    into.blue = (float8)(g.s26ae, h.s26ae);                                              \
-  }
+// Pose blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
+// order, as rows.  One column a lane: nearly always all of one object, and the one of the eight before.
+#define BLOCKS_OF_POSE (VIEWS + ORDERS)
+#define POSE (12 * BLOCKS_OF_POSE)
 
-// Poses of eight splats: nearly always one object's, and the one of the eight before.
-inline void load_poses(Eight* s, int8 object, int* current, __global const float* poses) {
+inline void load_poses(float8* m, int8 object, int* current, __global const float* poses) {
   if (all(object == object.s0)) {
     if (object.s0 != *current)
-      for (int k = 0; k < 12; k++) s->m[k] = poses[12 * object.s0 + k];
+      for (int k = 0; k < POSE; k++) m[k] = poses[POSE * object.s0 + k];
     *current = object.s0;
     return;
   }
   *current = -1;
   int index[LANES];
   vstore8(object, 0, index);
-  for (int k = 0; k < 12; k++) {
+  for (int k = 0; k < POSE; k++) {
     float column[LANES];
-    for (int lane = 0; lane < LANES; lane++) column[lane] = poses[12 * index[lane] + k];
-    s->m[k] = vload8(0, column);
+    for (int lane = 0; lane < LANES; lane++) column[lane] = poses[POSE * index[lane] + k];
+    m[k] = vload8(0, column);
   }
 }
 
-// Four vectors -> eight rows of four, into column `at` of the records.
-inline void store_rows(float* rows, int at, float8 a, float8 b, float8 c, float8 d) {
-  const float8 ab_lo = (float8)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3);
-  const float8 ab_hi = (float8)(a.s4, b.s4, a.s5, b.s5, a.s6, b.s6, a.s7, b.s7);
-  const float8 cd_lo = (float8)(c.s0, d.s0, c.s1, d.s1, c.s2, d.s2, c.s3, d.s3);
-  const float8 cd_hi = (float8)(c.s4, d.s4, c.s5, d.s5, c.s6, d.s6, c.s7, d.s7);
-  vstore4((float4)(ab_lo.s01, cd_lo.s01), 0, rows + at);
-  vstore4((float4)(ab_lo.s23, cd_lo.s23), 0, rows + at + RECORD);
-  vstore4((float4)(ab_lo.s45, cd_lo.s45), 0, rows + at + RECORD * 2);
-  vstore4((float4)(ab_lo.s67, cd_lo.s67), 0, rows + at + RECORD * 3);
-  vstore4((float4)(ab_hi.s01, cd_hi.s01), 0, rows + at + RECORD * 4);
-  vstore4((float4)(ab_hi.s23, cd_hi.s23), 0, rows + at + RECORD * 5);
-  vstore4((float4)(ab_hi.s45, cd_hi.s45), 0, rows + at + RECORD * 6);
-  vstore4((float4)(ab_hi.s67, cd_hi.s67), 0, rows + at + RECORD * 7);
+// One order: its pairs (splat, key), packed at the chunk's start, and a histogram of low digits.
+typedef struct {
+  __global uint2* pairs;
+  __global int* bins;
+  int next;  // where the next pair goes
+  uint8 least, most;
+} Keys;
+
+// Floats of any sign sort as these bits do.
+inline uint8 sortable(float8 value) {
+  const uint8 bits = as_uint8(value);
+  return bits ^ (as_uint8(as_int8(bits) >> 31) | 0x80000000u);
 }
 
-inline int kept(int8 lanes) {  // how many lanes are true (-1)
-  const int4 a = lanes.lo + lanes.hi;
-  const int2 b = a.lo + a.hi;
-  return -(b.x + b.y);
+inline void enter_keys(Keys* keys, int i, uint8 key, int8 member) {
+  keys->least = min(keys->least, key | ~as_uint8(member));
+  keys->most = max(keys->most, key & as_uint8(member));
+  uint low[LANES];
+  vstore8(key & (LOW_BINS - 1), 0, low);
+  if (all(member)) {
+    vstore16((uint16)(i, key.s0, i + 1, key.s1, i + 2, key.s2, i + 3, key.s3, i + 4, key.s4, i + 5,
+                      key.s5, i + 6, key.s6, i + 7, key.s7),
+             0, (__global uint*)(keys->pairs + keys->next));
+    for (int lane = 0; lane < LANES; lane++) keys->bins[low[lane]]++;
+    keys->next += LANES;
+    return;
+  }
+  uint whole[LANES];
+  int here[LANES];
+  vstore8(key, 0, whole);
+  vstore8(member & 1, 0, here);
+  for (int lane = 0; lane < LANES; lane++) {
+    if (!here[lane]) continue;
+    keys->pairs[keys->next++] = (uint2)(i + lane, whole[lane]);
+    keys->bins[low[lane]]++;
+  }
 }
 
-// rows: 8 records.  depth: 8.  culled: counts of opacity, size, distance, frustum so far.
-inline Ellipses project_eight(const Eight* s, int8 valid, __constant float* camera, int width,
-                          int height, float near, float least_alpha, float most_pixels,
-                          float most_distance, float low_pass, float* rows, float* depth,
-                          int4* culled) {
-  const float8* m = s->m;
-  const float8 x = m[0] * s->x + m[1] * s->y + m[2] * s->z + m[3];
-  const float8 y = m[4] * s->x + m[5] * s->y + m[6] * s->z + m[7];
-  const float8 z = m[8] * s->x + m[9] * s->y + m[10] * s->z + m[11];
+inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fade at
+  return per > 0 ? fmin(fmax(room * per, 0.0f), 1.0f) : (float8)(1);
+}
+
+// Screen ellipses of those `alive` in one view.  passed: per lane how many got past each gate.
+// rows: their records, culled ones with extents of -1.
+inline Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
+                              float8 square, int8 alive, __constant float* view,
+                              __constant float* limits, float* rows, int8* passed) {
+  const float low_pass = limits[LOW_PASS];
   const float8 per_z = 1.0f / z, tan_x = x * per_z, tan_y = y * per_z;
-  const float8 jx = camera[CAMERA_FX] * per_z, jy = camera[CAMERA_FY] * per_z;
-  const float8 jxz = -jx * fmin(fmax(tan_x, camera[LEAST_X]), camera[MOST_X]);
-  const float8 jyz = -jy * fmin(fmax(tan_y, camera[LEAST_Y]), camera[MOST_Y]);
+  const float8 jx = view[CAMERA_FX] * per_z, jy = view[CAMERA_FY] * per_z;
+  const float8 jxz = -jx * fmin(fmax(tan_x, view[LEAST_X]), view[MOST_X]);
+  const float8 jyz = -jy * fmin(fmax(tan_y, view[LEAST_Y]), view[MOST_Y]);
   // Rows of J camera_from_object, then the screen covariance a, b, c.
   const float8 ux = jx * m[0] + jxz * m[8], uy = jx * m[1] + jxz * m[9], uz = jx * m[2] + jxz * m[10];
   const float8 vx = jy * m[4] + jyz * m[8], vy = jy * m[5] + jyz * m[9], vz = jy * m[6] + jyz * m[10];
@@ -101,83 +104,188 @@ inline Ellipses project_eight(const Eight* s, int8 valid, __constant float* came
   const float8 bare = fmax(bare_a * bare_c - b * b, 0.0f);  // float rounding may go below 0
   const float8 determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
   const float8 per = 1.0f / determinant;
-  const float8 cut = 2.0f * log(s->opacity / least_alpha);
-  const float8 half_x = sqrt(cut * a), half_y = sqrt(cut * c);
-  const float8 px = jx * x + camera[CAMERA_CX], py = jy * y + camera[CAMERA_CY];
+  float8 cut = s->cut, opacity = s->opacity;
+  float8 half_x = sqrt(cut * a), half_y = sqrt(cut * c);
+  const float8 px = jx * x + view[CAMERA_CX], py = jy * y + view[CAMERA_CY];
   const float8 mid = 0.5f * (a + c), off = 0.5f * (a - c);
   const float8 major = mid + sqrt(off * off + b * b);  // px^2, one sigma squared
-  const float8 distance = x * x + y * y + z * z;
-  const float8 finite = s->red + s->green + s->blue;
 
-  // Each gate is a positive test, so that NaN fails it; the first gate that fails counts.
-  const int8 bright = valid & (s->opacity > least_alpha) & (s->opacity < FLT_MAX);
-  const int8 near_enough = bright & (distance <= most_distance * most_distance);
-  int8 seen = near_enough & (z > near) & (z < CULLED_DEPTH);
-  seen &= (px + half_x > 0.0f) & (px - half_x < (float)width);
-  seen &= (py + half_y > 0.0f) & (py - half_y < (float)height);
-  int8 small = seen & (major <= most_pixels * most_pixels) & isfinite(finite);
-  small &= (determinant > 0.0f) & (determinant < FLT_MAX) & (half_x < FLT_MAX) & (half_y < FLT_MAX);
-  const int n = kept(bright), near_count = kept(near_enough), seen_count = kept(seen);
-  *culled += (int4)(kept(valid) - n, seen_count - kept(small), n - near_count,
-                    near_count - seen_count);
+  // The first gate that fails counts.  What is not finite is nowhere, so it fails at "size", whose
+  // tests are positive.
+  const int8 finite = (half_x < FLT_MAX) & (half_y < FLT_MAX) & isfinite(px + py);
+  const int8 inside = (px + half_x > 0.0f) & (px - half_x < view[IMAGE_WIDTH]) &
+                      (py + half_y > 0.0f) & (py - half_y < view[IMAGE_HEIGHT]);
+  const int8 seen = alive & (inside | ~finite);
+  int8 small = seen & finite & (major <= limits[MOST_PIXELS_2]);
+  small &= (determinant > 0.0f) & (determinant < FLT_MAX) & (fabs(s->red) <= MOST_COLOR) &
+           (fabs(s->green) <= MOST_COLOR) & (fabs(s->blue) <= MOST_COLOR);
+  const int8 large = small & (cut * major >= limits[LEAST_PIXELS_2]);
+  int8 drawn = large;
+  if (limits[FADES] > 0) {
+    opacity *= ramp(limits[MOST_PIXELS] - sqrt(major), limits[PER_PIXELS]) *
+               ramp(limits[MOST_DISTANCE] - sqrt(square), limits[PER_DISTANCE]) *
+               ramp(sqrt(cut * major) - limits[LEAST_PIXELS], limits[PER_FOOTPRINT]);
+    drawn &= opacity >= limits[LEAST_ALPHA];
+    cut = fmax(2.0f * log(opacity * limits[PER_LEAST_ALPHA]), 0.0f);
+    half_x = sqrt(cut * a);
+    half_y = sqrt(cut * c);
+  }
+  passed[GATE_FRUSTUM] += seen;
+  passed[GATE_SIZE] += small;
+  passed[GATE_FOOTPRINT] += large;
+  passed[GATE_FADED] += drawn;
 
   const float8 none = -1;
+  half_x = select(none, half_x, drawn);
+  half_y = select(none, half_y, drawn);
   store_rows(rows, 0, px, py, c * per, -b * per);
-  store_rows(rows, 4, a * per, s->opacity, s->red, s->green);
-  store_rows(rows, 8, s->blue, select(none, half_x, small), select(none, half_y, small), cut);
-  vstore8(select((float8)(CULLED_DEPTH), z, small), 0, depth);
-  const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, cut, small};
+  store_rows(rows, 4, a * per, opacity, s->red, s->green);
+  store_rows(rows, 8, s->blue, half_x, half_y, cut);
+  const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, cut, drawn};
   return out;
 }
 
-__kernel void project_arena(int count, int chunk, int width, int height, float near,
-                            float least_alpha, float most_pixels, float most_distance,
-                            float low_pass, __constant float* camera,
-                            __global const float* mean_opacity, __global const float* covariance,
-                            __global const float* color, __global const int* object_index,
-                            __global const float* poses, __global float* record,
-                            __global float* depth, __global int4* culled, int tiles_x, int tiles_y,
-                            __global uint2* places, __global uint2* pairs,
-                            __global int* histogram, __global uint4* status) {
+inline int sum_int8(int8 a) {
+  const int4 b = a.lo + a.hi;
+  const int2 c = b.lo + b.hi;
+  return c.x + c.y;
+}
+
+inline uint least_of(uint8 a) {
+  const uint4 b = min(a.lo, a.hi);
+  return min(min(b.x, b.y), min(b.z, b.w));
+}
+
+inline uint most_of(uint8 a) {
+  const uint4 b = max(a.lo, a.hi);
+  return max(max(b.x, b.y), max(b.z, b.w));
+}
+
+// Splats without a record: told by their depth, and by a place that is no tile.
+inline void leave_out(int i, int n, __global float* record, __global float* depth,
+                      __global uint2* places) {
+  for (int lane = 0; lane < n; lane++) {
+    record[(size_t)RECORD * (i + lane) + EXTENT_X] = -1;
+    depth[i + lane] = CULLED_DEPTH;
+    places[i + lane] = (uint2)(0);
+  }
+}
+
+// views: VIEW_SIZE floats a view.  by_distance: keys are metres to the sort frame's origin, else
+// along its z.  keep_outside: also splats that no view sees get a key.
+// status: pairs of the view's order, instances, least and most key.
+__kernel void project_arena(
+    int count, int chunk, int by_distance, int keep_outside, __constant float* views,
+    __constant float* limits, __global const float* mean_opacity, __global const float* covariance,
+    __global const float* color, __global const int* object_index, __global const float* poses,
+    __global float* record_0, __global float* depth_0, __global int* culled_0,
+    __global uint2* places_0, __global uint4* status_0, __global uint2* pairs_0,
+    __global int* table_0, __global float* record_1, __global float* depth_1,
+    __global int* culled_1, __global uint2* places_1, __global uint4* status_1,
+    __global uint2* pairs_1, __global int* table_1) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
-  int4 counts = 0;
-  int current = -1;  // the object whose pose s.m holds
+  __global float* const record[2] = {record_0, record_1};
+  __global float* const depth[2] = {depth_0, depth_1};
+  __global int* const culled[2] = {culled_0, culled_1};
+  __global uint2* const places[2] = {places_0, places_1};
+  __global uint4* const status[2] = {status_0, status_1};
+  __global uint2* const pairs[2] = {pairs_0, pairs_1};
+  __global int* const table[2] = {table_0, table_1};
+
+  Keys keys[ORDERS + 1];
+  for (int o = 0; o < ORDERS; o++) {
+    const Keys none = {pairs[o], table[o] + c * LOW_BINS, first, 0xffffffffu, 0};
+    keys[o] = none;
+    for (int b = 0; b < LOW_BINS; b++) keys[o].bins[b] = 0;
+  }
+  int8 passed[VIEWS][GATES], instances[VIEWS], entered = 0;
+  for (int v = 0; v < VIEWS; v++) {
+    instances[v] = 0;
+    for (int g = 0; g < GATES; g++) passed[v][g] = 0;
+  }
+  int current = -1;  // the object whose pose m holds
+  float8 m[POSE];
   Eight s;
-  Chunk mine = open_chunk(first, places, pairs, histogram + c * LOW_BINS);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
-    float rows[RECORD * LANES], z[LANES];
-    int8 object, valid = -1;
-    if (n == LANES) {
-      LOAD_EIGHT(s, mean_opacity + (size_t)4 * i, covariance + (size_t)8 * i, color + (size_t)4 * i)
-      object = vload8(0, object_index + i);
-    } else {  // the last few: the last one again for those that are missing
-      float mean[4 * LANES], cov[8 * LANES], rgb[4 * LANES];
-      int index[LANES];
-      for (int lane = 0; lane < LANES; lane++) {
-        const size_t from = i + min(lane, n - 1);
-        vstore4(vload4(from, mean_opacity), lane, mean);
-        vstore8(vload8(from, covariance), lane, cov);
-        vstore4(vload4(from, color), lane, rgb);
-        index[lane] = object_index[from];
+    const int8 valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
+    LOAD_ROWS(LOAD_MEANS, s, mean_opacity, 4)
+    const int8 bright = valid & (s.opacity >= limits[LEAST_ALPHA]) & (s.opacity < FLT_MAX);
+    entered += bright;
+    if (!any(bright)) {
+      for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], places[v]);
+      continue;
+    }
+    int8 object;
+    LOAD_INDICES(object, object_index)
+    load_poses(m, object, &current, poses);
+    float8 x[VIEWS], y[VIEWS], z[VIEWS], square[VIEWS];
+    int8 alive[VIEWS], seen[VIEWS + 1], anywhere = 0;
+    for (int v = 0; v < VIEWS; v++) {
+      const float8* to = m + 12 * v;
+      x[v] = to[0] * s.x + to[1] * s.y + to[2] * s.z + to[3];
+      y[v] = to[4] * s.x + to[5] * s.y + to[6] * s.z + to[7];
+      z[v] = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
+      square[v] = x[v] * x[v] + y[v] * y[v] + z[v] * z[v];
+      const int8 near_enough = bright & (square[v] <= limits[MOST_DISTANCE_2]);
+      passed[v][GATE_DISTANCE] += near_enough;
+      alive[v] = near_enough & (z[v] > views[VIEW_SIZE * v + NEAR]);
+      anywhere |= alive[v];
+      seen[v] = 0;
+    }
+    if (any(anywhere)) {
+      LOAD_ROWS(LOAD_COVARIANCES, s, covariance, 8)
+      LOAD_ROWS(LOAD_COLORS, s, color, 4)
+      s.cut = fmax(2.0f * log(s.opacity * limits[PER_LEAST_ALPHA]), 0.0f);
+    }
+    int8 drawn_anywhere = 0;
+    for (int v = 0; v < VIEWS; v++) {
+      if (!any(alive[v])) {
+        leave_out(i, n, record[v], depth[v], places[v]);
+        continue;
       }
-      LOAD_EIGHT(s, mean, cov, rgb)
-      object = vload8(0, index);
-      valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
+      __constant float* view = views + VIEW_SIZE * v;
+      float rows[RECORD * LANES];
+      const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], alive[v], view,
+                                       limits, rows, passed[v]);
+      const Places p = places_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
+      instances[v] += p.count;
+      seen[v] = p.count > 0;
+      drawn_anywhere |= seen[v];
+      const float8 far = select((float8)(CULLED_DEPTH), z[v], e.seen);
+      store_records(rows, i, n, record[v]);
+      store_floats(far, i, n, depth[v]);
+      store_pairs(p.corner, p.mask, i, n, places[v]);
     }
-    load_poses(&s, object, &current, poses);
-    const Ellipses e =
-        project_eight(&s, valid, camera, width, height, near, least_alpha, most_pixels,
-                      most_distance, low_pass, rows, z, &counts);
-    for (int lane = 0; lane < n; lane++) {
-      vstore8(vload8(0, rows + RECORD * lane), 0, record + (size_t)RECORD * (i + lane));
-      vstore4(vload4(0, rows + RECORD * lane + 8), 0, record + (size_t)RECORD * (i + lane) + 8);
-      depth[i + lane] = z[lane];
+    for (int o = 0; o < ORDERS; o++) {
+      const float8* to = m + 12 * (VIEWS + o);
+      const int8 member = keep_outside ? bright : ORDERS == 1 ? drawn_anywhere : seen[o];
+      if (!any(member)) continue;
+      const float8 kz = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
+      float8 key = kz;
+      if (by_distance) {
+        const float8 kx = to[0] * s.x + to[1] * s.y + to[2] * s.z + to[3];
+        const float8 ky = to[4] * s.x + to[5] * s.y + to[6] * s.z + to[7];
+        key = sqrt(kx * kx + ky * ky + kz * kz);
+      }
+      enter_keys(keys + o, i, sortable(key), member & isfinite(key));
     }
-    const Places p = places_of_eight(&e, tiles_x, tiles_y);
-    enter_eight(&mine, i, n, &p, vload8(0, z));
   }
-  culled[c] = counts;
-  status[c] = close_chunk(&mine, first);
+  for (int v = 0; v < VIEWS; v++) {
+    int before = last - first;
+    for (int g = 0; g < GATES; g++) {
+      const int after = -sum_int8(g == GATE_OPACITY ? entered : passed[v][g]);
+      culled[v][GATES * c + g] = max(before, 0) - max(after, 0);
+      before = after;
+    }
+    uint4 told = (uint4)(0, sum_int8(instances[v]), 0, 0);
+    if (ORDERS) {
+      const Keys* mine = keys + (ORDERS == 1 ? 0 : v);
+      told.x = mine->next - first;
+      told.z = least_of(mine->least);
+      told.w = most_of(mine->most);
+    }
+    status[v][c] = told;
+  }
 }

@@ -11,7 +11,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rasterizer_scenes import arena, as_double, device, psnr
 
 from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, project_arena
+from rasterizer.project import Camera
+from rasterizer.project_arena import project_arena
 from rasterizer.raster import rasterize_rgba
 from rasterizer.reference import project_reference, rasterize_reference
 from runtime_models.evaluate import evaluate
@@ -46,7 +47,7 @@ def camera_before(splats: list) -> Camera:
 
 def test_the_leg_matches_float64(leg):
     camera, d = camera_before(leg), device()
-    projected = project_arena(d, *arena(leg), np.eye(4)[None], camera)
+    projected = project_arena(d, *arena(leg), np.eye(4)[None], [camera])[0]
     rgba = rasterize_rgba(d, projected, bin_tiles(d, projected, SIZE), SIZE)
     image, through = rasterize_reference(*project_reference(*as_double(leg), camera), SIZE)
     assert (through < 0.5).mean() > 0.02  # it is in the picture
@@ -66,7 +67,9 @@ def test_projection_is_a_small_part_of_a_frame(leg):
         return result
 
     def draw() -> None:
-        projected = timed("project", lambda: project_arena(d, *inputs, np.eye(4)[None], camera))
+        projected = timed(
+            "project", lambda: project_arena(d, *inputs, np.eye(4)[None], [camera])[0]
+        )
         tiles = timed("bin", lambda: bin_tiles(d, projected, SIZE))
         timed("raster", lambda: rasterize_rgba(d, projected, tiles, SIZE))
 

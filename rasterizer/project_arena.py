@@ -1,0 +1,132 @@
+"""project_arena: splats of posed objects -> ellipses, tiles and sort keys of one or two views."""
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from rasterizer.device import Device
+from rasterizer.project import (
+    CULL_REASONS,
+    LEAST_ALPHA,
+    LOW_BITS,
+    LOW_PASS,
+    RECORD,
+    Camera,
+    Found,
+    Projected,
+    chunks_of,
+    grid_of,
+)
+
+KERNEL = Path(__file__).parent / "kernels" / "project_arena.cl"
+FARTHEST = 1e18  # metres, or pixels: its square is a finite float
+LANES = 8
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is left out of a frame, gate by gate; see renderer.settings for the prices."""
+
+    min_alpha: float = LEAST_ALPHA
+    max_pixels: float = inf  # one sigma of the longer screen axis
+    max_distance: float = inf  # metres from the eye
+    min_pixels: float = 0.0  # of the longer axis where alpha reaches min_alpha
+    fade: float = 0.0  # part of each limit over which opacity falls to 0 before it
+    low_pass: float = LOW_PASS  # px^2
+
+    def packed(self) -> np.ndarray:
+        """(13,) float32 as kernels/common/limits.cl reads it."""
+        limits = (self.max_pixels, self.max_distance, self.min_pixels)
+        large, far, least = (min(limit, FARTHEST) for limit in limits)
+        bands = [1 / (self.fade * t) if 0 < self.fade * t < inf else 0.0 for t in limits]
+        rows = [self.min_alpha, 1 / self.min_alpha, self.low_pass, large, large**2, far, far**2]
+        return np.float32([*rows, least, least**2, *bands, any(bands)])
+
+
+@dataclass(frozen=True)
+class SortFrames:
+    """By what splats are ordered: camera_from_world (4, 4), OpenCV axes, one or one a view.
+
+    by_distance: metres to the frame's origin instead of along its z.  keep_outside: splats that no
+    view sees are ordered, too, so that the order can be kept while the views turn.
+    """
+
+    camera_from_world: tuple[np.ndarray, ...]
+    by_distance: bool = False
+    keep_outside: bool = False
+
+
+def project_arena(
+    device: Device, mean_opacity, covariance, color, object_index, world_from_object,
+    cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
+) -> list[Projected]:  # fmt: skip
+    """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
+
+    mean_opacity (N, 4) object frame metres and 0..1; covariance (N, 8) m^2, object frame, xx xy xz
+    yy yz zz and two unused; color (N, 4), last unused; object_index (N,) int32; device arrays.
+    world_from_object: numpy (O, 3 or 4, 4) or (O, 12) rows, rigid.
+    sort: no camera_from_world at all: no keys, an order from before is to be used; None: by depth,
+    each view for itself.  With one frame for two views both share the pairs to be sorted.
+    """
+    sort = sort or SortFrames(tuple(camera.camera_from_world for camera in cameras))
+    count, views, orders = mean_opacity.shape[0], len(cameras), len(sort.camera_from_world)
+    if views not in (1, 2) or orders not in (0, 1, views):
+        raise ValueError(f"project_arena takes 1 or 2 views and 0, 1 or as many sort frames, "
+                         f"not {views} and {orders}.")  # fmt: skip
+    chunks, chunk = _chunks(device, count)
+    keys = [
+        (device.empty((count, 2), np.uint32), device.empty((chunks, 1 << LOW_BITS), np.int32))
+        for _ in range(orders)
+    ]
+    projected = []
+    for i, camera in enumerate(cameras):
+        pairs, table = keys[i if orders == views else 0] if orders else (None, None)
+        places = device.empty((count, 2), np.uint32)
+        status = device.empty((chunks, 4), np.uint32)
+        found = Found(places, pairs, table, status, chunk, grid_of(camera.size))
+        counts = device.empty((chunks, len(CULL_REASONS)), np.int32)
+        record, depth = device.empty((count, RECORD)), device.empty(count)
+        low_pass = (limits or Limits()).low_pass
+        projected.append(Projected(record, depth, low_pass, counts, found))
+    kernel = device.program(KERNEL, VIEWS=views, ORDERS=orders)["project_arena"]
+    buffers = [_buffers(p) for p in projected]
+    device.launch(
+        kernel, chunks, 1,
+        count, chunk, sort.by_distance, sort.keep_outside,
+        device.upload(np.concatenate([_packed(camera) for camera in cameras])),
+        device.upload((limits or Limits()).packed()),
+        mean_opacity, covariance, color, object_index,
+        device.upload(_poses(cameras, sort, world_from_object)),
+        *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
+    )  # fmt: skip
+    return projected
+
+
+def _chunks(device: Device, count: int) -> tuple[int, int]:
+    """How many chunks, and splats a chunk: whole vectors but for the last."""
+    chunks = chunks_of(device, count)
+    return chunks, -(-count // (chunks * LANES)) * LANES
+
+
+def _buffers(projected: Projected) -> tuple:
+    found = projected.found
+    results = (projected.record, projected.depth, projected.culled_counts)
+    return (*results, found.places, found.status, found.pairs, found.table)
+
+
+def _packed(camera: Camera) -> np.ndarray:
+    """(25,) float32 as kernels/common/limits.cl reads a view."""
+    rest = (*camera.size, camera.near, *grid_of(camera.size))
+    return np.concatenate([camera.packed(), np.float32(rest)])
+
+
+def _poses(cameras: list[Camera], sort: SortFrames, world_from_object) -> np.ndarray:
+    """(O, blocks, 12) float32: rows from each object into every camera and sort frame."""
+    poses = np.asarray(world_from_object, np.float64)
+    poses = poses.reshape(-1, poses.size // max(1, len(poses)) // 4, 4)[:, :3]  # (O, 3, 4)
+    into = [camera.camera_from_world for camera in cameras] + list(sort.camera_from_world)
+    chained = np.stack([np.asarray(m, np.float64)[:3, :3] @ poses for m in into], axis=1)
+    chained[..., 3] += np.stack([np.asarray(m, np.float64)[:3, 3] for m in into])
+    return chained.reshape(-1, len(into), 12).astype(np.float32)
