@@ -61,9 +61,6 @@ class Arena:
         self.mean_opacity = gpu.reserve(16 * n)
         self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * n)
         self.color = gpu.reserve(16 * n)
-        objects = np.repeat(np.arange(len(counts), dtype=np.uint32), np.array(counts, np.int64))
-        self.object = gpu.upload(objects)
-        self.poses = gpu.reserve(16 * layout.POSE_ROWS * (layout.MOST_VIEWS + 1) * len(counts))
         self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
         self.keys, self.keys_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
         self.order, self.order_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
@@ -146,7 +143,7 @@ class Arena:
 
     def release(self) -> None:
         for buffer in (
-            self.mean_opacity, self.covariance, self.color, self.object, self.poses, self.records,
+            self.mean_opacity, self.covariance, self.color, self.records,
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
             self.command, self.quads, self.staging,
         ):  # fmt: skip

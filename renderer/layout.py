@@ -8,7 +8,6 @@ CULLED_KEY = 0xFFFFFFFF  # sorts behind every depth
 
 RECORD_VECS = 2  # uvec4 a projected splat
 COVARIANCE_VECS = 2  # vec4 a splat: xx xy xz yy | yz zz 0 0
-POSE_ROWS = 3  # vec4 rows of eye_from_object
 MOST_VIEWS = 2  # that one dispatch of project handles
 
 MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
@@ -22,8 +21,6 @@ SLOTS = {
     "MEAN_OPACITY": 0,  # vec4 (N,)      xyz metres in the object, w opacity
     "COVARIANCE": 1,  # vec4 (N, 2)    m^2, in the object
     "COLOR": 2,  # vec4 (N,)      display sRGB
-    "OBJECT": 3,  # uint (N,)      which pose
-    "POSES": 4,  # vec4 (O, V + 1, 3)    rows of eye_from_object of each view; sort_from_object
     "RECORDS": 5,  # uvec4 (V, N, 2)   screen ellipses
     "KEYS": 6,  # uint (N,)      depth or distance as float bits, or CULLED_KEY
     "COUNTS": 7,  # uint (20,)     as COUNTS below
@@ -48,11 +45,11 @@ SLOTS = {
 }
 WEIGHTS_BLOCK = 0  # uniform block
 
-# Rows of the counts buffer.  Those of view v start at v * COUNTS_STRIDE: the splats drawn, then the
-# reasons of settings.CULL_REASONS; the first gate that a splat fails counts it.
+# Rows of the counts buffer.  Those of view v start at v * COUNTS_STRIDE and are the reasons of
+# settings.CULL_REASONS; the first gate that a splat fails counts it.  What is drawn is the rest.
 COUNTS_STRIDE = 8
 COUNTS = {
-    "DRAWN": 0,
+    "DRAWN": 0,  # not counted
     "OPACITY": 1,
     "DISTANCE": 2,
     "FRUSTUM": 3,
@@ -76,5 +73,5 @@ def defines() -> dict[str, int | float]:
         "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",
     }  # fmt: skip
     slots = {f"SLOT_{name}": slot for name, slot in SLOTS.items()}
-    counts = {f"COUNT_{name}": row for name, row in COUNTS.items()}
+    counts = {f"COUNT_{name}": f"{row}u" for name, row in COUNTS.items()}
     return numbers | slots | counts

@@ -1,6 +1,9 @@
 """project: splats -> screen ellipses and keys to sort by; the only culling gate."""
 
+from itertools import pairwise
+
 import numpy as np
+from moderngl import ComputeShader
 
 from renderer import layout
 from renderer.buffers import Arena, bind
@@ -17,7 +20,13 @@ class Projector:
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        gpu.compute("project.comp", VIEWS=1, SORT_FRAME=0)  # a broken shader is told at the start
+        self._variant(1, False, RenderSettings())  # a broken shader is told at the start
+
+    def _variant(self, views: int, own_frame: bool, settings: RenderSettings) -> ComputeShader:
+        return self._gpu.compute(
+            "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
+            KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
+        )  # fmt: skip
 
     def project(
         self,
@@ -36,7 +45,9 @@ class Projector:
         """
         if not 1 <= len(views) <= layout.MOST_VIEWS:
             raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
-        arena.counts.write(NO_COUNTS)
+        counts = NO_COUNTS.copy()
+        counts[layout.COUNTS["SORTED"]] = arena.count  # from which project subtracts
+        arena.counts.write(counts)
         if not arena.count:
             return
         arena.make_room(len(views))
@@ -44,22 +55,26 @@ class Projector:
         if sort_from_world is not None:
             frames.append(np.asarray(sort_from_world, np.float64))
         # In float64 on the CPU: a far world origin must not eat the digits of a near splat.
-        poses = np.stack([frame @ arena.world_from_object for frame in frames], axis=1)
-        arena.poses.write(np.ascontiguousarray(poses[:, :, :3], np.float32))
+        rows = np.stack([frame @ arena.world_from_object for frame in frames], axis=1)
+        rows = np.ascontiguousarray(rows[:, :, :3], np.float32)  # (O, frames, 3, 4)
         bind(
             mean_opacity=arena.mean_opacity, covariance=arena.covariance, color=arena.color,
-            object=arena.object, poses=arena.poses, records=arena.records, keys=arena.keys,
-            counts=arena.counts,
+            records=arena.records, keys=arena.keys, counts=arena.counts,
         )  # fmt: skip
-        program = self._gpu.compute(
-            "project.comp", VIEWS=len(views), SORT_FRAME=len(frames) - len(views)
-        )
-        self._gpu.run(
-            program, groups_for(arena.count, layout.WORKGROUP),
-            count=arena.count, by_distance=settings.order == "distance", keep_outside=keep_outside,
-            tangents=_each(v.tangents for v in views), size=_each(v.size for v in views),
-            near=_each(v.near for v in views), **limits(settings),
+        program = self._variant(len(views), len(frames) > len(views), settings)
+        set_uniforms(
+            program, keep_outside=keep_outside, tangents=_each(v.tangents for v in views),
+            size=_each(v.size for v in views), near=_each(v.near for v in views),
+            **limits(settings),
         )  # fmt: skip
+        if len(views) > 1:
+            set_uniforms(program, count=arena.count)
+        for i, (first, last) in enumerate(pairwise(arena.starts)):
+            if last > first:
+                set_uniforms(program, first=first, last=last)
+                program["frames"].write(rows[i])
+                program.run(groups_for(last - first, layout.WORKGROUP))
+        self._gpu.ctx.memory_barrier()
 
     def counts(self, arena: Arena, i: int = 0) -> dict[str, int]:
         """Splats of view i at the last projection: drawn, then CULL_REASONS.
@@ -67,7 +82,8 @@ class Projector:
         Waits for the GPU.
         """
         rows = np.frombuffer(arena.counts.read(), np.uint32)[i * layout.COUNTS_STRIDE :]
-        return {name: int(rows[layout.COUNTS[name.upper()]]) for name in ("drawn", *CULL_REASONS)}
+        culled = {name: int(rows[layout.COUNTS[name.upper()]]) for name in CULL_REASONS}
+        return {"drawn": arena.count - sum(culled.values()), **culled}
 
     def release(self) -> None:
         """Nothing of its own: programs belong to the Gpu."""
@@ -90,11 +106,18 @@ def limits(settings: RenderSettings) -> dict[str, object]:
     for i, limit in enumerate((largest, farthest, settings.min_pixels)):
         if settings.fade > 0 and 0 < limit < layout.HUGE:
             ends[i], slopes[i] = limit, min(1 / (settings.fade * limit), layout.HUGE)
-    return {
+    numbers = {
         "min_alpha": settings.min_alpha, "low_pass": settings.low_pass, "max_pixels": largest,
         "max_distance": farthest, "min_pixels": min(settings.min_pixels, layout.HUGE),
-        "fade_ends": tuple(ends), "fade_slopes": tuple(slopes),
     }  # fmt: skip
+    if settings.fade > 0:
+        numbers |= {"fade_ends": tuple(ends), "fade_slopes": tuple(slopes)}
+    return numbers
+
+
+def set_uniforms(program: ComputeShader, **values: object) -> None:
+    for name, value in values.items():
+        program[name].value = value
 
 
 def _each(values) -> object:

@@ -36,7 +36,6 @@ def test_an_upload_becomes_rows_of_the_arena(gpu, n):
         mean_opacity = read(arena.mean_opacity, np.float32, 4)
         color = read(arena.color, np.float32, 4)
         sigma = read(arena.covariance, np.float32, 8)
-        objects = read(arena.object, np.uint32)
     np.testing.assert_array_equal(mean_opacity[rows, :3], means)
     np.testing.assert_array_equal(mean_opacity[rows, 3], opacity)
     np.testing.assert_array_equal(color[rows, :3], means * 2)
@@ -47,7 +46,6 @@ def test_an_upload_becomes_rows_of_the_arena(gpu, n):
         np.testing.assert_allclose(sigma[3, [0, 3, 5]], np.square(scales[0]), rtol=1e-6)
     assert not mean_opacity[[0, 1, 2, -1, -2]].any()  # the neighbours' rows are untouched
     assert not sigma[[0, 1, 2, -1, -2]].any() and not color[[0, 1, 2, -1, -2]].any()
-    np.testing.assert_array_equal(objects, [0] * 3 + [1] * n + [2] * 2)
 
 
 def test_an_upload_larger_than_the_staging_buffer_comes_in_parts(gpu, monkeypatch):

@@ -125,7 +125,8 @@ def test_every_reason_is_counted_once(gpu):
     settings = RenderSettings(max_distance=50, max_pixels=40)
     counts = projected(gpu, model, FRONT, settings)["counts"]
     assert counts == {
-        "drawn": 1, "opacity": 1, "distance": 1, "frustum": 3, "size": 1, "footprint": 0, "faded": 0,
+        "drawn": 1, "opacity": 1, "distance": 1, "frustum": 3, "size": 1,
+        "footprint": 0, "faded": 0,
     }  # fmt: skip
 
 
