@@ -3,6 +3,7 @@
 Name transforms by what they give and take:  p_world = world_from_object @ p_object.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,25 @@ class View:
     near: float  # metres
     far: float  # metres
     size: tuple[int, int]  # width, height, pixels
+
+    def __post_init__(self) -> None:
+        """Refuses what has no picture: ValueError with a sentence."""
+        left, right, down, up = self.tangents
+        pose = (*self.world_from_eye.position, *self.world_from_eye.wxyz)
+        if not all(map(math.isfinite, pose)):
+            told = " ".join(f"{number:.6g}" for number in pose)
+            raise ValueError(f"a view has the pose {told}; every number of it must be finite.")
+        if not (-math.inf < left < right < math.inf and -math.inf < down < up < math.inf):
+            raise ValueError(
+                f"a view has the tangents {self.tangents}; left must be less than right, and down "
+                "less than up, all finite."
+            )
+        if not 0 < self.near < self.far:
+            raise ValueError(
+                f"a view has near {self.near} and far {self.far}; 0 < near < far is wanted, metres."
+            )
+        if not all(side >= 1 and side == int(side) for side in self.size):
+            raise ValueError(f"a view has the size {self.size}; whole pixels from 1 are wanted.")
 
     def clip_from_eye(self) -> np.ndarray:
         """(4, 4) OpenGL projection: eye metres to clip, depth -1..1, off-centre allowed."""

@@ -1,0 +1,116 @@
+"""Cases of networks gone wrong: control values that no one trained, weights that are no numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.stability_cases.finding import (
+    Panel,
+    Result,
+    at_least,
+    at_most,
+    broken_pixels,
+    clean,
+    decibels,
+)
+from app.stability_cases.places import ORACLE_DB
+from app.stability_cases.scenes import alone, front, small_model
+from app.stability_cases.stage import Stage, difference
+from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
+
+OUTSIDE = (-0.1, -1e-3, 1.001, 1.1, 1e30, np.inf, -np.inf, np.nan)  # of 0..1, both sides
+
+
+def extrapolated(stage: Stage) -> Result:
+    """x outside [0, 1] is refused with a sentence, and what was drawn before is drawn again."""
+    scene, view = stage.scene(), stage.view()
+    before = stage.draw(scene, view)
+    taken, silent = 0, 0
+    for x in OUTSIDE:
+        try:
+            stage.renderer.update(stage.scene(x=float(x)))
+        except ValueError as refusal:
+            silent += not is_sentence(str(refusal))
+        else:
+            taken += 1
+    after = stage.draw(scene, view)
+    findings = [
+        clean(before, after),
+        at_most(
+            f"of {len(OUTSIDE)} values outside 0..1 (NaN too) that were taken", taken, 0,
+            "nothing was trained there: networks may answer anything; sliders clamp, the renderer "
+            "refuses",
+        ),
+        at_most(
+            "refusals that are no sentence", silent, 0, "a person reads them",
+        ),
+        at_most(
+            "largest change of the scene afterwards", np.abs(after - before).max(), 1e-6,
+            "a refused value leaves everything as it was",
+        ),
+    ]  # fmt: skip
+    panels = [stage.panel("after the refusals", after), stage.panel("before", before)]
+    return Result(findings, panels)
+
+
+def is_sentence(text: str) -> bool:
+    """One line of several words that ends like a sentence."""
+    return len(text.split()) >= 4 and "\n" not in text.strip() and text.strip().endswith(".")
+
+
+def broken_heads(stage: Stage) -> Result:
+    """NaN and Inf in the weights or biases of one head at a time."""
+    model = stage.model if isinstance(stage.model, AnchorModel) else small_model()
+    view = stage.view() if model is stage.model else front(stage.size)
+    whole = stage.draw(alone(model), view)
+    images, worst = {}, None
+    for head in HEADS:
+        for what, value in (("NaN", np.nan), ("Inf", np.inf), ("-Inf", -np.inf)):
+            for where in ("all weights", "one bias"):
+                broken = with_broken_head(model, head, value, where)
+                name = f"{what} in {where} of {head}"
+                images[name] = stage.draw(alone(broken), view)
+                bad = broken_pixels(images[name])
+                if worst is None or bad > worst[0]:
+                    worst = (bad, name)
+    one = stage.draw(alone(small_model()), front(stage.size))
+    partly, known = half_broken(stage)
+    findings = [
+        at_most(
+            f"broken pixels in {len(images)} pictures (worst: {worst[1]})",
+            sum(broken_pixels(image) for image in images.values()), 0,
+            "what is not finite is not drawn: one NaN fragment would poison its pixel for good",
+        ),
+        at_least(
+            "NaN in one splat's opacity of each anchor, against float64 without it, dB", partly,
+            known, "the other splats stay as they are (rgba16f alone costs 59.5 dB)",
+        ),
+        clean(whole, one),
+    ]  # fmt: skip
+    panels = [
+        stage.panel(worst[1], images[worst[1]]),
+        stage.panel("whole networks", whole),
+        Panel("8 times the difference", difference(images[worst[1]], whole)),
+    ]
+    return Result(findings, panels)
+
+
+def half_broken(stage: Stage) -> tuple[float, float]:
+    """dB of a small model of which one opacity output is NaN, and the least it may be."""
+    model, view = small_model(), front((160, 96))
+    broken = with_broken_head(model, "opacity", np.nan, "one bias")
+    image = stage.draw(alone(broken), view)
+    return decibels(image, stage.reference(alone(broken), view)), ORACLE_DB
+
+
+def with_broken_head(model: AnchorModel, head: str, value: float, where: str) -> AnchorModel:
+    """The model with one head's numbers replaced; `where`: "all weights" or "one bias"."""
+    mlp = model.networks[head]
+    weights, biases = list(mlp.weights), list(mlp.biases)
+    if where == "all weights":
+        weights[-1] = np.full_like(weights[-1], value)
+    else:
+        biases[-1] = biases[-1].copy()
+        biases[-1][: SIZE_PER_SPLAT[head]] = value  # of the first splat of every anchor
+    broken: Mlp = replace(mlp, weights=tuple(weights), biases=tuple(biases))
+    return replace(model, networks=model.networks | {head: broken})

@@ -1,0 +1,185 @@
+"""Cases of where the eye is: far from the origin, over all depths, within things, any lens."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.stability_cases.finding import (
+    Panel,
+    Result,
+    at_least,
+    at_most,
+    broken_pixels,
+    clean,
+    decibels,
+)
+from app.stability_cases.scenes import alone, front, shell, splats, turns
+from app.stability_cases.stage import Stage, difference, moved, turned, turned_about
+from scene.pose import Pose, View, look_at, perspective
+from scene.scene import IDENTITY
+
+FAR_OFF = np.array([5e6, -5e6, 5e6])  # metres: geocentric coordinates are that large
+NEAREST, FARTHEST = 1e-2, 1e6  # metres
+WALLS = 33  # from NEAREST to FARTHEST, four a decade
+ORACLE_DB = 55  # rgba16f alone costs 59.5 dB (its rounding, blended back to front)
+SMALL = (160, 96)  # pixels: what the float64 oracle draws in a second
+FILL = 12.0  # times the frame from outside
+
+
+def far_origin(stage: Stage) -> Result:
+    """The scene and its view 5,000 km from the origin look as they do at it."""
+    view = stage.view()
+    there = Pose(FAR_OFF, IDENTITY.wxyz)
+    here = stage.draw(stage.scene(), view)
+    far = stage.draw(stage.scene(pose=there), moved(view, FAR_OFF))
+    findings = [
+        clean(here, far),
+        at_least(
+            "5e6 m off against the origin, dB", decibels(far, here), 70,
+            "float64 keeps 1e-9 m of 5e6: a thousandth of a pixel at most, and a few orders of "
+            "equal depths; float32 would keep half a metre",
+        ),
+    ]  # fmt: skip
+    return Result(findings, compared(stage, "5e6 m off", far, "at the origin", here))
+
+
+def depth_range(stage: Stage) -> Result:
+    """Walls at 1 cm to 1000 km, far ones listed first or last, each before the next."""
+    size = stage.size
+    depths = np.geomspace(NEAREST, FARTHEST, WALLS)
+    rng = np.random.default_rng(1)
+    shuffled = rng.permutation(WALLS)
+    # Each wall leaves the upper right a little freer, so that all of them are seen.
+    shift = np.linspace(-0.25, 0.25, WALLS)
+    means = np.stack([shift * depths, shift * depths * 0.4, -depths], axis=1)[shuffled]
+    sizes = (0.06 * depths[:, None] * np.array([1, 1, 0.01]))[shuffled]
+    scene = alone(splats(means, sizes, 0.9, rng.uniform(size=(WALLS, 3))))
+    view = replace(front(size, 0.0, near=NEAREST / 2), far=2 * FARTHEST)
+    image = stage.draw(scene, view)
+    want = stage.reference(scene, view)
+    coarse = stage.draw(scene, view, key_bits=16)
+    reason = "keys are the bits of the float depth: seven digits at any distance"
+    tight = "linear steps of 15 m between 1 cm and 1000 km: one price that is named, not a fault"
+    findings = [
+        clean(image, coarse),
+        at_least("32-bit keys against float64, dB", decibels(image, want), ORACLE_DB, reason),
+        at_least("16-bit keys against float64, dB", decibels(coarse, want), 5, tight),
+    ]
+    return Result(findings, compared(stage, "32-bit keys", image, "16-bit keys", coarse))
+
+
+def inside(stage: Stage) -> Result:
+    """The eye within a splat, on the near plane of one, and in the middle of the scene."""
+    findings, pair = within_a_splat(stage)
+    centre, radius = stage.bounds()
+    outside_ms = stage.cpu_ms(stage.scene(), stage.view())
+    near = 1e-3 * radius
+    forward = View(
+        look_at(centre, centre + np.array([0, 0, -1.0])), stage.view().tangents, near,
+        400 * radius, stage.size,
+    )  # fmt: skip
+    looks = [turned(forward, angle) for angle in (0, 90, 180, 270)]
+    looks += [turned_about(forward, centre, angle, (1, 0, 0)) for angle in (89, -89)]
+    images = [stage.draw(stage.scene(), look) for look in looks]
+    times = [stage.cpu_ms(stage.scene(), look, 2) for look in looks]
+    slowest = int(np.argmax(times))
+    fullest = images[slowest]
+    findings += [
+        clean(*images),
+        at_most(
+            "slowest look from the middle, times the frame from outside",
+            times[slowest] / max(outside_ms, 1.0), FILL,
+            "the picture from outside is covered to a tenth or more; full cover alone is ten "
+            "times that, and an early stop must save the rest (process time, least of 2)",
+        ),
+    ]  # fmt: skip
+    panels = [
+        stage.panel(f"slowest look from the middle: {times[slowest]:.0f} ms of the CPU", fullest),
+        stage.panel(f"from outside: {outside_ms:.0f} ms", stage.draw(stage.scene(), stage.view())),
+        *pair,
+    ]
+    return Result(findings, panels)
+
+
+def within_a_splat(stage: Stage) -> tuple[list, list[Panel]]:
+    """A splat of 30 cm whose centre lies before, on, and behind the near plane."""
+    near = np.float32(0.05)
+    places = {
+        "at the eye": 0.0, "behind the eye": -0.1, "half way to the near plane": near / 2,
+        "on the near plane": near, "next to it": np.nextafter(near, np.float32(1)),
+        "just beyond": near * 1.01,
+    }  # fmt: skip
+    worst, images, known = None, [], 0
+    for what, depth in places.items():
+        scene = alone(splats([[0, 0, -depth], [0.1, 0, -2]], [[0.3] * 3, [0.2] * 3]))
+        view = front(SMALL, 0.0, near=float(near))
+        image = stage.draw(scene, view)
+        images.append(image)
+        # On the plane itself a rounding decides: either of the two pictures is right.
+        wants = [stage.reference(scene, replace(view, near=float(near) * s)) for s in (1, 1.000001)]
+        wants.append(stage.reference(scene, replace(view, near=float(near) * 0.999999)))
+        db = max(decibels(image, want) for want in wants)
+        known += db >= ORACLE_DB
+        if worst is None or db < worst[0]:
+            worst = (db, what, image)
+    reason = "rgba16f alone costs 59.5 dB; a splat on the plane may be drawn or not"
+    findings = [
+        clean(*images),
+        at_least(f"splat {worst[1]}, against float64, dB", worst[0], ORACLE_DB, reason),
+    ]
+    return findings, [stage.panel(f"a splat {worst[1]}", worst[2])]
+
+
+def lenses(stage: Stage) -> Result:
+    """Fields of view of 1 and 170 degrees."""
+    findings, images, panels = [], [], []
+    ball = shell()
+    for degrees, distance in ((1.0, 100.0), (170.0, 1.6)):
+        fov_y = np.radians(degrees)
+        view = front(SMALL, distance, fov_y=fov_y)
+        scene = alone(ball)
+        image = stage.draw(scene, view)
+        db = decibels(image, stage.reference(scene, view))
+        findings.append(
+            at_least(
+                f"{degrees:g} degrees, a ball against float64, dB", db, 45,
+                "a lens of 1 degree magnifies float32's 1e-7 of a place to hundredths of a pixel, "
+                "one of 170 its edge the same way",
+            )
+        )  # fmt: skip
+        own = replace(stage.view(), tangents=perspective(fov_y, stage.size))
+        seen = stage.draw(stage.scene(), own)
+        images += [image, seen]
+        panels += [
+            stage.panel(f"{degrees:g} degrees, a ball", image),
+            stage.panel(f"{degrees:g} degrees, the scene", seen),
+        ]
+    return Result([clean(*images), *findings], panels)
+
+
+def random_eyes(stage: Stage) -> Result:
+    """Eyes anywhere in and around the scene, turned anyhow: no picture may break."""
+    centre, radius = stage.bounds()
+    rng = np.random.default_rng(3)
+    view = stage.view()
+    broken, worst, images = 0, None, 0
+    for wxyz in turns(stage.steps, rng):
+        eye = centre + rng.normal(size=3) * radius * rng.uniform(0.01, 2)
+        look = replace(view, world_from_eye=Pose(eye, wxyz))
+        image = stage.draw(stage.scene(), look)
+        bad = broken_pixels(image)
+        images += 1
+        if worst is None or bad > worst[0]:
+            worst = (bad, image)
+        broken += bad
+    reason = "no place of the eye may break a pixel; which ones were tried is fixed by a seed"
+    findings = [at_most(f"broken pixels in {images} pictures", broken, 0, reason)]
+    return Result(findings, [stage.panel("one of the eyes", worst[1])])
+
+
+def compared(stage: Stage, name: str, image, other: str, beside) -> list[Panel]:
+    return [
+        stage.panel(name, image),
+        stage.panel(other, beside),
+        Panel("8 times the difference", difference(image, beside)),
+    ]

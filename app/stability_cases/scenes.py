@@ -1,0 +1,81 @@
+"""Small scenes that cases make themselves: their right picture is known, whatever the user's is."""
+
+import numpy as np
+
+from runtime_models.model import AnchorModel, ControlEncoding, Mlp, SplatLayers, Stop
+from runtime_models.spherical_harmonics import C0
+from scene.pose import Pose, View, perspective
+from scene.scene import IDENTITY, Scene, SceneObject
+
+ONLY = (Stop("only", 0.0),)
+
+
+def splats(means, scales, opacity=0.8, color=(1.0, 0.5, 0.2), wxyz=(1, 0, 0, 0)) -> SplatLayers:
+    """Plain splats; what is given once holds for all of them.  color: display sRGB."""
+    means = np.asarray(means, np.float32).reshape(-1, 3)
+    count = len(means)
+
+    def rows(value, width: int) -> np.ndarray:
+        return np.array(np.broadcast_to(np.asarray(value, np.float32), (count, width)))
+
+    sh = (rows(color, 3) - np.float32(0.5)) / np.float32(C0)
+    index = np.zeros(count, np.int32)
+    opacities = rows(np.reshape(opacity, (-1, 1)), 1)[:, 0]
+    return SplatLayers(
+        means, rows(scales, 3), rows(wxyz, 4), opacities, sh[:, None], index, ONLY
+    )  # fmt: skip
+
+
+def shell(count: int = 1500, seed: int = 0) -> SplatLayers:
+    """A closed ball of a metre, of flat splats of random colours and opacities."""
+    rng = np.random.default_rng(seed)
+    normal = rng.normal(size=(count, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    size = np.sqrt(4 * np.pi / count) * np.array([0.8, 0.5, 0.1])
+    return splats(
+        normal, size, rng.uniform(0.3, 1, count), rng.uniform(size=(count, 3)), turns(count, rng)
+    )
+
+
+def turns(count: int, rng: np.random.Generator) -> np.ndarray:
+    """(N, 4) unit quaternions of any direction."""
+    wxyz = rng.normal(size=(count, 4))
+    return wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)
+
+
+def small_model(anchors: int = 60, k: int = 5, seed: int = 0) -> AnchorModel:
+    """Networks with random weights, bounded as trained ones are: splats of a few centimetres."""
+    rng = np.random.default_rng(seed)
+
+    def network(width: int, bias: float, seen: bool = False, **kind) -> Mlp:
+        inputs = ("feature", "direction", "control") if seen else ("feature", "control")
+        sizes = (32, 8 + 3 * seen + 16)
+        weights = (rng.normal(0, 0.3, sizes), rng.normal(0, 0.15, (width, 32)))
+        biases = (rng.normal(0, 0.1, 32), np.full(width, bias))
+        as_float = [tuple(a.astype(np.float32) for a in arrays) for arrays in (weights, biases)]
+        return Mlp(*as_float, inputs=inputs, **kind)
+
+    networks = {
+        "offset": network(3 * k, 0, head="tanh", gain=0.1),
+        "scale": network(3 * k, -3, head="exp"),
+        "rotation": network(4 * k, 0.2),
+        "opacity": network(k, 0.5, head="tanh"),
+        "color": network(3 * k, 0, True, head="sigmoid"),
+    }
+    places = rng.normal(size=(anchors, 3)) * 0.5
+    features = rng.normal(size=(anchors, 8))
+    stops = (Stop("first", 0.0), Stop("second", 1.0))
+    arrays = (places.astype(np.float32), features.astype(np.float32))
+    return AnchorModel(*arrays, networks, k, ControlEncoding(), stops)
+
+
+def alone(model: AnchorModel | SplatLayers, pose=IDENTITY, x: float = 0.0) -> Scene:
+    return Scene((SceneObject("thing", model, pose, x),))
+
+
+def front(
+    size: tuple[int, int], distance: float = 3.0, near: float = 0.05, fov_y: float = 0.8
+) -> View:
+    """An eye on +Z that looks along -Z."""
+    pose = Pose(np.array([0.0, 0.0, distance]), IDENTITY.wxyz)
+    return View(pose, perspective(fov_y, size), near, 1e7, size)
