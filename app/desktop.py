@@ -1,22 +1,26 @@
 """The viewer: a window loop that draws only when something has changed."""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import glfw
 import numpy as np
 import tyro
 
-from app.controls import FAST, SLOW, SMOOTH_S, Camera, Push
-from app.drawing import make_folder, parse_size, save_png
+from app.controls import SMOOTH_S, Camera
+from app.drawing import parse_size
 from app.errors import UsageError
-from app.panel import Readings, draw_note, draw_panel, draw_problem, free_area
+from app.hands import is_erasing, is_painting, push, take
+from app.outlines import draw_brush, draw_outlines
+from app.panel import draw_note, draw_panel, draw_problem, free_area
+from app.pictures import write_numbered_png, write_png
+from app.readings import Readings
 from app.scale_bar import draw_scale_bar
+from app.shown import Shown, Wish
 from app.slider import draw_slider_bar
 from app.stage import Stage
-from app.window import DoubleClick, Drag, Drop, Event, KeyDown, Wheel, Window
+from app.window import Event, Window
 from renderer.context import describe
 from renderer.renderer import Renderer
 from runtime_models.model import BadFile
@@ -24,8 +28,6 @@ from runtime_models.read_scene import read_model
 from scene.pose import View
 
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
-TURN = 0.006  # radians a logical pixel of mouse movement
-LOOK = 0.003
 WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
 NOTE_S = 3.0  # how long a note stays
 SLEEP_S = 0.5  # longest wait for input while nothing moves
@@ -74,16 +76,17 @@ class Viewer:
         self.overlay = options.panel
         names = describe(window.ctx) | renderer.backends
         self.readings = Readings(
-            machine={key.replace("_", " "): str(v) for key, v in names.items()}
+            machine={key.replace("_", " "): str(v) for key, v in names.items()},
+            drawing=renderer.backends["drawing"],
         )
         self._free = self._free_wanted()  # where the picture's middle is; follows the overlay
         self.camera = self._first_camera()
-        self._drawn: tuple | None = None  # what the splats on screen were drawn from
+        self.shown = Shown(renderer, self.readings)
         self._note_until = 0.0
-        self._wanted: Drop | None = None  # files to be opened once the note about them is seen
+        self._wanted: tuple[Path, ...] = ()  # files to be opened once the note about them is seen
         self._frames = 0
         self._overlay_ms = 0.0
-        self._save_picture = False
+        self.save_picture = False
 
     def loop(self) -> None:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
@@ -109,7 +112,7 @@ class Viewer:
         for event in self.window.begin_frame():
             self.take(event)
         self.stage.advance(seconds)
-        self.camera.step(seconds, self._push())
+        self.camera.step(seconds, push(self.window))
         self._follow_overlay(seconds)
         fresh = self._draw_splats()
         drawn = time.perf_counter()
@@ -119,30 +122,21 @@ class Viewer:
         self._frames += 1
         self._save_pictures()
         self.window.swap()
+        now = self.readings.now = time.perf_counter()
         if fresh:
-            self.readings.frame_ms = (time.perf_counter() - start) * 1e3
+            self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
         self.readings.idle = not fresh
         if self._wanted and self._frames > 1:
             self._open_wanted()
 
     def take(self, event: Event) -> None:
         """Lets one input event act."""
-        width, height = self.window.logical_size
-        match event:
-            case KeyDown():
-                self._key(event)
-            case Drag(button="middle") | Drag(button="right") if self._pans(event):
-                self.camera.pan(-event.dx / height, event.dy / height)
-            case Drag():
-                rate = LOOK if self.camera.flying else TURN
-                self.camera.turn(-event.dx * rate, -event.dy * rate)
-            case Wheel():
-                self.camera.dolly(event.notches)
-            case DoubleClick():
-                self._focus(event.x / width, event.y / height)
-            case Drop():
-                self._wanted = event
-                self.say(f"Opening {', '.join(path.name for path in event.paths)} \u2026")
+        take(self, event)
+
+    def open_soon(self, paths: tuple[Path, ...]) -> None:
+        """Opens files in the next frame, so that the note about them is seen first."""
+        self._wanted = paths
+        self.say(f"Opening {', '.join(path.name for path in paths)} \u2026")
 
     def say(self, text: str) -> None:
         """Shows a note for a few seconds."""
@@ -151,8 +145,8 @@ class Viewer:
 
     def _busy(self) -> bool:
         """Whether the next frame is due without waiting for input."""
-        moving = self.camera.moving or self._push().any
-        waiting = self._wanted is not None or self.options.screenshot is not None
+        moving = self.camera.moving or push(self.window).any
+        waiting = bool(self._wanted) or self.options.screenshot is not None
         sliding = not np.array_equal(self._free, self._free_wanted())
         return moving or waiting or sliding or self.stage.playing or self._frames < WARM_UP
 
@@ -171,10 +165,10 @@ class Viewer:
         if np.abs(self._free - wanted).max() < 0.5 or self._frames == 0:
             self._free = wanted
 
-    def _view(self) -> View:
+    def view(self) -> View:
         return self.camera.view(self.window.size, tuple(self._free))
 
-    def _free_size(self) -> tuple[int, int]:
+    def free_size(self) -> tuple[int, int]:
         left, top, right, bottom = self._free_wanted()
         return int(right - left), int(bottom - top)
 
@@ -186,79 +180,35 @@ class Viewer:
         return over
 
     def _first_camera(self) -> Camera:
-        view = self.stage.first_view(self._free_size())
+        view = self.stage.first_view(self.free_size())
         return Camera(view, self.stage.centre, self.stage.radius)
 
-    def _pans(self, drag: Drag) -> bool:
-        return drag.button == "middle" or not self.camera.flying
-
-    def _push(self) -> Push:
-        """The movement keys that are held now."""
-        held = self.window.held
-        fast = held(glfw.KEY_LEFT_SHIFT) or held(glfw.KEY_RIGHT_SHIFT)
-        slow = held(glfw.KEY_LEFT_CONTROL) or held(glfw.KEY_RIGHT_CONTROL)
-        return Push(
-            right=held(glfw.KEY_D) - held(glfw.KEY_A),
-            up=held(glfw.KEY_E) - held(glfw.KEY_Q),
-            forward=held(glfw.KEY_W) - held(glfw.KEY_S),
-            pace=FAST if fast else SLOW if slow else 1.0,
-        )
-
-    def _key(self, event: KeyDown) -> None:
-        """Keys that act once; the held ones are asked for in `_push`."""
-        stage, camera = self.stage, self.camera
-        match event.key:
-            case glfw.KEY_V:
-                camera.toggle_flying()
-            case glfw.KEY_F if event.shift:
-                camera.reset()
-            case glfw.KEY_F:
-                distance = stage.fit(self._view(), camera.fov_y, self._free_size())
-                camera.frame(stage.centre, distance)
-            case glfw.KEY_SPACE:
-                stage.toggle_play()
-            case glfw.KEY_H | glfw.KEY_TAB:
-                self.overlay = not self.overlay
-            case glfw.KEY_P | glfw.KEY_F12:
-                self._save_picture = True
-            case key if glfw.KEY_1 <= key <= glfw.KEY_9:
-                stage.go_to_stop(key - glfw.KEY_1)
-
-    def _focus(self, across: float, down: float) -> None:
-        """Centres what lies under a place of the picture, both in 0..1 from the top left."""
-        view = self._view()
-        left, right, low, high = view.tangents
-        in_eye = np.array([left + (right - left) * across, high + (low - high) * down, -1.0])
-        world_from_eye = view.world_from_eye.matrix()
-        point = self.stage.point_under(world_from_eye[:3, 3], world_from_eye[:3, :3] @ in_eye)
-        if point is not None:
-            self.camera.focus(point)
+    def _wish(self) -> Wish:
+        """What the screen should show now."""
+        stage = self.stage
+        moving = self.camera.moving or push(self.window).any or stage.playing
+        view = self.view()
+        return Wish(stage.shown(view), view, stage.settings, moving)
 
     def _draw_splats(self) -> bool:
         """Draws the scene into the window; True when the splats had to be drawn anew."""
-        view = self._view()
-        pose, settings = view.world_from_eye, self.stage.settings
-        quality = replace(settings, background=(0.0, 0.0, 0.0))  # the background needs no splats
-        wanted = (
-            self.stage.scene, pose.position.tobytes(), pose.wxyz.tobytes(), view.tangents,
-            view.size, quality,
-        )  # fmt: skip
-        self.renderer.settings = settings
-        fresh = self._drawn != wanted or self.options.screenshot is not None
-        fresh = fresh or self._frames < WARM_UP
+        wish, now = self._wish(), time.perf_counter()
+        if self.stage.measure_now or self.shown.due(wish, now):
+            self.stage.measure_now = False
+            self.shown.measure(wish)
+        force = self.options.screenshot is not None or self._frames < WARM_UP
+        fresh = self.shown.draw(wish, self.window.screen(), force)
         if fresh:
-            self.renderer.update(self.stage.scene)
-            self.readings.stats = self.renderer.draw([view], self.window.screen())
             self.readings.stats.ms["overlay"] = self._overlay_ms  # of the frame before
-            self._drawn = wanted
-        else:
-            self.renderer.present(self.window.screen())
+        self.shown.read(wish, now)
         return fresh
 
     def _draw_overlay(self) -> None:
         scale = self.window.ui_scale
         self.readings.flying = self.camera.flying
         covered = []
+        if not self.save_picture:
+            self._draw_marks(scale)
         if self.overlay:
             draw_scale_bar(self.stage.scene, scale)
             left = free_area(self.window.logical_size, len(self.stage.sliders), scale)[0]
@@ -266,16 +216,24 @@ class Viewer:
                 draw_panel(self.stage, self.readings, scale),
                 draw_slider_bar(self.stage, left, scale),
             ]
-        if not self._save_picture:  # a note is no part of a picture
+        if not self.save_picture:  # a note is no part of a picture
             draw_note(self.readings.note, scale)
         draw_problem(self.stage, scale)
         self.window.covered = tuple(covered)
 
+    def _draw_marks(self, scale: float) -> None:
+        """Outlines of the regions, and the brush while there is one."""
+        stage, window = self.stage, self.window
+        if self.overlay or stage.regions.placing:
+            draw_outlines(stage.regions, stage.scene, self.view(), scale)
+        if is_painting(self) and window.on_scene:
+            draw_brush(window.cursor, stage.regions.brush * scale, is_erasing(self), scale)
+
     def _open_wanted(self) -> None:
         """Opens the dropped files; after a bad one the old scene is still there."""
-        wanted, self._wanted = self._wanted, None
+        wanted, self._wanted = self._wanted, ()
         before = self.stage.scene
-        if self.stage.drop(wanted.paths):
+        if self.stage.drop(wanted):
             try:
                 self.renderer.update(self.stage.scene)
             except BadFile as error:
@@ -284,35 +242,14 @@ class Viewer:
         self.readings.note = ""
         if self.stage.scene is not before:
             self.camera = self._first_camera()
-            self.window.set_title(f"Shapeshift \u2013 {wanted.paths[0].name}")
+            self.window.set_title(f"Shapeshift \u2013 {wanted[0].name}")
 
     def _save_pictures(self) -> None:
         """Writes the picture that a key or --screenshot asked for, of what is on the screen."""
         last = self._frames >= self.options.frames
         if self.options.screenshot is not None and last:
             write_png(self.window.picture(), self.options.screenshot)
-        if self._save_picture:
-            self._save_picture = False
+        if self.save_picture:
+            self.save_picture = False
             path = write_numbered_png(self.window.picture(), self.options.pictures)
             self.say(f"Saved {path}")
-
-
-def write_png(picture: np.ndarray, path: Path) -> None:
-    """Writes (H, W, 3) uint8 whole or not at all, with the folder that it needs."""
-    make_folder(path.parent)
-    save_png(picture / 255, path)
-
-
-def write_numbered_png(picture: np.ndarray, folder: Path) -> Path:
-    """Writes shapeshift-0001.png or the next free number; never over a file that is there."""
-    make_folder(folder)
-    number = 1
-    while True:
-        path = folder / f"shapeshift-{number:04}.png"
-        try:
-            path.touch(exist_ok=False)  # claims the name, also against another viewer
-        except FileExistsError:
-            number += 1
-            continue
-        write_png(picture, path)
-        return path

@@ -1,16 +1,18 @@
-"""The panel at the left: frame times, splat counts, quality, palette, machine, keys, messages."""
+"""The panel at the left: its frame, times and counts, keys, messages; sections from beside it."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
-import numpy as np
 from imgui_bundle import imgui
 
 from app import theme
+from app.panel_rows import choice, ms_text, number, right_aligned, rows, section, tip
+from app.quality_panel import draw_quality
+from app.readings import Readings
 from app.stage import AS_FILED, Stage
 from app.theme import Box
 from renderer.palette import PALETTES
-from renderer.settings import FrameStats
+from renderer.settings import CULL_REASONS, FrameStats
 
 Vec = imgui.ImVec2
 WIDTH = 268.0  # logical pixels
@@ -18,8 +20,6 @@ MARGIN = 16.0
 BAR_HEIGHT = 92.0  # of the slider bar with one row, with what lies below it
 BAR_FIRST, BAR_ROW = 46.0, 71.0  # a row without and with the name of its object
 MIN_FREE = 0.5  # of the window's width and height
-MAX_LAMBDA = 512.0  # pixels; the slider's end means no limit
-FAR_RADII = 12.0  # scene radii; the distance slider's end means no limit
 KEYS = (
     ("drag", "orbit, look"),
     ("right drag", "pan, look"),
@@ -34,18 +34,6 @@ KEYS = (
     ("P, F12", "save a picture"),
     ("H, Tab", "hide all this"),
 )
-
-
-@dataclass
-class Readings:
-    """What was measured, for showing."""
-
-    stats: FrameStats = field(default_factory=FrameStats)
-    frame_ms: float = 0.0  # the last frame with new splats, whole: update to swap
-    machine: Mapping[str, str] = field(default_factory=dict)  # label -> driver or back end
-    flying: bool = False
-    idle: bool = False
-    note: str = ""  # said for a few seconds at the upper edge
 
 
 def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
@@ -67,16 +55,19 @@ def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     )  # fmt: skip
     _title(stage)
     _frame(readings)
-    if _section("Passes", open_first=True):
+    if section("Quality", open_first=True):
+        draw_quality(stage, readings, ui_scale)
+    if section("Passes", open_first=True):
         _passes(readings.stats.ms, ui_scale)
-    if _section("Splats", open_first=True):
+        _rates(readings, ui_scale)
+    if section("Splats"):
         _splats(readings.stats)
-    if _section("Quality", open_first=True):
-        _quality(stage, ui_scale)
-    if _section("Machine"):
-        _rows(readings.machine.items(), share=0.34)
-    if _section("Keys"):
-        _rows(KEYS, share=0.40)
+    if section("Look"):
+        _look(stage, ui_scale)
+    if section("Machine"):
+        rows(readings.machine.items(), share=0.34)
+    if section("Keys"):
+        rows(KEYS, share=0.40)
     box = theme.window_box()
     imgui.end()
     return box
@@ -157,26 +148,19 @@ def _title(stage: Stage) -> None:
 
 
 def _frame(readings: Readings) -> None:
-    """The frame in one line."""
-    if not readings.frame_ms > 0:
+    """The frame in two lines: its time, and how much of the scene it drew."""
+    ms = readings.meter.ms
+    if not ms > 0:
         return
-    rate = "at rest" if readings.idle else f"{1e3 / readings.frame_ms:.0f} fps"
+    rate = "at rest" if readings.idle else f"{1e3 / ms:.0f} fps"
     mode = "fly" if readings.flying else "orbit"
-    imgui.text(f"{_ms(readings.frame_ms)} ms")
+    imgui.text(f"{ms_text(ms)} ms")
     imgui.same_line()
     imgui.text_disabled(f"{rate}  \u2013  {mode}")
-
-
-def _section(name: str, open_first: bool = False) -> bool:
-    """A heading that folds; returns whether it is open."""
-    imgui.dummy(Vec(0, 1))
-    flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
-    if open_first:
-        flags |= imgui.TreeNodeFlags_.default_open
-    imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(0, imgui.get_style().frame_padding.y))
-    is_open = imgui.tree_node_ex(name, flags)
-    imgui.pop_style_var()
-    return is_open
+    stats = readings.stats
+    imgui.text(number(stats.drawn))
+    imgui.same_line()
+    imgui.text_disabled(f"of {number(stats.splats)} splats drawn")
 
 
 def _passes(ms_of_pass: Mapping[str, float], ui_scale: float) -> None:
@@ -201,71 +185,46 @@ def _passes(ms_of_pass: Mapping[str, float], ui_scale: float) -> None:
             2.0,
         )
         imgui.table_next_column()
-        _right_aligned(_ms(ms))
+        right_aligned(ms_text(ms))
     imgui.end_table()
 
 
+def _rates(readings: Readings, ui_scale: float) -> None:
+    """How often the work was done that need not be done every frame."""
+    meter, now = readings.meter, readings.now
+    sorts = "kept" if readings.stats.order_age else "new"
+    rows(
+        [
+            ("slowest of the last second", f"{ms_text(meter.slowest_ms)} ms"),
+            ("sorts a second", f"{meter.per_second('sorts', now):.0f}, order {sorts}"),
+            ("shapes decoded a second", f"{meter.per_second('geometry_runs', now):.0f}"),
+            ("colours decoded a second", f"{meter.per_second('color_runs', now):.0f}"),
+        ]
+    )
+    tip("Networks run when x changes (shapes) or when the eye has moved (colours).", ui_scale)
+
+
 def _splats(stats: FrameStats) -> None:
-    rows = [("in the scene", stats.splats), ("drawn", stats.drawn)]
-    rows += [(f"culled: {why}", count) for why, count in sorted(stats.culled.items())]
-    _rows([(name, f"{count:,}".replace(",", "\u2009")) for name, count in rows])
+    """Why splats were not drawn: the first gate that each one failed, in the gates' order."""
+    counts = [("in the scene", stats.splats), ("drawn", stats.drawn)]
+    known = [why for why in CULL_REASONS if why in stats.culled]
+    counts += [(f"culled: {why}", stats.culled[why]) for why in known]
+    rows([(name, number(count)) for name, count in counts])
 
 
-def _quality(stage: Stage, ui_scale: float) -> None:
-    """Thresholds, palette and background."""
-    settings = stage.settings
-    imgui.push_item_width(imgui.get_content_region_avail().x)
-    flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
-    end = MAX_LAMBDA
-    shown = min(settings.max_pixels, end)
-    text = "largest splat: any" if shown >= end else "largest splat: %.0f px"
-    moved, pixels = imgui.slider_float("##lambda", shown, 1.0, end, text, flags)
-    if moved:
-        settings = replace(settings, max_pixels=pixels if pixels < end else np.inf)
-    imgui.set_item_tooltip("\u03c4\u03bb: splats longer than this on the screen are left out")
-    end = FAR_RADII * stage.radius
-    shown = min(settings.max_distance, end)
-    text = "distance: any" if shown >= end else "distance: %.2f m"
-    low = 0.01 * stage.radius
-    moved, metres = imgui.slider_float("##distance", shown, low, end, text, flags)
-    if moved:
-        settings = replace(settings, max_distance=metres if metres < end else np.inf)
-    imgui.set_item_tooltip("\u03c4dist: splats farther away than this are left out")
+def _look(stage: Stage, ui_scale: float) -> None:
+    """What the picture is shown in, at no cost: palette and background."""
     if stage.has_palettes:
+        imgui.push_item_width(-1)
         names = [AS_FILED, *PALETTES]
         labels = ["palette: as filed", *(f"palette: {name}" for name in PALETTES)]
-        changed, chosen = imgui.combo("##palette", names.index(stage.palette), labels)
-        if changed:
-            stage.choose_palette(names[chosen])
-    imgui.pop_item_width()
+        chosen = choice("palette", stage.palette, names, labels)
+        if chosen != stage.palette:
+            stage.choose_palette(chosen)
+        imgui.pop_item_width()
+    settings = stage.settings
     changed, background = imgui.color_edit3(
         "background", list(settings.background), imgui.ColorEditFlags_.no_inputs
     )
     if changed:
-        settings = replace(settings, background=tuple(background))
-    if settings != stage.settings:
-        stage.settings = settings
-
-
-def _rows(rows: Iterable[tuple[str, str]], share: float = 0.0) -> None:
-    """Muted names, values: at the right, or from a `share` of the width on, where they wrap."""
-    for name, value in rows:
-        imgui.text_disabled(name)
-        if share:
-            imgui.same_line(imgui.get_window_size().x * share)
-            imgui.push_text_wrap_pos(0)
-            imgui.text_unformatted(value)
-            imgui.pop_text_wrap_pos()
-        else:
-            imgui.same_line()
-            _right_aligned(value)
-
-
-def _right_aligned(text: str) -> None:
-    room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
-    imgui.text_unformatted(text)
-
-
-def _ms(value: float) -> str:
-    return f"{value:.2f}" if value < 10 else f"{value:.1f}" if value < 100 else f"{value:.0f}"
+        stage.settings = replace(settings, background=tuple(background))

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from renderer.settings import RenderSettings
+from app.regions import Regions
+from renderer.settings import DEBUG_VIEWS, RenderSettings
 from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
 from scene.control import Sweep
 from scene.framing import (
@@ -15,9 +16,9 @@ from scene.framing import (
     fit_points,
     frame_points,
     framing_view,
-    point_under,
     scene_points,
 )
+from scene.pick import Hit, Picker
 from scene.pose import View, perspective
 from scene.scene import Scene, SceneObject
 
@@ -36,9 +37,13 @@ class Stage:
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
         self.palette = AS_FILED
+        self.regions = Regions()
+        self.measure_now = False  # compare the picture with the exact one in the next frame
         self.problem = ""  # one sentence for the message box; "" = nothing is wrong
         self.centre, self.radius = np.zeros(3), 1.0
         self._points = (np.zeros((0, 3)), np.zeros(0))
+        self._picker = Picker()
+        self._shown: tuple = (None, None)  # what `shown` was made of, and what it was
 
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
         """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
@@ -62,6 +67,8 @@ class Stage:
             sweep.resume_at(thing.x)
         self._points = scene_points(scene)
         self.centre, self.radius = frame_points(*self._points)
+        self.regions.clear()
+        self.regions.radius = self.radius
 
     def drop(self, paths: Sequence[Path]) -> bool:
         """Opens what was dropped on the window; False, and a sentence in `problem`, when bad."""
@@ -83,9 +90,34 @@ class Stage:
         axes = view.world_from_eye.matrix()
         return fit_points(*self._points, self.centre, axes, perspective(fov_y, size))
 
-    def point_under(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:
-        """The world point (3,) that a ray meets, or None."""
-        return point_under(*self._points, origin, direction)
+    def shown(self, view: View) -> Scene:
+        """The scene with its regions as `view` sees them; the same object until one changes."""
+        return self.scene
+
+    def pick(self, origin: np.ndarray, direction: np.ndarray, spread: float) -> Hit | None:
+        """What a ray meets, of splats as they are now; `spread` is what the hand may be off."""
+        return self._picker.under(self.scene, origin, direction, spread)
+
+    def toggle_lens(self) -> bool:
+        """Switches the lens on or off; returns whether it is on."""
+        return bool(self.scene.objects) and self.regions.toggle_lens(self.scene.objects[0])
+
+    def paint(self, view: View, cursor: tuple[float, float], radius: float, erase: bool) -> None:
+        """Paints anchors of the chosen painted region, of a new one where none is chosen."""
+        regions = self.regions
+        if regions.current is None or regions.current.kind != "painted":
+            numbers = [n for n, region in enumerate(regions.items) if region.kind == "painted"]
+            if numbers:
+                regions.choose(numbers[-1])
+            else:
+                regions.add("painted", 0, self.scene.objects[0], np.zeros(3))
+        thing = self.scene.objects[regions.current.index]
+        regions.paint(view, cursor, radius, thing, erase)
+
+    def next_debug_view(self, step: int) -> None:
+        """The next debug view in their order, the picture itself among them."""
+        number = (DEBUG_VIEWS.index(self.settings.debug) + step) % len(DEBUG_VIEWS)
+        self.settings = replace(self.settings, debug=DEBUG_VIEWS[number])
 
     def set_x(self, index: int, x: float) -> None:
         objects = list(self.scene.objects)

@@ -18,6 +18,7 @@ BUTTONS = {0: "left", 1: "right", 2: "middle"}
 DOUBLE_CLICK_S = 0.3
 CLICK_PIXELS = 4.0  # a press that moves further is a drag, not a click
 SETTLE_FRAMES = 3  # ImGui hands out queued input over this many frames
+HOVER_S = 0.35  # after the mouse came to rest tooltips are due, so there is a frame for them
 MODIFIERS = {
     imgui.Key.mod_shift: (glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT),
     imgui.Key.mod_ctrl: (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL),
@@ -52,6 +53,20 @@ class Drag:
     button: str  # left, right or middle
     dx: float  # logical pixels since the last event, right and down positive
     dy: float
+    x: float = 0.0  # logical pixels from the top left, where it is now
+    y: float = 0.0
+
+
+@dataclass(frozen=True)
+class Press:
+    button: str  # left, right or middle
+    x: float  # logical pixels from the top left
+    y: float
+
+
+@dataclass(frozen=True)
+class Release:
+    button: str
 
 
 @dataclass(frozen=True)
@@ -70,7 +85,7 @@ class Drop:
     paths: tuple[Path, ...]
 
 
-Event = KeyDown | Drag | Wheel | DoubleClick | Drop
+Event = KeyDown | Press | Drag | Release | Wheel | DoubleClick | Drop
 
 
 class Window:
@@ -97,6 +112,7 @@ class Window:
         self._last_click = (0.0, 0.0, -1.0)  # x, y, seconds
         self._cursor = (0.0, 0.0)
         self._unsettled = SETTLE_FRAMES
+        self._look_again = np.inf  # seconds on glfw's clock
         self._clock = glfw.get_time()
         self._listen()
 
@@ -129,6 +145,16 @@ class Window:
     def close(self) -> None:
         self._window.is_closing = True
 
+    @property
+    def cursor(self) -> tuple[float, float]:
+        """Where the mouse is, logical pixels from the top left."""
+        return self._cursor
+
+    @property
+    def on_scene(self) -> bool:
+        """Whether the mouse is over the picture rather than over the overlay."""
+        return not self._over_overlay(*self._cursor)
+
     def set_title(self, title: str) -> None:
         self._window.title = title
 
@@ -139,10 +165,14 @@ class Window:
 
     def wait(self, seconds: float) -> bool:
         """Takes input, sleeping up to that long for it; True when the overlay must be redrawn."""
+        seconds = min(seconds, self._look_again - glfw.get_time())
         if self._unsettled > 0 or seconds <= 0:
             glfw.poll_events()
         else:
             glfw.wait_events_timeout(seconds)
+        if glfw.get_time() >= self._look_again:
+            self._look_again = np.inf
+            self._note()
         return self._unsettled > 0
 
     def begin_frame(self) -> list[Event]:
@@ -219,7 +249,8 @@ class Window:
         imgui.get_io().add_mouse_pos_event(x, y)
         dx, dy = x - self._cursor[0], y - self._cursor[1]
         self._cursor = (x, y)
-        self._note(Drag(self._pressed, dx, dy) if self._pressed else None)
+        self._look_again = glfw.get_time() + HOVER_S
+        self._note(Drag(self._pressed, dx, dy, x, y) if self._pressed else None)
 
     def _on_button(self, handle, button: int, action: int, mods: int) -> None:
         if button not in BUTTONS:
@@ -229,11 +260,14 @@ class Window:
         io.add_mouse_button_event(button, action == glfw.PRESS)
         self._note()
         if action == glfw.RELEASE:
-            self._pressed = None if self._pressed == BUTTONS[button] else self._pressed
+            if self._pressed == BUTTONS[button]:
+                self._pressed = None
+                self._note(Release(BUTTONS[button]))
             return
         if self._over_overlay(x, y):
             return
         self._pressed = BUTTONS[button]
+        self._note(Press(BUTTONS[button], x, y))
         if button == glfw.MOUSE_BUTTON_LEFT:
             last_x, last_y, when = self._last_click
             close = abs(x - last_x) + abs(y - last_y) <= CLICK_PIXELS

@@ -9,7 +9,7 @@ import pytest
 from desktop_stand import read_stub, run_frames
 from PIL import Image
 
-from app import desktop
+from app import hands
 from app.stage import Stage
 from app.window import DoubleClick, Drag, Drop, KeyDown, Wheel
 from renderer.settings import RenderSettings
@@ -113,16 +113,16 @@ def test_play_is_of_time_and_keeps_its_place(viewer):
 
 
 def test_fly_frame_reset_and_hide(viewer):
-    first = viewer._view().eye_from_world()
+    first = viewer.view().eye_from_world()
     press(viewer, glfw.KEY_V)
     assert viewer.camera.flying
     viewer.take(Drag("left", 200, 10))
     run_frames(viewer, 60)
-    assert np.abs(viewer._view().eye_from_world() - first).max() > 0.1
+    assert np.abs(viewer.view().eye_from_world() - first).max() > 0.1
     press(viewer, glfw.KEY_F, shift=True)
     press(viewer, glfw.KEY_V)
     run_frames(viewer, 60)
-    np.testing.assert_allclose(viewer._view().eye_from_world(), first, atol=1e-6)
+    np.testing.assert_allclose(viewer.view().eye_from_world(), first, atol=1e-6)
     with_overlay = screenshot(viewer)
     press(viewer, glfw.KEY_H)
     run_frames(viewer, 60)
@@ -132,7 +132,7 @@ def test_fly_frame_reset_and_hide(viewer):
         == 1
         < len(np.unique(with_overlay.reshape(-1, 3), axis=0))
     )
-    left, right, down, up = viewer._view().tangents
+    left, right, down, up = viewer.view().tangents
     assert left == pytest.approx(-right) and down == pytest.approx(-up)  # the whole window again
 
 
@@ -161,23 +161,23 @@ def glfw_release(window, button=glfw.MOUSE_BUTTON_LEFT):
 
 
 def test_a_drag_in_the_scene_turns_the_camera_and_one_on_the_panel_does_not(viewer):
-    before = viewer._view().eye_from_world()
+    before = viewer.view().eye_from_world()
     glfw_click(viewer.window, 60, 40)  # on the panel
     viewer.window._on_cursor(None, 120, 90)
     glfw_release(viewer.window)
     run_frames(viewer, 30)
-    np.testing.assert_array_equal(viewer._view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
     glfw_click(viewer.window, 600, 200)
     viewer.window._on_cursor(None, 660, 200)
     glfw_release(viewer.window)
     viewer.window._on_cursor(None, 800, 300)  # no button is down any more
     run_frames(viewer, 60)
     centre = viewer.stage.centre
-    eyes = [np.linalg.inv(before)[:3, 3], viewer._view().world_from_eye.position]
+    eyes = [np.linalg.inv(before)[:3, 3], viewer.view().world_from_eye.position]
     one, other = (eye - centre for eye in eyes)
     assert np.linalg.norm(one) == pytest.approx(np.linalg.norm(other))
     angle = np.arctan2(one[0], one[2]) - np.arctan2(other[0], other[2])
-    assert angle == pytest.approx(60 * desktop.TURN)
+    assert angle == pytest.approx(60 * hands.TURN)
 
 
 def test_the_slider_follows_the_mouse_and_snaps(viewer):

@@ -1,0 +1,170 @@
+"""Regions of a scene that have a control value of their own, as a person edits them; no window."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from scene.pick import anchor_places
+from scene.pose import View
+from scene.scene import SceneObject
+
+KINDS = ("box", "sphere", "half-space", "lens", "painted")
+FIRST_SIZE = 0.25  # of the scene's radius: half a box's side, a sphere's radius
+FIRST_BORDER = 0.05  # of the scene's radius
+LENS = 0.25  # tangent of half the lens' angle at first
+BRUSH = 24.0  # logical pixels, radius
+DEEP = 2.0  # brush radii behind the front: what lies deeper is another surface
+
+
+@dataclass(frozen=True)
+class Region:
+    """One region of one object; which of the sizes count depends on its kind."""
+
+    kind: str  # one of KINDS
+    name: str
+    index: int = 0  # of its object
+    enabled: bool = True
+    x: float = 0.0  # control value inside
+    border: float = 0.0  # metres over which x changes to what is outside
+    centre: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) metres, object frame
+    half: np.ndarray = field(default_factory=lambda: np.ones(3))  # (3,) metres; a sphere's: [0]
+    normal: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  # out of it
+    tangent: float = LENS  # a lens' radius at a metre from the eye
+    painted: np.ndarray | None = None  # (A,) bool, one an anchor or a plain splat
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether it has a place in the scene that a click can set."""
+        return self.kind in ("box", "sphere", "half-space")
+
+
+class Regions:
+    """The list of regions, which of them is being edited, and what the mouse does to it.
+
+    `version` goes up with every edit, so that whoever depends on regions knows when they changed.
+    """
+
+    def __init__(self, radius: float = 1.0) -> None:
+        self.radius = radius  # metres, of the scene: what sizes start from
+        self.items: tuple[Region, ...] = ()
+        self.chosen = -1  # index of the one that is edited; -1: none
+        self.placing = False  # the next click into the picture sets the chosen one's place
+        self.holding = False  # the mouse is down since such a click and moves the region
+        self.brush = BRUSH
+        self.version = 0
+
+    @property
+    def current(self) -> Region | None:
+        return self.items[self.chosen] if 0 <= self.chosen < len(self.items) else None
+
+    def choose(self, number: int) -> None:
+        self.chosen, self.placing = number, False
+
+    def add(self, kind: str, index: int, thing: SceneObject, point: np.ndarray) -> Region:
+        """A new region of the object `thing`, about `point` (3,) in its frame; it is chosen.
+
+        It shows the stop farthest from what the object shows, so that it is seen at once.
+        """
+        names = {region.name for region in self.items}
+        count = next(n for n in range(1, len(names) + 2) if f"{kind} {n}" not in names)
+        region = Region(
+            kind, f"{kind} {count}", index,
+            x=farthest_stop(thing), border=FIRST_BORDER * self.radius,
+            centre=np.asarray(point, np.float64),
+            half=np.full(3, FIRST_SIZE * self.radius),
+            painted=np.zeros(len(anchor_places(thing.model)), bool) if kind == "painted" else None,
+        )  # fmt: skip
+        self.items = (*self.items, region)
+        self.choose(len(self.items) - 1)
+        self.placing = region.is_placed
+        self.version += 1
+        return region
+
+    def remove(self, number: int) -> None:
+        self.items = self.items[:number] + self.items[number + 1 :]
+        self.choose(min(number, len(self.items) - 1))
+        self.version += 1
+
+    def clear(self) -> None:
+        """Forgets all, for another scene."""
+        self.items, self.version = (), self.version + 1
+        self.choose(-1)
+
+    def edit(self, number: int, **changes: object) -> None:
+        """Changes fields of one region; `version` tells only when something is different."""
+        before = self.items[number]
+        if all(same(getattr(before, name), value) for name, value in changes.items()):
+            return
+        after = replace(before, **changes)
+        self.items = (*self.items[:number], after, *self.items[number + 1 :])
+        self.version += 1
+
+    def place(self, point: np.ndarray, index: int, things: tuple[SceneObject, ...]) -> None:
+        """Moves the chosen region to a world point (3,), into the object that was met there.
+
+        A painted region stays with its object: its anchors mean nothing in another one.
+        """
+        world_from_object = things[index].world_from_object.matrix()
+        local = np.linalg.inv(world_from_object) @ np.append(point, 1.0)
+        self.edit(self.chosen, index=index, centre=local[:3])
+
+    def toggle_lens(self, thing: SceneObject) -> bool:
+        """Switches the lens on or off, adding one the first time; returns whether it is on."""
+        for number, region in enumerate(self.items):
+            if region.kind == "lens":
+                self.edit(number, enabled=not region.enabled)
+                return not region.enabled
+        self.add("lens", 0, thing, np.zeros(3))
+        return True
+
+    def paint(
+        self, view: View, cursor: tuple[float, float], radius: float, thing: SceneObject,
+        erase: bool,
+    ) -> int:  # fmt: skip
+        """Paints or erases the chosen region's anchors under a brush; returns how many changed.
+
+        cursor and radius are in pixels of the view, from its top left.
+        """
+        region = self.current
+        under = brushed(view, anchor_places(thing.model), thing, cursor, radius)
+        painted = region.painted.copy()
+        painted[under] = not erase
+        changed = int((painted != region.painted).sum())
+        if changed:
+            self.edit(self.chosen, painted=painted)
+        return changed
+
+
+def same(one: object, other: object) -> bool:
+    """Equal numbers, texts or arrays; NaN is never the same."""
+    return one is other or bool(np.array_equal(one, other))
+
+
+def farthest_stop(thing: SceneObject) -> float:
+    """x of the stop that differs most from what the object shows."""
+    xs = [stop.x for stop in thing.model.stops] or [0.0, 1.0]
+    return max(xs, key=lambda x: abs(x - thing.x))
+
+
+def brushed(
+    view: View, places: np.ndarray, thing: SceneObject, cursor: tuple[float, float],
+    radius: float,
+) -> np.ndarray:  # fmt: skip
+    """Indices of the places (A, 3), object frame, within `radius` pixels of the cursor.
+
+    Just those of the nearest surface: at most DEEP brush radii, in metres at its depth, behind its
+    front.
+    """
+    eye_from_object = view.eye_from_world() @ thing.world_from_object.matrix()
+    in_eye = places @ eye_from_object[:3, :3].T + eye_from_object[:3, 3]  # (A, 3) metres
+    depth = -in_eye[:, 2]
+    ahead = np.flatnonzero(depth > view.near)
+    left, right, _, up = view.tangents
+    per_pixel = (right - left) / view.size[0]  # tangent of one pixel
+    across = (in_eye[ahead, 0] / depth[ahead] - left) / per_pixel
+    down = (up - in_eye[ahead, 1] / depth[ahead]) / per_pixel
+    under = ahead[np.hypot(across - cursor[0], down - cursor[1]) <= radius]
+    if not len(under):
+        return under
+    front = np.percentile(depth[under], 5, method="lower")  # a floater before it is no surface
+    return under[depth[under] <= front * (1 + DEEP * radius * per_pixel)]
