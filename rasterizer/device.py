@@ -4,6 +4,7 @@ import os
 import sys
 import tempfile
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -150,7 +151,6 @@ def open_device(kind: str | None = None) -> Device:
     if "POCL_CACHE_DIR" not in os.environ:
         os.environ["POCL_CACHE_DIR"] = str(cache_folder())
     import pyopencl as cl
-    from pyopencl.tools import ImmediateAllocator, MemoryPool
 
     try:
         found = [d for platform in cl.get_platforms() for d in platform.get_devices()]
@@ -160,7 +160,15 @@ def open_device(kind: str | None = None) -> Device:
     if not usable:
         wanted = f" of kind {kind!r}" if kind and found else ""
         raise NoDevice(f"There is no OpenCL device{wanted} on this machine: {INSTALL}.")
-    device = max(usable, key=_preference)
+    return _opened(max(usable, key=_preference))
+
+
+@cache  # PoCL keeps 8 MB of every set of programs that is built anew, even when all is released
+def _opened(device: "cl.Device") -> Device:
+    """One context, queue and set of programs a process for each device."""
+    import pyopencl as cl
+    from pyopencl.tools import ImmediateAllocator, MemoryPool
+
     context = cl.Context([device])
     queue = cl.CommandQueue(context)
     return Device(
