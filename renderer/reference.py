@@ -1,10 +1,12 @@
 """The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from renderer.settings import RenderSettings
+from renderer import layout
+from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.evaluate import evaluate
-from runtime_models.model import Splats
 from runtime_models.rotation import normalize, rotation_matrices
 from scene.pose import View
 from scene.scene import Scene, SceneObject
@@ -13,64 +15,164 @@ MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
 JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection counts as flat
 
 
+@dataclass(frozen=True)
+class Projected:
+    """All splats of an object as a view sees them; rows with a reason may hold anything."""
+
+    reason: np.ndarray  # (N,) uint8: 0 drawn, else 1 + index into CULL_REASONS
+    depth: np.ndarray  # (N,) metres along the view
+    place: np.ndarray  # (N, 3) metres in the world
+    mean_px: np.ndarray  # (N, 2) row 0 on top
+    covariance: np.ndarray  # (N, 2, 2) px^2, low_pass included
+    opacity: np.ndarray  # (N,) after the fade
+    color: np.ndarray  # (N, 3)
+
+
 def reference_image(
     scene: Scene, view: View, settings: RenderSettings | None = None, eye: np.ndarray | None = None
 ) -> np.ndarray:
     """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top.
 
-    eye: (3,) world metres, where colours are looked at from if not from the view's own eye
-    (stereo computes them once, for the centre of both).
+    eye: (3,) world metres, where colours are looked at from and distances in the order
+    "distance" are measured from, if not the view's own eye (stereo: the centre of both).
     """
     settings = settings or RenderSettings()
     eye = view.world_from_eye.position if eye is None else eye
-    parts = [project_object(o, view, settings, eye) for o in scene.objects if o.visible]
-    if not parts:
+    objects = [gate_object(o, view, settings, eye) for o in scene.objects if o.visible]
+    if not objects:
         return np.zeros((view.size[1], view.size[0], 4))
-    columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
-    order = np.argsort(columns[0], kind="stable")
-    return blend(*(column[order] for column in columns[1:]), view.size, settings.min_alpha)
+    depth, place, *ellipses = (
+        np.concatenate([getattr(o, name)[o.reason == 0] for o in objects])
+        for name in ("depth", "place", "mean_px", "covariance", "opacity", "color")
+    )
+    key = np.linalg.norm(place - eye, axis=1) if settings.order == "distance" else depth
+    order = np.argsort(key, kind="stable")
+    return blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
+
+
+def reference_reasons(
+    scene: Scene, view: View, settings: RenderSettings | None = None
+) -> np.ndarray:
+    """(N,) uint8 of all splats in the scene's order: 0 drawn, else 1 + index into CULL_REASONS.
+
+    Splats of hidden objects are nowhere: "distance", if not "opacity".
+    """
+    settings = settings or RenderSettings()
+    eye = view.world_from_eye.position
+    parts = [gate_object(o, view, settings, eye).reason for o in scene.objects]
+    return np.concatenate([np.zeros(0, np.uint8), *parts])
+
+
+def reference_counts(
+    scene: Scene, view: View, settings: RenderSettings | None = None
+) -> dict[str, int]:
+    """{drawn, *CULL_REASONS} of `reference_reasons`, as the drawings count them."""
+    numbers = np.bincount(reference_reasons(scene, view, settings), minlength=7)
+    return dict(zip(("drawn", *CULL_REASONS), numbers.tolist(), strict=True))
 
 
 def project_object(
     thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
 ) -> tuple:
     """depth (M,), mean_px (M, 2), covariance_px (M, 2, 2), opacity (M,), color (M, 3) of what is
-    in front of the eye and passes the settings' limits.
+    drawn.
     """
+    all_ = gate_object(thing, view, settings, eye)
+    names = ("depth", "mean_px", "covariance", "opacity", "color")
+    return tuple(getattr(all_, name)[all_.reason == 0] for name in names)
+
+
+def gate_object(
+    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
+) -> Projected:
+    """Projects every splat and finds the first gate that it fails."""
     world_from_object = thing.world_from_object.matrix()
     camera_from_world, fx, fy, cx, cy = view.pinhole()
     camera_from_object = camera_from_world @ world_from_object
     object_from_world = np.linalg.inv(world_from_object)
     eye_object = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
-    splats = _finite(evaluate(thing.model, thing.x, eye_object))
-
-    mean = splats.means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
-    keep = (
-        (mean[:, 2] > view.near)
-        & (np.linalg.norm(mean, axis=1) <= settings.max_distance)
-        & (splats.opacity >= settings.min_alpha)
+    splats = evaluate(thing.model, thing.x, eye_object)
+    means, scales, wxyz, opacity, color = (
+        np.asarray(a, np.float64)
+        for a in (splats.means, splats.scales, splats.wxyz, splats.opacity, splats.color)
     )
-    mean, opacity, color = mean[keep], splats.opacity[keep], splats.color[keep]
-    depth = mean[:, 2]
-    axes = (
-        rotation_matrices(normalize(splats.wxyz[keep])) * splats.scales[keep][:, None, :]
-    )  # (M, 3, 3) metres
+    scales = np.where(np.isfinite(wxyz).all(axis=1)[:, None], scales, np.nan)  # turned nowhere
+    if not thing.visible:
+        means = np.full_like(means, np.nan)
+    with np.errstate(all="ignore"):  # splats that are not finite, or beside or behind the eye
+        mean = means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
+        depth = mean[:, 2]
+        axes = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3) metres
+        left, right, down, up = (t * JACOBIAN_MARGIN for t in view.tangents)
+        x, y = np.clip(mean[:, 0] / depth, left, right), np.clip(mean[:, 1] / depth, -up, -down)
+        zero = np.zeros_like(depth)
+        jacobian = np.stack(
+            [
+                np.stack([fx / depth, zero, -fx * x / depth], axis=1),
+                np.stack([zero, fy / depth, -fy * y / depth], axis=1),
+            ],
+            axis=1,
+        )  # (N, 2, 3) pixels per metre
+        half = jacobian @ camera_from_object[:3, :3] @ axes
+        covariance = half @ half.transpose(0, 2, 1) + settings.low_pass * np.eye(2)
+        # The arena keeps covariances as float32: what is infinite there is so here.
+        overflow = np.square(axes).sum(axis=2).max(axis=1) > np.finfo(np.float32).max
+        covariance[overflow] = np.inf
+        mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
+        reason, faded = gate(mean, mean_px, covariance, opacity, color, view, settings)
+        place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
+    return Projected(reason, depth, place, mean_px, covariance, faded, color)
 
-    left, right, down, up = (t * JACOBIAN_MARGIN for t in view.tangents)
-    x, y = np.clip(mean[:, 0] / depth, left, right), np.clip(mean[:, 1] / depth, -up, -down)
-    zero = np.zeros_like(depth)
-    jacobian = np.stack(
-        [
-            np.stack([fx / depth, zero, -fx * x / depth], axis=1),
-            np.stack([zero, fy / depth, -fy * y / depth], axis=1),
-        ],
-        axis=1,
-    )  # (M, 2, 3) pixels per metre
-    half = jacobian @ camera_from_object[:3, :3] @ axes
-    covariance = half @ half.transpose(0, 2, 1) + settings.low_pass * np.eye(2)
-    mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
-    small = largest_axis_px(covariance) <= settings.max_pixels
-    return tuple(a[small] for a in (depth, mean_px, covariance, opacity, color))
+
+def gate(
+    mean: np.ndarray,
+    mean_px: np.ndarray,
+    covariance: np.ndarray,
+    opacity: np.ndarray,
+    color: np.ndarray,
+    view: View,
+    settings: RenderSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) reasons and faded opacities; mean (N, 3) metres in the camera, the rest as Projected."""
+    # The kernels get limits as float32: a splat that meets one exactly must meet it here.
+    least, largest, farthest, smallest, near = (
+        float(np.float32(min(limit, layout.HUGE)))
+        for limit in (
+            settings.min_alpha, settings.max_pixels, settings.max_distance, settings.min_pixels,
+            view.near,
+        )
+    )  # fmt: skip
+    distance = np.linalg.norm(mean, axis=1)
+    cut = np.sqrt(np.maximum(2 * np.log(opacity / least), 0))  # sigmas to where alpha is `least`
+    extent = cut[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    inside = np.all((mean_px - extent < view.size) & (mean_px + extent > 0), axis=1)
+    shaped = np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(mean_px).all(axis=1)
+    shaped &= opacity / least < np.finfo(np.float32).max  # else the cut is infinite there
+    sigma = largest_axis_px(covariance)
+    flat = np.linalg.det(np.where(shaped[:, None, None], covariance, 0)) <= 0
+    colored = (np.abs(color) <= layout.HALF_MAX).all(axis=1)
+    reach = cut * sigma  # pixels
+    faded = opacity * ramp(largest - sigma, settings.fade, settings.max_pixels)
+    faded = faded * ramp(farthest - distance, settings.fade, settings.max_distance)
+    faded = faded * ramp(reach - smallest, settings.fade, settings.min_pixels)
+    passes = {
+        "opacity": np.isfinite(opacity) & (opacity >= least),
+        "distance": distance <= farthest,
+        "frustum": (mean[:, 2] > near) & (inside | ~shaped),
+        "size": shaped & ~flat & colored & (sigma <= largest),
+        "footprint": reach >= smallest,
+        "faded": faded >= least,
+    }
+    failed = np.stack([~passes[name] for name in CULL_REASONS])
+    reason = np.where(failed.any(axis=0), 1 + failed.argmax(axis=0), 0).astype(np.uint8)
+    return reason, faded
+
+
+def ramp(within: np.ndarray, fade: float, limit: float) -> np.ndarray | float:
+    """0 at a limit, 1 from `fade` times the limit within it; 1 where nothing is to fade."""
+    if not (fade > 0 and 0 < limit < layout.HUGE):
+        return 1.0
+    return np.clip(within / (fade * limit), 0, 1)
 
 
 def largest_axis_px(covariance: np.ndarray) -> np.ndarray:
@@ -108,15 +210,3 @@ def blend(
         image[y0:y1, x0:x1] += weight[..., None] * color[i]
         through[y0:y1, x0:x1] -= weight
     return np.concatenate([image, 1 - through[..., None]], axis=2)
-
-
-def _finite(splats: Splats) -> Splats:
-    """The splats of which every number is finite, in float64."""
-    parts = [splats.means, splats.scales, splats.wxyz, splats.opacity[:, None], splats.color]
-    good = np.isfinite(np.concatenate(parts, axis=1)).all(axis=1)
-    return Splats(
-        *(
-            np.asarray(a, np.float64)[good]
-            for a in (splats.means, splats.scales, splats.wxyz, splats.opacity, splats.color)
-        )
-    )
