@@ -82,8 +82,8 @@ inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fad
 // Screen ellipses of those `alive` in one view.  passed: per lane how many got past each gate.
 // rows: their records, culled ones with extents of -1.
 inline Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
-                              float8 square, int8 alive, __constant float* view,
-                              __constant float* limits, float* rows, int8* passed) {
+                              float8 square, int8 alive, __global const float* view,
+                              __global const float* limits, float* rows, int8* passed) {
   const float low_pass = limits[LOW_PASS];
   const float8 per_z = 1.0f / z, tan_x = x * per_z, tan_y = y * per_z;
   const float8 jx = view[CAMERA_FX] * per_z, jy = view[CAMERA_FY] * per_z;
@@ -171,20 +171,21 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
   }
 }
 
-// views: VIEW_SIZE floats a view.  by_distance: keys are metres to the sort frame's origin, else
+// frame: the limits, VIEW_SIZE floats a view, POSE floats an object.  by_distance: keys are metres to the sort frame's origin, else
 // along its z.  keep_outside: also splats that no view sees get a key.
 // status: pairs of the view's order, instances, least and most key.
 __kernel void project_arena(
-    int count, int chunk, int by_distance, int keep_outside, __constant float* views,
-    __constant float* limits, __global const float* mean_opacity, __global const float* covariance,
-    __global const float* color, __global const int* object_index, __global const float* poses,
-    __global float* record_0, __global float* depth_0, __global int* culled_0,
+    int count, int chunk, int by_distance, int keep_outside, __global const float* frame,
+    __global const float* mean_opacity, __global const float* covariance,
+    __global const float* color, __global const int* object_index, __global float* record_0, __global float* depth_0, __global int* culled_0,
     __global uint2* places_0, __global uint4* status_0, __global uint2* pairs_0,
     __global int* table_0, __global float* record_1, __global float* depth_1,
     __global int* culled_1, __global uint2* places_1, __global uint4* status_1,
     __global uint2* pairs_1, __global int* table_1) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
+  __global const float *limits = frame, *views = frame + LIMITS;
+  __global const float* poses = views + VIEWS * VIEW_SIZE;
   __global float* const record[2] = {record_0, record_1};
   __global float* const depth[2] = {depth_0, depth_1};
   __global int* const culled[2] = {culled_0, culled_1};
@@ -245,7 +246,7 @@ __kernel void project_arena(
         leave_out(i, n, record[v], depth[v], places[v]);
         continue;
       }
-      __constant float* view = views + VIEW_SIZE * v;
+      __global const float* view = views + VIEW_SIZE * v;
       float rows[RECORD * LANES];
       const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], alive[v], view,
                                        limits, rows, passed[v]);

@@ -13,6 +13,7 @@
 #define PER_FOOTPRINT 11
 #define FADES 12           // above 0: there is a band somewhere
 
+#define LIMITS 13
 #define MOST_COLOR 60000.0f  // what half floats hold with some room: larger is as good as infinite
 
 // Of each view: a camera (camera.cl), then

@@ -47,48 +47,49 @@ inline Places places_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
   const float8 x = select(zero, e->x, e->seen), y = select(zero, e->y, e->seen);
   const float8 ex = select(zero, e->half_x, e->seen), ey = select(zero, e->half_y, e->seen);
   // Pixel centres lie at +0.5: the first and last pixels whose centre is inside the box.
-  const int8 x0 = convert_int8(ceil(fmax(x - ex, zero) - 0.5f)) / TILE;
-  const int8 y0 = convert_int8(ceil(fmax(y - ey, zero) - 0.5f)) / TILE;
+  const int8 x0 = convert_int8(ceil(fmax(x - ex, zero) - 0.5f)) >> 4;
+  const int8 y0 = convert_int8(ceil(fmax(y - ey, zero) - 0.5f)) >> 4;
   const int8 x1 = convert_int8(floor(fmin(x + ex, (float8)(TILE * tiles_x)) - 0.5f)) >> 4;
   const int8 y1 = convert_int8(floor(fmin(y + ey, (float8)(TILE * tiles_y)) - 0.5f)) >> 4;
   const int8 columns = x1 + 1 - x0, rows = y1 + 1 - y0;
   const int8 present = e->seen & (columns > 0) & (rows > 0);
   const int8 box = present & ((columns > 8) | (rows > 4));
   const int8 masked = present & ~box;
-
-  // Tests of the ellipse against the tiles of the largest grid among the eight.
-  const int8 tested = masked & ((columns > 1) | (rows > 1));
-  const int8 wide = tested & columns, high = tested & rows;
-  const int most_columns = max_int8(wide), most_rows = max_int8(high);
-  const float8 cut = e->cut * 1.0001f;  // float rounding must not lose a pixel
-  const float8 tilt_x = -e->b / e->a, tilt_y = -e->b / e->c;
-  uint8 mask = select((uint8)(1), (uint8)(0), as_uint8(tested));
+  // A tile is touched where the ellipse is, in x, among its columns of pixel centres while it is,
+  // in y, between the first and last of its row of tiles: an interval a row, no test a tile.
+  //   x = tilt y +- sqrt((cut - y^2 / covariance_yy) / a), largest at y = lean
+  const float8 per_a = 1.0f / e->a, tilt = -e->b * per_a;
+  const float8 lean = -e->b / e->c * ex;
+  const float8 per_yy = e->cut / fmax(ey * ey, FLT_MIN), most = 1.0001f * e->cut;
+  const float8 left = convert_float8(x0 * TILE) + 0.5f - x;
+  float8 top = convert_float8(y0 * TILE) + 0.5f - y;
+  uint8 mask = 0;
+  int8 count = 0;
+  const int most_rows = max_int8(masked & rows);
   for (int row = 0; row < most_rows; row++) {
-    const float8 top = convert_float8((y0 + row) * TILE) + 0.5f - y, bottom = top + (TILE - 1);
-    const float8 dy = fmin(fmax(zero, top), bottom), on_y = e->c * dy * dy;
-    const float8 lean_x = tilt_x * dy;
-    for (int column = 0; column < most_columns; column++) {
-      const float8 left = convert_float8((x0 + column) * TILE) + 0.5f - x;
-      const float8 right = left + (TILE - 1);
-      const float8 dx = fmin(fmax(zero, left), right);
-      const float8 near_x = fmin(fmax(lean_x, left), right);
-      const float8 near_y = fmin(fmax(tilt_y * dx, top), bottom);
-      const float8 across = e->a * near_x * near_x + 2.0f * e->b * near_x * dy + on_y;
-      const float8 along = e->a * dx * dx + 2.0f * e->b * dx * near_y + e->c * near_y * near_y;
-      // Inside in x (dx = 0) the face across y is the near one, and the other way round.
-      const float8 out_y = select(along, fmin(along, across), dy != 0.0f);
-      const float8 r = select(across, out_y, dx != 0.0f);
-      const int8 hit = tested & (r <= cut) & (column < columns) & (row < rows);
-      mask |= as_uint8(hit) & (1u << (8 * row + column));
-    }
+    const float8 bottom = top + (TILE - 1);
+    const float8 up = fmin(fmax(lean, top), bottom), down = fmin(fmax(-lean, top), bottom);
+    // 1.0001: float rounding must not lose a pixel.
+    const float8 right_x = tilt * up + sqrt(fmax(most - up * up * per_yy, 0.0f) * per_a) - left;
+    const float8 left_x = tilt * down - sqrt(fmax(most - down * down * per_yy, 0.0f) * per_a) - left;
+    const int8 after = convert_int8(floor(right_x * (1.0f / TILE))) + 1;
+    const int8 first = convert_int8(ceil((left_x - (TILE - 1)) * (1.0f / TILE)));
+    const int8 in = masked & (row < rows);
+    const int8 end = clamp(after, 0, columns) & in, start = min(max(first, 0), end);
+    mask |= (((uint8)(1) << as_uint8(end)) - ((uint8)(1) << as_uint8(start))) << (uint8)(8 * row);
+    count += end - start;
+    top += TILE;
   }
-  const int8 touched = present & as_int8(mask != 0u);
+  const int8 single = masked & (columns == 1) & (rows == 1);  // its box holds a pixel centre
+  mask |= as_uint8(single & 1);
+  count |= single & 1;
+  const int8 touched = present & (box | (count > 0));
   Places out;
   const uint8 corner = as_uint8(x0) | as_uint8(y0) << 12;
   out.corner = as_uint8(touched) & (corner | select((uint8)(MASKED), (uint8)(BOX), as_uint8(box)));
   const uint8 size = as_uint8(columns) | as_uint8(rows) << 16;
   out.mask = as_uint8(touched) & select(mask, size, as_uint8(box));
-  out.count = touched & select(as_int8(popcount(mask)), columns * rows, box);
+  out.count = touched & select(count, columns * rows, box);
   return out;
 }
 
