@@ -42,15 +42,31 @@ class Tiles:
 
 
 def bin_tiles(
-    device: Device, projected: Projected, size: tuple[int, int], form: str | None = None
+    device: Device,
+    projected: Projected,
+    size: tuple[int, int],
+    form: str | None = None,
+    order: "Array | None" = None,
 ) -> Tiles:
     """The instance lists of an image of `size` (width, height) pixels; order by depth, stable.
 
     form: "cpu" or "gpu", by default the device's kind.  Both give the same lists.
+    order: (n,) int32 splats near to far, as sort_order gives it for another view or an earlier
+    frame: it is not sorted again, and splats that this view does not show take no part.
     """
     grid = grid_of(size)
+    if order is not None:
+        return _bin_chunks(device, projected, grid, order)
     bin_form = {"cpu": _bin_chunks, "gpu": _bin_groups}[form or device.kind]
     return bin_form(device, projected, grid)
+
+
+def sort_order(device: Device, found: Found) -> "Array":
+    """(n,) int32: the splats that project_arena entered, by their keys, stable."""
+    status = device.view(found.status)
+    visible = int(status[:, 0].sum(dtype=np.int64))
+    kernels = device.program(KERNELS / "bin.cl")
+    return _sort(device, kernels, found, visible, int(status[:, 2].min()), int(status[:, 3].max()))
 
 
 def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> Tiles:
@@ -83,7 +99,9 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     return Tiles(grid, starts, instances, places, order[:shown], total, first_slot)
 
 
-def _bin_chunks(device: Device, projected: Projected, grid: tuple[int, int]) -> Tiles:
+def _bin_chunks(
+    device: Device, projected: Projected, grid: tuple[int, int], order: "Array | None" = None
+) -> Tiles:
     """The CPU form: a work-item owns a chunk of splats and a table of counts."""
     kernels = device.program(KERNELS / "bin.cl")
     found = projected.found
@@ -94,9 +112,9 @@ def _bin_chunks(device: Device, projected: Projected, grid: tuple[int, int]) -> 
             projected.depth.shape[0], found.chunk, *grid, projected.record, projected.depth,
             *found.arrays(),
         )  # fmt: skip
-    status = device.view(found.status)
-    visible, total = (int(n) for n in status[:, :2].sum(axis=0, dtype=np.int64))
-    order = _sort(device, kernels, found, visible, int(status[:, 2].min()), int(status[:, 3].max()))
+    total = int(device.view(found.status)[:, 1].sum(dtype=np.int64))
+    order = sort_order(device, found) if order is None else order
+    visible = order.shape[0]
     starts, instances = _scatter_tiles(device, kernels, order, found, visible, total)
     return Tiles(grid, starts, instances, found.places, order, total)
 
