@@ -67,6 +67,13 @@ class Device:
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
         return cl.Buffer(self.context, flags, hostbuf=np.ascontiguousarray(host))
 
+    def shared(self, host: np.ndarray) -> "cl.Buffer":
+        """The memory of a numpy array for kernels to read; on a CPU without a copy."""
+        import pyopencl as cl
+
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
+        return cl.Buffer(self.context, flags, hostbuf=host)
+
     def download(self, array: "Array") -> np.ndarray:
         """A copy of a device array in numpy."""
         return array.get() if array.size else np.empty(array.shape, array.dtype)

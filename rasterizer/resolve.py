@@ -1,14 +1,10 @@
 """resolve: a drawn image -> bytes for a window: background, palette, 8 bits, bottom row first."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rasterizer.device import Device
-
-if TYPE_CHECKING:
-    from pyopencl.array import Array
 
 KERNEL = Path(__file__).parent / "kernels" / "resolve.cl"
 NO_PALETTE = np.zeros((1, 3), np.float32)
@@ -16,23 +12,23 @@ NO_PALETTE = np.zeros((1, 3), np.float32)
 
 def resolve(
     device: Device,
-    image: "Array",
+    image: np.ndarray,
     background: tuple[float, float, float],
     palette: np.ndarray | None = None,
     weight: float = 0.0,
 ) -> np.ndarray:
     """(H, W, 4) uint8, opaque, row 0 at the bottom as GL wants it, of image (H, W, 4) float32.
 
-    image: premultiplied, row 0 on top.  palette (256, 3): mixed in by weight 0..1.  Read only; on
+    image: as rasterize_rgba gives it.  palette (256, 3): mixed in by weight 0..1.  Read only; on
     a CPU it is the device's own memory, which is reused when the array goes.
     """
     height, width = image.shape[:2]
     pixels = device.empty((height, width, 4), np.uint8)
     mixed = palette is not None and weight > 0
-    colors = device.upload(np.asarray(palette if mixed else NO_PALETTE, np.float32))
+    colors = np.asarray(palette if mixed else NO_PALETTE, np.float32)
     device.launch(
         device.program(KERNEL)["resolve"], height, 1,
-        width, height, *(float(c) for c in background), float(weight if mixed else 0), image,
-        colors, pixels,
+        width, height, *(float(c) for c in background), float(weight if mixed else 0),
+        device.shared(image), device.constants(colors), pixels,
     )  # fmt: skip
     return device.view(pixels)

@@ -22,7 +22,7 @@ def image(height: int, width: int, seed: int = 0) -> np.ndarray:
 def test_it_equals_the_picture_that_numpy_resolves(size, name, weight):
     rgba, background = image(*size), (0.1, 0.5, 0.9)
     palette = palette_colors(name) if name else None
-    got = resolve(device(), device().upload(rgba), background, palette, weight)
+    got = resolve(device(), rgba, background, palette, weight)
     rgba = apply_palette(rgba.astype(np.float64), name, weight)
     shown = rgba[..., :3] + (1 - rgba[..., 3:]) * background
     want = shown.clip(0, 1)[::-1] * 255
@@ -32,7 +32,7 @@ def test_it_equals_the_picture_that_numpy_resolves(size, name, weight):
 
 
 def test_a_palette_without_weight_is_none():
-    rgba = device().upload(image(4, 9))
+    rgba = image(4, 9)
     plain = resolve(device(), rgba, (0, 0, 0))
     np.testing.assert_array_equal(
         resolve(device(), rgba, (0, 0, 0), palette_colors("gray"), 0.0), plain
