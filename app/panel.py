@@ -7,12 +7,14 @@ from imgui_bundle import imgui
 
 from app import theme
 from app.panel_rows import choice, ms_text, number, right_aligned, rows, section, tip
+from app.play_panel import draw_play
 from app.quality_panel import draw_quality
 from app.readings import Readings
+from app.regions_panel import draw_regions
 from app.stage import AS_FILED, Stage
 from app.theme import Box
 from renderer.palette import PALETTES
-from renderer.settings import CULL_REASONS, FrameStats
+from renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats
 
 Vec = imgui.ImVec2
 WIDTH = 268.0  # logical pixels
@@ -20,6 +22,14 @@ MARGIN = 16.0
 BAR_HEIGHT = 92.0  # of the slider bar with one row, with what lies below it
 BAR_FIRST, BAR_ROW = 46.0, 71.0  # a row without and with the name of its object
 MIN_FREE = 0.5  # of the window's width and height
+DEBUG_NAMES = {
+    "": "picture",
+    "culls": "what is culled, and why",
+    "birdseye": "the same from above",
+    "overdraw": "overdraw",
+    "depth": "depth",
+    "object": "objects",
+}
 KEYS = (
     ("drag", "orbit, look"),
     ("right drag", "pan, look"),
@@ -31,6 +41,10 @@ KEYS = (
     ("Space", "play, pause"),
     ("1 \u2013 9", "go to a stop"),
     ("Alt", "slider without snapping"),
+    ("G, Shift+G", "debug views"),
+    ("L", "lens on, off"),
+    ("B + drag", "paint a region; Shift erases"),
+    ("Esc", "leave the region"),
     ("P, F12", "save a picture"),
     ("H, Tab", "hide all this"),
 )
@@ -57,13 +71,17 @@ def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     _frame(readings)
     if section("Quality", open_first=True):
         draw_quality(stage, readings, ui_scale)
-    if section("Passes", open_first=True):
-        _passes(readings.stats.ms, ui_scale)
-        _rates(readings, ui_scale)
-    if section("Splats"):
-        _splats(readings.stats)
-    if section("Look"):
+    if section("Regions", open_first=bool(stage.regions.items)):
+        draw_regions(stage, ui_scale)
+    if section("Play"):
+        draw_play(stage, ui_scale)
+    if section("Look", open_first=True):
         _look(stage, ui_scale)
+    if section("Passes"):
+        _passes(readings.stats.ms, ui_scale)
+    if section("Counts"):
+        _splats(readings.stats)
+        _rates(readings, ui_scale)
     if section("Machine"):
         rows(readings.machine.items(), share=0.34)
     if section("Keys"):
@@ -192,13 +210,15 @@ def _passes(ms_of_pass: Mapping[str, float], ui_scale: float) -> None:
 def _rates(readings: Readings, ui_scale: float) -> None:
     """How often the work was done that need not be done every frame."""
     meter, now = readings.meter, readings.now
-    sorts = "kept" if readings.stats.order_age else "new"
+    shapes, colors = (meter.per_second(f"{what}_runs", now) for what in ("geometry", "color"))
     rows(
         [
             ("slowest of the last second", f"{ms_text(meter.slowest_ms)} ms"),
-            ("sorts a second", f"{meter.per_second('sorts', now):.0f}, order {sorts}"),
-            ("shapes decoded a second", f"{meter.per_second('geometry_runs', now):.0f}"),
-            ("colours decoded a second", f"{meter.per_second('color_runs', now):.0f}"),
+            ("sorts a second", f"{meter.per_second('sorts', now):.0f}"),
+            ("age of the order", f"{readings.stats.order_age} frames"),
+            ("shapes decoded a second", f"{shapes:.0f}"),
+            ("colours decoded a second", f"{colors:.0f}"),
+            ("of all frames", f"{number(meter.geometry_runs)}, {number(meter.color_runs)}"),
         ]
     )
     tip("Networks run when x changes (shapes) or when the eye has moved (colours).", ui_scale)
@@ -213,15 +233,20 @@ def _splats(stats: FrameStats) -> None:
 
 
 def _look(stage: Stage, ui_scale: float) -> None:
-    """What the picture is shown in, at no cost: palette and background."""
+    """What is shown: the picture or a debug view of it, palette and background."""
+    imgui.push_item_width(-1)
+    names = [f"show: {DEBUG_NAMES[name]}" for name in DEBUG_VIEWS]
+    debug = choice("debug", stage.settings.debug, DEBUG_VIEWS, names)
+    tip("Key G goes through these, Shift+G backwards.", ui_scale)
+    if debug != stage.settings.debug:
+        stage.settings = replace(stage.settings, debug=debug)
     if stage.has_palettes:
-        imgui.push_item_width(-1)
         names = [AS_FILED, *PALETTES]
         labels = ["palette: as filed", *(f"palette: {name}" for name in PALETTES)]
         chosen = choice("palette", stage.palette, names, labels)
         if chosen != stage.palette:
             stage.choose_palette(chosen)
-        imgui.pop_item_width()
+    imgui.pop_item_width()
     settings = stage.settings
     changed, background = imgui.color_edit3(
         "background", list(settings.background), imgui.ColorEditFlags_.no_inputs

@@ -49,7 +49,8 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
         stage.toggle_play(index)
     imgui.same_line(0, 16 * ui_scale)
     value_width = imgui.calc_text_size("x 0.000").x + 20 * ui_scale
-    x, held = _track(thing.model.stops, thing.x, imgui.get_content_region_avail().x - value_width)
+    room = imgui.get_content_region_avail().x - value_width
+    x, held = track(thing.model.stops, thing.x, height, room)
     if held:
         sweep.playing = False
         stage.set_x(index, x)
@@ -89,10 +90,15 @@ def _play_button(playing: bool, height: float) -> bool:
     return clicked
 
 
-def _track(stops: Sequence[Stop], x: float, width: float) -> tuple[float, bool]:
-    """The line with its ticks, names and grab.  Returns x and whether the hand holds it."""
+def track(stops: Sequence[Stop], x: float, height: float, width: float = 0.0) -> tuple[float, bool]:
+    """The line with its ticks, names and grab.  Returns x and whether the hand holds it.
+
+    Without a width it takes what there is, less half a grab at both ends.
+    """
     line = imgui.get_text_line_height()
-    height = imgui.get_item_rect_size().y
+    if not width > 0:
+        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 0.5 * line)
+        width = imgui.get_content_region_avail().x - 0.5 * line
     corner = imgui.get_cursor_screen_pos()
     imgui.invisible_button("track", Vec(width, height))
     held, hovered = imgui.is_item_active(), imgui.is_item_hovered()

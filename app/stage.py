@@ -98,6 +98,13 @@ class Stage:
         """What a ray meets, of splats as they are now; `spread` is what the hand may be off."""
         return self._picker.under(self.scene, origin, direction, spread)
 
+    def add_region(self, kind: str) -> None:
+        """A region of the first object, in the middle of the scene until it is placed."""
+        thing = self.scene.objects[0]
+        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+        centre = object_from_world @ np.append(self.centre, 1.0)
+        self.regions.add(kind, 0, thing, centre[:3])
+
     def toggle_lens(self) -> bool:
         """Switches the lens on or off; returns whether it is on."""
         return bool(self.scene.objects) and self.regions.toggle_lens(self.scene.objects[0])
@@ -134,15 +141,27 @@ class Stage:
 
     def toggle_play(self, index: int | None = None) -> None:
         """Starts or stops one object's sweep, or all together: all stop if any was playing."""
-        chosen = self.sweeps if index is None else [self.sweeps[index]]
-        start = not any(sweep.playing for sweep in chosen)
-        for sweep in chosen:
-            sweep.playing = start and sweep.period > 0
+        chosen = range(len(self.sweeps)) if index is None else [index]
+        start = not any(self.sweeps[i].playing for i in chosen)
+        for i in chosen:
+            if start:
+                self.set_x(i, self.sweeps[i].play(self.scene.objects[i].x))
+            else:
+                self.sweeps[i].playing = False
+
+    def visit(self, index: int, x: float, on: bool) -> None:
+        """Adds a stop to those that an object's sweep visits or takes it away; two are left."""
+        sweep = self.sweeps[index]
+        xs = {*sweep.xs, x} if on else {*sweep.xs} - {x}
+        if len(xs) >= 2:
+            sweep.xs = tuple(sorted(xs))
+            sweep.resume_at(self.scene.objects[index].x)
 
     @property
     def sliders(self) -> list[int]:
         """Indices of the objects that have somewhere to go: two stops or more."""
-        return [index for index, sweep in enumerate(self.sweeps) if sweep.period > 0]
+        things = enumerate(self.scene.objects)
+        return [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
 
     @property
     def playing(self) -> bool:

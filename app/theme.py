@@ -72,6 +72,8 @@ def _colors() -> dict:
         col.header_active: (RAISED, 1),
         col.slider_grab: (ACCENT, 0.9),
         col.slider_grab_active: (ACCENT, 1),
+        col.scrollbar_bg: (SURFACE, 0),
+        col.scrollbar_grab: (TRACK, 1),
         col.check_mark: (ACCENT, 1),
         col.plot_histogram: (ACCENT, 0.75),
         col.separator: (TRACK, 0.5),

@@ -27,53 +27,92 @@ def unease(y: float) -> float:
     return 0.5 - float(np.sin(np.arcsin(1 - 2 * y) / 3))
 
 
+EASES = {  # name -> (part of the way at part t of the time, its inverse)
+    "smooth": (ease, unease),
+    "even": (lambda t: t, lambda y: y),
+    "slow start": (lambda t: t * t, lambda y: y**0.5),
+    "slow end": (lambda t: t * (2 - t), lambda y: 1 - (1 - y) ** 0.5),
+}
+MODES = ("ping-pong", "loop", "once")
+
+
 @dataclass
 class Sweep:
-    """x as a function of time: from stop to stop and back, resting a moment at each.
+    """x as a function of time: from stop to stop, resting a moment at each.
 
     `seconds` counts playing time, so stopping and resuming keeps its place; `resume_at` moves it
-    to where the hand has left the slider.
+    to where the hand has left the slider.  All fields may be changed while it plays.
     """
 
-    xs: tuple[float, ...]  # the stops' x, ascending
-    leg_s: float = 2.5
-    rest_s: float = 0.8
+    xs: tuple[float, ...]  # x of the stops to visit, ascending
+    leg_s: float = 2.5  # from one stop to the next
+    rest_s: float = 0.8  # at each stop
     seconds: float = 0.0
     playing: bool = False
+    ease: str = "smooth"  # one of EASES
+    mode: str = "ping-pong"  # one of MODES: back the same way, back in one leg, or ends there
 
     @staticmethod
     def over(stops: Sequence[Stop]) -> "Sweep":
         return Sweep(tuple(sorted({s.x for s in stops})))
 
     @property
+    def way(self) -> tuple[float, ...]:
+        """x of the stops in the order of one round; it ends where it began, unless played once."""
+        if self.mode == "once" or len(self.xs) < 2:
+            return self.xs
+        back = self.xs[-2:0:-1] if self.mode == "ping-pong" else ()
+        return self.xs + back + self.xs[:1]
+
+    @property
     def period(self) -> float:
-        """Seconds of a way there and back."""
-        return 2 * (len(self.xs) - 1) * (self.leg_s + self.rest_s)
+        """Seconds of one round; 0 when there is nowhere to go."""
+        return max(len(self.way) - 1, 0) * (self.leg_s + self.rest_s)
+
+    def play(self, x: float) -> float:
+        """Starts at x; returns where: the beginning when a single round was at its end."""
+        self.playing = self.period > 0
+        if self.playing and self.mode == "once" and x >= self.xs[-1]:
+            self.seconds = 0.0
+            return self.xs[0]
+        return x
 
     def advance(self, seconds: float) -> float:
-        """Plays on and returns x."""
+        """Plays on and returns x; a single round ends by itself."""
         if self.period > 0:
-            self.seconds = (self.seconds + seconds) % self.period
+            self.seconds += seconds
+            if self.mode != "once":
+                self.seconds %= self.period
+            elif self.seconds >= self.period:
+                self.seconds, self.playing = self.period, False
         return self.x
 
     @property
     def x(self) -> float:
         if not self.period > 0:
             return self.xs[0] if self.xs else 0.0
-        way = self.xs + self.xs[-2:0:-1] + self.xs[:1]  # there and back to the first
-        leg, into = divmod(self.seconds % self.period, self.leg_s + self.rest_s)
-        start, end = way[int(leg)], way[int(leg) + 1]
-        part = ease(min(max((into - self.rest_s) / self.leg_s, 0.0), 1.0))
+        leg, into = self._place()
+        part = EASES[self.ease][0](min(max((into - self.rest_s) / self.leg_s, 0.0), 1.0))
+        start, end = self.way[leg], self.way[leg + 1]
         return start + (end - start) * part
 
     def resume_at(self, x: float) -> None:
-        """Continues from x, in the direction in which it was going."""
+        """Continues from x, on the next leg that passes it, if possible in the same direction."""
         if not self.period > 0 or abs(self.x - x) < 1e-6:
             return
+        way = self.way
         x = min(max(x, self.xs[0]), self.xs[-1])
-        backwards = self.seconds % self.period >= self.period / 2
-        leg = int(np.clip(np.searchsorted(self.xs, x, side="right") - 1, 0, len(self.xs) - 2))
-        part = unease((x - self.xs[leg]) / (self.xs[leg + 1] - self.xs[leg]))
-        if backwards:
-            leg, part = 2 * (len(self.xs) - 1) - 1 - leg, 1 - part
+        now, count = self._place()[0], len(way) - 1
+        upwards = way[now + 1] > way[now]
+        passing = [i for i in range(count) if min(way[i : i + 2]) <= x <= max(way[i : i + 2])]
+        leg = min(passing, key=lambda i: ((way[i + 1] > way[i]) != upwards, (i - now) % count))
+        part = EASES[self.ease][1](min(max((x - way[leg]) / (way[leg + 1] - way[leg]), 0.0), 1.0))
         self.seconds = leg * (self.leg_s + self.rest_s) + self.rest_s + part * self.leg_s
+
+    def _place(self) -> tuple[int, float]:
+        """The leg of the way it is on, and seconds since it began, with the rest before it."""
+        step = self.leg_s + self.rest_s
+        if self.mode == "once" and self.seconds >= self.period:
+            return len(self.way) - 2, step
+        leg, into = divmod(self.seconds % self.period, step)
+        return min(int(leg), len(self.way) - 2), into

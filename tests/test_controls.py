@@ -1,14 +1,18 @@
 """Cameras and the slider as numbers: what stays, what is limited, what does not depend on dt."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
 from app.controls import MAX_RADII, MIN_RADII, POLE, Camera, Push
+from app.stage import Stage
 from runtime_models.model import Stop
-from scene.control import Sweep, ease, snap, unease
+from scene.control import EASES, MODES, Sweep, ease, snap, unease
 from scene.framing import fit_distance, orbit_path
+from scene.scene import Scene, SceneObject
 
 SIZE = (640, 360)
 CENTRE = np.array([1.0, 2.0, 3.0])
@@ -249,3 +253,71 @@ def test_sweep_is_of_time_not_of_frames_and_stops_keep_their_place():
 def test_a_single_stop_has_nothing_to_play():
     assert Sweep.over((Stop("only", 0.3),)).advance(5.0) == 0.3
     assert Sweep.over(()).advance(5.0) == 0.0
+
+
+@pytest.mark.parametrize("name", EASES)
+def test_every_pace_goes_from_0_to_1_forwards_and_has_its_inverse(name):
+    forward, inverse = EASES[name]
+    t = np.linspace(0, 1, 101)
+    y = np.array([forward(v) for v in t])
+    assert y[0] == 0 and y[-1] == 1 and (np.diff(y) > 0).all()
+    np.testing.assert_allclose([inverse(v) for v in y], t, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("mode", "way"),
+    [("ping-pong", [0, 0.5, 1, 0.5, 0, 0.5]), ("loop", [0, 0.5, 1, 0, 0.5, 1]),
+     ("once", [0, 0.5, 1, 1, 1, 1])],
+)  # fmt: skip
+@pytest.mark.parametrize("ease_name", EASES)
+def test_after_the_last_stop_each_mode_goes_its_own_way(mode, way, ease_name):
+    sweep = Sweep.over(STOPS)
+    sweep.mode, sweep.ease, sweep.rest_s = mode, ease_name, 0.0
+    assert sweep.play(0.0) == 0.0
+    got = [sweep.x] + [sweep.advance(sweep.leg_s) for _ in way[1:]]
+    np.testing.assert_allclose(got, way, atol=1e-9)
+    assert sweep.playing == (mode != "once")
+
+
+def test_played_once_it_rests_at_the_end_and_the_next_play_begins_anew():
+    sweep = Sweep.over(STOPS)
+    sweep.mode = "once"
+    sweep.play(0.0)
+    sweep.advance(100.0)
+    assert not sweep.playing and sweep.x == 1.0
+    assert sweep.play(1.0) == 0.0 and sweep.playing and sweep.x == 0.0
+    assert sweep.play(0.3) == 0.3  # from where the hand has left it
+
+
+@given(
+    some.sampled_from(MODES), some.sampled_from(list(EASES)), some.floats(0.2, 20),
+    some.floats(0, 10), some.floats(0, 1), some.floats(0, 30),
+)  # fmt: skip
+def test_changing_how_it_plays_does_not_move_it(mode, pace, leg, rest, x, seconds):
+    sweep = Sweep.over(STOPS)
+    sweep.seconds = seconds
+    sweep.resume_at(x)
+    sweep.mode, sweep.ease, sweep.leg_s, sweep.rest_s = mode, pace, leg, rest
+    sweep.resume_at(x)  # what the stage does before each step
+    assert sweep.x == pytest.approx(x, abs=1e-6)
+    later = sweep.advance(1e-4)
+    assert abs(later - x) < 0.02
+
+
+def test_the_stage_visits_two_stops_at_least():
+    stage = Stage(lambda path: Dummy(STOPS))
+    stage.sweeps = [Sweep.over(STOPS)]
+    stage.scene = Scene((SceneObject("a", Dummy(STOPS), x=0.5),))
+    stage.visit(0, 0.0, on=False)
+    assert stage.sweeps[0].xs == (0.5, 1.0)
+    stage.visit(0, 1.0, on=False)
+    assert stage.sweeps[0].xs == (0.5, 1.0) and stage.sliders == [0]
+    stage.visit(0, 0.0, on=True)
+    assert stage.sweeps[0].xs == (0.0, 0.5, 1.0)
+
+
+@dataclass
+class Dummy:
+    """What a stage needs of a model to play it."""
+
+    stops: tuple
