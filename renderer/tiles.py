@@ -7,18 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rasterizer.bin import bin_tiles
+from rasterizer.bin import Tiles, bin_tiles, sort_order
 from rasterizer.device import Device, open_device
 from rasterizer.pack import pack
-from rasterizer.project import CULL_REASONS, Camera
-from rasterizer.project_arena import Limits, project_arena
+from rasterizer.project import CULL_REASONS, Camera, Projected
+from rasterizer.project_arena import Limits, SortFrames, project_arena
 from rasterizer.raster import rasterize_rgba
+from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
 from renderer.settings import RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.evaluate import Evaluator
 from runtime_models.model import AnchorModel, SplatLayers
-from scene.pose import View
+from scene.pose import OPENCV_FROM_EYE, View
+
+PARALLEL = np.radians(1.0)  # eyes that look along the same line within this share an order
 
 
 @dataclass
@@ -46,6 +49,8 @@ class TilesDrawing:
         self.allocations = 0  # how often the arena was made: once for each set of objects
         self._slots: list[_Slot] = []
         self._images: dict[int, np.ndarray] = {}
+        self._projected: list[Projected] = []
+        self._rooms: dict[int, list[Projected]] = {}  # arrays of projection, kept between frames
 
     def allocate(self, models: list[AnchorModel | SplatLayers]) -> None:
         """Room for these objects; what was decoded before is gone."""
@@ -54,6 +59,7 @@ class TilesDrawing:
         self.splats = int(starts[-1])
         self.allocations += 1
         device = self.device
+        self._projected, self._rooms = [], {}
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
         self._color = device.zeros((self.splats, 4))
@@ -97,27 +103,53 @@ class TilesDrawing:
             for i, view in enumerate(views):
                 self._images[i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
             return
-        device = self.device
+        with timer.time("project", on_gpu=False):
+            self._project(views, settings)
+            self.device.queue.finish()
+        with timer.time("bin", on_gpu=False):
+            tiles = self._bin(views)
+            self.device.queue.finish()
+        with timer.time("splat", on_gpu=False):
+            for i, view in enumerate(views):
+                self._images[i] = rasterize_rgba(
+                    self.device, self._projected[i], tiles[i], view.size
+                )
+
+    def _project(self, views: list[View], settings: RenderSettings) -> None:
+        """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
+        frames = [OPENCV_FROM_EYE @ frame for frame in sort_frames(views, settings)]
+        shared = len(frames) == 1
+        # One order for more views than a launch has must hold what none of its two sees.
+        keep_outside = shared and len(views) > 2
+        self._projected = []
         for first in range(0, len(views), 2):
             pair = views[first : first + 2]
-            with timer.time("project", on_gpu=False):
-                self._projected = project_arena(
-                    device,
-                    self._mean_opacity,
-                    self._covariance,
-                    self._color,
-                    self._object_index,
-                    self._world_from_objects,
-                    [Camera(*view.pinhole(), view.size, view.near) for view in pair],
-                    limits_of(settings),
-                )
-                device.queue.finish()
-            for i, (view, projected) in enumerate(zip(pair, self._projected, strict=True), first):
-                with timer.time("bin", on_gpu=False):
-                    tiles = bin_tiles(device, projected, view.size)
-                    device.queue.finish()
-                with timer.time("splat", on_gpu=False):
-                    self._images[i] = rasterize_rgba(device, projected, tiles, view.size)
+            mine = frames[first : first + 2] if not shared else frames[:1] if not first else []
+            sort = SortFrames(tuple(mine), settings.order == "distance", keep_outside)
+            projected = project_arena(
+                self.device,
+                self._mean_opacity,
+                self._covariance,
+                self._color,
+                self._object_index,
+                self._world_from_objects,
+                [Camera(*view.pinhole(), view.size, view.near) for view in pair],
+                limits_of(settings),
+                sort,
+                self._rooms.get(first),
+            )
+            self._rooms[first] = projected
+            self._projected += projected
+        self._sorted_by = range(1 if shared else len(views))  # views whose keys make an order
+
+    def _bin(self, views: list[View]) -> list[Tiles]:
+        orders = [sort_order(self.device, self._projected[i].found) for i in self._sorted_by]
+        if len(orders) == 1:
+            orders = orders * len(views)
+        return [
+            bin_tiles(self.device, projected, view.size, order=order)
+            for projected, view, order in zip(self._projected, views, orders, strict=True)
+        ]
 
     def counts(self) -> dict[str, int]:
         """{drawn, opacity, distance, ...} of the view drawn last: gates in their order."""
@@ -130,13 +162,43 @@ class TilesDrawing:
         """What resolve takes: the image, row 0 on top."""
         return self._images[i]
 
+    def presentable_rgba8(
+        self,
+        i: int,
+        background: tuple[float, float, float],
+        palette: np.ndarray | None = None,
+        weight: float = 0.0,
+    ) -> np.ndarray:
+        """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom."""
+        return resolve(self.device, self._images[i], background, palette, weight)
+
+    def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
+        arrays = (self._mean_opacity, self._object_index, self._covariance)
+        return tuple(self.device.download(array) for array in arrays)
+
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._images[i]
 
     def close(self) -> None:
-        self._slots.clear()
+        """Lets go of the scene's memory; the device outlives this drawing."""
+        self.allocate([])
         self._images.clear()
+        self.device.pool.free_held()
+
+
+def sort_frames(views: list[View], settings: RenderSettings) -> list[np.ndarray]:
+    """eye_from_world (4, 4) of each sort of a frame: one for parallel eyes, else one a view."""
+    own = [view.eye_from_world() for view in views]
+    forward = np.array([frame[2, :3] for frame in own])
+    parallel = (forward @ forward[0] >= np.cos(PARALLEL)).all()
+    if len(views) == 1 or settings.stereo_sort == "each" or not parallel:
+        return own
+    centre = own[0].copy()
+    eye = np.mean([view.world_from_eye.position for view in views], axis=0)
+    centre[:3, 3] = -centre[:3, :3] @ eye
+    return [centre]
 
 
 def limits_of(settings: RenderSettings) -> Limits:
