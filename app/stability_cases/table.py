@@ -10,14 +10,14 @@ import numpy as np
 
 from app.drawing import save_png
 from app.errors import UsageError
-from app.stability_cases import eyes, life, motion, networks, places, shapes
+from app.stability_cases import eyes, life, motion, networks, places, popping, shapes
 from app.stability_cases.finding import Finding, Panel
 
 CASES = {
     "sweep": motion.sweep,
     "stale-orbit": motion.stale_orbit,
     "stale-yaw": motion.stale_yaw,
-    "popping": motion.popping,
+    "popping": popping.popping,
     "disparity": eyes.disparity,
     "canted": eyes.canted,
     "far-origin": places.far_origin,

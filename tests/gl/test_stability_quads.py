@@ -1,0 +1,31 @@
+"""Every case of `launch.py stability` on a small scene with GL quads."""
+
+import pytest
+from splat_scenes import random_layers
+from stability_stage import failures, make_stage
+
+from app.drawing import open_renderer
+from app.stability_cases.table import CASES
+from renderer.renderer import Renderer
+
+
+def reopen():
+    return open_renderer("auto", "quads")
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_case_holds(ctx, name):
+    with Renderer(ctx, "quads") as renderer:
+        stage = make_stage(renderer, ctx, reopen, random_layers(600, seed=3, layers=2))
+        try:
+            result = CASES[name](stage)
+        finally:
+            ctx.__enter__()  # the case of contexts leaves none of ours current
+    assert not failures(result)
+    assert result.panels
+
+
+@pytest.mark.parametrize("name", ["disparity", "limits", "needles", "broken-heads", "crowd"])
+def test_the_case_holds_where_all_runs_in_gl(ctx, name):
+    with Renderer(ctx, "quads", mlps="gl", sort="gl", target="rgba32f") as renderer:
+        assert not failures(CASES[name](make_stage(renderer, ctx, reopen)))

@@ -1,0 +1,22 @@
+"""A stage for the cases of `launch.py stability`: small scenes, few steps."""
+
+from splat_scenes import random_layers
+
+from app.stability_cases.stage import Stage
+from runtime_models.model import SplatLayers
+
+SIZE = (96, 64)
+
+
+def make_stage(renderer, ctx, reopen, model: SplatLayers | None = None, **choices) -> Stage:
+    """A cloud of splats of random colours in two layers: the hardest scene for an old order."""
+    model = model or random_layers(1500, seed=3, layers=2)
+    return Stage(renderer, ctx, model, SIZE, reopen, steps=12, rounds=8, **choices)
+
+
+def failures(result) -> list[str]:
+    return [
+        f"{f.figure}: {f.measured:.6g}, bound {f.bound}"
+        for f in result.findings
+        if f.verdict == "FAILS"
+    ]
