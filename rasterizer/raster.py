@@ -66,16 +66,30 @@ def rasterize_rgba(
 
     Read only; on a CPU it is the device's own memory, which is reused when the array goes.
     """
+    return rasterize_rgba_views(device, [(projected, tiles)], size, form)[0]
+
+
+def rasterize_rgba_views(
+    device: Device,
+    views: list[tuple[Projected, Tiles]],
+    size: tuple[int, int],
+    form: str | None = None,
+) -> list[np.ndarray]:
+    """What rasterize_rgba gives, of several views of the same size."""
     width, height = size
-    number = tiles.grid[0] * tiles.grid[1]
-    image, ends = device.empty((height, width, 4)), device.empty(number, np.int32)
     file, group, _ = FORMS[form or device.kind]
-    device.launch(
-        device.program(file, RGBA=1)["rasterize"], number * group, group,
-        width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
-        0.0, 0.0, 0.0, image, None, ends,
-    )  # fmt: skip
-    return device.view(image)
+    kernel = device.program(file, RGBA=1)["rasterize"]
+    images = []
+    for projected, tiles in views:
+        number = tiles.grid[0] * tiles.grid[1]
+        image, ends = device.empty((height, width, 4)), device.empty(number, np.int32)
+        device.launch(
+            kernel, number * group, group,
+            width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
+            0.0, 0.0, 0.0, image, None, ends,
+        )  # fmt: skip
+        images.append(image)
+    return [device.view(image) for image in images]
 
 
 def rasterize_backward(

@@ -15,7 +15,7 @@ from rasterizer_scenes import (
 from rasterizer.bin import bin_tiles
 from rasterizer.project import LEAST_ALPHA, Camera, project
 from rasterizer.project_arena import project_arena
-from rasterizer.raster import rasterize, rasterize_rgba
+from rasterizer.raster import rasterize, rasterize_rgba, rasterize_rgba_views
 from rasterizer.reference import project_reference, rasterize_reference
 
 FORMS = ("cpu", "gpu")
@@ -252,3 +252,17 @@ def test_splat_order_in_memory_does_not_matter_but_for_equal_depths():
     one, *_ = draw(splats, camera)
     other, *_ = draw([a[shuffled] for a in splats], camera)
     np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_several_views_are_the_same_as_each_alone(count, form):
+    d, size, views = device(), (83, 45), []
+    for seed in range(count):
+        camera = off_centre_camera(size)
+        projected = project(d, *upload(random_splats(300, seed)), camera)
+        views.append((projected, bin_tiles(d, projected, size, form)))
+    together = rasterize_rgba_views(d, views, size, form)
+    assert len(together) == count
+    for image, view in zip(together, views, strict=True):
+        np.testing.assert_array_equal(image, rasterize_rgba(d, *view, size, form))
