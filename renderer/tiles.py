@@ -177,6 +177,12 @@ class TilesDrawing:
         arrays = (self._mean_opacity, self._object_index, self._covariance)
         return tuple(self.device.download(array) for array in arrays)
 
+    def write_colors(self, color: np.ndarray) -> None:
+        """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
+        rows = np.zeros((self.splats, 4), np.float32)
+        rows[:, :3] = color
+        self._color.set(rows)
+
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._images[i]
