@@ -12,7 +12,7 @@ from rasterizer.device import Device, open_device
 from rasterizer.pack import pack
 from rasterizer.project import CULL_REASONS, Camera, Projected
 from rasterizer.project_arena import Limits, SortFrames, project_arena
-from rasterizer.raster import rasterize_rgba
+from rasterizer.raster import rasterize_rgba_views
 from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
 from renderer.settings import RenderSettings
@@ -110,10 +110,11 @@ class TilesDrawing:
             tiles = self._bin(views)
             self.device.queue.finish()
         with timer.time("splat", on_gpu=False):
-            for i, view in enumerate(views):
-                self._images[i] = rasterize_rgba(
-                    self.device, self._projected[i], tiles[i], view.size
-                )
+            for size in {view.size for view in views}:
+                same = [i for i, view in enumerate(views) if view.size == size]
+                drawn = [(self._projected[i], tiles[i]) for i in same]
+                images = rasterize_rgba_views(self.device, drawn, size)
+                self._images.update(zip(same, images, strict=True))
 
     def _project(self, views: list[View], settings: RenderSettings) -> None:
         """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
