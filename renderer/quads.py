@@ -3,12 +3,15 @@
 Same life as renderer/tiles.py: allocate, decode what changed, place, draw.
 """
 
+from itertools import pairwise
+
 import moderngl
 import numpy as np
 
 from renderer.buffers import Arena
 from renderer.decode import Decoder
 from renderer.gpu import Gpu
+from renderer.overdraw import count_overdraw
 from renderer.project import Projector
 from renderer.settings import RenderSettings
 from renderer.sort import Sorter
@@ -78,6 +81,23 @@ class QuadsDrawing:
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._splatter.image(i)
+
+    def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
+        arena = self._arena
+        owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
+        rows = [np.frombuffer(b.read(), np.float32) for b in (arena.mean_opacity, arena.covariance)]
+        n = arena.count
+        return rows[0][: 4 * n].reshape(n, 4), owner, rows[1][: 8 * n].reshape(n, 8)
+
+    def write_colors(self, color: np.ndarray) -> None:
+        """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
+        for i, (start, end) in enumerate(pairwise(self._arena.starts)):
+            self._arena.write_color(i, color[start:end])
+
+    def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
+        """(H, W): how many splats each pixel of a view just drawn blends, for a debug view."""
+        return count_overdraw(self._gpu, self._projector, self._arena, view, settings)
 
     def close(self) -> None:
         self._release_arena()

@@ -75,3 +75,4 @@ class FrameStats:
     color_runs: int = 0  # objects whose colour network ran for this frame
     sorts: int = 0  # how often this frame sorted: 0 with an order kept, 1, or 1 a view
     order_age: int = 0  # frames since the order in use was made
+    debug: dict[str, float] = field(default_factory=dict)  # numbers of the debug picture's legend

@@ -9,6 +9,7 @@ import numpy as np
 
 from rasterizer.bin import Tiles, bin_tiles, sort_order
 from rasterizer.device import Device, open_device
+from rasterizer.overdraw import count_overdraw
 from rasterizer.pack import pack
 from rasterizer.project import CULL_REASONS, Camera, Projected
 from rasterizer.project_arena import Limits, SortFrames, project_arena
@@ -183,6 +184,10 @@ class TilesDrawing:
         rows = np.zeros((self.splats, 4), np.float32)
         rows[:, :3] = color
         self._color.set(rows)
+
+    def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
+        """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
+        return count_overdraw(self.device, self._projected[i], view.size)
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""

@@ -1,0 +1,23 @@
+// overdraw: adds one to every pixel that a splat is blended into.  One work-item a splat.
+#include "common/record.cl"
+
+__kernel void overdraw(int count, int width, int height, __global const float* record,
+                       __global int* number) {
+  const int i = get_global_id(0);
+  if (i >= count) return;
+  __global const float* r = record + (size_t)RECORD * i;
+  if (!(r[EXTENT_X] > 0.0f && r[EXTENT_Y] > 0.0f)) return;
+  // Pixels whose centres lie in the box; clamped as floats, because a box may be as wide as any.
+  const int x0 = (int)clamp(ceil(r[MEAN_X] - r[EXTENT_X] - 0.5f), 0.0f, (float)width);
+  const int x1 = (int)clamp(floor(r[MEAN_X] + r[EXTENT_X] - 0.5f) + 1.0f, 0.0f, (float)width);
+  const int y0 = (int)clamp(ceil(r[MEAN_Y] - r[EXTENT_Y] - 0.5f), 0.0f, (float)height);
+  const int y1 = (int)clamp(floor(r[MEAN_Y] + r[EXTENT_Y] - 0.5f) + 1.0f, 0.0f, (float)height);
+  for (int y = y0; y < y1; y++) {
+    const float dy = y + 0.5f - r[MEAN_Y];
+    for (int x = x0; x < x1; x++) {
+      const float dx = x + 0.5f - r[MEAN_X];
+      const float q = r[CONIC_A] * dx * dx + 2.0f * r[CONIC_B] * dx * dy + r[CONIC_C] * dy * dy;
+      if (q <= r[CUT]) atomic_inc(number + y * width + x);
+    }
+  }
+}
