@@ -1,7 +1,7 @@
 """The viewer: a window loop that draws only when something has changed."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,9 +9,11 @@ import numpy as np
 import tyro
 
 from app.controls import SMOOTH_S, Camera
+from app.dial import FLOOR_DB, TARGET_MS, Dial
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.hands import is_erasing, is_painting, push, take
+from app.legend import draw_legend
 from app.outlines import draw_brush, draw_outlines
 from app.panel import draw_note, draw_panel, draw_problem, free_area
 from app.pictures import write_numbered_png, write_png
@@ -22,6 +24,7 @@ from app.slider import draw_slider_bar
 from app.stage import Stage
 from app.window import Event, Window
 from renderer.context import describe
+from renderer.debug import debug_legend
 from renderer.renderer import Renderer
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
@@ -44,6 +47,12 @@ class Options:
     """Of the window, WxH in pixels."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
     """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
+    target_ms: float | None = None
+    """Choose the setting by this budget, milliseconds a frame; measured once at the start."""
+    floor_db: float | None = None
+    """Never below this PSNR in dB against the exact picture, whatever the budget."""
+    debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
+    """Debug view to start in; G goes through them."""
     pictures: Path = Path("pictures")
     """Folder for the pictures that P saves."""
     screenshot: Path | None = None
@@ -60,8 +69,12 @@ def run(options: Options) -> int:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
     if options.frames < 1:
         raise UsageError(f"--frames is {options.frames}, expected 1 or more.")
+    for name, value in (("--target-ms", options.target_ms), ("--floor-db", options.floor_db)):
+        if value is not None and not 0 < value < np.inf:
+            raise UsageError(f"{name} is {value}, expected a number above 0.")
     stage = Stage(read_model)
     stage.open(options.scenes or (DEMO,), options.x)
+    stage.settings = replace(stage.settings, debug=options.debug)
     with Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             Viewer(window, renderer, stage, options).loop()
@@ -82,6 +95,11 @@ class Viewer:
         self._free = self._free_wanted()  # where the picture's middle is; follows the overlay
         self.camera = self._first_camera()
         self.shown = Shown(renderer, self.readings)
+        self.dial = Dial(
+            options.target_ms or TARGET_MS,
+            options.floor_db or FLOOR_DB,
+            wanted=(options.target_ms or options.floor_db) is not None,
+        )
         self._note_until = 0.0
         self._wanted: tuple[Path, ...] = ()  # files to be opened once the note about them is seen
         self._frames = 0
@@ -103,7 +121,7 @@ class Viewer:
             last = now
             if busy or redraw or self._note_ends(now):
                 self.frame(seconds)
-            if self.options.screenshot and self._frames >= self.options.frames:
+            if self.options.screenshot and self._last_frame:
                 return
 
     def frame(self, seconds: float) -> None:
@@ -114,6 +132,7 @@ class Viewer:
         self.stage.advance(seconds)
         self.camera.step(seconds, push(self.window))
         self._follow_overlay(seconds)
+        self._turn_dial()
         fresh = self._draw_splats()
         drawn = time.perf_counter()
         self._draw_overlay()
@@ -148,7 +167,9 @@ class Viewer:
         moving = self.camera.moving or push(self.window).any
         waiting = bool(self._wanted) or self.options.screenshot is not None
         sliding = not np.array_equal(self._free, self._free_wanted())
-        return moving or waiting or sliding or self.stage.playing or self._frames < WARM_UP
+        measuring = self.dial.wanted or self.dial.measuring
+        first = self._frames < WARM_UP
+        return moving or waiting or sliding or measuring or self.stage.playing or first
 
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
@@ -187,8 +208,21 @@ class Viewer:
         """What the screen should show now."""
         stage = self.stage
         moving = self.camera.moving or push(self.window).any or stage.playing
+        moving = moving or self.dial.measuring
         view = self.view()
         return Wish(stage.shown(view), view, stage.settings, moving)
+
+    def _turn_dial(self) -> None:
+        """Measures a little for the budget where that is wanted, and takes over what it chose."""
+        dial, stage = self.dial, self.stage
+        if dial.wanted:
+            view = self.view()
+            finish = self.window.ctx.finish
+            dial.start(self.renderer, stage.shown(view), view, stage.centre, finish)
+        if dial.measuring:
+            self.shown.forget()
+            if dial.step():
+                stage.settings = dial.applied(stage.settings)
 
     def _draw_splats(self) -> bool:
         """Draws the scene into the window; True when the splats had to be drawn anew."""
@@ -212,8 +246,10 @@ class Viewer:
         if self.overlay:
             draw_scale_bar(self.stage.scene, scale)
             left = free_area(self.window.logical_size, len(self.stage.sliders), scale)[0]
+            debug, stats = self.stage.settings.debug, self.readings.stats
+            draw_legend(debug_legend(debug, stats), left, scale)
             covered = [
-                draw_panel(self.stage, self.readings, scale),
+                draw_panel(self.stage, self.dial, self.readings, scale),
                 draw_slider_bar(self.stage, left, scale),
             ]
         if not self.save_picture:  # a note is no part of a picture
@@ -242,12 +278,18 @@ class Viewer:
         self.readings.note = ""
         if self.stage.scene is not before:
             self.camera = self._first_camera()
+            self.dial.forget()
             self.window.set_title(f"Shapeshift \u2013 {wanted[0].name}")
+
+    @property
+    def _last_frame(self) -> bool:
+        """Whether a --screenshot is due: enough frames, and the budget has chosen."""
+        measuring = self.dial.wanted or self.dial.measuring
+        return self._frames >= self.options.frames and not measuring
 
     def _save_pictures(self) -> None:
         """Writes the picture that a key or --screenshot asked for, of what is on the screen."""
-        last = self._frames >= self.options.frames
-        if self.options.screenshot is not None and last:
+        if self.options.screenshot is not None and self._last_frame:
             write_png(self.window.picture(), self.options.screenshot)
         if self.save_picture:
             self.save_picture = False

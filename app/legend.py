@@ -17,7 +17,7 @@ def draw_legend(rows: Sequence[Row], left: float, ui_scale: float) -> None:
     line, pad, margin = imgui.get_text_line_height(), 10 * ui_scale, 16 * ui_scale
     step = line + 4 * ui_scale
     width = max(imgui.calc_text_size(text).x for text, _ in rows) + line + 3 * pad
-    left = max(left, margin)
+    left += margin if left <= 0 else margin / 2
     draw = imgui.get_background_draw_list()
     draw.add_rect_filled(
         Vec(left, margin),

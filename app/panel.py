@@ -6,6 +6,8 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from app import theme
+from app.budget_panel import draw_budget
+from app.dial import Dial
 from app.panel_rows import choice, ms_text, number, right_aligned, rows, section, tip
 from app.play_panel import draw_play
 from app.quality_panel import draw_quality
@@ -50,7 +52,7 @@ KEYS = (
 )
 
 
-def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
+def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float) -> Box:
     """The whole left panel; changes the stage's settings and palette.  Returns where it is."""
     imgui.set_next_window_pos(Vec(MARGIN * ui_scale, MARGIN * ui_scale))
     screen = imgui.get_io().display_size
@@ -69,13 +71,15 @@ def draw_panel(stage: Stage, readings: Readings, ui_scale: float) -> Box:
     )  # fmt: skip
     _title(stage)
     _frame(readings)
+    if section("Budget", open_first=True):
+        draw_budget(stage, dial, ui_scale)
     if section("Quality", open_first=True):
         draw_quality(stage, readings, ui_scale)
     if section("Regions", open_first=bool(stage.regions.items)):
         draw_regions(stage, ui_scale)
     if section("Play"):
         draw_play(stage, ui_scale)
-    if section("Look", open_first=True):
+    if section("Look"):
         _look(stage, ui_scale)
     if section("Passes"):
         _passes(readings.stats.ms, ui_scale)
