@@ -53,6 +53,9 @@ class RenderSettings:
             if getattr(self, name) not in choices:
                 told = ", ".join(repr(c) for c in choices)
                 raise ValueError(f"{name} is {getattr(self, name)!r}; choose one of {told}.")
+        if not (len(self.background) == 3 and all(0 <= c <= 1 for c in self.background)):
+            told = f"background is {self.background}"
+            raise ValueError(f"{told}, expected three values of display sRGB from 0 to 1.")
         for name, least, most in (
             ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
             ("max_pixels", 0.0, math.inf), ("max_distance", 0.0, math.inf),

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 # OpenCV axes (x right, y down, z forward) from eye axes (x right, y up, -z forward).
+MOST_SIDE = 65536  # pixels
+UNIT_SLACK = 1e-3  # of a quaternion's length: turns added up in float32 drift less
 OPENCV_FROM_EYE = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -65,8 +67,8 @@ class View:
         """Refuses what has no picture: ValueError with a sentence."""
         left, right, down, up = self.tangents
         pose = (*self.world_from_eye.position, *self.world_from_eye.wxyz)
+        told = " ".join(f"{number:.6g}" for number in pose)
         if not all(map(math.isfinite, pose)):
-            told = " ".join(f"{number:.6g}" for number in pose)
             raise ValueError(f"a view has the pose {told}; every number of it must be finite.")
         if not (-math.inf < left < right < math.inf and -math.inf < down < up < math.inf):
             raise ValueError(
@@ -77,8 +79,12 @@ class View:
             raise ValueError(
                 f"a view has near {self.near} and far {self.far}; 0 < near < far is wanted, metres."
             )
-        if not all(side >= 1 and side == int(side) for side in self.size):
-            raise ValueError(f"a view has the size {self.size}; whole pixels from 1 are wanted.")
+        if not all(isinstance(n, int | np.integer) and 1 <= n <= MOST_SIDE for n in self.size):
+            raise ValueError(
+                f"a view has the size {self.size}; whole pixels, 1 to {MOST_SIDE}, are wanted."
+            )
+        if abs(math.hypot(*self.world_from_eye.wxyz) - 1) > UNIT_SLACK:
+            raise ValueError(f"a view has the pose {told}; its quaternion must have length 1.")
 
     def clip_from_eye(self) -> np.ndarray:
         """(4, 4) OpenGL projection: eye metres to clip, depth -1..1, off-centre allowed."""

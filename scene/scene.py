@@ -1,11 +1,12 @@
 """What is in the world: objects with a pose and a control value."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from runtime_models.model import AnchorModel, SplatLayers
-from scene.pose import Pose
+from scene.pose import UNIT_SLACK, Pose
 
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
@@ -18,6 +19,20 @@ class SceneObject:
     x: float = 0.0  # control value in [0, 1]
     label: int = 0  # 0 = background
     visible: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuses what is nowhere: ValueError with a sentence."""
+        pose = self.world_from_object
+        length = math.hypot(*pose.wxyz)
+        if not (all(map(math.isfinite, pose.position)) and abs(length - 1) <= UNIT_SLACK):
+            raise ValueError(
+                f"object '{self.name}' stands at {_told(pose.position)} with a quaternion "
+                f"{_told(pose.wxyz)}; finite metres and a quaternion of length 1 are wanted."
+            )
+
+
+def _told(numbers: np.ndarray) -> str:
+    return "(" + ", ".join(f"{number:.6g}" for number in numbers) + ")"
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,12 @@ __kernel void pack(int count, int start, __global const float* means, __global c
   const int i = get_global_id(0);
   if (i >= count) return;
   const float4 given = vload4(i, wxyz);
-  const float squared = dot(given, given);
+  // By the largest entry first: neither tiny nor huge quaternions lose their length.
+  const float4 size = fabs(given);
+  const float largest = fmax(fmax(size.x, size.y), fmax(size.z, size.w));
   // One without a length is no turn; NaN stays NaN, and project drops it.
-  const float4 q = squared == 0 ? (float4)(1, 0, 0, 0) : given / sqrt(squared);
+  const float4 scaled = given / largest;
+  const float4 q = all(given == 0) ? (float4)(1, 0, 0, 0) : scaled / sqrt(dot(scaled, scaled));
   const float w = q.x, x = q.y, y = q.z, z = q.w;
   const float3 s = vload3(i, scales);
   const float3 row_x = (float3)(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)) * s;
