@@ -11,7 +11,7 @@ import numpy as np
 
 from renderer.classify import Points, classify, eye_places
 from renderer.debug_map import birdseye
-from renderer.points import dim, paint_points
+from renderer.points import dim, dot_size, paint_points
 from renderer.settings import CULL_REASONS, FrameStats, RenderSettings
 from scene.pose import View
 from scene.scene import Scene
@@ -106,10 +106,10 @@ def debug_image(
         return picture, told | {"metres": metres}
     picture = dim(rgba[..., :3])
     seen = (depth > view.near) & np.isfinite(pixel).all(axis=0)
-    # Who is near covers; then what was culled for another reason than its place, on top of all.
-    for names, dot in (((2, 3, 1), 1), ((0,), 1), ((5, 6), 2), ((4,), 3)):
+    unit = dot_size(view.size)
+    # What is too large or too small lies on top: it is why somebody looks.
+    for names, dot in (((3, 1), unit), ((0, 2), unit), ((5, 6), unit + 1), ((4,), unit + 1)):
         paint_points(picture, pixel, depth, reason, colors, seen & np.isin(reason, names), dot)
-    paint_points(picture, pixel, depth, reason, colors, seen & (reason == 2), 2)
     return picture, told
 
 

@@ -12,6 +12,11 @@ def dim(picture: np.ndarray) -> np.ndarray:
     return np.clip(np.nan_to_num(grey * 0.8 + picture * 0.2) * DIM, 0, 1).astype(np.float32)
 
 
+def dot_size(size: tuple[int, int]) -> int:
+    """Pixels across the dot of a splat that is drawn, in a picture of this size."""
+    return max(1, round(min(size) / 480))
+
+
 def paint_points(
     picture: np.ndarray,
     pixel: np.ndarray,
