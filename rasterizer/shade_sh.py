@@ -11,21 +11,42 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 KERNEL = Path(__file__).parent / "kernels" / "shade_sh.cl"
-GROUP = 64
+LANES = 8  # splats a block
+RUN = 32  # blocks a work-item
 
 
 def upload_sh(device: Device, sh: np.ndarray) -> "Array":
-    """The coefficients (n, M, 3) as shade_sh reads them: (M * 3, n) on the device."""
-    return device.upload(np.asarray(sh, np.float32).reshape(len(sh), 3 * sh.shape[1]).T)
+    """The coefficients (n, M, 3) as shade_sh reads them: (blocks, 3 M, 8) on the device."""
+    count, coefficients = sh.shape[:2]
+    padded = np.zeros((-(-count // LANES) * LANES, 3 * coefficients), np.float32)
+    padded[:count] = np.reshape(sh, (count, 3 * coefficients))
+    return device.upload(padded.reshape(-1, LANES, 3 * coefficients).transpose(0, 2, 1))
 
 
 def shade_sh(
-    device: Device, sh: "Array", eye: np.ndarray, start: int, mean_opacity: "Array", color: "Array"
+    device: Device,
+    sh: "Array",
+    eye: np.ndarray,
+    rows: slice,
+    mean_opacity: "Array",
+    color: "Array",
+    seen: np.ndarray | None = None,
 ) -> None:
-    """Writes rows start... of color (N, 4): max(0, 0.5 + basis(mean - eye) . sh).
+    """Writes `rows` (a plain slice) of color (N, 4): max(0, 0.5 + basis(mean - eye) . sh).
 
-    sh: from upload_sh; eye (3,) in the object frame; mean_opacity (N, 4) holds the means.
+    sh: from upload_sh, of as many splats; eye (3,) in the object frame; mean_opacity (N, 4) holds
+    the means.  seen (n,) bool: where False the colour may stay what it was.
     """
-    kernel = device.program(KERNEL, COEFFICIENTS=sh.shape[0] // 3)["shade_sh"]
-    count, (x, y, z) = sh.shape[1], (float(v) for v in eye)
-    device.launch(kernel, count, GROUP, count, start, x, y, z, mean_opacity, sh, color)
+    blocks, width = sh.shape[:2]
+    count = rows.stop - rows.start
+    wanted = None
+    if seen is not None and blocks:
+        whole = np.zeros(blocks * LANES, bool)
+        whole[:count] = seen
+        wanted = device.constants(whole.reshape(blocks, LANES).any(axis=1).view(np.uint8))
+    kernel = device.program(KERNEL, COEFFICIENTS=width // 3)["shade_sh"]
+    x, y, z = (float(v) for v in eye)
+    device.launch(
+        kernel, -(-blocks // RUN), 1,
+        count, rows.start, RUN, x, y, z, mean_opacity, sh, wanted, color,
+    )  # fmt: skip

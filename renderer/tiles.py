@@ -82,11 +82,17 @@ class TilesDrawing:
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
         self.device.queue.finish()
 
-    def decode_color(self, i: int, x: float, eye_object: np.ndarray) -> None:
-        """Colours of object i at x, towards an eye (3,) in the object's frame."""
+    def decode_color(
+        self, i: int, x: float, eye_object: np.ndarray, seen: np.ndarray | None = None
+    ) -> None:
+        """Colours of object i at x, towards an eye (3,) in the object's frame.
+
+        seen: (A,) bool, one an anchor (a splat of layers): the rest may keep what it has.
+        """
         slot = self._slots[i]
         if slot.sh is not None:
-            args = (slot.sh, eye_object, slot.start, self._mean_opacity, self._color)
+            rows = slice(slot.start, slot.start + slot.count)
+            args = (slot.sh, eye_object, rows, self._mean_opacity, self._color, seen)
             shade_sh(self.device, *args)
             self.device.queue.finish()
         elif slot.count:
