@@ -163,6 +163,11 @@ def ramp(table: np.ndarray, value: np.ndarray) -> np.ndarray:
     return table[low] * (1 - part) + table[low + 1] * part
 
 
+def opaque(picture: np.ndarray) -> np.ndarray:
+    """(H, W, 4) of (H, W, 3): covers whatever it is presented over."""
+    return np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
+
+
 def object_poses(scene: Scene) -> np.ndarray:
     """(O, 4, 4) world_from_object, NaN where hidden."""
     nowhere = np.full((4, 4), np.nan)

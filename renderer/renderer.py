@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from renderer.context import is_software
+from renderer.debug import debug_image, opaque, prepare_debug
 from renderer.gpu import Gpu
 from renderer.palette import apply_palette, palette_colors, thermal_blend
 from renderer.resolve import Resolve
@@ -68,6 +69,7 @@ class Renderer:
         self._decoded: list[_Decoded] = []
         self._drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
+        self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
 
     @property
     def backends(self) -> dict[str, str]:
@@ -118,8 +120,16 @@ class Renderer:
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
+        debug = self.settings.debug
+        if debug and prepare_debug(self._drawing, views, self._scene, debug):
+            for decoded in self._decoded:
+                decoded.color_key = None  # their own colours are to come back
         with self._framebuffer_kept():
             self._drawing.draw(views, self.settings, self._timer)
+            self._debug = [
+                debug_image(self._drawing, i, view, self._scene, self.settings)
+                for i, view in enumerate(views if debug else [])
+            ]
         if targets is not None:
             with self._timer.time("resolve"):
                 for i, framebuffer in enumerate(targets):
@@ -128,7 +138,10 @@ class Renderer:
         drawn = culled.pop("drawn")
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
-        return FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
+        stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
+        if debug:
+            stats.debug = self._debug[0][1]
+        return stats
 
     def _decode_colors(self, eye_world: np.ndarray) -> None:
         """Runs the colour of the visible objects towards which the eye (3,) has moved."""
@@ -151,7 +164,11 @@ class Renderer:
         return self._drawing.image(i)
 
     def resolved(self, i: int = 0) -> np.ndarray:
-        """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background."""
+        """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background;
+        or its debug picture, where the frame was drawn with settings.debug.
+        """
+        if self._debug:
+            return self._debug[i][0]
         name, weight, _ = thermal_blend(self._scene)
         rgba = apply_palette(self.image(i), name, weight)
         return rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(self.settings.background)
@@ -161,8 +178,8 @@ class Renderer:
         if self._resolve is None:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
         name, weight, _ = thermal_blend(self._scene)
-        palette = palette_colors(name) if name else None
-        image = self._drawing.presentable(i)
+        palette = palette_colors(name) if name and not self._debug else None
+        image = opaque(self._debug[i][0]) if self._debug else self._drawing.presentable(i)
         with self._framebuffer_kept():
             self._resolve.draw(image, framebuffer, self.settings.background, palette, weight)
 
