@@ -13,7 +13,7 @@ from app.dial import FLOOR_DB, TARGET_MS, Dial
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.hands import is_erasing, is_painting, push, take
-from app.legend import draw_legend
+from app.legend_panel import draw_legend
 from app.outlines import draw_brush, draw_outlines
 from app.panel import draw_note, draw_panel, draw_problem, free_area
 from app.pictures import write_numbered_png, write_png
