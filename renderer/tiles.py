@@ -16,13 +16,14 @@ from rasterizer.project_arena import Limits, SortFrames, project_arena
 from rasterizer.raster import rasterize_rgba_views
 from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
+from renderer.cadence import Cadence
 from renderer.settings import RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.evaluate import Evaluator
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import OPENCV_FROM_EYE, View
 
-PARALLEL = np.radians(1.0)  # eyes that look along the same line within this share an order
+SAMPLE = 4096  # splats, for a median
 
 
 @dataclass
@@ -52,6 +53,11 @@ class TilesDrawing:
         self._images: dict[int, np.ndarray] = {}
         self._projected: list[Projected] = []
         self._rooms: dict[int, list[Projected]] = {}  # arrays of projection, kept between frames
+        self._orders: list = []  # device arrays, splats near to far: one, or one a view
+        self._cadence = Cadence()
+        self._changed = True  # since the last frame: a pose, a control value, the set of objects
+        self._world_from_objects = np.zeros((0, 4, 4))
+        self.sorts = self.order_age = 0  # of the last frame, see FrameStats
 
     def allocate(self, models: list[AnchorModel | SplatLayers]) -> None:
         """Room for these objects; what was decoded before is gone."""
@@ -60,7 +66,8 @@ class TilesDrawing:
         self.splats = int(starts[-1])
         self.allocations += 1
         device = self.device
-        self._projected, self._rooms = [], {}
+        self._projected, self._rooms, self._orders = [], {}, []
+        self._changed = True
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
         self._color = device.zeros((self.splats, 4))
@@ -78,6 +85,7 @@ class TilesDrawing:
     def decode_geometry(self, i: int, x: float) -> None:
         """Means, covariances and opacities of object i at control value x."""
         slot = self._slots[i]
+        self._changed = True
         splats = slot.evaluator.geometry(x)
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
         self.device.queue.finish()
@@ -102,7 +110,9 @@ class TilesDrawing:
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
-        self._world_from_objects = np.reshape(world_from_objects, (-1, 4, 4))
+        poses = np.reshape(world_from_objects, (-1, 4, 4))
+        if not np.array_equal(poses, self._world_from_objects, equal_nan=True):
+            self._world_from_objects, self._changed = poses, True
 
     def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
         """Draws every view; view i is then image(i)."""
@@ -125,39 +135,62 @@ class TilesDrawing:
 
     def _project(self, views: list[View], settings: RenderSettings) -> None:
         """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
-        frames = [OPENCV_FROM_EYE @ frame for frame in sort_frames(views, settings)]
-        shared = len(frames) == 1
+        plan = self._cadence.plan(views, settings, self._changed, self._median_distance)
+        self._changed = False
+        frames = [OPENCV_FROM_EYE @ frame for frame in plan.frames]
+        shared = len(frames) <= 1 < len(views)
         # One order for more views than a launch has must hold what none of its two sees.
-        keep_outside = shared and len(views) > 2
+        keep_outside = plan.keep_outside or (shared and len(views) > 2)
         self._projected = []
         for first in range(0, len(views), 2):
             pair = views[first : first + 2]
-            mine = frames[first : first + 2] if not shared else frames[:1] if not first else []
+            mine = frames[first : first + (1 if shared else 2)]
             sort = SortFrames(tuple(mine), settings.order == "distance", keep_outside)
-            projected = project_arena(
-                self.device,
-                self._mean_opacity,
-                self._covariance,
-                self._color,
-                self._object_index,
-                self._world_from_objects,
-                [Camera(*view.pinhole(), view.size, view.near) for view in pair],
-                limits_of(settings),
-                sort,
-                self._rooms.get(first),
-            )
+            projected = self._launch(pair, settings, sort, self._rooms.get(first))
             self._rooms[first] = projected
             self._projected += projected
-        self._sorted_by = range(1 if shared else len(views))  # views whose keys make an order
+        self.sorts, self.order_age = plan.sorts, plan.age
+
+    def _launch(
+        self,
+        views: list[View],
+        settings: RenderSettings,
+        sort: SortFrames,
+        into: list[Projected] | None = None,
+    ) -> list[Projected]:
+        return project_arena(
+            self.device,
+            self._mean_opacity,
+            self._covariance,
+            self._color,
+            self._object_index,
+            self._world_from_objects,
+            [Camera(*view.pinhole(), view.size, view.near) for view in views],
+            limits_of(settings),
+            sort,
+            into,
+        )
 
     def _bin(self, views: list[View]) -> list[Tiles]:
-        orders = [sort_order(self.device, self._projected[i].found) for i in self._sorted_by]
-        if len(orders) == 1:
-            orders = orders * len(views)
+        if self.sorts:
+            sorted_by = self._projected[: self.sorts]  # views whose keys make an order
+            self._orders = [sort_order(self.device, p.found) for p in sorted_by]
+        orders = self._orders * (len(views) if len(self._orders) == 1 else 1)
         return [
             bin_tiles(self.device, projected, view.size, order=order)
             for projected, view, order in zip(self._projected, views, orders, strict=True)
         ]
+
+    def _median_distance(self, eye_from_world: np.ndarray) -> float:
+        """Metres from an eye to the median splat, from a sample of those that are there."""
+        step = -(-self.splats // SAMPLE)
+        mean_opacity = self.device.view(self._mean_opacity)[::step]
+        poses = eye_from_world @ self._world_from_objects  # (O, 4, 4)
+        rows = poses[self.device.view(self._object_index)[::step], :3]  # (n, 3, 4)
+        places = (rows[..., :3] @ mean_opacity[:, :3, None])[..., 0] + rows[..., 3]
+        distance = np.linalg.norm(places[mean_opacity[:, 3] > 0], axis=1)
+        distance = distance[np.isfinite(distance)]
+        return float(np.median(distance)) if distance.size else 0.0
 
     def counts(self) -> dict[str, int]:
         """{drawn, opacity, distance, ...} of the view drawn last: gates in their order."""
@@ -193,6 +226,8 @@ class TilesDrawing:
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
+        if not self.splats:
+            return np.zeros(view.size[::-1], np.int32)
         return count_overdraw(self.device, self._projected[i], view.size)
 
     def image(self, i: int) -> np.ndarray:
@@ -204,19 +239,6 @@ class TilesDrawing:
         self.allocate([])
         self._images.clear()
         self.device.pool.free_held()
-
-
-def sort_frames(views: list[View], settings: RenderSettings) -> list[np.ndarray]:
-    """eye_from_world (4, 4) of each sort of a frame: one for parallel eyes, else one a view."""
-    own = [view.eye_from_world() for view in views]
-    forward = np.array([frame[2, :3] for frame in own])
-    parallel = (forward @ forward[0] >= np.cos(PARALLEL)).all()
-    if len(views) == 1 or settings.stereo_sort == "each" or not parallel:
-        return own
-    centre = own[0].copy()
-    eye = np.mean([view.world_from_eye.position for view in views], axis=0)
-    centre[:3, 3] = -centre[:3, :3] @ eye
-    return [centre]
 
 
 def limits_of(settings: RenderSettings) -> Limits:
