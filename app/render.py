@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,6 +36,17 @@ class Options:
     """Where GL comes from."""
     mode: Literal["cumulative", "exclusive"] = "cumulative"
     """How a folder of layers adds up."""
+    debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
+    """Instead of the picture: which splats are left out and why, the same from above, how many
+    splats lie over each pixel, how far they are, which object they are of; with a legend."""
+    max_pixels: float = inf
+    """Leave out splats larger than this: one sigma of the longer axis, pixels."""
+    max_distance: float = inf
+    """Leave out splats farther from the eye than this, metres."""
+    min_pixels: float = 0.0
+    """Leave out splats smaller than this: from the centre to where they end, pixels."""
+    fade: float = 0.0
+    """Part of each of these limits over which splats fade, 0 to 1; 0: they end at once."""
     overwrite: bool = False
     """Replace pictures of the same name."""
 
@@ -59,6 +71,7 @@ def run(options: Options) -> int:
         raise UsageError(f"--background is {options.background}, expected three values in 0..1.")
     if not 0 <= options.stereo < 1:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
+    settings = choose_settings(options)
     model = read_model(options.scene, options.mode)
     views = choose_views(options, model, size)
     count = len(controls) * len(views)
@@ -72,10 +85,24 @@ def run(options: Options) -> int:
     with open_renderer(options.context, options.drawing) as (renderer, _):
         make_folder(options.out)
         background = options.background or default_background(model, (0.0, 0.0, 0.0))
-        renderer.settings = replace(renderer.settings, background=background)
+        renderer.settings = replace(
+            settings, target=renderer.settings.target, background=background
+        )
         draw_all(renderer, model, pairs, paths, options.stereo)
     print(f"{count} picture{'s' * (count > 1)} in {options.out}", file=sys.stderr)
     return 0
+
+
+def choose_settings(options: Options):
+    """The RenderSettings of the options; UsageError names what is out of range."""
+    from app.errors import UsageError
+    from renderer.settings import RenderSettings
+
+    names = ("debug", "max_pixels", "max_distance", "min_pixels", "fade")
+    try:
+        return RenderSettings(**{name: getattr(options, name) for name in names})
+    except ValueError as error:
+        raise UsageError(f"--{str(error).replace('_', '-', 1)}") from None
 
 
 def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
@@ -98,6 +125,8 @@ def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: floa
     from rich.progress import track
 
     from app.drawing import save_png
+    from app.picture_legend import with_legend
+    from renderer.debug import debug_legend
     from scene.scene import Scene, SceneObject
     from scene.stereo import stereo_pair
 
@@ -106,5 +135,6 @@ def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: floa
     for (x, view), path in track(work, "drawing", console=console, transient=True):
         renderer.update(Scene((SceneObject("scene", model, x=x),)))
         views = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
-        renderer.draw(views)
-        save_png(np.concatenate([renderer.resolved(i) for i in range(len(views))], axis=1), path)
+        stats = renderer.draw(views)
+        picture = np.concatenate([renderer.resolved(i) for i in range(len(views))], axis=1)
+        save_png(with_legend(picture, debug_legend(renderer.settings.debug, stats)), path)
