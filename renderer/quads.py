@@ -31,6 +31,7 @@ class QuadsDrawing:
         self._projector = Projector(gpu)
         self._sorter = Sorter(gpu, sort)
         self._splatter = Splatter(gpu, target)
+        self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._arena: Arena | None = None
         self._decoder: Decoder | None = None
 
@@ -59,6 +60,7 @@ class QuadsDrawing:
 
     def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
         """Draws every view; view i is then image(i)."""
+        self.sorts = len(views)
         for i, view in enumerate(views):
             self._draw_view(i, view, settings, timer)
 

@@ -139,6 +139,7 @@ class Renderer:
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
         stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
+        stats.sorts, stats.order_age = self._drawing.sorts, self._drawing.order_age
         if debug:
             stats.debug = self._debug[0][1]
         return stats
