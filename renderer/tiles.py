@@ -13,6 +13,7 @@ from rasterizer.overdraw import count_overdraw
 from rasterizer.pack import pack
 from rasterizer.project import CULL_REASONS, Camera, Projected
 from rasterizer.project_arena import Limits, SortFrames, project_arena
+from rasterizer.quantize_keys import quantize_keys
 from rasterizer.raster import rasterize_rgba_views
 from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
@@ -124,7 +125,7 @@ class TilesDrawing:
             self._project(views, settings)
             self.device.queue.finish()
         with timer.time("bin", on_gpu=False):
-            tiles = self._bin(views)
+            tiles = self._bin(views, settings.key_bits)
             self.device.queue.finish()
         with timer.time("splat", on_gpu=False):
             for size in {view.size for view in views}:
@@ -171,9 +172,11 @@ class TilesDrawing:
             into,
         )
 
-    def _bin(self, views: list[View]) -> list[Tiles]:
+    def _bin(self, views: list[View], key_bits: int) -> list[Tiles]:
         if self.sorts:
             sorted_by = self._projected[: self.sorts]  # views whose keys make an order
+            for projected in sorted_by if key_bits == 16 else ():
+                quantize_keys(self.device, projected.found)
             self._orders = [sort_order(self.device, p.found) for p in sorted_by]
         orders = self._orders * (len(views) if len(self._orders) == 1 else 1)
         return [
