@@ -18,7 +18,8 @@ def eye_places(points: Points, poses: np.ndarray, frame_from_world: np.ndarray) 
     mean_opacity, owner, _ = points
     out = np.empty((3, len(owner)), np.float32)
     for start, end, matrix in runs(owner, frame_from_world @ poses):
-        out[:, start:end] = matrix[:, :3] @ mean_opacity[start:end, :3].T + matrix[:, 3:]
+        with np.errstate(invalid="ignore"):  # what is not finite is nowhere
+            out[:, start:end] = matrix[:, :3] @ mean_opacity[start:end, :3].T + matrix[:, 3:]
     return out
 
 

@@ -9,10 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
+from renderer import layout
 from renderer.classify import Points, classify, eye_places
 from renderer.debug_map import birdseye
 from renderer.points import dim, dot_size, paint_points
-from renderer.settings import CULL_REASONS, FrameStats, RenderSettings
+from renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
 from scene.pose import View
 from scene.scene import Scene
 
@@ -44,6 +45,7 @@ DISTANT = np.float32(
      [0.99, 0.91, 0.14]]
 )  # fmt: skip
 LEGEND_STEPS = 5  # rows that stand for a ramp
+DEBUG_NAMES = tuple(name for name in DEBUG_VIEWS if name)
 RECOLORED = ("depth", "object")  # drawn with other colours than the scene's
 
 
@@ -66,8 +68,8 @@ def prepare_debug(drawing: Drawing, views: list[View], scene: Scene, name: str) 
 
 def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndarray:
     """(N, 3) float32: depth as a part of the farthest one, or the object's colour."""
-    depth = np.nan_to_num(-eye_places(points, object_poses(scene), view.eye_from_world())[2])
-    part = np.clip(depth / farthest_depth(depth), 0, 1)[:, None]
+    depth = -eye_places(points, object_poses(scene), view.eye_from_world())[2]
+    part = np.clip(np.nan_to_num(depth / farthest_depth(depth)), 0, 1)[:, None]
     if name == "depth":
         return np.repeat(part, 3, axis=1)
     colors = np.float32([object_color(i) for i in range(len(scene.objects))])
@@ -76,7 +78,8 @@ def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndar
 
 def farthest_depth(depth: np.ndarray) -> np.float32:
     """By which depths in metres are divided; a power of two, so that nothing is rounded."""
-    return np.float32(2.0 ** np.ceil(np.log2(max(float(depth.max(initial=0)), 1e-6))))
+    known = depth[np.abs(depth) < layout.HUGE]  # NaN is not
+    return np.float32(2.0 ** np.ceil(np.log2(max(float(known.max(initial=0)), 1e-6))))
 
 
 def debug_image(
@@ -116,7 +119,7 @@ def debug_image(
 def depth_picture(rgba: np.ndarray, depth: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
     """Blended depth over coverage, near bright, between the 1st and 99th hundredth of it."""
     coverage = rgba[..., 3]
-    scale = farthest_depth(np.nan_to_num(depth))
+    scale = farthest_depth(depth)
     metres = rgba[..., 0] / np.maximum(coverage, np.float32(1e-6)) * scale
     solid = metres[coverage > 0.5]
     near, far = np.percentile(solid, [1, 99]) if solid.size else (0.0, float(scale))
