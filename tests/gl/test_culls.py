@@ -1,6 +1,7 @@
 """Culls of project.comp against the float64 oracle, reason by reason; thresholds met exactly."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from renderer import layout
 from renderer.buffers import Arena
 from renderer.gpu import Gpu
 from renderer.project import Projector
-from renderer.reference import gate_object, reference_counts, reference_reasons
+from renderer.reference import gate_object, reference_counts, reference_image, reference_reasons
+from renderer.renderer import Renderer
 from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.evaluate import evaluate
 from scene.pose import Pose, View
@@ -236,3 +238,79 @@ def test_fade_multiplies_opacity_along_its_ramp(gpu, limit):
     assert 5 < len(index) < 60 and got.min() < 0.1 and got.max() == np.float32(0.8)
     cut = records[index][:, 7].view(np.float32)
     np.testing.assert_allclose(cut, np.sqrt(2 * np.log(255 * got)), atol=3e-3)
+
+
+# What a splat of 0.8 does that crosses a limit by going away (or, for max_pixels, coming near).
+CROSSINGS = {
+    "max_distance": (4.0, np.linspace(2.9, 4.1, 61)),
+    "max_pixels": (4.0, np.linspace(2.2, 1.1, 61)),  # one sigma of 5 cm at 50 px/m a 2 m
+    "min_pixels": (5.0, np.linspace(1.8, 3.6, 61)),
+}
+
+
+@pytest.mark.parametrize("drawing", ["quads", "tiles", "reference"])
+@pytest.mark.parametrize("limit", CROSSINGS)
+def test_what_crosses_a_limit_fades_or_jumps(session_gpu, drawing, limit):
+    """Bounds: 60 steps over a crossing change opacity 0.8 by at most 0.05 each where it fades,
+    the place and size of the splat the rest; without fade the last picture has all of it.
+    """
+    at, distances = CROSSINGS[limit]
+    scenes = [alone(row_of(np.array([[0, 0, -d]]), 0.05, 0.8)) for d in distances]
+    steps = {}
+    for fade in (0.0, 0.4):
+        settings = RenderSettings(fade=fade, **{limit: at})
+        images = pictures(session_gpu, drawing, scenes, FRONT, settings)
+        assert images[0].max() > 0.5 and images[-1].max() == 0, "it crosses the limit"
+        steps[fade] = max(np.abs(b - a).max() for a, b in pairwise(images))
+    assert steps[0.0] > 0.5 and steps[0.4] < 0.09, steps
+
+
+def pictures(gpu: Gpu, drawing: str, scenes: list, view: View, settings: RenderSettings) -> list:
+    """(H, W, 4) of each scene by a drawing, or by the oracle."""
+    if drawing == "reference":
+        return [reference_image(scene, view, settings) for scene in scenes]
+    made = []
+    with gpu.ctx as ctx, Renderer(ctx, drawing, target="rgba32f") as renderer:
+        renderer.settings = settings
+        for scene in scenes:
+            renderer.update(scene)
+            renderer.draw([view])
+            made.append(renderer.image().copy())
+    return made
+
+
+def turned(degrees: float) -> View:
+    half = np.radians(degrees) / 2
+    pose = Pose(np.zeros(3), np.array([np.cos(half), 0, np.sin(half), 0]))
+    return replace(FRONT, world_from_eye=pose, tangents=(-2, 2, -1, 1))
+
+
+def test_turning_the_head_keeps_the_order_by_distance(gpu):
+    scene = alone(random_layers(2000, seed=8), world_from_object=Pose(np.array([0, 0, -2.5]),
+                  np.array([1.0, 0, 0, 0])))  # fmt: skip
+    orders = {}
+    for order in ("depth", "distance"):
+        settings = RenderSettings(order=order)
+        keys = [
+            seen(gpu, scene, [turned(a)], settings, keep_outside=True)[0][2] for a in (0, 3, 25)
+        ]
+        orders[order] = [np.argsort(k, kind="stable") for k in keys]
+    straight, little, much = orders["distance"]
+    # Of equal distances in float32 the rounding decides: a handful of neighbours swap.
+    assert (straight != little).mean() < 0.01 and (straight != much).mean() < 0.01
+    assert (orders["depth"][0] != orders["depth"][2]).mean() > 0.9
+
+
+@pytest.mark.parametrize("drawing", ["quads", "tiles", "reference"])
+def test_distance_and_depth_disagree_beside_the_axis(session_gpu, drawing):
+    """One splat ahead at 2.2 m, one beside at 2.0 m of depth and 2.33 m away, overlapping."""
+    pair = one_splat(
+        means=[[0.75, 0, -2.2], [1.2, 0, -2.0]], scales=[[0.25] * 3] * 2, wxyz=[[1, 0, 0, 0]] * 2,
+        opacity=[0.9, 0.9], sh=[[[1.7, -1.7, -1.7]], [[-1.7, -1.7, 1.7]]],
+    )  # fmt: skip
+    red_over_blue = {}
+    for order in ("depth", "distance"):
+        image = pictures(session_gpu, drawing, [alone(pair)], FRONT, RenderSettings(order=order))[0]
+        red, _, blue, _ = image[50, 148]
+        red_over_blue[order] = red / blue
+    assert red_over_blue["depth"] < 0.7 and red_over_blue["distance"] > 1.1
