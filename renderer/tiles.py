@@ -10,7 +10,7 @@ import numpy as np
 from rasterizer.bin import Tiles, bin_tiles, sort_order
 from rasterizer.device import Device, open_device
 from rasterizer.overdraw import count_overdraw
-from rasterizer.pack import pack
+from rasterizer.pack import pack, pack_opacity
 from rasterizer.project import CULL_REASONS, Camera, Projected
 from rasterizer.project_arena import Limits, SortFrames, project_arena
 from rasterizer.quantize_keys import quantize_keys
@@ -35,6 +35,7 @@ class _Slot:
     count: int
     evaluator: Evaluator
     sh: object | None  # device array of coefficients; None: the colour comes from a network
+    placed: bool = False  # layers: the control value changes nothing but their opacity
 
 
 class TilesDrawing:
@@ -88,8 +89,11 @@ class TilesDrawing:
         slot = self._slots[i]
         self._changed = True
         splats = slot.evaluator.geometry(x)
+        if slot.placed:
+            pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
+            return
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
-        self.device.queue.finish()
+        slot.placed = slot.sh is not None
 
     def decode_color(
         self, i: int, x: float, eye_object: np.ndarray, seen: np.ndarray | None = None

@@ -1,24 +1,60 @@
-// pack: means, scales, quaternions -> what project_arena reads of a splat.  One work-item a splat.
+// pack: means, scales, quaternions -> what project_arena reads of a splat, eight at a time.
 // Sigma = R S S^T R^T, stored as xx xy xz yy yz zz 0 0 (square metres, object frame).
+#include "common/eight_rows.cl"
 
-__kernel void pack(int count, int start, __global const float* means, __global const float* scales,
-                   __global const float* wxyz, __global const float* opacity,
-                   __global float4* mean_opacity, __global float8* covariance) {
+typedef struct {
+  float8 x, y, z, opacity;
+} Rows;  // of any array, as many columns as it has; of quaternions x is their w, and so on
+
+inline float8 dot3(Rows a, Rows b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+inline Rows scaled_row(float8 x, float8 y, float8 z, Rows by) {
+  const Rows row = {x * by.x, y * by.y, z * by.z, 0};
+  return row;
+}
+
+// A work-item takes `run` splats, a multiple of eight, to rows `start` and after of the arena.
+__kernel void pack(int count, int start, int run, __global const float* means,
+                   __global const float* scales, __global const float* wxyz,
+                   __global const float* opacity, __global float4* mean_opacity,
+                   __global float8* covariance) {
+  const int first = get_global_id(0) * run, last = min(count, first + run);
+  for (int i = first; i < last; i += LANES) {
+    const int n = min(LANES, last - i);
+    Rows mean, s, q;
+    LOAD_ROWS(LOAD_THREES, mean, means, 3)
+    LOAD_ROWS(LOAD_THREES, s, scales, 3)
+    LOAD_ROWS(LOAD_MEANS, q, wxyz, 4)
+    LOAD_ROWS(LOAD_ONES, mean.opacity, opacity, 1)
+    // By the largest entry first: neither tiny nor huge quaternions lose their length.
+    const float8 largest = fmax(fmax(fabs(q.x), fabs(q.y)), fmax(fabs(q.z), fabs(q.opacity)));
+    // One without a length is no turn; NaN stays NaN, and project drops it.
+    const int8 none = (q.x == 0.0f) & (q.y == 0.0f) & (q.z == 0.0f) & (q.opacity == 0.0f);
+    const float8 zero = 0;
+    float8 w = select(q.x / largest, (float8)(1), none), x = select(q.y / largest, zero, none);
+    float8 y = select(q.z / largest, zero, none), z = select(q.opacity / largest, zero, none);
+    const float8 per = 1.0f / sqrt(w * w + x * x + y * y + z * z);
+    w *= per;
+    x *= per;
+    y *= per;
+    z *= per;
+    const Rows a = scaled_row(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), s);
+    const Rows b = scaled_row(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), s);
+    const Rows c = scaled_row(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), s);
+    float places[4 * LANES], sigmas[8 * LANES];
+    store_columns(places, 4, 0, mean.x, mean.y, mean.z, mean.opacity);
+    store_columns(sigmas, 8, 0, dot3(a, a), dot3(a, b), dot3(a, c), dot3(b, b));
+    store_columns(sigmas, 8, 4, dot3(b, c), dot3(c, c), 0, 0);
+    for (int lane = 0; lane < n; lane++) {
+      mean_opacity[start + i + lane] = vload4(lane, places);
+      covariance[start + i + lane] = vload8(lane, sigmas);
+    }
+  }
+}
+
+// The same with other opacities alone: layers come and go, their splats stay.
+__kernel void pack_opacity(int count, int start, __global const float* opacity,
+                           __global float* mean_opacity) {
   const int i = get_global_id(0);
-  if (i >= count) return;
-  const float4 given = vload4(i, wxyz);
-  // By the largest entry first: neither tiny nor huge quaternions lose their length.
-  const float4 size = fabs(given);
-  const float largest = fmax(fmax(size.x, size.y), fmax(size.z, size.w));
-  // One without a length is no turn; NaN stays NaN, and project drops it.
-  const float4 scaled = given / largest;
-  const float4 q = all(given == 0) ? (float4)(1, 0, 0, 0) : scaled / sqrt(dot(scaled, scaled));
-  const float w = q.x, x = q.y, y = q.z, z = q.w;
-  const float3 s = vload3(i, scales);
-  const float3 row_x = (float3)(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)) * s;
-  const float3 row_y = (float3)(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)) * s;
-  const float3 row_z = (float3)(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)) * s;
-  mean_opacity[start + i] = (float4)(vload3(i, means), opacity[i]);
-  covariance[start + i] = (float8)(dot(row_x, row_x), dot(row_x, row_y), dot(row_x, row_z),
-                                   dot(row_y, row_y), dot(row_y, row_z), dot(row_z, row_z), 0, 0);
+  if (i < count) mean_opacity[4 * (size_t)(start + i) + 3] = opacity[i];
 }

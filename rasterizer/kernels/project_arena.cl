@@ -15,8 +15,8 @@ typedef struct {
   float8 cut;                     // 2 ln(opacity / least alpha)
 } Eight;
 
-// Pose blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
-// order, as rows.  One column a lane: nearly always all of one object, and the one of the eight before.
+// Blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
+// order, as rows.  Eight splats are nearly always of one object, and of the one before.
 #define BLOCKS_OF_POSE (VIEWS + ORDERS)
 #define POSE (12 * BLOCKS_OF_POSE)
 
@@ -90,8 +90,9 @@ inline Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 
   const float8 jxz = -jx * fmin(fmax(tan_x, view[LEAST_X]), view[MOST_X]);
   const float8 jyz = -jy * fmin(fmax(tan_y, view[LEAST_Y]), view[MOST_Y]);
   // Rows of J camera_from_object, then the screen covariance a, b, c.
-  const float8 ux = jx * m[0] + jxz * m[8], uy = jx * m[1] + jxz * m[9], uz = jx * m[2] + jxz * m[10];
-  const float8 vx = jy * m[4] + jyz * m[8], vy = jy * m[5] + jyz * m[9], vz = jy * m[6] + jyz * m[10];
+  const float8 ux = jx * m[0] + jxz * m[8], uy = jx * m[1] + jxz * m[9];
+  const float8 vx = jy * m[4] + jyz * m[8], vy = jy * m[5] + jyz * m[9];
+  const float8 uz = jx * m[2] + jxz * m[10], vz = jy * m[6] + jyz * m[10];
   const float8 sx = s->xx * ux + s->xy * uy + s->xz * uz;
   const float8 sy = s->xy * ux + s->yy * uy + s->yz * uz;
   const float8 sz = s->xz * ux + s->yz * uy + s->zz * uz;
@@ -138,9 +139,9 @@ inline Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 
   const float8 none = -1;
   half_x = select(none, half_x, drawn);
   half_y = select(none, half_y, drawn);
-  store_rows(rows, 0, px, py, c * per, -b * per);
-  store_rows(rows, 4, a * per, opacity, s->red, s->green);
-  store_rows(rows, 8, s->blue, half_x, half_y, cut);
+  store_columns(rows, RECORD, 0, px, py, c * per, -b * per);
+  store_columns(rows, RECORD, 4, a * per, opacity, s->red, s->green);
+  store_columns(rows, RECORD, 8, s->blue, half_x, half_y, cut);
   const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, cut, drawn};
   return out;
 }
@@ -171,17 +172,19 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
   }
 }
 
-// frame: the limits, VIEW_SIZE floats a view, POSE floats an object.  by_distance: keys are metres to the sort frame's origin, else
-// along its z.  keep_outside: also splats that no view sees get a key.
-// status: pairs of the view's order, instances, least and most key.
+// frame: the limits, VIEW_SIZE floats a view, POSE floats an object.  by_distance: keys are metres
+// to the sort frame's origin, else along its z.  keep_outside: also splats that no view sees get a
+// key.  status: pairs of the view's order, instances, least and most key.
 __kernel void project_arena(
     int count, int chunk, int by_distance, int keep_outside, __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
-    __global const float* color, __global const int* object_index, __global float* record_0, __global float* depth_0, __global int* culled_0,
+    __global const float* color, __global const int* object_index,
+    __global float* record_0, __global float* depth_0, __global int* culled_0,
     __global uint2* places_0, __global uint4* status_0, __global uint2* pairs_0,
-    __global int* table_0, __global float* record_1, __global float* depth_1,
-    __global int* culled_1, __global uint2* places_1, __global uint4* status_1,
-    __global uint2* pairs_1, __global int* table_1) {
+    __global int* table_0,
+    __global float* record_1, __global float* depth_1, __global int* culled_1,
+    __global uint2* places_1, __global uint4* status_1, __global uint2* pairs_1,
+    __global int* table_1) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
   __global const float *limits = frame, *views = frame + LIMITS;

@@ -3,69 +3,80 @@
 #include "common/vector.cl"
 
 // LOAD(into, rows) for splats i to i + n: where fewer than eight are left, the last one again.
-#define LOAD_ROWS(LOAD, into, rows, width)                                            \
-  if (n == LANES) {                                                                   \
-    LOAD(into, rows + (size_t)(width) * i)                                            \
-  } else {                                                                            \
-    float copy[(width) * LANES];                                                      \
-    for (int lane = 0; lane < LANES; lane++)                                          \
-      for (int k = 0; k < (width); k++)                                               \
-        copy[(width) * lane + k] = rows[(size_t)(width) * (i + min(lane, n - 1)) + k]; \
-    LOAD(into, copy)                                                                  \
+#define LOAD_ROWS(LOAD, into, rows, width)                                                         \
+  if (n == LANES) {                                                                                \
+    LOAD(into, rows + (size_t)(width) * i)                                                         \
+  } else {                                                                                         \
+    float copy[(width) * LANES];                                                                   \
+    for (int lane = 0; lane < LANES; lane++)                                                       \
+      for (int k = 0; k < (width); k++)                                                            \
+        copy[(width) * lane + k] = rows[(size_t)(width) * (i + min(lane, n - 1)) + k];             \
+    LOAD(into, copy)                                                                               \
   }
 
-#define LOAD_INDICES(into, array)                                                     \
-  if (n == LANES) {                                                                   \
-    into = vload8(0, array + i);                                                      \
-  } else {                                                                            \
-    int copy[LANES];                                                                  \
-    for (int lane = 0; lane < LANES; lane++) copy[lane] = array[i + min(lane, n - 1)]; \
-    into = vload8(0, copy);                                                           \
+#define LOAD_INDICES(into, array)                                                                  \
+  if (n == LANES) {                                                                                \
+    into = vload8(0, array + i);                                                                   \
+  } else {                                                                                         \
+    int copy[LANES];                                                                               \
+    for (int lane = 0; lane < LANES; lane++) copy[lane] = array[i + min(lane, n - 1)];             \
+    into = vload8(0, copy);                                                                        \
   }
 
-#define LOAD_MEANS(into, rows)                                \
-  {                                                           \
-    const float16 p = vload16(0, rows), q = vload16(1, rows); \
-    into.x = (float8)(p.s048c, q.s048c);                      \
-    into.y = (float8)(p.s159d, q.s159d);                      \
-    into.z = (float8)(p.s26ae, q.s26ae);                      \
-    into.opacity = (float8)(p.s37bf, q.s37bf);                \
+#define LOAD_MEANS(into, rows)                                                                     \
+  {                                                                                                \
+    const float16 rp = vload16(0, rows), rq = vload16(1, rows);                                    \
+    into.x = (float8)(rp.s048c, rq.s048c);                                                         \
+    into.y = (float8)(rp.s159d, rq.s159d);                                                         \
+    into.z = (float8)(rp.s26ae, rq.s26ae);                                                         \
+    into.opacity = (float8)(rp.s37bf, rq.s37bf);                                                   \
   }
 
-#define LOAD_COVARIANCES(into, rows)                          \
-  {                                                           \
-    const float16 a = vload16(0, rows), b = vload16(1, rows); \
-    const float16 c = vload16(2, rows), d = vload16(3, rows); \
-    into.xx = (float8)(a.s08, b.s08, c.s08, d.s08);           \
-    into.xy = (float8)(a.s19, b.s19, c.s19, d.s19);           \
-    into.xz = (float8)(a.s2a, b.s2a, c.s2a, d.s2a);           \
-    into.yy = (float8)(a.s3b, b.s3b, c.s3b, d.s3b);           \
-    into.yz = (float8)(a.s4c, b.s4c, c.s4c, d.s4c);           \
-    into.zz = (float8)(a.s5d, b.s5d, c.s5d, d.s5d);           \
+#define LOAD_COVARIANCES(into, rows)                                                               \
+  {                                                                                                \
+    const float16 ra = vload16(0, rows), rb = vload16(1, rows);                                    \
+    const float16 rc = vload16(2, rows), rd = vload16(3, rows);                                    \
+    into.xx = (float8)(ra.s08, rb.s08, rc.s08, rd.s08);                                            \
+    into.xy = (float8)(ra.s19, rb.s19, rc.s19, rd.s19);                                            \
+    into.xz = (float8)(ra.s2a, rb.s2a, rc.s2a, rd.s2a);                                            \
+    into.yy = (float8)(ra.s3b, rb.s3b, rc.s3b, rd.s3b);                                            \
+    into.yz = (float8)(ra.s4c, rb.s4c, rc.s4c, rd.s4c);                                            \
+    into.zz = (float8)(ra.s5d, rb.s5d, rc.s5d, rd.s5d);                                            \
   }
 
-#define LOAD_COLORS(into, rows)                               \
-  {                                                           \
-    const float16 g = vload16(0, rows), h = vload16(1, rows); \
-    into.red = (float8)(g.s048c, h.s048c);                    \
-    into.green = (float8)(g.s159d, h.s159d);                  \
-    into.blue = (float8)(g.s26ae, h.s26ae);                   \
+#define LOAD_COLORS(into, rows)                                                                    \
+  {                                                                                                \
+    const float16 rg = vload16(0, rows), rh = vload16(1, rows);                                    \
+    into.red = (float8)(rg.s048c, rh.s048c);                                                       \
+    into.green = (float8)(rg.s159d, rh.s159d);                                                     \
+    into.blue = (float8)(rg.s26ae, rh.s26ae);                                                      \
   }
 
-// Four vectors -> eight rows of four, into column `at` of the records.
-inline void store_rows(float* rows, int at, float8 a, float8 b, float8 c, float8 d) {
+// Rows of three, as three vectors side by side.
+#define LOAD_THREES(into, rows)                                                                    \
+  {                                                                                                \
+    const float8 ra = vload8(0, rows), rb = vload8(1, rows), rc = vload8(2, rows);                 \
+    into.x = (float8)(ra.s0, ra.s3, ra.s6, rb.s1, rb.s4, rb.s7, rc.s2, rc.s5);                     \
+    into.y = (float8)(ra.s1, ra.s4, ra.s7, rb.s2, rb.s5, rc.s0, rc.s3, rc.s6);                     \
+    into.z = (float8)(ra.s2, ra.s5, rb.s0, rb.s3, rb.s6, rc.s1, rc.s4, rc.s7);                     \
+  }
+
+#define LOAD_ONES(into, rows) into = vload8(0, rows);
+
+// Four vectors -> eight rows of `stride` floats, into their columns from `at` on.
+inline void store_columns(float* rows, int stride, int at, float8 a, float8 b, float8 c, float8 d) {
   const float8 ab_lo = (float8)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3);
   const float8 ab_hi = (float8)(a.s4, b.s4, a.s5, b.s5, a.s6, b.s6, a.s7, b.s7);
   const float8 cd_lo = (float8)(c.s0, d.s0, c.s1, d.s1, c.s2, d.s2, c.s3, d.s3);
   const float8 cd_hi = (float8)(c.s4, d.s4, c.s5, d.s5, c.s6, d.s6, c.s7, d.s7);
   vstore4((float4)(ab_lo.s01, cd_lo.s01), 0, rows + at);
-  vstore4((float4)(ab_lo.s23, cd_lo.s23), 0, rows + at + RECORD);
-  vstore4((float4)(ab_lo.s45, cd_lo.s45), 0, rows + at + RECORD * 2);
-  vstore4((float4)(ab_lo.s67, cd_lo.s67), 0, rows + at + RECORD * 3);
-  vstore4((float4)(ab_hi.s01, cd_hi.s01), 0, rows + at + RECORD * 4);
-  vstore4((float4)(ab_hi.s23, cd_hi.s23), 0, rows + at + RECORD * 5);
-  vstore4((float4)(ab_hi.s45, cd_hi.s45), 0, rows + at + RECORD * 6);
-  vstore4((float4)(ab_hi.s67, cd_hi.s67), 0, rows + at + RECORD * 7);
+  vstore4((float4)(ab_lo.s23, cd_lo.s23), 0, rows + at + stride * 1);
+  vstore4((float4)(ab_lo.s45, cd_lo.s45), 0, rows + at + stride * 2);
+  vstore4((float4)(ab_lo.s67, cd_lo.s67), 0, rows + at + stride * 3);
+  vstore4((float4)(ab_hi.s01, cd_hi.s01), 0, rows + at + stride * 4);
+  vstore4((float4)(ab_hi.s23, cd_hi.s23), 0, rows + at + stride * 5);
+  vstore4((float4)(ab_hi.s45, cd_hi.s45), 0, rows + at + stride * 6);
+  vstore4((float4)(ab_hi.s67, cd_hi.s67), 0, rows + at + stride * 7);
 }
 
 inline void store_records(const float* rows, int i, int n, __global float* record) {
