@@ -3,6 +3,13 @@
 // Eye space has y up and looks along -z; pixels count from lower left.
 // Screen covariance: J W Sigma W^T J^T + low_pass (EWA splatting, as 3DGS).
 // No early returns: on llvmpipe each would mask all that follows (see docs/bench/ideas.md).
+#ifndef VIEWS             // the variants, as Projector asks for them
+#define VIEWS 1           // views at once
+#define SORT_FRAME 0      // 1: the order is made along another frame than the first view's
+#define BY_DISTANCE 0     // 1: and by the distance in it
+#define FADE 0            // 1: some limit has a ramp
+#define KEY_RANGE 0       // 1: the least and largest key are wanted
+#endif
 #include "common/finite.glsl"
 #include "common/record.glsl"
 layout(local_size_x = WORKGROUP) in;
