@@ -38,10 +38,18 @@ def pack(
 
 
 def pack_opacity(device: Device, opacity: np.ndarray, start: int, mean_opacity: "Array") -> None:
-    """Writes the opacities (n,) of rows start... alone."""
-    count = len(opacity)
-    if count:
-        given = device.shared(np.ascontiguousarray(opacity, np.float32))
-        kernel = device.program(KERNEL)["pack_opacity"]
-        device.launch(kernel, count, GROUP, count, start, given, mean_opacity)
+    """Writes the opacities (n,) of rows start... of mean_opacity (N, 4) alone."""
+    _copy(device, "pack_opacity", opacity, start, mean_opacity)
+
+
+def pack_color(device: Device, given: np.ndarray, start: int, color: "Array") -> None:
+    """Writes colours (n, 3) into rows start... of color (N, 4)."""
+    _copy(device, "pack_color", given, start, color)
+
+
+def _copy(device: Device, kernel: str, given: np.ndarray, start: int, into: "Array") -> None:
+    if len(given):
+        host = device.shared(np.ascontiguousarray(given, np.float32))
+        program = device.program(KERNEL)
+        device.launch(program[kernel], len(given), GROUP, len(given), start, host, into)
         device.queue.finish()

@@ -10,7 +10,7 @@ import numpy as np
 from rasterizer.bin import Tiles, bin_tiles, sort_order
 from rasterizer.device import Device, open_device
 from rasterizer.overdraw import count_overdraw
-from rasterizer.pack import pack, pack_opacity
+from rasterizer.pack import pack, pack_color, pack_opacity
 from rasterizer.project import CULL_REASONS, Camera, Projected
 from rasterizer.project_arena import Limits, SortFrames, project_arena
 from rasterizer.quantize_keys import quantize_keys
@@ -73,7 +73,6 @@ class TilesDrawing:
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
         self._color = device.zeros((self.splats, 4))
-        self._staging = np.zeros((max(counts, default=0), 4), np.float32)
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
         )
@@ -108,10 +107,8 @@ class TilesDrawing:
             args = (slot.sh, eye_object, rows, self._mean_opacity, self._color, seen)
             shade_sh(self.device, *args)
             self.device.queue.finish()
-        elif slot.count:
-            rows = self._staging[: slot.count]
-            rows[:, :3] = slot.evaluator.color(x, eye_object)
-            self._color[slot.start : slot.start + slot.count].set(rows)
+        else:
+            pack_color(self.device, slot.evaluator.color(x, eye_object), slot.start, self._color)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
@@ -227,9 +224,7 @@ class TilesDrawing:
 
     def write_colors(self, color: np.ndarray) -> None:
         """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
-        rows = np.zeros((self.splats, 4), np.float32)
-        rows[:, :3] = color
-        self._color.set(rows)
+        pack_color(self.device, np.reshape(color, (self.splats, 3)), 0, self._color)
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""

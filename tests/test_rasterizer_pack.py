@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.pack import pack, pack_opacity
+from rasterizer.pack import pack, pack_color, pack_opacity
 from rasterizer.reference import rotations
 
 BEFORE, AFTER = 3, 5  # rows of other objects
@@ -64,10 +64,14 @@ def test_no_turn_for_zero_and_nan_stays_nan():
 
 
 @pytest.mark.parametrize("count", [0, 1, 64, 65])
-def test_opacities_alone(count):
+def test_opacities_or_colours_alone(count):
     d = device()
     rows = np.arange((BEFORE + count + AFTER) * 4, dtype=np.float32).reshape(-1, 4)
     array, opacity = d.upload(rows), np.linspace(0, 1, count).astype(np.float32)
     pack_opacity(d, opacity, BEFORE, array)
     rows[BEFORE : BEFORE + count, 3] = opacity
+    np.testing.assert_array_equal(d.download(array), rows)
+    color = np.random.default_rng(0).uniform(size=(count, 3)).astype(np.float32)
+    pack_color(d, color, BEFORE, array)
+    rows[BEFORE : BEFORE + count] = np.column_stack([color, np.zeros(count)])
     np.testing.assert_array_equal(d.download(array), rows)

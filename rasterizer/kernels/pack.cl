@@ -58,3 +58,10 @@ __kernel void pack_opacity(int count, int start, __global const float* opacity,
   const int i = get_global_id(0);
   if (i < count) mean_opacity[4 * (size_t)(start + i) + 3] = opacity[i];
 }
+
+// Colours of three floats -> rows of four.
+__kernel void pack_color(int count, int start, __global const float* given,
+                         __global float4* color) {
+  const int i = get_global_id(0);
+  if (i < count) color[start + i] = (float4)(vload3(i, given), 0);
+}
