@@ -33,7 +33,8 @@ vec4 values[2 * LAYER_VECS];     // a layer's inputs in one half, its outputs in
 
 void write(uint anchor, uint output_index, float z) {
     if (!(output_index < splats_per_anchor * size)) return;  // padding
-    float value = gain * activate(activation, clamp(z, low, high));
+    // clamp() makes a number of NaN, and a splat nobody meant would be drawn.
+    float value = isnan(z) ? z : gain * activate(activation, clamp(z, low, high));
     uint splat = anchor * splats_per_anchor + output_index / size;
     outputs[base + stride * splat + output_index % size] = value;
 }
