@@ -13,11 +13,16 @@ inline Rows scaled_row(float8 x, float8 y, float8 z, Rows by) {
   return row;
 }
 
+#define STORE_PLACES(rows) STORE_COLUMNS(rows, 4, 0, mean.x, mean.y, mean.z, mean.opacity)
+#define STORE_SIGMAS(rows)                                                       \
+  STORE_COLUMNS(rows, 8, 0, dot3(a, a), dot3(a, b), dot3(a, c), dot3(b, b))      \
+  STORE_COLUMNS(rows, 8, 4, dot3(b, c), dot3(c, c), 0, 0)
+
 // A work-item takes `run` splats, a multiple of eight, to rows `start` and after of the arena.
 __kernel void pack(int count, int start, int run, __global const float* means,
                    __global const float* scales, __global const float* wxyz,
-                   __global const float* opacity, __global float4* mean_opacity,
-                   __global float8* covariance) {
+                   __global const float* opacity, __global float* mean_opacity,
+                   __global float* covariance) {
   const int first = get_global_id(0) * run, last = min(count, first + run);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
@@ -41,14 +46,8 @@ __kernel void pack(int count, int start, int run, __global const float* means,
     const Rows a = scaled_row(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), s);
     const Rows b = scaled_row(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), s);
     const Rows c = scaled_row(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), s);
-    float places[4 * LANES], sigmas[8 * LANES];
-    store_columns(places, 4, 0, mean.x, mean.y, mean.z, mean.opacity);
-    store_columns(sigmas, 8, 0, dot3(a, a), dot3(a, b), dot3(a, c), dot3(b, b));
-    store_columns(sigmas, 8, 4, dot3(b, c), dot3(c, c), 0, 0);
-    for (int lane = 0; lane < n; lane++) {
-      mean_opacity[start + i + lane] = vload4(lane, places);
-      covariance[start + i + lane] = vload8(lane, sigmas);
-    }
+    STORE_ROWS(STORE_PLACES, (mean_opacity + 4 * (size_t)start), 4)
+    STORE_ROWS(STORE_SIGMAS, (covariance + 8 * (size_t)start), 8)
   }
 }
 

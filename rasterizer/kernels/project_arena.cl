@@ -79,11 +79,17 @@ inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fad
   return per > 0 ? fmin(fmax(room * per, 0.0f), 1.0f) : (float8)(1);
 }
 
+#define STORE_RECORDS(rows)                                                          \
+  STORE_COLUMNS(rows, RECORD, 0, px, py, c * per, -b * per)                          \
+  STORE_COLUMNS(rows, RECORD, 4, a * per, opacity, s->red, s->green)                 \
+  STORE_COLUMNS(rows, RECORD, 8, s->blue, half_x, half_y, cut)
+
 // Screen ellipses of those `alive` in one view.  passed: per lane how many got past each gate.
-// rows: their records, culled ones with extents of -1.
-inline Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
-                              float8 square, int8 alive, __global const float* view,
-                              __global const float* limits, float* rows, int8* passed) {
+// record: of all splats, these are i to i + n; culled ones get extents of -1.
+IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
+                                float8 square, int8 alive, __global const float* view,
+                                __global const float* limits, int i, int n,
+                                __global float* record, int8* passed) {
   const float low_pass = limits[LOW_PASS];
   const float8 per_z = 1.0f / z, tan_x = x * per_z, tan_y = y * per_z;
   const float8 jx = view[CAMERA_FX] * per_z, jy = view[CAMERA_FY] * per_z;
@@ -139,9 +145,7 @@ inline Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 
   const float8 none = -1;
   half_x = select(none, half_x, drawn);
   half_y = select(none, half_y, drawn);
-  store_columns(rows, RECORD, 0, px, py, c * per, -b * per);
-  store_columns(rows, RECORD, 4, a * per, opacity, s->red, s->green);
-  store_columns(rows, RECORD, 8, s->blue, half_x, half_y, cut);
+  STORE_ROWS(STORE_RECORDS, record, RECORD)
   const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, cut, drawn};
   return out;
 }
@@ -250,15 +254,13 @@ __kernel void project_arena(
         continue;
       }
       __global const float* view = views + VIEW_SIZE * v;
-      float rows[RECORD * LANES];
       const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], alive[v], view,
-                                       limits, rows, passed[v]);
+                                       limits, i, n, record[v], passed[v]);
       const Places p = places_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
       instances[v] += p.count;
       seen[v] = p.count > 0;
       drawn_anywhere |= seen[v];
       const float8 far = select((float8)(CULLED_DEPTH), z[v], e.seen);
-      store_records(rows, i, n, record[v]);
       store_floats(far, i, n, depth[v]);
       store_pairs(p.corner, p.mask, i, n, places[v]);
     }

@@ -23,10 +23,12 @@ inline float8 at_least_0(float8 color) {
     blue += weight * vload8(3 * (k) + 2, s); \
   }
 
+#define STORE_COLORS(rows) STORE_COLUMNS(rows, 4, 0, red, green, blue, 0)
+
 // A work-item takes `run` blocks.  seen: a byte a block, 0 where no colour is wanted; may be null.
 __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, float eye_z,
                        __global const float* mean_opacity, __global const float* sh,
-                       __global const uchar* seen, __global float4* color) {
+                       __global const uchar* seen, __global float* color) {
   const int first = get_global_id(0) * run, blocks = (count + LANES - 1) / LANES;
   for (int block = first; block < min(first + run, blocks); block++) {
     if (seen && !seen[block]) continue;
@@ -63,10 +65,9 @@ __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, 
     ADD(14, 1.445305721320277f * z * (xx - yy))
     ADD(15, -0.5900435899266435f * x * (xx - 3 * yy))
 #endif
-    float r[LANES], g[LANES], b[LANES];
-    vstore8(at_least_0(red), 0, r);
-    vstore8(at_least_0(green), 0, g);
-    vstore8(at_least_0(blue), 0, b);
-    for (int lane = 0; lane < n; lane++) color[i + lane] = (float4)(r[lane], g[lane], b[lane], 0);
+    red = at_least_0(red);
+    green = at_least_0(green);
+    blue = at_least_0(blue);
+    STORE_ROWS(STORE_COLORS, color, 4)
   }
 }

@@ -63,28 +63,34 @@
 
 #define LOAD_ONES(into, rows) into = vload8(0, rows);
 
-// Four vectors -> eight rows of `stride` floats, into their columns from `at` on.
-inline void store_columns(float* rows, int stride, int at, float8 a, float8 b, float8 c, float8 d) {
-  const float8 ab_lo = (float8)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3);
-  const float8 ab_hi = (float8)(a.s4, b.s4, a.s5, b.s5, a.s6, b.s6, a.s7, b.s7);
-  const float8 cd_lo = (float8)(c.s0, d.s0, c.s1, d.s1, c.s2, d.s2, c.s3, d.s3);
-  const float8 cd_hi = (float8)(c.s4, d.s4, c.s5, d.s5, c.s6, d.s6, c.s7, d.s7);
-  vstore4((float4)(ab_lo.s01, cd_lo.s01), 0, rows + at);
-  vstore4((float4)(ab_lo.s23, cd_lo.s23), 0, rows + at + stride * 1);
-  vstore4((float4)(ab_lo.s45, cd_lo.s45), 0, rows + at + stride * 2);
-  vstore4((float4)(ab_lo.s67, cd_lo.s67), 0, rows + at + stride * 3);
-  vstore4((float4)(ab_hi.s01, cd_hi.s01), 0, rows + at + stride * 4);
-  vstore4((float4)(ab_hi.s23, cd_hi.s23), 0, rows + at + stride * 5);
-  vstore4((float4)(ab_hi.s45, cd_hi.s45), 0, rows + at + stride * 6);
-  vstore4((float4)(ab_hi.s67, cd_hi.s67), 0, rows + at + stride * 7);
-}
-
-inline void store_records(const float* rows, int i, int n, __global float* record) {
-  for (int lane = 0; lane < n; lane++) {
-    vstore8(vload8(0, rows + RECORD * lane), 0, record + (size_t)RECORD * (i + lane));
-    vstore4(vload4(0, rows + RECORD * lane + 8), 0, record + (size_t)RECORD * (i + lane) + 8);
+// Four vectors -> rows of `stride` floats, into their columns from `at` on.  Straight to where they
+// belong: a row that is put together in private memory and read back whole waits for its stores.
+#define STORE_COLUMNS(rows, stride, at, ca, cb, cc, cd)                                            \
+  {                                                                                                \
+    const float8 va = ca, vb = cb, vc = cc, vd = cd;                                               \
+    const float8 ab_lo = (float8)(va.s0, vb.s0, va.s1, vb.s1, va.s2, vb.s2, va.s3, vb.s3);         \
+    const float8 ab_hi = (float8)(va.s4, vb.s4, va.s5, vb.s5, va.s6, vb.s6, va.s7, vb.s7);         \
+    const float8 cd_lo = (float8)(vc.s0, vd.s0, vc.s1, vd.s1, vc.s2, vd.s2, vc.s3, vd.s3);         \
+    const float8 cd_hi = (float8)(vc.s4, vd.s4, vc.s5, vd.s5, vc.s6, vd.s6, vc.s7, vd.s7);         \
+    vstore4((float4)(ab_lo.s01, cd_lo.s01), 0, (rows) + (at));                                     \
+    vstore4((float4)(ab_lo.s23, cd_lo.s23), 0, (rows) + (at) + (stride));                          \
+    vstore4((float4)(ab_lo.s45, cd_lo.s45), 0, (rows) + (at) + 2 * (stride));                      \
+    vstore4((float4)(ab_lo.s67, cd_lo.s67), 0, (rows) + (at) + 3 * (stride));                      \
+    vstore4((float4)(ab_hi.s01, cd_hi.s01), 0, (rows) + (at) + 4 * (stride));                      \
+    vstore4((float4)(ab_hi.s23, cd_hi.s23), 0, (rows) + (at) + 5 * (stride));                      \
+    vstore4((float4)(ab_hi.s45, cd_hi.s45), 0, (rows) + (at) + 6 * (stride));                      \
+    vstore4((float4)(ab_hi.s67, cd_hi.s67), 0, (rows) + (at) + 7 * (stride));                      \
   }
-}
+
+// STORE(rows) for splats i to i + n of global rows of `width` floats.
+#define STORE_ROWS(STORE, rows, width)                                                             \
+  if (n == LANES) {                                                                                \
+    STORE(rows + (size_t)(width) * i)                                                              \
+  } else {                                                                                         \
+    float copy[(width) * LANES];                                                                   \
+    STORE(copy)                                                                                    \
+    for (int k = 0; k < (width) * n; k++) rows[(size_t)(width) * i + k] = copy[k];                 \
+  }
 
 inline void store_floats(float8 values, int i, int n, __global float* array) {
   if (n == LANES) {
