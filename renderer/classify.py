@@ -4,6 +4,8 @@ float32 and a column at a time: 400,000 splats take some 50 ms.  renderer/refere
 and exact one.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from renderer import layout
@@ -17,17 +19,23 @@ def eye_places(points: Points, poses: np.ndarray, frame_from_world: np.ndarray) 
     """(3, N) float32 metres in a frame; poses (O, 4, 4), NaN where hidden."""
     mean_opacity, owner, _ = points
     out = np.empty((3, len(owner)), np.float32)
-    for start, end, matrix in runs(owner, frame_from_world @ poses):
+    matrices = rows_of(frame_from_world @ poses)
+    for i, start, end in runs(owner, len(poses)):
+        matrix = matrices[i]
         with np.errstate(invalid="ignore"):  # what is not finite is nowhere
             out[:, start:end] = matrix[:, :3] @ mean_opacity[start:end, :3].T + matrix[:, 3:]
     return out
 
 
-def runs(owner: np.ndarray, matrices: np.ndarray) -> list[tuple[int, int, np.ndarray]]:
-    """(first, after the last, (3, 4) float32) of each object's splats, which lie together."""
-    edges = np.searchsorted(owner, np.arange(len(matrices) + 1))
-    rows = np.asarray(matrices, np.float32)[:, :3]
-    return [(int(a), int(b), m) for a, b, m in zip(edges, edges[1:], rows, strict=False) if b > a]
+def runs(owner: np.ndarray, objects: int) -> list[tuple[int, int, int]]:
+    """(object, its first splat, after its last) of those that have any; they lie together."""
+    edges = np.searchsorted(owner, np.arange(objects + 1)).tolist()
+    return [(i, a, b) for i, (a, b) in enumerate(pairwise(edges)) if b > a]
+
+
+def rows_of(frame_from_objects: np.ndarray) -> np.ndarray:
+    """(O, 3, 4) float32, for numbers that are float32 all the way."""
+    return np.asarray(frame_from_objects, np.float32)[:, :3]
 
 
 def classify(
@@ -49,8 +57,9 @@ def classify(
         margin = layout.JACOBIAN_MARGIN
         held_x = np.clip(tangent_x, np.float32(margin * left), np.float32(margin * right))
         held_y = np.clip(tangent_y, np.float32(margin * down), np.float32(margin * up))
-        for start, end, matrix in runs(owner, view.eye_from_world() @ poses):
-            part = slice(start, end)
+        matrices = rows_of(view.eye_from_world() @ poses)
+        for i, start, end in runs(owner, len(poses)):
+            part, matrix = slice(start, end), matrices[i]
             sigma = covariance[part, :6].T  # xx xy xz yy yz zz
             scale_x, scale_y = (
                 per_depth[part] * np.float32(focal_x),

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from renderer import layout
-from renderer.classify import Points, classify, eye_places
+from renderer.classify import Points, classify, eye_places, runs
 from renderer.debug_map import birdseye
 from renderer.points import dim, dot_size, paint_points
 from renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
@@ -69,11 +69,17 @@ def prepare_debug(drawing: Drawing, views: list[View], scene: Scene, name: str) 
 def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndarray:
     """(N, 3) float32: depth as a part of the farthest one, or the object's colour."""
     depth = -eye_places(points, object_poses(scene), view.eye_from_world())[2]
-    part = np.clip(np.nan_to_num(depth / farthest_depth(depth)), 0, 1)[:, None]
     if name == "depth":
-        return np.repeat(part, 3, axis=1)
-    colors = np.float32([object_color(i) for i in range(len(scene.objects))])
-    return colors[points[1]] * (1 - np.float32(0.6) * part)  # near bright: shapes stay readable
+        part = np.clip(np.nan_to_num(depth / farthest_depth(depth)), 0, 1)
+        return np.repeat(part[:, None], 3, axis=1)
+    colors = np.empty((len(depth), 3), np.float32)
+    for i, start, end in runs(points[1], len(scene.objects)):
+        # Its near side bright and its far side dark, or an object would be a flat shape.
+        mine = np.nan_to_num(depth[start:end])
+        near, far = np.percentile(mine, [2, 98])
+        shade = 1 - 0.75 * np.clip((mine - near) / max(far - near, 1e-6), 0, 1)
+        colors[start:end] = np.outer(shade, object_color(i))
+    return colors
 
 
 def farthest_depth(depth: np.ndarray) -> np.float32:
