@@ -181,8 +181,14 @@ class Renderer:
         name, weight, _ = thermal_blend(self._scene)
         palette = palette_colors(name) if name and not self._debug else None
         image = opaque(self._debug[i][0]) if self._debug else self._drawing.presentable(i)
+        background = self.settings.background
+        as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
-            self._resolve.draw(image, framebuffer, self.settings.background, palette, weight)
+            if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
+                pixels = self._drawing.presentable_rgba8(i, background, palette, weight)
+                self._resolve.copy(pixels, framebuffer)
+            else:
+                self._resolve.draw(image, framebuffer, background, palette, weight)
 
     @contextmanager
     def _framebuffer_kept(self) -> Iterator[None]:

@@ -19,6 +19,7 @@ from renderer.context import is_software
 from renderer.palette import thermal_blend
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
+from renderer.resolve import Resolve
 from renderer.settings import RenderSettings
 from runtime_models.model import BadFile, SplatLayers, Stop
 from runtime_models.read_scene import read_model
@@ -302,3 +303,28 @@ def test_software_gl_takes_the_cpu_back_ends(opened, ctx):
     else:
         assert renderer.backends["drawing"].startswith("tiles (")
         assert renderer.backends["mlps"] == "onnxruntime"
+
+
+@pytest.mark.parametrize("drawing", DRAWINGS)
+def test_eight_bits_show_what_resolved_says(opened, ctx, drawing):
+    """Where the framebuffer is a window's size and format tiles hand over bytes, upright."""
+    renderer, view = opened(drawing, target="rgba32f"), front_view((83, 50))
+    cloud = random_layers(2000)
+    stops = (Stop("rgb", 0.0), Stop("heat", 1.0, "thermal", "ironbow"))
+    fields = (cloud.means, cloud.scales, cloud.wxyz, cloud.opacity, cloud.sh, cloud.layer)
+    model = SplatLayers(*fields, stops)
+    renderer.settings = RenderSettings(background=(0.2, 0.1, 0.3))
+    same, larger = ctx.simple_framebuffer((83, 50)), ctx.simple_framebuffer((100, 60))
+    for x in (0.0, 0.5):
+        renderer.update(alone(model, x=x))
+        for shown in (same, larger):
+            shown.clear(1.0, 1.0, 1.0)
+            shown.viewport = (0, 0, 83, 50)
+            renderer.draw([view], shown)
+            assert Resolve.takes_bytes(shown, (83, 50)) == (shown is same)
+            raw = np.frombuffer(shown.read(viewport=(0, 0, 83, 50), components=4), np.uint8)
+            got = raw.reshape(50, 83, 4)[::-1]
+            want = renderer.resolved().clip(0, 1) * 255
+            assert np.abs(got[..., :3] - want).max() < 0.51 and (got[..., 3] == 255).all()
+    for shown in (same, larger):
+        shown.release()
