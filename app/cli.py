@@ -13,6 +13,7 @@ COMMANDS = {
     "view": ("desktop", "open a scene in a window"),
     "render": ("render", "draw a scene into PNG files, no window needed"),
     "bench": ("bench", "frame times and image error, no window needed"),
+    "chart": ("chart", "what each shortcut saves in time and costs in the picture"),
     "stability": ("stability", "the cases where splat renderers fail, each held to a bound"),
     "info": ("info", "what is in a scene"),
     "train": ("train", "posed photos of several modalities to a scene"),

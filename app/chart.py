@@ -1,0 +1,181 @@
+"""launch.py chart: what every named setting saves in time and costs in the picture."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+FRAMES, SWEEP = 24, 7
+QUICK_FRAMES, QUICK_SWEEP = 8, 3
+MOST_FRAMES = 1000
+PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Price at least 24 settings: frame time and image error beside those of the exact one.
+
+    Writes rows.csv, chart.svg and chart.png.  Rows that are there are kept: Ctrl-C loses nothing.
+    """
+
+    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Packages, .ply, .splat or folders of PLY layers; several stand side by side."""
+    out: Annotated[Path, tyro.conf.arg(name="out")] = Path("out/chart")
+    """Folder for rows.csv and the chart."""
+    cameras: Path | None = None
+    """Views to measure from, any file that render's --camera takes; default: an arc of 2 degrees
+    a frame about the scene."""
+    size: str = "1280x720"
+    """WIDTHxHEIGHT in pixels."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Drawing back end: GL quads or OpenCL tiles."""
+    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
+    """Where GL comes from."""
+    frames: int = 0
+    """Views on the arc; default 24, with --quick 8."""
+    x: float | None = None
+    """Control value on the path, 0 to 1; default: the first stop of the first scene."""
+    mode: Literal["cumulative", "exclusive"] = "cumulative"
+    """How a folder of layers adds up."""
+    quick: bool = False
+    """About ten settings, fewer frames, no SSIM."""
+    decode: bool = False
+    """Instead: decode time against anchors, all five networks and colour alone (no scene)."""
+
+
+def run(options: Options) -> int:
+    from app.drawing import make_folder, parse_size
+    from app.errors import UsageError
+
+    size = parse_size(options.size)
+    if options.decode:
+        if options.scenes:
+            raise UsageError("--decode takes no scene; leave it out, or leave --decode out.")
+        from app.decode_chart import run_decode
+
+        make_folder(options.out)
+        return run_decode(options.out, options.context, command_line(options))
+    if not options.scenes:
+        raise UsageError("name a scene to chart, or add --decode.")
+    if not 0 <= options.frames <= MOST_FRAMES or options.frames == 1:
+        raise UsageError(f"--frames is {options.frames}, expected 2 to {MOST_FRAMES}.")
+    if options.x is not None and not 0 <= options.x <= 1:
+        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    models = read_models(options)
+    cameras = read_views(options, size)
+    make_folder(options.out)
+    return measure_and_draw(options, models, cameras, size)
+
+
+def read_models(options: Options) -> list:
+    """The models in order; a scene that is named twice is read once and shared."""
+    from runtime_models.read_scene import read_model
+
+    known = {path: read_model(path, options.mode) for path in dict.fromkeys(options.scenes)}
+    return [known[path] for path in options.scenes]
+
+
+def read_views(options: Options, size: tuple[int, int]) -> list:
+    from app.errors import UsageError
+    from scene.read_cameras import read_cameras
+
+    if options.cameras is None:
+        return []
+    if options.frames:
+        raise UsageError("--cameras gives the number of frames; leave --frames out.")
+    return read_cameras(options.cameras, size)[:MOST_FRAMES]
+
+
+def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[int, int]) -> int:
+    from app.chart_measure import ChartRow, Pricing, open_pair
+    from app.chart_picture import draw_chart
+    from app.chart_rows import RowsFile
+    from app.chart_settings import settings_of
+    from app.chart_stage import digest, make_stage
+    from scene.framing import default_background
+
+    x = models[0].stops[0].x if options.x is None else options.x
+    frames = options.frames or (QUICK_FRAMES if options.quick else FRAMES)
+    sweep = QUICK_SWEEP if options.quick else SWEEP
+    stage = make_stage(models, x, size, frames, sweep, cameras)
+    told = scene_line(options, stage, digest(models, cameras))
+    with open_pair(options.context, options.drawing) as (renderers, ctx):
+        background = default_background(models[0], (0.0, 0.0, 0.0))
+        pricing = Pricing(renderers, ctx, stage, background)
+        head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
+        file = RowsFile(options.out / "rows.csv", ChartRow, head)
+        measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
+    title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
+    front = draw_chart(file.rows, title, options.out)
+    print_front(front, len(file.rows), options.out)
+    return 0
+
+
+def measure_rows(pricing, file, settings, pictures: bool) -> None:
+    """Adds the rows that the file lacks, one after the other, with progress on stderr."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    known = {row.name for row in file.rows}
+    missing = [named for named in settings if named.name not in known]
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(),
+               MofNCompleteColumn(), Remaining())  # fmt: skip
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("", total=len(settings), completed=len(settings) - len(missing))
+        for named in missing:
+            progress.update(task, description=named.name)
+            file.add(pricing.row(named, pictures))
+            progress.advance(task)
+
+
+def command_line(options: Options) -> str:
+    """What makes these rows again, with file names alone: they are read on other machines."""
+    words = ["python3 launch.py chart", *(path.name for path in options.scenes)]
+    plain = Options()
+    for name in ("cameras", "size", "drawing", "context", "frames", "x", "mode"):
+        value = getattr(options, name)
+        if value != getattr(plain, name):
+            words.append(f"--{name} {value.name if isinstance(value, Path) else value}")
+    words += [f"--{name}" for name in ("quick", "decode") if getattr(options, name)]
+    return " ".join([*words, "--out DIR"])
+
+
+def machine_line(ctx) -> str:
+    """Processor, cores, drivers and versions, as they matter for a time."""
+    from app.measure import gl_renderer, machine
+
+    told = machine(ctx) | {"gl": gl_renderer(ctx)}
+    versions = PARTS[4:]
+    words = [f"{told['processor']}, {told['cores']} cores", f"OpenCL {told['opencl']}",
+             f"GL {told['gl']}", *(f"{name} {told[name]}" for name in versions)]  # fmt: skip
+    return "; ".join(words)
+
+
+def scene_line(options: Options, stage, contents: str) -> str:
+    """What was drawn: names, splats, contents, and what near and far are there."""
+    from collections import Counter
+
+    names = Counter(path.name for path in options.scenes)
+    words = [name if n == 1 else f"{n} x {name}" for name, n in names.items()]
+    far = stage.distances
+    return (
+        f"{' + '.join(words)} ({stage.scene.splat_count:,} splats); contents {contents}; "
+        f"{len(stage.path) - 3} views; near {far.near:g} m, far {far.far:g} m"
+    )
+
+
+def print_front(front: list, count: int, out: Path) -> None:
+    """The settings that nothing beats, on stderr."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("nothing is both faster and more alike", "ms", "x exact", "dB", "SSIM")
+    for row in front:
+        ssim = f"{row.ssim:.4f}" if row.ssim == row.ssim else "-"
+        table.add_row(row.name, f"{row.ms:.2f}", f"{row.ratio:.3f}", f"{row.db:.1f}", ssim)
+    Console(stderr=True, highlight=False).print(table)
+    print(f"{count} settings in {out / 'rows.csv'}; {out / 'chart.png'} shows them.",
+          file=sys.stderr)  # fmt: skip

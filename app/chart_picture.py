@@ -1,0 +1,192 @@
+"""The chart as a picture: speed against likeness, the Pareto front drawn and named."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from app.chart_measure import ChartRow
+from app.pareto import pareto_front
+
+WIDTH, HEIGHTS, DPI = 8.3, (4.6, 3.4), 200  # inches: a README shows it 830 pixels wide
+TOP_DB = 100.0  # drawn here: equal, or so near that nothing can tell them apart
+FAMILIES = {  # name -> (colour, fields that belong to it)
+    "order": ("#0072b2", ("key_bits", "order", "resort_frames", "resort_degrees", "stereo_sort")),
+    "culls": ("#d55e00", ("min_alpha", "low_pass", "max_pixels", "max_distance", "min_pixels",
+                          "fade")),
+    "colour": ("#009e73", ("recolor_degrees", "skip_unseen")),
+    "target and scale": ("#cc79a7", ("target", "render_scale")),
+    "several of them": ("#56564f", ()),
+}  # fmt: skip
+INK, PALE, FRONT = "#222222", "#e4e4e0", "#a8a49a"
+TITLES = {1: "One eye", 2: "Two eyes, beside exact frames of two eyes{}"}
+REACHES = (9, 15, 24, 36, 50, 66, 84)  # points from a dot to its name: the first free place
+SIDES = ((1, 1), (-1, -1))  # above a falling front there is room; below it dots
+
+
+def draw_chart(rows: Sequence[ChartRow], title: str, folder: Path) -> list[ChartRow]:
+    """Writes chart.svg and chart.png; returns the front of one eye, exact to fastest."""
+    from matplotlib.figure import Figure
+
+    panels = {eyes: [row for row in rows if row.eyes == eyes] for eyes in (1, 2)}
+    panels[2], second_eye = _beside_two_eyes(panels[2])
+    panels = {eyes: found for eyes, found in panels.items() if found}
+    heights = HEIGHTS[: len(panels)]
+    figure = Figure((WIDTH, sum(heights) + 0.5), layout="constrained", facecolor="white")
+    figure.suptitle(title, fontsize=10, color=INK)
+    axes = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
+    fronts = {}
+    for axis, (eyes, found) in zip(axes, panels.items(), strict=True):
+        title = TITLES[eyes].format(second_eye) if len(panels) > 1 else ""
+        fronts[eyes] = _panel(axis, found, title)
+    figure.draw_without_rendering()  # the layout is settled before names look for room
+    figure.set_layout_engine("none")
+    for axis, (eyes, found) in zip(axes, panels.items(), strict=True):
+        name_points(axis, [_place(r) for r in fronts[eyes]], [r.name for r in fronts[eyes]],
+                    [_place(r) for r in found])  # fmt: skip
+    save_figure(figure, folder / "chart")
+    return fronts.get(1, [])
+
+
+def _beside_two_eyes(rows: list[ChartRow]) -> tuple[list[ChartRow], str]:
+    """Rows of two eyes with exact at 1: it was measured beside one eye; and what that gave."""
+    second = next((row for row in rows if row.name == "stereo"), None)
+    if second is None:
+        return rows, ""
+    plain = replace(second, name="exact", ratio=1.0, psnr_db=TOP_DB, sweep_psnr_db=TOP_DB)
+    told = f" ({second.ratio:.2f} times the time of one eye)"
+    return [plain, *(row for row in rows if row is not second)], told
+
+
+def _place(row: ChartRow) -> tuple[float, float]:
+    """Where a row lies: times as fast as exact, dB up to TOP_DB."""
+    return 1 / row.ratio, min(row.db, TOP_DB)
+
+
+def _panel(axis, rows: list[ChartRow], title: str) -> list[ChartRow]:
+    """Dots, front and axes; returns the rows of the front, most alike first."""
+    drawn = [row for row in rows if row.db == row.db and row.ratio > 0]
+    front = [drawn[i] for i in pareto_front([_place(row) for row in drawn])][::-1]
+    axis.plot(*zip(*map(_place, front), strict=True), color=FRONT, lw=1.4, zorder=1)
+    for name, (color, _) in FAMILIES.items():
+        mine = [row for row in drawn if family(row.changes) == name]
+        if mine:
+            axis.scatter(*zip(*map(_place, mine), strict=True), s=26, color=color, zorder=3,
+                         edgecolors="white", linewidths=0.6, label=name)  # fmt: skip
+    plain = [_place(row) for row in drawn if not row.changes or row.name == "exact"]
+    if plain:
+        axis.scatter(*zip(*plain, strict=True), s=40, color=INK, marker="D", zorder=4,
+                     edgecolors="white", linewidths=0.6, label="exact")  # fmt: skip
+    _style(axis, [_place(row) for row in drawn], title)
+    return front
+
+
+def family(changes: str) -> str:
+    """Which kind of shortcut a row is, from the fields that it changes."""
+    changed = {word.split("=")[0] for word in changes.split()} - {""}
+    if "target=rgba16f" in changes.split() and len(changed) > 1:
+        changed.discard("target")
+    for name, (_, members) in FAMILIES.items():
+        if changed and changed <= set(members):
+            return name
+    return "several of them" if changed else ""
+
+
+def _style(axis, places: list[tuple[float, float]], title: str) -> None:
+    """Axes with room for names on every side, ticks that say what the top means."""
+    fastest = max(x for x, _ in places)
+    least = min(y for _, y in places)
+    slowest = min(x for x, _ in places)
+    span = max(fastest - slowest, 0.2)
+    axis.set_xlim(slowest - 0.12 * span, fastest + 0.3 * span)
+    low = 10 * (least // 10)
+    axis.set_ylim(low - 4, TOP_DB + 12)
+    ticks = [tick for tick in range(int(low), int(TOP_DB), 10)]
+    axis.set_yticks([*ticks, TOP_DB], [*map(str, ticks), "equal"])
+    axis.set_xlabel("speed, times the exact setting in the same run", fontsize=9, color=INK)
+    axis.set_ylabel("worst PSNR to the exact picture, dB", fontsize=9, color=INK)
+    axis.tick_params(labelsize=8, colors=INK)
+    axis.grid(color=PALE, lw=0.6, zorder=0)
+    axis.set_axisbelow(True)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+    axis.set_title(title, fontsize=9, color=INK, loc="left")
+    axis.legend(fontsize=7.5, loc="upper right", frameon=True, framealpha=0.9, edgecolor=PALE)
+
+
+def name_points(axis, places, names, occupied) -> list:
+    """Writes each name beside its place, where it covers no other name and no dot.
+
+    places: (x, y) of the names; occupied: (x, y) of all dots.  Returns the annotations; a name
+    for which no place is free goes where it overlaps least.
+    """
+    from matplotlib.transforms import Bbox
+
+    figure = axis.figure
+    pixels = figure.dpi / 72  # per point
+    dots = [axis.transData.transform(p) for p in occupied]
+    boxes = [Bbox.from_extents(x - 3 * pixels, y - 3 * pixels, x + 3 * pixels, y + 3 * pixels)
+             for x, y in dots]  # fmt: skip
+    legend = axis.get_legend()
+    if legend is not None:
+        boxes.append(legend.get_window_extent())
+    written = []
+    for place, name in zip(places, names, strict=True):
+        note = axis.annotate(name, place, xytext=(0, 0), textcoords="offset points", fontsize=8,
+                             color=INK, zorder=5)  # fmt: skip
+        best = min(
+            (_overlap(note, reach, side, boxes, axis), number, reach, side)
+            for number, (reach, side) in enumerate((r, s) for s in SIDES for r in REACHES)
+        )
+        _, _, reach, side = best
+        _move(note, reach, side)
+        box = note.get_window_extent()
+        boxes.append(Bbox.from_extents(box.x0 - 2, box.y0 - 2, box.x1 + 2, box.y1 + 2))
+        if reach > REACHES[0]:
+            _lead(axis, place, box)
+        written.append(note)
+    return written
+
+
+def _move(note, reach: float, side: tuple[int, int]) -> None:
+    dx, dy = side
+    note.xyann = (dx * reach * (0.6 if dy else 1), dy * reach * (0.8 if dx else 1))
+    note.set_ha({1: "left", 0: "center", -1: "right"}[dx])
+    note.set_va({1: "bottom", 0: "center", -1: "top"}[dy])
+
+
+def _overlap(note, reach: float, side: tuple[int, int], boxes: list, axis) -> float:
+    """Square pixels of the name over others, and what of it lies outside the axes."""
+    _move(note, reach, side)
+    box, frame = note.get_window_extent(), axis.get_window_extent()
+    outside = box.width * box.height - _shared(box, frame)
+    return round(sum(_shared(box, other) for other in boxes) + 4 * outside, 1)
+
+
+def _shared(a, b) -> float:
+    width = min(a.x1, b.x1) - max(a.x0, b.x0)
+    height = min(a.y1, b.y1) - max(a.y0, b.y0)
+    return max(width, 0) * max(height, 0)
+
+
+def _lead(axis, place: tuple[float, float], box) -> None:
+    """A thin line from a dot to its name where they are apart."""
+    x, y = axis.transData.transform(place)
+    end = (min(max(x, box.x0), box.x1), min(max(y, box.y0), box.y1))
+    axis.plot(*zip(place, axis.transData.inverted().transform(end), strict=True), color=INK,
+              lw=0.5, alpha=0.5, zorder=2, scalex=False, scaley=False)  # fmt: skip
+
+
+def save_figure(figure, path: Path) -> None:
+    """path.svg and path.png, each all or nothing; the same rows make the same bytes."""
+    import matplotlib
+
+    fixed = {"svg.hashsalt": "shapeshift", "svg.fonttype": "path"}
+    for ending, metadata in (("svg", {"Date": None}), ("png", {"Software": "Shapeshift"})):
+        temporary = path.with_name(f"{path.name}.{ending}.part")
+        try:
+            with matplotlib.rc_context(fixed):
+                figure.savefig(temporary, format=ending, dpi=DPI, metadata=metadata)
+            os.replace(temporary, path.with_name(f"{path.name}.{ending}"))
+        finally:
+            temporary.unlink(missing_ok=True)

@@ -1,0 +1,74 @@
+"""rows.csv of a chart: what was measured so far, kept through Ctrl-C and taken up again."""
+
+import csv
+import io
+import os
+from collections.abc import Sequence
+from dataclasses import astuple, fields
+from pathlib import Path
+
+from app.errors import UsageError
+
+
+class RowsFile:
+    """A table of dataclass rows behind "# " lines that say what was run, where and on what.
+
+    Opened again with the same lines it holds the rows that are there; anything else is refused.
+    """
+
+    def __init__(self, path: Path, kind: type, head: Sequence[str]) -> None:
+        self.path, self._kind = path, kind
+        self._head = [f"# {line}" for line in head]
+        self.rows: list = []
+        if path.exists():
+            self.rows = self._read()
+
+    def add(self, row: object) -> None:
+        """Writes the file anew with one row more, all or nothing."""
+        self.rows.append(row)
+        text = io.StringIO()
+        text.writelines(f"{line}\n" for line in self._head)
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(field.name for field in fields(self._kind))
+        table.writerows(astuple(each) for each in self.rows)
+        write_text(self.path, text.getvalue())
+
+    def _read(self) -> list:
+        try:
+            lines = self.path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError):
+            lines = []
+        count = len(self._head)
+        for wanted, found in zip(self._head, [*lines, *[""] * count], strict=False):
+            if found != wanted:
+                raise UsageError(
+                    f"{self.path} is of another run ({found[:120] or 'an empty line'}, where this "
+                    f"one writes {wanted[:120]}); choose another --out, or delete it."
+                )
+        return self._parse(lines[count:])
+
+    def _parse(self, lines: list[str]) -> list:
+        names = [field.name for field in fields(self._kind)]
+        table = list(csv.reader(lines))
+        try:
+            if table[0] != names:
+                raise ValueError("other columns")
+            kinds = [field.type for field in fields(self._kind)]
+            return [
+                self._kind(*(kind(word) for kind, word in zip(kinds, row, strict=True)))
+                for row in table[1:]
+            ]
+        except (ValueError, IndexError):
+            raise UsageError(
+                f"{self.path} holds rows of another form; choose another --out, or delete it."
+            ) from None
+
+
+def write_text(path: Path, text: str) -> None:
+    """The whole file or none of it."""
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)

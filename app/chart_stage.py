@@ -1,0 +1,128 @@
+"""What a chart is measured on: scenes side by side, a path of the camera, a sweep of x."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+
+import numpy as np
+
+from app.chart_settings import Distances
+from app.quick_chart import turned
+from runtime_models.model import AnchorModel, SplatLayers
+from scene.framing import default_view, frame_points, framing_view, model_points, scene_points
+from scene.pose import Pose, View
+from scene.scene import IDENTITY, Scene, SceneObject
+
+STEP = np.radians(2.0)  # of the path between two frames: a turn of 120 degrees a second at 60 Hz
+WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
+GAP = 1.05  # of the sum of two radii, between neighbours
+NEAR_PART, FAR_PART = 0.6, 0.9  # of the splats, see distances_of
+DISTANCE_VIEWS = 5
+EYE_DISTANCE = 0.032  # of the framed radius: a thing of 2 m radius is seen by a person's eyes
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Everything that is drawn for one row of a chart."""
+
+    scene: Scene
+    path: tuple[View, ...]  # warm-up first: WARM_UP views that do not count
+    xs: tuple[float, ...]  # of the sweep, seen from the middle of the path
+    distances: Distances
+    eye_distance: float  # metres, of rows with two eyes
+
+    @property
+    def middle(self) -> View:
+        return self.path[WARM_UP + (len(self.path) - WARM_UP) // 2]
+
+    def at(self, x: float) -> Scene:
+        """The scene with every object at control value x."""
+        return Scene(tuple(replace(thing, x=x) for thing in self.scene.objects))
+
+
+def make_stage(
+    models: Sequence[AnchorModel | SplatLayers],
+    x: float,
+    size: tuple[int, int],
+    frames: int,
+    sweep: int,
+    cameras: Sequence[View] = (),
+) -> Stage:
+    """`models` in a row along x, `frames` views on an arc before them, or those of `cameras`."""
+    scene = side_by_side(models, x)
+    points = scene_points(scene)
+    centre, radius = frame_points(*points)
+    if cameras:
+        counted = tuple(cameras)
+        path = (counted[0],) * WARM_UP + counted
+    else:
+        first = default_view(models[0], size) if len(models) == 1 else framing_view(*points, size)
+        path = arc(first, centre, frames)
+    xs = tuple(np.linspace(0, 1, sweep).tolist())
+    return Stage(scene, path, xs, distances_of(points, path), EYE_DISTANCE * radius)
+
+
+def arc(first: View, centre: np.ndarray, frames: int) -> tuple[View, ...]:
+    """`frames` views about the vertical axis through `centre`, `first` in their middle."""
+    return tuple(
+        turned(first, centre, STEP * (i - frames // 2)) for i in range(-WARM_UP, frames)
+    )  # fmt: skip
+
+
+def side_by_side(models: Sequence[AnchorModel | SplatLayers], x: float) -> Scene:
+    """Objects along the world's x, framed radii touching; the first stays where it is."""
+    things, at, before = [], 0.0, None
+    for number, model in enumerate(models):
+        centre, radius = frame_points(*model_points(model))
+        if before is None:
+            pose, left = IDENTITY, float(centre[0])
+        else:
+            at += GAP * (before + radius)
+            pose = Pose(np.array([left + at - centre[0], 0.0, 0.0]), IDENTITY.wxyz)
+        before = radius
+        things.append(SceneObject(f"scene {number}", model, pose, x))
+    return Scene(tuple(things))
+
+
+def distances_of(points: tuple[np.ndarray, np.ndarray], path: Sequence[View]) -> Distances:
+    """tau_dist in this scene's own scale, metres.
+
+    near and far: within them lie 60 % and 90 % of the splats, in the median over views of the path.
+    The paper's 20 and 40 m are such parts of its scenes, and mean nothing in one of 2 m.
+    """
+    means, opacity = points
+    seen = means[np.isfinite(means).all(axis=1) & (opacity > 0)]
+    if not len(seen):
+        return Distances(1.0, 2.0)
+    eyes = [path[i].world_from_eye.position for i in
+            np.linspace(0, len(path) - 1, DISTANCE_VIEWS).astype(int)]  # fmt: skip
+    parts = [np.quantile(np.linalg.norm(seen - eye, axis=1), (NEAR_PART, FAR_PART)) for eye in eyes]
+    near, far = np.median(parts, axis=0)
+    return Distances(float(f"{near:.4g}"), float(f"{far:.4g}"))
+
+
+def digest(*things: object) -> str:
+    """16 hex digits of what models hold: equal contents, equal digits, wherever they came from."""
+    hasher = hashlib.sha256()
+    for thing in things:
+        _feed(hasher, thing)
+    return hasher.hexdigest()[:16]
+
+
+def _feed(hasher, thing: object) -> None:
+    if is_dataclass(thing):
+        for each in fields(thing):
+            if each.name != "provenance":  # where it came from draws nothing
+                _feed(hasher, getattr(thing, each.name))
+    elif isinstance(thing, np.ndarray):
+        hasher.update(f"{thing.dtype}{thing.shape}".encode())
+        hasher.update(np.ascontiguousarray(thing).tobytes())
+    elif isinstance(thing, dict):
+        for name in sorted(thing):
+            _feed(hasher, (name, thing[name]))
+    elif isinstance(thing, list | tuple):
+        hasher.update(f"[{len(thing)}".encode())
+        for each in thing:
+            _feed(hasher, each)
+    else:
+        hasher.update(repr(thing).encode())
