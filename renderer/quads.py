@@ -3,14 +3,17 @@
 Same life as renderer/tiles.py: allocate, decode what changed, place, draw.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 
 import moderngl
 import numpy as np
 
 from renderer.buffers import Arena
+from renderer.cadence import Cadence, sort_frames
 from renderer.decode import Decoder
 from renderer.gpu import Gpu
+from renderer.layout import MOST_VIEWS
 from renderer.overdraw import count_overdraw
 from renderer.project import Projector
 from renderer.settings import RenderSettings
@@ -19,6 +22,8 @@ from renderer.splat import Splatter
 from renderer.timing import PassTimer
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import View
+
+SAMPLE = 4096  # splats, for a median
 
 
 class QuadsDrawing:
@@ -32,6 +37,9 @@ class QuadsDrawing:
         self._sorter = Sorter(gpu, sort)
         self._splatter = Splatter(gpu, target)
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
+        self._cadence = Cadence()
+        self._changed = True  # since the last frame: a pose, a control value, the set of objects
+        self._last = 0  # row of the counts of the view drawn last
         self._arena: Arena | None = None
         self._decoder: Decoder | None = None
 
@@ -43,11 +51,13 @@ class QuadsDrawing:
     def allocate(self, models: list[AnchorModel | SplatLayers]) -> None:
         """Room for these objects; what was decoded before is gone."""
         self._release_arena()
+        self._changed = True
         self._arena = Arena(self._gpu, [model.splat_count for model in models])
         self._decoder = Decoder(self._gpu, self._arena, models, self.backends["mlps"])
 
     def decode_geometry(self, i: int, x: float) -> None:
         """Means, covariances and opacities of object i at control value x."""
+        self._changed = True
         self._decoder.geometry(i, x)
 
     def decode_color(self, i: int, x: float, eye_object: np.ndarray) -> None:
@@ -56,25 +66,54 @@ class QuadsDrawing:
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
-        self._arena.place(np.reshape(world_from_objects, (-1, 4, 4)))
+        poses = np.reshape(world_from_objects, (-1, 4, 4))
+        if not np.array_equal(poses, self._arena.world_from_object, equal_nan=True):
+            self._changed = True
+            self._arena.place(poses)
 
     def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
         """Draws every view; view i is then image(i)."""
-        self.sorts = len(views)
-        for i, view in enumerate(views):
-            self._draw_view(i, view, settings, timer)
+        arena = self._arena
+        canted = len(sort_frames(views, settings)) > 1
+        if canted:  # an order a view, and room for one: none is kept
+            settings = replace(settings, resort_frames=1, resort_degrees=0.0)
+        plan = self._cadence.plan(views, settings, self._changed, self._median_distance)
+        self._changed = False
+        self.sorts, self.order_age = plan.sorts, plan.age
+        at_once = len(views) <= MOST_VIEWS and arena.holds_views(len(views)) and not canted
+        groups = [views] if at_once else [[view] for view in views]
+        # One order for views that are projected one by one must hold what the first does not see.
+        keep_outside = plan.keep_outside or (len(groups) > 1 and not canted)
+        i = 0
+        for n, group in enumerate(groups):
+            frame = plan.frames[n] if n < plan.sorts else None
+            with timer.time("project"):
+                own = frame is None or canted or len(views) == 1  # its own eye: one frame less
+                sort_from_world = None if own else frame
+                self._projector.project(arena, group, settings, sort_from_world, keep_outside)
+            if frame is not None:
+                with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
+                    self._sorter.sort(arena, settings.key_bits)
+            with timer.time("splat"):
+                for row, view in enumerate(group):
+                    self._splatter.draw(arena, i, view.size, settings.min_alpha, row)
+                    i += 1
+        self._last = len(groups[-1]) - 1
 
-    def _draw_view(self, i: int, view: View, settings: RenderSettings, timer: PassTimer) -> None:
-        with timer.time("project"):
-            self._projector.project(self._arena, [view], settings)
-        with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
-            self._sorter.sort(self._arena, settings.key_bits)
-        with timer.time("splat"):
-            self._splatter.draw(self._arena, i, view.size, settings.min_alpha)
+    def _median_distance(self, eye_from_world: np.ndarray) -> float:
+        """Metres from an eye to the median splat, from a sample of those that are there."""
+        mean_opacity, owner, _ = (
+            a[:: -(-self._arena.count // SAMPLE)] for a in self.splat_points()
+        )
+        rows = (eye_from_world @ self._arena.world_from_object)[owner, :3]  # (n, 3, 4)
+        places = (rows[..., :3] @ mean_opacity[:, :3, None])[..., 0] + rows[..., 3]
+        distance = np.linalg.norm(places[mean_opacity[:, 3] > 0], axis=1)
+        distance = distance[np.isfinite(distance)]
+        return float(np.median(distance)) if distance.size else 0.0
 
     def counts(self) -> dict[str, int]:
-        """{drawn, opacity, size, distance, frustum} of the view drawn last."""
-        return self._projector.counts(self._arena)
+        """{drawn, *CULL_REASONS} of the view drawn last."""
+        return self._projector.counts(self._arena, self._last)
 
     def presentable(self, i: int) -> moderngl.Texture:
         """The float image of view i on the GPU, row 0 at the bottom."""

@@ -22,21 +22,29 @@ class Splatter:
         self._quads: moderngl.VertexArray | None = None
         self._quads_of: Arena | None = None
 
-    def draw(self, arena: Arena, i: int, size: tuple[int, int], min_alpha: float) -> None:
-        """Draws the arena as it was last projected and sorted, into the image of view i."""
+    def draw(
+        self, arena: Arena, i: int, size: tuple[int, int], min_alpha: float, row: int = 0
+    ) -> None:
+        """Draws the arena as it was last projected and sorted, into the image of view i.
+
+        row: which of the views that were projected together.
+        """
         target = self._target(i, size)
         with self._gpu.drawing_into(target):
             target.clear(0.0, 0.0, 0.0, 0.0)
             if arena.count:
-                self._draw_quads(arena, size, min_alpha)
+                self._draw_quads(arena, size, min_alpha, row * arena.count)
 
-    def _draw_quads(self, arena: Arena, size: tuple[int, int], min_alpha: float) -> None:
+    def _draw_quads(
+        self, arena: Arena, size: tuple[int, int], min_alpha: float, first: int
+    ) -> None:
         ctx = self._gpu.ctx
         ctx.enable_only(moderngl.BLEND)
         ctx.blend_func = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
         bind(order=arena.order, records=arena.records, counts=arena.counts)
         self._program["size"].value = size
         self._program["min_alpha"].value = min_alpha
+        self._program["first"].value = first
         self._vertex_array(arena).render_indirect(arena.command, moderngl.TRIANGLES, count=1)
         ctx.memory_barrier()  # the next view's project overwrites what this draw still reads
 

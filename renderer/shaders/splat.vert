@@ -4,7 +4,8 @@
 layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  // near to far
 layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
 layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
-uniform vec2 size;  // pixels
+uniform vec2 size;   // pixels
+uniform uint first;  // record of splat 0 in this view
 
 out vec2 sigmas;              // place in the ellipse's own axes
 flat out vec4 color_opacity;
@@ -12,7 +13,7 @@ flat out vec4 color_opacity;
 void main() {
     // Four corners a quad; the farthest splat is drawn first.
     uint quad = uint(gl_VertexID) >> 2, corner = uint(gl_VertexID) & 3u;
-    uint i = order[counts[COUNT_SORTED] - 1u - quad];
+    uint i = first + order[counts[COUNT_SORTED] - 1u - quad];
     Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
     sigmas = e.cut * vec2((corner & 1u) != 0u ? 1.0 : -1.0, (corner & 2u) != 0u ? 1.0 : -1.0);
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
