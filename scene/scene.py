@@ -21,7 +21,7 @@ class SceneObject:
     visible: bool = True
 
     def __post_init__(self) -> None:
-        """Refuses what is nowhere: ValueError with a sentence."""
+        """Refuses a place or an x that is none: ValueError with a sentence."""
         pose = self.world_from_object
         length = math.hypot(*pose.wxyz)
         if not (all(map(math.isfinite, pose.position)) and abs(length - 1) <= UNIT_SLACK):
@@ -29,6 +29,8 @@ class SceneObject:
                 f"object '{self.name}' stands at {_told(pose.position)} with a quaternion "
                 f"{_told(pose.wxyz)}; finite metres and a quaternion of length 1 are wanted."
             )
+        if not 0 <= self.x <= 1:  # nothing was trained out there, and NaN is nowhere
+            raise ValueError(f"object '{self.name}' has x = {self.x}; from 0 to 1 is wanted.")
 
 
 def _told(numbers: np.ndarray) -> str:
