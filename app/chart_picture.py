@@ -21,6 +21,8 @@ FAMILIES = {  # name -> (colour, fields that belong to it)
 INK, PALE, FRONT = "#222222", "#e4e4e0", "#a8a49a"
 TITLES = {1: "One eye", 2: "Two eyes, beside exact frames of two eyes{}"}
 REACHES = (9, 15, 24, 36, 50, 66, 84)  # points from a dot to its name: the first free place
+LINE_PARTS = tuple(i / 12 for i in range(3, 12))  # of a line to a name, from its own dot on
+CROSSING = 100.0  # square pixels that a point of the line under another name counts as
 SIDES = ((1, 1), (-1, -1))  # above a falling front there is room; below it dots
 
 
@@ -135,7 +137,7 @@ def name_points(axis, places, names, occupied) -> list:
         note = axis.annotate(name, place, xytext=(0, 0), textcoords="offset points", fontsize=8,
                              color=INK, zorder=5)  # fmt: skip
         best = min(
-            (_overlap(note, reach, side, boxes, axis), number, reach, side)
+            (_overlap(note, place, reach, side, boxes), number, reach, side)
             for number, (reach, side) in enumerate((r, s) for s in SIDES for r in REACHES)
         )
         _, _, reach, side = best
@@ -155,12 +157,18 @@ def _move(note, reach: float, side: tuple[int, int]) -> None:
     note.set_va({1: "bottom", 0: "center", -1: "top"}[dy])
 
 
-def _overlap(note, reach: float, side: tuple[int, int], boxes: list, axis) -> float:
-    """Square pixels of the name over others, and what of it lies outside the axes."""
+def _overlap(note, place, reach: float, side: tuple[int, int], boxes: list) -> float:
+    """Square pixels of the name over others, beyond the axes, and of others under its line."""
     _move(note, reach, side)
-    box, frame = note.get_window_extent(), axis.get_window_extent()
-    outside = box.width * box.height - _shared(box, frame)
-    return round(sum(_shared(box, other) for other in boxes) + 4 * outside, 1)
+    box, frame = note.get_window_extent(), note.axes.get_window_extent()
+    cost = sum(_shared(box, other) for other in boxes)
+    cost += 4 * (box.width * box.height - _shared(box, frame))
+    if reach > REACHES[0]:
+        start = note.axes.transData.transform(place)
+        end = (min(max(start[0], box.x0), box.x1), min(max(start[1], box.y0), box.y1))
+        steps = [start + (end - start) * part for part in LINE_PARTS]
+        cost += CROSSING * sum(other.contains(*step) for other in boxes for step in steps)
+    return round(cost, 1)
 
 
 def _shared(a, b) -> float:
