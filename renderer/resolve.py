@@ -56,13 +56,13 @@ class Resolve:
 
     @staticmethod
     def takes_bytes(framebuffer: moderngl.Framebuffer, size: tuple[int, int]) -> bool:
-        """Whether pixels of 8 bits and this size fill the framebuffer as they are."""
-        parts = framebuffer.color_attachments or ()  # a window tells none, and has 8 bits
-        eight_bits = all(part.dtype == "f1" and part.components == 4 for part in parts)
-        whole = (0, 0, *size)
-        clipped = framebuffer.viewport != whole or framebuffer.scissor not in (None, whole)
-        same_size = tuple(framebuffer.size) == tuple(size)
-        return eight_bits and same_size and not clipped and framebuffer.samples == 0
+        """Whether pixels of 8 bits and this size fill the framebuffer's viewport as they are."""
+        parts = framebuffer.color_attachments
+        if parts is None:  # not made here: a window has 8 bits, of others nothing is known
+            eight_bits = framebuffer.glo == 0
+        else:
+            eight_bits = all(part.dtype == "f1" and part.components == 4 for part in parts)
+        return eight_bits and framebuffer.samples == 0 and framebuffer.viewport == (0, 0, *size)
 
     def copy(self, pixels: np.ndarray, framebuffer: moderngl.Framebuffer) -> None:
         """Fills a framebuffer that takes_bytes with (H, W, 4) uint8, row 0 at the bottom.
@@ -74,9 +74,13 @@ class Resolve:
             self._release_bytes()
             self._bytes = self._gpu.ctx.framebuffer([self._gpu.ctx.texture(size, 4)])
             self._gpu.allocations += 1
-        self._bytes.color_attachments[0].write(pixels)
-        with self._gpu.drawing_into(framebuffer):
-            self._gpu.ctx.copy_framebuffer(framebuffer, self._bytes)
+        (texture,) = self._bytes.color_attachments
+        texture.write(pixels)
+        if all(have >= want for have, want in zip(framebuffer.size, size, strict=True)):
+            with self._gpu.drawing_into(framebuffer):
+                self._gpu.ctx.copy_framebuffer(framebuffer, self._bytes)
+        else:  # a window that has grown: moderngl copies no more than it had when it was opened
+            self.draw(texture, framebuffer, (0.0, 0.0, 0.0))
 
     def _release_bytes(self) -> None:
         if self._bytes is not None:

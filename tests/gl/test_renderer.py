@@ -314,17 +314,25 @@ def test_eight_bits_show_what_resolved_says(opened, ctx, drawing):
     fields = (cloud.means, cloud.scales, cloud.wxyz, cloud.opacity, cloud.sh, cloud.layer)
     model = SplatLayers(*fields, stops)
     renderer.settings = RenderSettings(background=(0.2, 0.1, 0.3))
-    same, larger = ctx.simple_framebuffer((83, 50)), ctx.simple_framebuffer((100, 60))
+    same, larger, floats = (
+        ctx.simple_framebuffer((83, 50)),
+        ctx.simple_framebuffer((100, 60)),
+        ctx.framebuffer([ctx.texture((83, 50), 4, dtype="f4")]),
+    )
     for x in (0.0, 0.5):
         renderer.update(alone(model, x=x))
-        for shown in (same, larger):
+        for shown in (same, larger, floats):
             shown.clear(1.0, 1.0, 1.0)
             shown.viewport = (0, 0, 83, 50)
             renderer.draw([view], shown)
-            assert Resolve.takes_bytes(shown, (83, 50)) == (shown is same)
-            raw = np.frombuffer(shown.read(viewport=(0, 0, 83, 50), components=4), np.uint8)
-            got = raw.reshape(50, 83, 4)[::-1]
-            want = renderer.resolved().clip(0, 1) * 255
-            assert np.abs(got[..., :3] - want).max() < 0.51 and (got[..., 3] == 255).all()
-    for shown in (same, larger):
+            assert Resolve.takes_bytes(shown, (83, 50)) == (shown is not floats)
+            assert not Resolve.takes_bytes(shown, (83, 49))
+            width, height = shown.size
+            whole = (0, 0, width, height)
+            raw = np.frombuffer(shown.read(viewport=whole, components=4), np.uint8)
+            got = raw.reshape(height, width, 4)
+            want = renderer.resolved()[::-1].clip(0, 1) * 255
+            assert np.abs(got[:50, :83, :3] - want).max() < 0.51
+            assert (got[50:, :, :3] == 255).all() and (got[:, 83:, :3] == 255).all(), "beyond the viewport"
+    for shown in (same, larger, floats):
         shown.release()
