@@ -29,13 +29,13 @@ SAMPLE = 4096  # splats, for a median
 class QuadsDrawing:
     """The arena of all objects in GL buffers, and the passes that draw it."""
 
-    def __init__(self, gpu: Gpu, mlps: str, sort: str, target: str) -> None:
-        self.backends = {"drawing": f"quads ({target})", "mlps": mlps, "sort": sort}
+    def __init__(self, gpu: Gpu, mlps: str, sort: str) -> None:
+        self.backends = {"drawing": "quads", "mlps": mlps, "sort": sort}
         self.decodes_on_gpu = mlps == "gl"  # says which clock times the decoding
         self._gpu = gpu
         self._projector = Projector(gpu)
         self._sorter = Sorter(gpu, sort)
-        self._splatter = Splatter(gpu, target)
+        self._splatter = Splatter(gpu)
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._cadence = Cadence()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
@@ -74,6 +74,8 @@ class QuadsDrawing:
     def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
         """Draws every view; view i is then image(i)."""
         arena = self._arena
+        self._splatter.target = settings.target
+        self.backends["drawing"] = f"quads ({settings.target})"
         canted = len(sort_frames(views, settings)) > 1
         if canted:  # an order a view, and room for one: none is kept
             settings = replace(settings, resort_frames=1, resort_degrees=0.0)

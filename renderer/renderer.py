@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -11,8 +11,9 @@ from renderer.context import is_software
 from renderer.debug import debug_image, opaque, prepare_debug
 from renderer.gpu import Gpu
 from renderer.palette import apply_palette, palette_colors, thermal_blend
+from renderer.resample import bilinear
 from renderer.resolve import Resolve
-from renderer.settings import FrameStats, RenderSettings
+from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import View
@@ -20,7 +21,6 @@ from scene.scene import Scene
 
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
 CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
-TARGETS = ("rgba16f", "rgba32f")
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Renderer:
 
     drawing, mlps, sort: "auto" takes tiles, onnxruntime and numpy where GL is software or absent,
     and quads, gl, gl on a GPU; `backends` says what is in use and it never changes by itself.
-    target: "rgba16f" | "rgba32f", what quads blend into (tiles blend in registers, float32).
+    target: what quads blend into whatever settings.target says (tiles: float32 in registers).
     ctx None: no GL at all, tiles only, present() is not there.
     """
 
@@ -47,12 +47,13 @@ class Renderer:
         drawing: str = "auto",
         mlps: str = "auto",
         sort: str = "auto",
-        target: str = "rgba16f",
+        target: str | None = None,
     ) -> None:
         drawing, mlps, sort = _choose(ctx, drawing, mlps, sort)
-        if target not in TARGETS:
-            raise ValueError(f"there is no target {target!r}; choose {' or '.join(TARGETS)}.")
+        if target not in (None, *TARGETS):
+            raise ValueError(f"there is no target {target!r}; choose {', '.join(TARGETS)}.")
         self.settings = RenderSettings()
+        self._target = target
         self._ctx = ctx
         self._gpu = Gpu(ctx) if ctx is not None else None
         self._resolve = Resolve(self._gpu) if ctx is not None else None
@@ -63,12 +64,13 @@ class Renderer:
         else:
             from renderer.quads import QuadsDrawing
 
-            self._drawing = QuadsDrawing(self._gpu, mlps, sort, target)
+            self._drawing = QuadsDrawing(self._gpu, mlps, sort)
         self._timer = PassTimer(ctx)
         self._scene = Scene(())
         self._decoded: list[_Decoded] = []
         self._drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
+        self._sizes: list[tuple[int, int]] = []  # of the views of the last frame
         self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
 
     @property
@@ -120,15 +122,17 @@ class Renderer:
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
-        debug = self.settings.debug
-        if debug and prepare_debug(self._drawing, views, self._scene, debug):
+        settings = self._settings_of_frame()
+        self._sizes = [view.size for view in views]  # of what is shown; drawn is views from here
+        views = [scaled(view, settings.render_scale) for view in views]
+        if prepare_debug(self._drawing, views, self._scene, settings.debug):
             for decoded in self._decoded:
                 decoded.color_key = None  # their own colours are to come back
         with self._framebuffer_kept():
-            self._drawing.draw(views, self.settings, self._timer)
+            self._drawing.draw(views, settings, self._timer)
             self._debug = [
-                debug_image(self._drawing, i, view, self._scene, self.settings)
-                for i, view in enumerate(views if debug else [])
+                debug_image(self._drawing, i, view, self._scene, settings)
+                for i, view in enumerate(views if settings.debug else [])
             ]
         if targets is not None:
             with self._timer.time("resolve"):
@@ -140,9 +144,14 @@ class Renderer:
         self._geometry_runs = self._color_runs = 0
         stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
         stats.sorts, stats.order_age = self._drawing.sorts, self._drawing.order_age
-        if debug:
+        if self._debug:
             stats.debug = self._debug[0][1]
         return stats
+
+    def _settings_of_frame(self) -> RenderSettings:
+        """The settings with the target in use: debug pictures hold numbers, not colours."""
+        target = "rgba32f" if self.settings.debug else self._target or self.settings.target
+        return replace(self.settings, target=target)
 
     def _decode_colors(self, eye_world: np.ndarray) -> None:
         """Runs the colour of the visible objects towards which the eye (3,) has moved."""
@@ -161,7 +170,9 @@ class Renderer:
                     self._color_runs += 1
 
     def image(self, i: int = 0) -> np.ndarray:
-        """(H, W, 4) float32 of view i, premultiplied over nothing, row 0 on top."""
+        """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
+        row 0 on top.
+        """
         return self._drawing.image(i)
 
     def resolved(self, i: int = 0) -> np.ndarray:
@@ -169,9 +180,9 @@ class Renderer:
         or its debug picture, where the frame was drawn with settings.debug.
         """
         if self._debug:
-            return self._debug[i][0]
+            return bilinear(self._debug[i][0], self._sizes[i])
         name, weight, _ = thermal_blend(self._scene)
-        rgba = apply_palette(self.image(i), name, weight)
+        rgba = apply_palette(bilinear(self.image(i), self._sizes[i]), name, weight)
         return rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(self.settings.background)
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
@@ -212,6 +223,11 @@ class Renderer:
 
     def __exit__(self, *failure) -> None:
         self.close()
+
+
+def scaled(view: View, part: float) -> View:
+    """The view in `part` times its pixels a side, at least one."""
+    return view if part == 1 else view.resized(tuple(max(1, round(part * n)) for n in view.size))
 
 
 def color_key(model: AnchorModel | SplatLayers, x: float, eye: np.ndarray) -> tuple:

@@ -6,17 +6,17 @@ import numpy as np
 from renderer.buffers import Arena, bind
 from renderer.gpu import Gpu
 
-TARGETS = {"rgba16f": "f2", "rgba32f": "f4"}
+DTYPES = {"rgba8": "f1", "rgba16f": "f2", "rgba32f": "f4"}
 
 
 class Splatter:
-    """Owns the float images of the views; colour in them is premultiplied over nothing."""
+    """Owns the images of the views; colour in them is premultiplied over nothing."""
 
     def __init__(self, gpu: Gpu, target: str = "rgba16f") -> None:
-        if target not in TARGETS:
-            raise ValueError(f"there is no target {target!r}; choose {' or '.join(TARGETS)}.")
+        if target not in DTYPES:
+            raise ValueError(f"there is no target {target!r}; choose {', '.join(DTYPES)}.")
+        self.target = target  # may change from frame to frame
         self._gpu = gpu
-        self._dtype = TARGETS[target]
         self._program = gpu.program("splat.vert", "splat.frag")
         self._targets: dict[int, moderngl.Framebuffer] = {}
         self._quads: moderngl.VertexArray | None = None
@@ -56,16 +56,20 @@ class Splatter:
         """(H, W, 4) float32 of view i, row 0 on top: the one place where GL's rows are turned."""
         texture = self.texture(i)
         width, height = texture.size
-        pixels = np.frombuffer(texture.read(), texture.dtype).reshape(height, width, 4)
-        return np.ascontiguousarray(pixels[::-1], np.float32)
+        read = np.uint8 if texture.dtype == "f1" else texture.dtype
+        pixels = np.frombuffer(texture.read(), read).reshape(height, width, 4)
+        rows = np.ascontiguousarray(pixels[::-1], np.float32)
+        return rows / np.float32(255) if read is np.uint8 else rows
 
     def _target(self, i: int, size: tuple[int, int]) -> moderngl.Framebuffer:
-        target = self._targets.get(i)
-        if target is None or target.size != tuple(size):
-            if target is not None:
-                _release_target(target)
-            target = self._targets[i] = self._gpu.target(size, self._dtype)
-        return target
+        old, dtype = self._targets.get(i), DTYPES[self.target]
+        if old is not None and old.size == tuple(size) and old.color_attachments[0].dtype == dtype:
+            return old
+        made = self._gpu.target(size, dtype)  # before the old one goes: it may be refused
+        if old is not None:
+            _release_target(old)
+        self._targets[i] = made
+        return made
 
     def _vertex_array(self, arena: Arena) -> moderngl.VertexArray:
         """No attributes: an index buffer alone; the shader pulls what it draws from the arena."""

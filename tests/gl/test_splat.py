@@ -235,8 +235,8 @@ def test_what_was_bound_stays_bound(gpu):
 
 
 def test_an_unknown_target_is_refused(gpu):
-    with pytest.raises(ValueError, match="choose rgba16f or rgba32f"):
-        Splatter(gpu, "rgba8")
+    with pytest.raises(ValueError, match="choose rgba8, rgba16f, rgba32f"):
+        Splatter(gpu, "rgb565")
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.4, 1.0])
