@@ -1,12 +1,35 @@
 """The budget: of measured settings, the one that keeps a frame time and a likeness at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 from typing import Protocol
 
+from app.errors import UsageError
 from renderer.settings import RenderSettings
 
 EXACT = "exact"  # name of the row that leaves nothing out
+FLOOR_DB = 35.0  # where a difference begins to be seen side by side
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a user wants kept: milliseconds a frame, dB to the exact picture."""
+
+    target_ms: float
+    floor_db: float = FLOOR_DB
+
+
+def read_budget(target_ms: float | None, floor_db: float | None) -> Budget | None:
+    """The budget of --target-ms and --floor-db, None without them; UsageError in one sentence."""
+    for name, value in (("--target-ms", target_ms), ("--floor-db", floor_db)):
+        if value is not None and not 0 < value < inf:
+            raise UsageError(f"{name} is {value}, expected a number above 0.")
+    if target_ms is None:
+        if floor_db is not None:
+            raise UsageError("--floor-db bounds what --target-ms may choose; give both.")
+        return None
+    return Budget(target_ms, FLOOR_DB if floor_db is None else floor_db)
 
 
 class Row(Protocol):
@@ -69,3 +92,16 @@ def _sentence(best: Row, exact: Row, target_ms: float, floor_db: float, reached:
         f"Nothing at {floor_db:.0f} dB or better reaches {target_ms:.1f} ms; "
         f"the fastest of them is {what}."
     )
+
+
+def least_scale(rows: Sequence[Row], floor_db: float) -> float:
+    """The smallest render_scale that was measured at the floor or better with nothing else changed.
+
+    How far dynamic resolution may go down; 1 where no scale is good enough.
+    """
+    alone = [
+        row for row in rows
+        if replace(row.settings, render_scale=1.0, target="rgba16f", background=(0.0, 0.0, 0.0))
+        == RenderSettings()
+    ]  # fmt: skip
+    return min((row.settings.render_scale for row in alone if row.db >= floor_db), default=1.0)

@@ -33,7 +33,7 @@ class Named:
 
 
 def _sorted_every(n: int) -> Named:
-    return Named(f"sort every {n}", {"resort_frames": n}, quick=n == 4)
+    return Named(f"sort every {n}", {"resort_frames": n})
 
 
 def _table_3() -> tuple[Named, ...]:
@@ -53,6 +53,7 @@ def _table_3() -> tuple[Named, ...]:
 
 AFTER_1 = {"resort_frames": 0, "resort_degrees": 1.0}  # degrees
 COMBINED = {**AFTER_1, "recolor_degrees": 2.0, "min_pixels": 1.0}
+FAINT_AND_SMALL = {"min_alpha": 4 / 255, "min_pixels": 2.0}
 SETTINGS = (
     Named(EXACT, quick=True),
     Named("rgba16f", {"target": "rgba16f"}, quick=True),
@@ -78,11 +79,13 @@ SETTINGS = (
     Named("16 bit, colours 2\u00b0, 1 px",
           {"key_bits": 16, "recolor_degrees": 2.0, "min_pixels": 1.0}),
     Named("sort 1\u00b0, colours 2\u00b0", {**AFTER_1, "recolor_degrees": 2.0}),
-    Named("sort 1\u00b0, colours 2\u00b0, 1 px", COMBINED, quick=True),
+    Named("sort 1\u00b0, colours 2\u00b0, 1 px", COMBINED),
     Named("2/255, from 1.5 px", {"min_alpha": 2 / 255, "min_pixels": 1.5}),
-    Named("4/255, from 2 px", {"min_alpha": 4 / 255, "min_pixels": 2.0}),
-    Named("the three at 75 %", {**COMBINED, "render_scale": 0.75}, quick=True),
-    Named("the three at 50 %", {**COMBINED, "render_scale": 0.5}, quick=True),
+    Named("4/255, from 2 px", FAINT_AND_SMALL, quick=True),
+    Named("4/255, from 2 px, 75 %", {**FAINT_AND_SMALL, "render_scale": 0.75}, quick=True),
+    Named("4/255, from 2 px, 50 %", {**FAINT_AND_SMALL, "render_scale": 0.5}, quick=True),
+    Named("sort 1\u00b0, colours 2\u00b0, 1 px, 75 %", {**COMBINED, "render_scale": 0.75}),
+    Named("sort 1\u00b0, colours 2\u00b0, 1 px, 50 %", {**COMBINED, "render_scale": 0.5}),
     *(row for row in _table_3() if row.eyes == 1),
     # Beside one eye, so that its ratio is what the second eye costs.
     Named("stereo", eyes=2, beside_eyes=1),

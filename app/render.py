@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
+
 
 @dataclass(frozen=True)
 class Options:
@@ -47,11 +49,18 @@ class Options:
     """Leave out splats smaller than this: from the centre to where they end, pixels."""
     fade: float = 0.0
     """Part of each of these limits over which splats fade, 0 to 1; 0: they end at once."""
+    target_ms: float | None = None
+    """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
+    machine; measured once, in seconds, and kept."""
+    floor_db: float | None = None
+    """Never below this PSNR against the exact picture, whatever the budget; default 35."""
     overwrite: bool = False
     """Replace pictures of the same name."""
 
 
 def run(options: Options) -> int:
+    from app.budget import read_budget
+    from app.budget_chart import Drawn, settings_for
     from app.drawing import (
         MOST_VALUES,
         make_folder,
@@ -71,7 +80,8 @@ def run(options: Options) -> int:
         raise UsageError(f"--background is {options.background}, expected three values in 0..1.")
     if not 0 <= options.stereo < 1:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
-    settings = choose_settings(options)
+    settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
+    check_one_of(options, budget)
     model = read_model(options.scene, options.mode)
     views = choose_views(options, model, size)
     count = len(controls) * len(views)
@@ -82,15 +92,28 @@ def run(options: Options) -> int:
     taken = [p for p in paths if p.exists()]
     if taken and not options.overwrite:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
-    with open_renderer(options.context, options.drawing) as (renderer, _):
+    with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
         background = options.background or default_background(model, (0.0, 0.0, 0.0))
         renderer.settings = replace(
             settings, target=renderer.settings.target, background=background
         )
+        if budget:
+            drawn = Drawn(model, controls[0], views[0].size, 1 + (options.stereo > 0))
+            renderer.settings = settings_for(budget, renderer, ctx, drawn)
         draw_all(renderer, model, pairs, paths, options.stereo)
     print(f"{count} picture{'s' * (count > 1)} in {options.out}", file=sys.stderr)
     return 0
+
+
+def check_one_of(options: Options, budget) -> None:
+    """A budget chooses the limits; who gives them has chosen already."""
+    from app.errors import UsageError
+
+    given = [name for name in LIMITS if getattr(options, name) != getattr(Options, name)]
+    if budget and given:
+        option = f"--{given[0].replace('_', '-')}"
+        raise UsageError(f"--target-ms chooses what {option} says; leave one of the two out.")
 
 
 def choose_settings(options: Options):
@@ -98,9 +121,8 @@ def choose_settings(options: Options):
     from app.errors import UsageError
     from renderer.settings import RenderSettings
 
-    names = ("debug", "max_pixels", "max_distance", "min_pixels", "fade")
     try:
-        return RenderSettings(**{name: getattr(options, name) for name in names})
+        return RenderSettings(**{name: getattr(options, name) for name in ("debug", *LIMITS)})
     except ValueError as error:
         raise UsageError(f"--{str(error).replace('_', '-', 1)}") from None
 
