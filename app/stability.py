@@ -27,7 +27,9 @@ class Options:
     out: Path
     """Folder for stability.csv and the pictures."""
     cases: tuple[str, ...] = ()
-    """Names of cases; default: all of them. A wrong name lists them."""
+    """Names of cases; default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
+    far-origin, depth-range, inside, lenses, random-eyes, needles, limits, counts, crowd,
+    extrapolated-x, broken-heads, life."""
     size: str = "640x360"
     """WIDTHxHEIGHT in pixels."""
     steps: int = 24
@@ -90,10 +92,12 @@ def choose_cases(options: Options) -> list[str]:
 
 def subject(options: Options, renderer, model) -> str:
     """What the rows are about: rows of another scene, size or drawing do not belong with them."""
+    from app.measure import processor
+
     backends = ", ".join(renderer.backends.values())
     return (
         f"{options.scene.name}, {model.splat_count} splats, {options.mode}, {options.size}, "
-        f"{options.steps} steps, {options.rounds} rounds, {backends}"
+        f"{options.steps} steps, {options.rounds} rounds, {backends}, {processor()}"
     )
 
 

@@ -144,6 +144,22 @@ def test_a_scene_with_one_stop_has_no_sweep(stage):
     assert row.verdict == "does not apply" and "single stop" in row.reason
 
 
+def test_help_names_every_case():
+    told = " ".join(launch("stability", "--help").stdout.replace("│", " ").split())
+    assert ", ".join(CASES) in told
+    assert "1: one fails" in told
+
+
+def test_the_guide_and_the_committed_rows_name_every_case():
+    guide = (ROOT / "docs" / "stability.md").read_text()
+    assert [line.split("`")[1] for line in guide.splitlines() if line.startswith("| `")] == [*CASES]
+    lines = (ROOT / "docs" / "bench" / "stability.csv").read_text().splitlines()
+    found = list(csv.reader(lines[3:]))
+    assert lines[0].startswith("# python3 launch.py stability workshop.shift")
+    assert list(dict.fromkeys(row[0] for row in found)) == [*CASES]
+    assert {row[4] for row in found} <= {"holds", "does not apply"}
+
+
 def test_nan_holds_no_bound():
     assert at_least("f", np.nan, 1, "r").verdict == "FAILS"
     assert at_most("f", np.nan, 1, "r").verdict == "FAILS"

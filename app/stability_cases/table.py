@@ -55,7 +55,8 @@ class Table:
     def add(self, case: str, findings: list[Finding]) -> None:
         """Takes the rows of a case and writes the file anew, all or nothing."""
         self.rows[case] = [
-            (case, f.figure, f"{f.measured:.6g}", f.bound, f.verdict, f.reason) for f in findings
+            (case, f.figure, f"{f.measured:.5g}" if f.bound else "", f.bound, f.verdict, f.reason)
+            for f in findings
         ]
         self.write()
 
