@@ -9,10 +9,11 @@ from runtime_models.rotation import normalize
 from runtime_models.spherical_harmonics import shade
 from runtime_models.write_onnx import write_onnx
 
+Control = float | np.ndarray  # of everything, or (A,) one an anchor (layers: one a splat)
 BATCH = 16384  # anchors a run: bounds the memory; half and twice as many are no faster
 
 
-def evaluate(model: AnchorModel | SplatLayers, x: float, eye: np.ndarray) -> Splats:
+def evaluate(model: AnchorModel | SplatLayers, x: Control, eye: np.ndarray) -> Splats:
     """The splats at control x seen from `eye` (3,), metres in the object's frame.
 
     Runs the networks as a package holds them, on every input, Psi(x) too: the plain twin of
@@ -47,34 +48,82 @@ class Evaluator:
             for name, mlp in model.networks.items():
                 self._networks[name] = kind(name, mlp, model, threads)
 
-    def geometry(self, x: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def geometry(self, x: Control) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,) negative = absent."""
         model = self.model
         if isinstance(model, SplatLayers):
-            opacity = model.opacity * model.weights(x)[model.layer]
-            return model.means, model.scales, model.wxyz, opacity
+            weights = model.weights(x)  # (stops,) or (stops, N)
+            there = weights[model.layer] if np.ndim(x) == 0 else _own(weights, model.layer)
+            return model.means, model.scales, model.wxyz, model.opacity * there
         means = self._run("offset", x)  # (A, k * 3), from the anchor
         means += np.tile(model.anchors, model.splats_per_anchor)
         scales, wxyz = self._run("scale", x), self._run("rotation", x)
         opacity = self._run("opacity", x).reshape(-1)
         return means.reshape(-1, 3), scales.reshape(-1, 3), normalize(wxyz.reshape(-1, 4)), opacity
 
-    def color(self, x: float, eye: np.ndarray) -> np.ndarray:
-        """(N, 3) display sRGB seen from `eye` (3,), metres in the object's frame."""
-        if isinstance(self.model, SplatLayers):
-            return shade(self.model.sh, directions(self.model.means, eye))
-        return self._run("color", x, directions(self.model.anchors, eye)).reshape(-1, 3)
+    def color(
+        self,
+        x: Control,
+        eye: np.ndarray,
+        seen: np.ndarray | None = None,
+        out: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """(N, 3) display sRGB seen from `eye` (3,), metres in the object's frame.
 
-    def _run(self, name: str, x: float, direction: np.ndarray | None = None) -> np.ndarray:
-        """(A, k * size) output of one network, the splats of one anchor side by side."""
-        model, network = self.model, self._networks[name]
-        psi, count = model.encoding.encode(x), len(model.anchors)
-        out = np.empty((count, model.splats_per_anchor * SIZE_PER_SPLAT[name]), np.float32)
-        for start in range(0, count, BATCH):
-            rows = slice(start, start + BATCH)
-            seen = None if direction is None else direction[rows]
-            out[rows] = network.run(model.features[rows], seen, psi)
+        seen: (A,) bool; only these are computed, the rest of `out` (N, 3) stays what it was.
+        """
+        model = self.model
+        places = model.means if isinstance(model, SplatLayers) else model.anchors
+        if seen is None:
+            return self._color(x, slice(None), directions(places, eye))
+        rows = np.flatnonzero(seen)
+        out = np.zeros((model.splat_count, 3), np.float32) if out is None else out
+        if rows.size:
+            mine = x if np.ndim(x) == 0 else x[rows]
+            per_row = out.reshape(len(places), -1)  # a view: the splats of a row side by side
+            colors = self._color(mine, rows, directions(places[rows], eye))
+            per_row[rows] = colors.reshape(rows.size, -1)
         return out
+
+    def _color(self, x: Control, rows: np.ndarray | slice, direction: np.ndarray) -> np.ndarray:
+        """(n, 3) colours of the splats of some rows, towards which `direction` (rows, 3) points."""
+        if isinstance(self.model, SplatLayers):
+            return shade(self.model.sh[rows], direction)
+        return self._run("color", x, direction, rows).reshape(-1, 3)
+
+    def _run(
+        self,
+        name: str,
+        x: Control,
+        direction: np.ndarray | None = None,
+        rows: np.ndarray | slice = slice(None),
+    ) -> np.ndarray:
+        """(A, k * size) output of one network, the splats of one anchor side by side.
+
+        rows: of the anchors; x and direction are already of these rows alone.
+        """
+        model, network = self.model, self._networks[name]
+        features = model.features[rows]
+        out = np.empty((len(features), model.splats_per_anchor * SIZE_PER_SPLAT[name]), np.float32)
+        psi, which = self._encoded(x)
+        for start in range(0, len(features), BATCH):
+            part = slice(start, start + BATCH)
+            seen = None if direction is None else direction[part]
+            one_each = None if which is None else which[part]
+            out[part] = network.run(features[part], seen, psi, one_each)
+        return out
+
+    def _encoded(self, x: Control) -> tuple[np.ndarray, np.ndarray | None]:
+        """Psi of the values that x has, (values, d), and which of them each anchor's is."""
+        if np.ndim(x) == 0:
+            return self.model.encoding.encode(float(x))[None], None
+        values, which = np.unique(np.asarray(x, np.float32), return_inverse=True)
+        return self.model.encoding.encode(values[:, None].astype(np.float64)), which
+
+
+def _own(weights: np.ndarray, layer: np.ndarray) -> np.ndarray:
+    """(N,) of weights (stops, N): each splat's weight of its own layer."""
+    return weights[layer, np.arange(len(layer))]
 
 
 class WholeNetwork:
@@ -84,9 +133,17 @@ class WholeNetwork:
         self._inputs = mlp.inputs
         self._session = open_session(write_onnx(mlp, name), threads)
 
-    def run(self, feature: np.ndarray, direction: np.ndarray | None, psi: np.ndarray) -> np.ndarray:
-        """(n, k * size) of features (n, F), directions (n, 3) and Psi(x) (d,)."""
-        control = np.broadcast_to(psi, (len(feature), len(psi)))
+    def run(
+        self,
+        feature: np.ndarray,
+        direction: np.ndarray | None,
+        psi: np.ndarray,
+        which: np.ndarray | None,
+    ) -> np.ndarray:
+        """(n, k * size) of features (n, F), directions (n, 3) and Psi (values, d); which (n,): of
+        these values each anchor's own, None: all have the first.
+        """
+        control = np.broadcast_to(psi, (len(feature), psi.size)) if which is None else psi[which]
         parts = {"feature": feature, "direction": direction, "control": control}
         rows = np.concatenate([parts[part] for part in self._inputs], axis=1)
         return self._session.run(["output"], {"input": rows})[0]
@@ -107,9 +164,18 @@ class FoldedNetwork:
         rest = replace(mlp, weights=(first[:, ~is_control], *mlp.weights[1:]))
         self._session = open_session(write_onnx(rest, name, first_bias="input"), threads)
 
-    def run(self, feature: np.ndarray, direction: np.ndarray | None, psi: np.ndarray) -> np.ndarray:
+    def run(
+        self,
+        feature: np.ndarray,
+        direction: np.ndarray | None,
+        psi: np.ndarray,
+        which: np.ndarray | None,
+    ) -> np.ndarray:
         """As WholeNetwork.run."""
-        bias = self._bias + (self._control @ psi if self._control.shape[1] else 0)  # (hidden,)
+        bias = self._bias[None]
+        if self._control.shape[1]:
+            bias = bias + psi @ self._control.T  # (values, hidden)
+            bias = bias if which is None else bias[which]
         parts = {"feature": feature, "direction": direction}
         columns = [parts[part] for part in self._inputs]
         rows = columns[0] if len(columns) == 1 else np.concatenate(columns or [feature[:, :0]], 1)

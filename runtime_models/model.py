@@ -35,8 +35,8 @@ class ControlEncoding:
     spacing: float = 1 / 15  # s; the paper leaves it open, 1/(d-1) puts the last one at x = 1
     sigma: float = 0.04
 
-    def encode(self, x: float) -> np.ndarray:
-        """(d,) float32 control encoding of one scalar x."""
+    def encode(self, x: float | np.ndarray) -> np.ndarray:
+        """(d,) float32 control encoding of one scalar x; (n, d) of a column (n, 1)."""
         t = np.arange(self.d) * self.spacing
         return np.exp(-((t - x) ** 2) / (2 * self.sigma**2)).astype(np.float32)
 
@@ -112,8 +112,8 @@ class SplatLayers:
     def splat_count(self) -> int:
         return len(self.means)
 
-    def weights(self, x: float) -> np.ndarray:
-        """(stops,) float32 in 0..1: how much of each layer is there at x.
+    def weights(self, x: float | np.ndarray) -> np.ndarray:
+        """(stops,) float32 in 0..1: how much of each layer is there at x; (stops, n) for x (n,).
 
         Cumulative layers fade in on the way from the stop before and stay; exclusive layers fade
         out again on the way to the next stop.

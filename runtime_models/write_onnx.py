@@ -12,8 +12,8 @@ HEAD_NODE = {"tanh": "Tanh", "sigmoid": "Sigmoid", "softplus": "Softplus", "exp"
 def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
     """Gemm, Relu, ..., Gemm, then Clip, the head and Mul where the network has them.
 
-    With first_bias="input" the first layer's bias (hidden,) is not stored: it is a second input
-    "bias" of the graph.
+    With first_bias="input" the first layer's bias is not stored: it is a second input "bias" of the
+    graph, (1, hidden) for all rows or (N, hidden).
     """
     from onnx import TensorProto, checker, helper, numpy_helper
 
@@ -47,7 +47,7 @@ def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
 
     inputs = [shaped("input", "N", mlp.width_in)]
     if first_bias == "input":
-        inputs.append(shaped("bias", len(mlp.biases[0])))
+        inputs.append(shaped("bias", "rows", len(mlp.biases[0])))
     graph = helper.make_graph(
         nodes, name, inputs, [shaped("output", "N", mlp.width_out)], constants
     )
