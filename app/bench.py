@@ -37,24 +37,42 @@ class Options:
     """Where GL comes from."""
     mode: Literal["cumulative", "exclusive"] = "cumulative"
     """How a folder of layers adds up."""
+    settings: str = ""
+    """A setting by its name in the chart, such as "sort every 4"; wrong names list them all."""
+    target: Literal["", "rgba8", "rgba16f", "rgba32f"] = ""
+    """What quads blend into; default rgba16f, or what --settings says."""
+    target_ms: float | None = None
+    """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
+    machine; measured once, in seconds, and kept."""
+    floor_db: float | None = None
+    """Never below this PSNR against the exact picture, whatever the budget; default 35."""
 
 
 def run(options: Options) -> int:
+    from app.budget import read_budget
     from app.drawing import open_renderer, parse_size
     from app.errors import UsageError
     from app.measure import Measure
     from runtime_models.read_scene import read_model
 
-    size = parse_size(options.size)
+    size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
     quality_size = parse_size(options.quality_size, "--quality-size")
     check_counts(options)
     if options.x is not None and not 0 <= options.x <= 1:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    if budget and (options.settings or options.target):
+        raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
     if options.json not in (None, STANDARD_OUTPUT):
         check_result_path(options.json)
     model = read_model(options.scene, options.mode)
     x = model.stops[0].x if options.x is None else options.x
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
+        if budget:
+            from app.budget_chart import Drawn, settings_for
+
+            renderer.settings = settings_for(budget, renderer, ctx, Drawn(model, x, size))
+        elif options.settings or options.target:
+            renderer.settings = asked_settings(options, renderer, model, size)
         result = measure(Measure(renderer, ctx, model, x, size), options, quality_size)
     print_table(result)
     if options.json == STANDARD_OUTPUT:
@@ -63,6 +81,28 @@ def run(options: Options) -> int:
         write_json(options.json, result)
         print(f"written to {options.json}", file=sys.stderr)
     return 0
+
+
+def asked_settings(options: Options, renderer, model, size: tuple[int, int]):
+    """RenderSettings of --settings and --target; UsageError where there is none such."""
+    from dataclasses import replace
+
+    from app.chart_settings import named_settings, render_settings
+    from app.chart_stage import distances_of
+    from app.errors import UsageError
+    from scene.framing import frame_points, model_points, orbit_path
+
+    drawing = renderer.backends["drawing"].split()[0]
+    settings = renderer.settings
+    if options.settings:
+        named = named_settings(options.settings, drawing)
+        distances = distances_of(
+            model_points(model), orbit_path(8, *frame_points(*model_points(model)), size)
+        )
+        settings = render_settings(named, settings.background, drawing, distances)
+    if options.target and drawing != "quads":
+        raise UsageError(f"--target is what quads blend into, and {drawing} are drawn here.")
+    return replace(settings, target=options.target) if options.target else settings
 
 
 def measure(work, options, quality_size: tuple[int, int]) -> dict:

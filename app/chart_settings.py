@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, fields, replace
 
 from app.comparison import exact
+from app.errors import UsageError
 from renderer.settings import RenderSettings
 
 EXACT = "exact"
@@ -104,6 +105,17 @@ def settings_of(drawing: str, quick: bool = False, eyes: int = 0) -> tuple[Named
     if quick:
         rows = [row for row in rows if row.quick]
     return tuple(row for row in rows if eyes in (0, row.eyes))
+
+
+def named_settings(name: str, drawing: str) -> Named:
+    """The row of that name; UsageError says which there are, or that this drawing has it not."""
+    found = {row.name: row for row in SETTINGS}.get(name)
+    if found is None:
+        told = "; ".join(row.name for row in SETTINGS)
+        raise UsageError(f"there is no setting '{name}'; choose one of: {told}.")
+    if found not in settings_of(drawing):
+        raise UsageError(f"setting '{name}' changes nothing in {drawing}; choose --drawing quads.")
+    return found
 
 
 def render_settings(

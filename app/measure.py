@@ -47,7 +47,7 @@ class Measure:
     ) -> dict:
         """The rows that `launch.py bench` prints and writes; `tell` hears what is going on."""
         tell(f"{frames} frames of an orbit, mono and stereo in turns")
-        mono, stereo, passes, stats = self.orbit(frames)
+        mono, stereo, passes, sorts, stats = self.orbit(frames)
         tell(f"{sweep} frames from x = 0 to 1")
         sweep_ms = self.sweep(sweep)
         tell("pictures of the float64 reference")
@@ -65,6 +65,7 @@ class Measure:
             "splats": self.model.splat_count,
             "drawn": stats.drawn,
             "culled": stats.culled,
+            "sorts": float(np.mean(sorts)),
             "draw_passes": [name for name in passes if name in DRAW_PASSES],
             "draw_pass_ratio": float(np.median(mono) / drawing) if drawing else None,
             "x": self.x,
@@ -79,8 +80,11 @@ class Measure:
             "machine": machine(self.ctx),
         }
 
-    def orbit(self, frames: int) -> tuple[list[float], list[float], dict, object]:
-        """ms of mono and stereo frames, drawn in turns so that other load meets both alike."""
+    def orbit(self, frames: int) -> tuple[list[float], list[float], dict, list[int], object]:
+        """ms of mono and stereo frames, drawn in turns so that other load meets both alike.
+
+        Then ms of the passes, sorts and the last stats, all of mono.
+        """
         self.renderer.update(self.scene(self.x))
         count = frames + WARM_UP
         path = (count, self.centre, self.radius, self.size)
@@ -88,17 +92,29 @@ class Measure:
         # Half a step further on, so that neither finds the colours of the other's eye ready.
         between = orbit_path(*path, start=np.pi / count)
         distance = EYE_DISTANCE * self.radius / 2  # a model of 2 m radius is seen by a person
-        mono, stereo, passes = [], [], {}
-        for i, (view, other) in enumerate(zip(views, between, strict=True)):
-            both, _ = self.timed(stereo_pair(other, distance))
-            one, stats = self.timed([view])
+        frames_of = [
+            frame
+            for i, (view, other) in enumerate(zip(views, between, strict=True))
+            for frame in ((i, stereo_pair(other, distance)), (i, [view]))
+        ]
+        settings = self.renderer.settings
+        if settings.resort_frames != 1 or settings.recolor_degrees > 0:
+            # What is kept from frame to frame is kept for one kind of frame: no turns then.
+            frames_of.sort(key=lambda frame: -len(frame[1]))
+        times, sorts, passes = {1: [], 2: []}, [], {}
+        for i, eyes in frames_of:
+            ms, told = self.timed(eyes)
             if i < WARM_UP:
                 continue
-            mono.append(one)
-            stereo.append(both)
-            for name, ms in stats.ms.items():
-                passes.setdefault(name, []).append(ms)
-        return mono, stereo, {name: percentiles(ms) for name, ms in passes.items()}, stats
+            times[len(eyes)].append(ms)
+            if len(eyes) == 2:
+                continue
+            stats = told
+            sorts.append(stats.sorts)
+            for name, pass_ms in stats.ms.items():
+                passes.setdefault(name, []).append(pass_ms)
+        passes = {name: percentiles(ms) for name, ms in passes.items()}
+        return times[1], times[2], passes, sorts, stats
 
     def timed(self, views: list) -> tuple[float, object]:
         """ms until the pixels are there, which for GL means until the driver has finished."""
@@ -134,11 +150,14 @@ class Measure:
         ]
 
     def error(self, x: float, view: View) -> float:
-        """PSNR in dB of the premultiplied colours and the alpha of one picture."""
+        """PSNR in dB of the premultiplied colours and the alpha of one picture, as it was drawn."""
         self.renderer.update(self.scene(x))
         self.renderer.draw([view])
-        want = reference_image(self.scene(x), view, self.renderer.settings)
-        return min(psnr(self.renderer.image(0), want), MOST_DB)
+        got = self.renderer.image(0)
+        drawn = view.resized(got.shape[1::-1])  # smaller where settings.render_scale is
+        return min(
+            psnr(got, reference_image(self.scene(x), drawn, self.renderer.settings)), MOST_DB
+        )
 
 
 def worst(decibels: list[float]) -> float | None:
