@@ -82,7 +82,23 @@ def make(seed: int) -> Poisoned:
         made.views = [replace(v, world_from_eye=eye_at(side)) for side in (-0.03, 0.03)
                       for v in made.views[:1]]  # fmt: skip
         made.exact = False  # colours are those of the centre
+    if not plain(made.settings):
+        made.exact = False
     return made
+
+
+def plain(settings: RenderSettings) -> bool:
+    """Whether the first frame is what the oracle draws, to float rounding."""
+    whole = settings.render_scale == 1 and not settings.debug and settings.key_bits == 32
+    return whole and settings.target != "rgba8"
+
+
+def walk(made: Poisoned) -> list[list[View]]:
+    """The views of three frames: as made, after a turn of 40 degrees, and back again."""
+    half = np.radians(20)
+    turn = np.array([np.cos(half), 0, np.sin(half), 0])
+    aside = [replace(v, world_from_eye=Pose(v.world_from_eye.position, turn)) for v in made.views]
+    return [made.views, aside, made.views]
 
 
 def eye_at(side: float) -> Pose:
@@ -113,7 +129,11 @@ def settings_of(rng: np.random.Generator) -> RenderSettings:
         "max_distance": [REACH, np.inf, EYE], "max_pixels": [3.0, np.inf, layout.HALF_MAX],
         "min_pixels": [0.0, 1.0], "fade": [0.0, 0.3, 1.0], "key_bits": [16, 32],
         "order": ["depth", "distance"], "low_pass": [0.3, 0.0],
-        "min_alpha": [1 / 255, *beside(1 / 255)],
+        "min_alpha": [1 / 255, *beside(1 / 255)], "resort_frames": [1, 0, 3],
+        "resort_degrees": [0.0, 180.0], "stereo_sort": ["shared", "each"],
+        "recolor_degrees": [0.0, 30.0], "skip_unseen": [False, True],
+        "target": ["rgba16f", "rgba32f", "rgba8"], "render_scale": [1.0, 1.0, 0.5, 2.0],
+        "debug": [""] * 8 + ["culls", "birdseye", "overdraw", "depth", "object"],
     }  # fmt: skip
     return RenderSettings(**{n: v[rng.integers(len(v))] for n, v in choice.items()})
 

@@ -21,10 +21,12 @@ def judge(renderer: Renderer, seed: int) -> str:
             made = poison.make(seed)
             renderer.settings = made.settings
             renderer.update(made.scene)
-            renderer.draw(made.views)
-            pictures = [np.array(renderer.image(i)) for i in range(len(made.views))]
-            shown = [np.array(renderer.resolved(i)) for i in range(len(made.views))]
-            told = wrong(made, pictures, shown)
+            told = ""
+            for frame, views in enumerate(poison.walk(made)):
+                renderer.draw(views)
+                pictures = [np.array(renderer.image(i)) for i in range(len(views))]
+                shown = [np.array(renderer.resolved(i)) for i in range(len(views))]
+                told = told or wrong(made, pictures, shown, frame)
     except ValueError as refusal:
         if is_precise(str(refusal)):
             return ""
@@ -32,7 +34,7 @@ def judge(renderer: Renderer, seed: int) -> str:
     return f"seed {seed} ({made.told}; {made.settings}): {told}" if told else ""
 
 
-def wrong(made: poison.Poisoned, pictures: list, shown: list) -> str:
+def wrong(made: poison.Poisoned, pictures: list, shown: list, frame: int) -> str:
     for picture, seen in zip(pictures, shown, strict=True):
         if not np.isfinite(picture).all():
             return f"{np.count_nonzero(~np.isfinite(picture).all(axis=2))} pixels are not finite"
@@ -40,7 +42,8 @@ def wrong(made: poison.Poisoned, pictures: list, shown: list) -> str:
             return f"coverage {picture[..., 3].min()} to {picture[..., 3].max()}"
         if not np.isfinite(seen).all():
             return "resolved() is not finite"
-    return differs(made, pictures[0]) if made.exact else ""
+    # The third frame may stand on an order and on colours of the first: the same view again.
+    return differs(made, pictures[0]) if made.exact and frame != 1 else ""
 
 
 def differs(made: poison.Poisoned, picture: np.ndarray) -> str:
