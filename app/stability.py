@@ -71,7 +71,8 @@ def run(options: Options) -> int:
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]
     told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
-    print(f"{len(names)} cases, {told}; {table.path} and pictures beside it", file=sys.stderr)
+    count = f"{len(names)} case{'s' * (len(names) > 1)}"
+    print(f"{count}, {told}; {table.path} and pictures beside it", file=sys.stderr)
     return FAILED if failed else 0
 
 
@@ -125,7 +126,7 @@ def perform(stage, names: list[str], table) -> None:
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)
             failed = sum(f.verdict == "FAILS" for f in result.findings)
-            console.print(f"{name}: {f'{failed} figures past their bounds' if failed else 'holds'}")
+            console.print(f"{name}: {f'{failed} past their bounds' if failed else 'holds'}")
 
 
 def print_table(table, names: list[str]) -> None:

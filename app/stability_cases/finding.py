@@ -25,6 +25,15 @@ class Finding:
             return "does not apply"
         return "holds" if self.holds else "FAILS"
 
+    @property
+    def headroom(self) -> float:
+        """How far inside its bound, as a part of it; below 0 where it fails, NaN the furthest."""
+        if not self.bound:
+            return math.inf
+        sign, limit = self.bound.split()
+        inside = (self.measured - float(limit)) * (1 if sign == ">=" else -1)
+        return -math.inf if math.isnan(inside) else inside / max(abs(float(limit)), 1e-9)
+
 
 @dataclass(frozen=True)
 class Panel:

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.stability_cases.finding import (
+    Finding,
     Panel,
     Result,
     at_least,
@@ -20,6 +21,7 @@ from runtime_models.model import AnchorModel
 LONGEST_STEP = 0.02  # of x, half a Gaussian of the paper's encoding
 SIGMA = 0.04  # of x: the paper's encoding; layers, which have none, are held to the same
 LUMA = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709
+UNSEEN = 2 / 255  # two steps of a display: a change of the mean that nobody sees
 KEPT = {"resort_frames": 0, "resort_degrees": 180.0}  # an order is made once and then kept
 # Degrees and the least dB.  What an order that old costs where every splat has a colour of its own,
 # measured on 100,000 splats: no scene of surfaces comes near it.  Two dB are for small pictures.
@@ -45,73 +47,74 @@ def sweep(stage: Stage) -> Result:
             image = stage.draw(stage.scene(float(x)), view)
             frames[float(x)] = (image, stage.shown())
     sigma = stage.model.encoding.sigma if isinstance(stage.model, AnchorModel) else SIGMA
-    worst = [worst_between(frames, low, high, sigma) for low, high in pairwise(xs)]
-    findings = [min((rows[i] for rows, _ in worst), key=headroom)[1] for i in range(5)]
-    _, panels = max(worst, key=lambda pair: pair[0][4][1].measured)
-    return Result([clean(*(image for image, _ in frames.values())), *findings], panels)
+    spans = [Span(frames, low, high, sigma) for low, high in pairwise(xs)]
+    tables = zip(*(span.findings() for span in spans), strict=True)
+    findings = [min(rows, key=lambda row: row.headroom) for rows in tables]
+    worst = min(spans, key=lambda span: min(row.headroom for row in span.findings()))
+    return Result([clean(*(image for image, _ in frames.values())), *findings], worst.panels())
 
 
-def headroom(row: tuple) -> float:
-    return row[0]
-
-
-def worst_between(frames: dict, low: float, high: float, sigma: float) -> tuple[list, list[Panel]]:
-    """[(how far inside its bound, Finding)] of the frames between two stops, and panels.
+class Span:
+    """The frames between two stops: {x: (image, what a person sees)}.
 
     Were x to blend both ends pixel by pixel, every frame would lie between them in each pixel.
     """
-    xs = [x for x in frames if low <= x <= high]
-    alpha = np.array([frames[x][0][..., 3].mean() for x in xs])
-    luma = np.array([(frames[x][1] @ LUMA).mean() for x in xs])
-    first, last = frames[xs[0]], frames[xs[-1]]
-    both = [first[0][..., 3], last[0][..., 3]]
-    lights = [first[1] @ LUMA, last[1] @ LUMA]
-    apart = float(np.abs(first[1] - last[1]).mean())
-    steps = np.array([np.abs(frames[a][1] - frames[b][1]).mean() for a, b in pairwise(xs)])
-    detour = np.array(
-        [np.abs(frames[x][1] - first[1]).mean() + np.abs(frames[x][1] - last[1]).mean() for x in xs]
-    )
-    span = f"x {low:.3g} to {high:.3g}"
-    noise = 2 / 255  # two steps of a display: less cannot be seen as a flash
-    rows = [
-        at_least(
-            f"least coverage, {span}", alpha.min(), 0.98 * np.minimum(*both).mean(),
-            "pixels that both ends fill stay filled, 2 % for edges on the move",
-        ),
-        at_least(
-            f"least light, {span}", luma.min(), 0.98 * np.minimum(*lights).mean() - noise / 2,
-            "no darker than the darker end in every pixel, 2 % and half a grey step for edges",
-        ),
-        at_most(
-            f"most light, {span}", luma.max(), 1.02 * np.maximum(*lights).mean() + noise / 2,
-            "no brighter than the brighter end in every pixel, 2 % and half a grey step",
-        ),
-        at_most(
-            f"largest step, {span}", steps.max(), max(apart * (xs[1] - xs[0]) / sigma, noise),
-            f"all the way between the ends within {sigma:g} of x, the width of one Gaussian of "
-            "the encoding: faster is a jump that no encoding asked for",
-        ),
-        at_most(
-            f"longest way round, {span}", detour.max(), max(2 * apart, apart + 2 * noise),
-            "a blend of the ends is 1 times their difference away from both, content that has "
-            "left both places 2 times; more belongs to neither",
-        ),
-    ]  # fmt: skip
-    limits = [float(row.bound.split()[1]) for row in rows]
-    inside = [
-        (m - b if row.bound.startswith(">") else b - m) / max(b, 1e-9)
-        for row, b in zip(rows, limits, strict=True)
-        for m in [row.measured]
-    ]
-    at = int(detour.argmax())
-    beside = min(at + 1, len(xs) - 1)
-    panels = [
-        Panel(f"furthest from both ends: x = {xs[at]:.3f}", frames[xs[at]][1]),
-        Panel(f"its neighbour: x = {xs[beside]:.3f}", frames[xs[beside]][1]),
-        Panel(f"end: x = {xs[0]:.3f}", first[1]),
-        Panel(f"end: x = {xs[-1]:.3f}", last[1]),
-    ]
-    return list(zip(inside, rows, strict=True)), panels
+
+    def __init__(self, frames: dict, low: float, high: float, sigma: float) -> None:
+        self.xs = [x for x in frames if low <= x <= high]
+        self.images = [frames[x][0] for x in self.xs]
+        self.seen = [frames[x][1] for x in self.xs]
+        self.sigma = sigma
+        first, last = self.seen[0], self.seen[-1]
+        self.apart = float(np.abs(first - last).mean())
+        self.steps = [float(np.abs(a - b).mean()) for a, b in pairwise(self.seen)]
+        self.around = [np.abs(s - first).mean() + np.abs(s - last).mean() for s in self.seen]
+
+    def findings(self) -> list[Finding]:
+        span = f"x {self.xs[0]:.3g} to {self.xs[-1]:.3g}"
+        alpha = [float(image[..., 3].mean()) for image in self.images]
+        lights = [seen @ LUMA for seen in (self.seen[0], self.seen[-1])]
+        luma = [float((seen @ LUMA).mean()) for seen in self.seen]
+        filled = float(np.minimum(self.images[0][..., 3], self.images[-1][..., 3]).mean())
+        share = (self.xs[1] - self.xs[0]) / self.sigma  # of the whole way, in one step
+        return [
+            at_least(
+                f"least coverage, {span}", min(alpha), 0.98 * filled,
+                "pixels that both ends fill stay filled, 2 % for edges on the move",
+            ),
+            at_least(
+                f"least light, {span}", min(luma),
+                0.98 * float(np.minimum(*lights).mean()) - UNSEEN / 2,
+                "no darker than the darker end in every pixel, 2 % and a grey step for edges",
+            ),
+            at_most(
+                f"most light, {span}", max(luma),
+                1.02 * float(np.maximum(*lights).mean()) + UNSEEN / 2,
+                "no brighter than the brighter end in every pixel, 2 % and a grey step for edges",
+            ),
+            at_most(
+                f"largest step, {span}", max(self.steps), max(share * self.apart, UNSEEN),
+                f"all the way between the ends within {self.sigma:g} of x, the width of one "
+                "Gaussian of the encoding: faster is a jump that no encoding asked for",
+            ),
+            at_most(
+                f"longest way round, {span}", max(self.around),
+                max(2 * self.apart, self.apart + 2 * UNSEEN),
+                "a blend of the ends is 1 times their difference away from both, content that "
+                "has left both places 2 times; more belongs to neither",
+            ),
+        ]  # fmt: skip
+
+    def panels(self) -> list[Panel]:
+        """The frame furthest from both ends, or of the largest step where that fails."""
+        at = int(np.argmax(self.around))
+        if not self.findings()[3].holds:
+            at = int(np.argmax(self.steps))
+        beside = min(at + 1, len(self.xs) - 1)
+        captions = {at: "worst", beside: "its neighbour", 0: "end", len(self.xs) - 1: "end"}
+        return [
+            Panel(f"{told}: x = {self.xs[i]:.3f}", self.seen[i]) for i, told in captions.items()
+        ]
 
 
 def stale_orbit(stage: Stage) -> Result:
