@@ -25,6 +25,7 @@ class Decoder:
         if mlps not in MLPS:
             raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
         self._arena = arena
+        self._colors: dict[int, np.ndarray] = {}  # of what onnxruntime decodes, (N, 3)
         made: dict[int, Layers | Networks | Evaluator] = {}
         for model in models:
             if id(model) in made:
@@ -48,11 +49,15 @@ class Decoder:
         else:
             model.geometry(arena, arena.starts[i], x)
 
-    def color(self, i: int, x: float, eye: np.ndarray) -> None:
-        """Colours of object i at x towards an eye (3,) in the object's frame; after geometry."""
+    def color(self, i: int, x: float, eye: np.ndarray, seen: np.ndarray | None = None) -> None:
+        """Colours of object i at x towards an eye (3,) in the object's frame; after geometry.
+
+        seen: (A,) bool; the rest may keep what it has (compute passes colour all at once).
+        """
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
-            arena.write_color(i, model.color(x, eye))
+            self._colors[i] = model.color(x, eye, seen, self._colors.get(i))
+            arena.write_color(i, self._colors[i])
         elif isinstance(model, Layers):
             model.color(arena, arena.starts[i], eye)
         else:
@@ -63,6 +68,7 @@ class Decoder:
             if not isinstance(model, Evaluator):
                 model.release()
         self._models.clear()
+        self._colors.clear()
 
     def __enter__(self) -> "Decoder":
         return self

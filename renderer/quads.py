@@ -60,9 +60,14 @@ class QuadsDrawing:
         self._changed = True
         self._decoder.geometry(i, x)
 
-    def decode_color(self, i: int, x: float, eye_object: np.ndarray) -> None:
-        """Colours of object i at x, towards an eye (3,) in the object's frame."""
-        self._decoder.color(i, x, eye_object)
+    def decode_color(
+        self, i: int, x: float, eye_object: np.ndarray, seen: np.ndarray | None = None
+    ) -> None:
+        """Colours of object i at x, towards an eye (3,) in the object's frame.
+
+        seen: (A,) bool, one an anchor: the rest may keep what it has.
+        """
+        self._decoder.color(i, x, eye_object, seen)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""

@@ -1,5 +1,6 @@
 """Draws scenes: the passes of a frame in order.  The file to read first in renderer/."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -11,13 +12,14 @@ from renderer.context import is_software
 from renderer.debug import debug_image, opaque, prepare_debug
 from renderer.gpu import Gpu
 from renderer.palette import apply_palette, palette_colors, thermal_blend
+from renderer.recolor import Colored, centre_of, color_key, reach_of, seen_anchors
 from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import View
-from scene.scene import Scene
+from scene.scene import Scene, SceneObject
 
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
 CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
@@ -28,8 +30,8 @@ class _Decoded:
     """What of an object lies in the arena now."""
 
     model: AnchorModel | SplatLayers
+    colored: Colored
     x: float | None = None  # control value of its geometry; None: not decoded yet
-    color_key: tuple | None = None  # what its colours were computed for
 
 
 class Renderer:
@@ -106,7 +108,7 @@ class Renderer:
         except ValueError:
             self._drawing.allocate([])
             raise
-        self._decoded = [_Decoded(model) for model in models]
+        self._decoded = [_Decoded(model, Colored(centre_of(model))) for model in models]
 
     def draw(
         self,
@@ -121,13 +123,13 @@ class Renderer:
         targets = [target] if isinstance(target, moderngl.Framebuffer) else target
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
-        self._decode_colors(np.mean([v.world_from_eye.position for v in views], axis=0))
+        self._decode_colors(views)
         settings = self._settings_of_frame()
         self._sizes = [view.size for view in views]  # of what is shown; drawn is views from here
         views = [scaled(view, settings.render_scale) for view in views]
         if prepare_debug(self._drawing, views, self._scene, settings.debug):
             for decoded in self._decoded:
-                decoded.color_key = None  # their own colours are to come back
+                decoded.colored.key = None  # their own colours are to come back
         with self._framebuffer_kept():
             self._drawing.draw(views, settings, self._timer)
             self._debug = [
@@ -153,21 +155,59 @@ class Renderer:
         target = "rgba32f" if self.settings.debug else self._target or self.settings.target
         return replace(self.settings, target=target)
 
-    def _decode_colors(self, eye_world: np.ndarray) -> None:
-        """Runs the colour of the visible objects towards which the eye (3,) has moved."""
+    def _decode_colors(self, views: list[View]) -> None:
+        """Runs the colours of the visible objects for the centre of the eyes, where it moved."""
+        eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
+        degrees = self.settings.recolor_degrees
         with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
             for i, (thing, decoded) in enumerate(
                 zip(self._scene.objects, self._decoded, strict=True)
             ):
                 if not thing.visible:
                     continue
+                colored = decoded.colored
                 object_from_world = np.linalg.inv(thing.world_from_object.matrix())
                 eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
                 key = color_key(thing.model, thing.x, eye)
-                if key != decoded.color_key:
-                    self._drawing.decode_color(i, thing.x, eye)
-                    decoded.color_key = key
-                    self._color_runs += 1
+                stale = colored.is_stale(key, degrees)
+                wanted = self._wanted_anchors(i, thing, colored, stale, views)
+                if stale:
+                    colored.key = key
+                    colored.anchors = wanted
+                elif wanted is None or not wanted.any():
+                    continue  # all that is seen has its colours
+                else:
+                    colored.anchors |= wanted
+                self._drawing.decode_color(i, thing.x, eye, wanted)
+                self._color_runs += 1
+
+    def _wanted_anchors(
+        self, i: int, thing: SceneObject, colored: Colored, stale: bool, views: list[View]
+    ) -> np.ndarray | None:
+        """(A,) bool: the anchors that views see and whose colours are stale; None: all.
+
+        Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
+        """
+        if not self.settings.skip_unseen or isinstance(thing.model, SplatLayers):
+            if stale or colored.anchors is None:
+                return None
+            return ~colored.anchors  # left out before: now all are wanted
+        if not stale and colored.anchors is None:
+            return None
+        reach_key = (thing.x, self.settings.min_alpha)
+        if colored.reach_key != reach_key:
+            colored.reach, colored.reach_key = None, reach_key
+            if stale:  # how far splats reach is worth knowing once x rests
+                return None
+        if colored.reach is None:
+            mean_opacity, owner, covariance = self._drawing.splat_points()
+            mine = owner == i
+            k = math.sqrt(2 * math.log(1 / self.settings.min_alpha))
+            parts = (thing.model.anchors, mean_opacity[mine], covariance[mine], k)
+            colored.reach = reach_of(*parts)
+        pose = thing.world_from_object.matrix()
+        seen = seen_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
+        return seen if stale else seen & ~colored.anchors
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
@@ -228,14 +268,6 @@ class Renderer:
 def scaled(view: View, part: float) -> View:
     """The view in `part` times its pixels a side, at least one."""
     return view if part == 1 else view.resized(tuple(max(1, round(part * n)) for n in view.size))
-
-
-def color_key(model: AnchorModel | SplatLayers, x: float, eye: np.ndarray) -> tuple:
-    """What the colours of a model depend on: equal keys, equal colours."""
-    if isinstance(model, SplatLayers):
-        return tuple(eye) if model.sh.shape[1] > 1 else ()
-    inputs = model.networks["color"].inputs
-    return (x if "control" in inputs else None, tuple(eye) if "direction" in inputs else None)
 
 
 def _choose(ctx: moderngl.Context | None, drawing: str, mlps: str, sort: str) -> tuple:

@@ -35,6 +35,7 @@ class _Slot:
     count: int
     evaluator: Evaluator
     sh: object | None  # device array of coefficients; None: the colour comes from a network
+    colors: np.ndarray | None = None  # (count, 3) of a network, as last decoded
     placed: bool = False  # layers: the control value changes nothing but their opacity
 
 
@@ -108,7 +109,8 @@ class TilesDrawing:
             shade_sh(self.device, *args)
             self.device.queue.finish()
         else:
-            pack_color(self.device, slot.evaluator.color(x, eye_object), slot.start, self._color)
+            slot.colors = slot.evaluator.color(x, eye_object, seen, slot.colors)
+            pack_color(self.device, slot.colors, slot.start, self._color)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""

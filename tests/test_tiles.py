@@ -20,8 +20,9 @@ from splat_scenes import (
 
 from rasterizer.device import NoDevice
 from renderer.palette import palette_colors
+from renderer.recolor import color_key
 from renderer.reference import reference_image
-from renderer.renderer import Renderer, color_key
+from renderer.renderer import Renderer
 from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.model import SplatLayers, Stop
 from runtime_models.read_scene import read_model
