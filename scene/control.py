@@ -1,11 +1,17 @@
-"""The control value x over stops and time: snapping to named stops, the sweep of play."""
+"""The control value x over stops and time, and from place to place where an object has selectors.
+
+The rule for x outside 0 to 1, where no network was trained: whoever asks for it by number is
+refused (commands, SceneObject and selectors name the value, NaN too); what a hand or a clock moves
+is clamped (sliders, snap, Sweep).  So nothing below ever meets such a value.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import Stop
+from runtime_models.model import AnchorModel, Stop
+from scene.scene import SceneObject
 
 SNAP = 0.02  # of the slider's range: nearer than this to a stop is on the stop
 
@@ -15,6 +21,41 @@ def snap(x: float, stops: Sequence[Stop], reach: float = SNAP) -> float:
     x = min(max(x, 0.0), 1.0)
     nearest = min((s.x for s in stops), key=lambda stop_x: abs(stop_x - x), default=x)
     return nearest if abs(nearest - x) <= reach else x
+
+
+def control_of(thing: SceneObject) -> float | np.ndarray:
+    """x of an object: one value for all of it, or (A,) float32, one an anchor (layers: a splat).
+
+    Each selector mixes its x in by its weight at the anchor, so that a border shows what the slider
+    shows on the way between both.
+    """
+    if not thing.selectors:
+        return thing.x
+    model = thing.model
+    places = model.anchors if isinstance(model, AnchorModel) else model.means  # (A, 3) metres
+    x = np.full(len(places), thing.x)
+    for selector in thing.selectors:
+        weights = selector.weights(_in_space(places, thing, selector.space))
+        x += (selector.x - x) * weights
+    if not len(x) or (x == x[0]).all():  # a lens that looks elsewhere costs nothing
+        return float(x[0]) if len(x) else thing.x
+    return np.clip(x, 0, 1).astype(np.float32)
+
+
+def control_key(thing: SceneObject) -> tuple:
+    """What control_of depends on; of one model, equal keys give equal control values."""
+    if not any(selector.space == "world" for selector in thing.selectors):
+        return thing.x, thing.selectors
+    pose = thing.world_from_object
+    return thing.x, thing.selectors, (*pose.position, *pose.wxyz)
+
+
+def _in_space(places: np.ndarray, thing: SceneObject, space: str) -> np.ndarray:
+    """Places (A, 3) of the object's frame in a selector's space."""
+    if space == "object":
+        return places
+    world_from_object = thing.world_from_object.matrix()
+    return places @ world_from_object[:3, :3].T + world_from_object[:3, 3]
 
 
 def ease(t: float) -> float:

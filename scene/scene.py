@@ -7,6 +7,7 @@ import numpy as np
 
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import UNIT_SLACK, Pose
+from scene.selector import Selector, check_x
 
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
@@ -19,6 +20,7 @@ class SceneObject:
     x: float = 0.0  # control value in [0, 1]
     label: int = 0  # 0 = background
     visible: bool = True
+    selectors: tuple[Selector, ...] = ()  # parts with an x of their own; a later one lies above
 
     def __post_init__(self) -> None:
         """Refuses a place or an x that is none: ValueError with a sentence."""
@@ -29,8 +31,7 @@ class SceneObject:
                 f"object '{self.name}' stands at {_told(pose.position)} with a quaternion "
                 f"{_told(pose.wxyz)}; finite metres and a quaternion of length 1 are wanted."
             )
-        if not 0 <= self.x <= 1:  # nothing was trained out there, and NaN is nowhere
-            raise ValueError(f"object '{self.name}' has x = {self.x}; from 0 to 1 is wanted.")
+        check_x(self.x, f"object '{self.name}'")
 
 
 def _told(numbers: np.ndarray) -> str:
