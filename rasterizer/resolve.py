@@ -7,7 +7,7 @@ import numpy as np
 from rasterizer.device import Device
 
 KERNEL = Path(__file__).parent / "kernels" / "resolve.cl"
-NO_PALETTE = np.zeros((1, 3), np.float32)
+NO_PALETTE = np.zeros((1, 3), np.float32)  # its place in the kernel's arguments
 
 
 def resolve(
@@ -26,9 +26,11 @@ def resolve(
     pixels = device.empty((height, width, 4), np.uint8)
     mixed = palette is not None and weight > 0
     colors = np.asarray(palette if mixed else NO_PALETTE, np.float32)
+    table = np.zeros((2, len(colors), 4), np.float32)  # colours, differences
+    table[0, :, :3], table[1, :-1, :3] = colors, np.diff(colors, axis=0)
     device.launch(
         device.program(KERNEL)["resolve"], height, 1,
         width, height, *(float(c) for c in background), float(weight if mixed else 0),
-        device.shared(image), device.constants(colors), pixels,
+        device.shared(image), device.constants(table), pixels,
     )  # fmt: skip
     return device.view(pixels)

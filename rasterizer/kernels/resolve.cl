@@ -6,9 +6,10 @@ inline uchar4 eight_bits(float4 color) {
   return convert_uchar4(convert_int4(clamp(color, 0.0f, 1.0f) * 255.0f + 0.5f));
 }
 
+// palette: STEPS colours (alpha 0), then how each differs from the next.
 // image: premultiplied, row 0 on top.  weight 0: the colours stay; 1: all of them are the palette's.
 __kernel void resolve(int width, int height, float red, float green, float blue, float weight,
-                      __global const float4* image, __global const float* palette,
+                      __global const float4* image, __global const float4* palette,
                       __global uchar4* pixels) {
   const int y = get_global_id(0);
   __global const float4* row = image + (size_t)y * width;
@@ -18,15 +19,15 @@ __kernel void resolve(int width, int height, float red, float green, float blue,
     for (int x = 0; x < width; x++) out[x] = eight_bits(row[x] + (1 - row[x].w) * behind);
     return;
   }
+  const float4 kept = (float4)(1 - weight, 1 - weight, 1 - weight, 1);  // alpha stays
   for (int x = 0; x < width; x++) {
     float4 color = row[x];
     // The palette colours what is there, not the background: colour is divided by alpha first.
     const float luminance = 0.2126f * color.x + 0.7152f * color.y + 0.0722f * color.z;
     const float place = clamp(luminance / fmax(color.w, 1e-6f), 0.0f, 1.0f) * (STEPS - 1);
     const int below = min((int)place, STEPS - 2);
-    const float3 low = vload3(below, palette), high = vload3(below + 1, palette);
-    const float3 false_color = low + (place - below) * (high - low);
-    color.xyz = color.xyz * (1 - weight) + false_color * (color.w * weight);
+    const float4 false_color = palette[below] + (place - below) * palette[STEPS + below];
+    color = color * kept + false_color * (color.w * weight);
     out[x] = eight_bits(color + (1 - color.w) * behind);
   }
 }
