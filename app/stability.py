@@ -121,8 +121,6 @@ def perform(stage, names: list[str], table) -> None:
                 continue
             status.update(f"{name} ({i + 1} of {len(names)})")
             result = CASES[name](stage)
-            if stage.ctx is not None:
-                stage.ctx.__enter__()  # a case may have made other contexts current
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)
             failed = sum(f.verdict == "FAILS" for f in result.findings)

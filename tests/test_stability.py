@@ -115,7 +115,9 @@ def shivering(renderer, image, i):
 )
 def test_the_case_fails_where_the_renderer_does(stage, name, spoil):
     if name == "life":
-        result = CASES[name](Stage(None, None, stage.model, SIZE, spoiled_reopen, rounds=2))
+        result = CASES[name](
+            Stage(stage.renderer, None, stage.model, SIZE, spoiled_reopen, rounds=2)
+        )
     else:
         spoiled = Spoiled(stage.renderer, spoil)
         result = CASES[name](make_stage(spoiled, None, reopen))

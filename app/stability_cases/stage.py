@@ -75,6 +75,11 @@ class Stage:
         rgb = image[..., :3] + (1 - image[..., 3:]) * np.float32(self.background)
         return Panel(caption, rgb)
 
+    def make_current(self) -> None:
+        """Takes GL back after other contexts were made and closed."""
+        if self.ctx is not None:
+            self.ctx.__enter__()
+
     def cpu_ms(self, scene: Scene, view: View, count: int = 3) -> float:
         """Process time of a frame, the least of a few: other load on the machine only adds."""
         self.draw(scene, view)
