@@ -15,6 +15,7 @@ from renderer.settings import RenderSettings
 from runtime_models.model import AnchorModel, SplatLayers, Stop
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene, SceneObject
+from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
 
 SIZE = (40, 28)  # pixels: three tiles by two, none of them whole at the border
 NEAR = 0.5  # metres; the eye is at z = 3, so depth is exactly 3 - z
@@ -25,7 +26,7 @@ WILD_SCALE = 300.0
 WILD_PLACE = 4000.0  # with them a sigma passes layout.HALF_MAX pixels
 KINDS = (
     "row", "row", "row", "row", "row", "row", "rows", "rows", "network", "network", "bias",
-    "pose", "view", "settings", "x", "background",
+    "pose", "view", "settings", "x", "background", "selector",
 )  # fmt: skip
 
 
@@ -75,7 +76,7 @@ def make(seed: int) -> Poisoned:
     makers = {
         "row": spoil_rows, "rows": spoil_rows, "network": spoil_network, "bias": spoil_bias,
         "pose": spoil_pose, "view": spoil_view, "settings": spoil_settings, "x": spoil_x,
-        "background": spoil_background,
+        "background": spoil_background, "selector": spoil_selector,
     }  # fmt: skip
     made = makers[kind](start, rng)
     if rng.random() < 0.15 and kind != "view":
@@ -244,6 +245,39 @@ def spoil_x(made: Poisoned, rng: np.random.Generator) -> Poisoned:
     made.told += f"; x = {value!r}"
     model = small_model(5, 3) if rng.random() < 0.5 else made.objects[0].model
     made.objects = [SceneObject("cloud", model, x=value)]
+    made.exact = False
+    return made
+
+
+def spoil_selector(made: Poisoned, rng: np.random.Generator) -> Poisoned:
+    """A number of one of the regions that have an x of their own."""
+    model = small_model(6, 3) if rng.random() < 0.5 else made.objects[0].model
+    count = len(model.anchors) if isinstance(model, AnchorModel) else model.splat_count
+    fields = {
+        Sphere: {"centre": [0.1, 0, 0], "radius": [0.4]},
+        Box: {"centre": [0, 0.1, 0], "half": [0.5, 0.4, 0.3], "wxyz": [1, 0, 0, 0]},
+        HalfSpace: {"point": [0, 0, 0], "normal": [0, 1, 1]},
+        Lens: {"position": [0, 0, 3], "wxyz": [1, 0, 0, 0], "half_angle": [0.2]},
+        Painted: {"weight": [0.5] * count},
+    }
+    kinds = list(fields)
+    kind = kinds[rng.integers(len(kinds))]
+    numbers = {name: np.array(row, np.float64) for name, row in fields[kind].items()}
+    numbers |= {"x": np.array([0.7])} | ({} if kind is Painted else {"border": np.array([0.1])})
+    name = list(numbers)[rng.integers(len(numbers))]
+    value = value_for(rng)
+    if len(numbers[name]):
+        numbers[name][rng.integers(len(numbers[name])) if rng.random() < 0.7 else slice(None)] = (
+            value
+        )
+    made.told += f"; {kind.__name__} {name} = {value!r}"
+    single = {"radius", "half_angle", "x", "border"}
+    with np.errstate(over="ignore"):
+        made_of = {n: float(row[0]) if n in single else row for n, row in numbers.items()}
+        bad = kind(**made_of)
+    whole = Sphere(centre=(0.2, 0, 0), radius=0.3, x=0.2, border=0.1)
+    selectors = (whole, bad) if rng.random() < 0.5 else (bad,)
+    made.objects = [SceneObject("cloud", model, selectors=selectors)]
     made.exact = False
     return made
 
