@@ -3,6 +3,9 @@
 Same life as renderer/tiles.py: allocate, decode what changed, place, draw.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from itertools import pairwise
 
@@ -106,6 +109,20 @@ class QuadsDrawing:
                     self._splatter.draw(arena, i, view.size, settings.min_alpha, row)
                     i += 1
         self._last = len(groups[-1]) - 1
+
+    @contextmanager
+    def order_set_aside(self) -> Iterator[None]:
+        """Whatever the body does to the order, afterwards it is the one that was in use before."""
+        arena, cadence = self._arena, copy(self._cadence)
+        now = (self.sorts, self.order_age, self._changed)
+        kept = [(buffer, buffer.read()) for buffer in (arena.order, arena.command)]
+        try:
+            yield
+        finally:
+            for buffer, data in kept:
+                buffer.write(data)
+            self._cadence = cadence
+            self.sorts, self.order_age, self._changed = now
 
     def _median_distance(self, eye_from_world: np.ndarray) -> float:
         """Metres from an eye to the median splat, from a sample of those that are there."""

@@ -18,6 +18,7 @@ from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.model import AnchorModel, SplatLayers
+from scene.metrics import psnr
 from scene.pose import View
 from scene.scene import Scene, SceneObject
 
@@ -240,6 +241,23 @@ class Renderer:
                 self._resolve.copy(pixels, framebuffer)
             else:
                 self._resolve.draw(image, framebuffer, background, palette, weight)
+
+    def stale_order_db(self, views: list[View]) -> float:
+        """PSNR of the order in use against one sorted for these views: what keeping it costs, dB.
+
+        Of the worst view; inf where no pixel differs.  The order in use and its age stay as they
+        are; image(i) is the picture in that order afterwards.
+        """
+        self._decode_colors(views)
+        settings = replace(self._settings_of_frame(), debug="")
+        views = [scaled(view, settings.render_scale) for view in views]
+        pictures = []
+        for frames in (1, 0):  # sorted now, then the order that is kept
+            once = replace(settings, resort_frames=frames, resort_degrees=0.0)
+            with self._framebuffer_kept(), self._drawing.order_set_aside():
+                self._drawing.draw(views, once, PassTimer(self._ctx))
+                pictures.append([self.image(i)[..., :3].copy() for i in range(len(views))])
+        return min(psnr(kept, exact) for exact, kept in zip(*pictures, strict=True))
 
     @contextmanager
     def _framebuffer_kept(self) -> Iterator[None]:

@@ -3,6 +3,9 @@
 Same life as renderer/quads.py: allocate, decode what changed, place, draw.  No GL here.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -186,6 +189,18 @@ class TilesDrawing:
             bin_tiles(self.device, projected, view.size, order=order)
             for projected, view, order in zip(self._projected, views, orders, strict=True)
         ]
+
+    @contextmanager
+    def order_set_aside(self) -> Iterator[None]:
+        """Whatever the body does to the order, afterwards it is the one that was in use before."""
+        names = ("_orders", "sorts", "order_age", "_changed")
+        kept, cadence = [getattr(self, name) for name in names], copy(self._cadence)
+        try:
+            yield
+        finally:
+            self._cadence = cadence
+            for name, value in zip(names, kept, strict=True):
+                setattr(self, name, value)
 
     def _median_distance(self, eye_from_world: np.ndarray) -> float:
         """Metres from an eye to the median splat, from a sample of those that are there."""

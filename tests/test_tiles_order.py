@@ -199,3 +199,28 @@ def test_closing_gives_the_memory_back():
     del image
     pool.free_held()
     assert pool.managed_bytes <= before + 10_000
+
+
+@pytest.mark.parametrize("order", ["depth", "distance"])
+def test_the_price_of_a_stale_order_is_told_and_paid_by_no_frame(renderer, order):
+    scene, views = two_objects(3000), [orbit(0), orbit(25)]
+    told = film(renderer, scene, views, order=order, resort_frames=0)
+    kept, counts = renderer.image().copy(), renderer._drawing.counts()
+    exact = reference_image(scene, views[1], RenderSettings(order=order))
+    db = renderer.stale_order_db([views[1]])
+    assert db == pytest.approx(psnr_db(kept[..., :3], exact[..., :3]), abs=0.05)
+    assert 15 < db < 45
+    np.testing.assert_array_equal(renderer.image(), kept)
+    assert renderer._drawing.counts() == counts
+    after = renderer.draw([views[1]])
+    assert (told[1].order_age, after.sorts, after.order_age) == (1, 0, 2)
+    np.testing.assert_array_equal(renderer.image(), kept)
+    assert renderer.stale_order_db([views[0]]) == np.inf, "the view it was sorted for"
+
+
+def test_a_sorted_frame_has_no_price(renderer):
+    film(renderer, two_objects(500), [orbit(0)])
+    assert renderer.stale_order_db([orbit(40)]) == np.inf
+    stereo = stereo_views((64, 48))
+    film(renderer, two_objects(500), [stereo])
+    assert renderer.stale_order_db(stereo) == np.inf
