@@ -68,10 +68,6 @@ class Arena:
         self.histogram = gpu.reserve(4 * layout.RADIX * sort_groups)
         self.counts = gpu.reserve(4 * layout.COUNTS_SIZE)
         self.command = gpu.upload(np.array([0, 1, 0, 0, 0], np.uint32))
-        corners = np.array([0, 1, 2, 2, 1, 3], np.uint32)
-        quads = np.arange(n, dtype=np.uint32)[:, None] * 4 + corners  # (N, 6)
-        self.quads = gpu.ctx.buffer(quads if n else corners)  # an index buffer: no block limit
-        gpu.allocations += 1
         fit = min(STAGED_SPLATS, gpu.max_block // (4 * STAGED_FLOATS))
         self.staged = min(max(counts, default=0), fit)
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
@@ -145,7 +141,7 @@ class Arena:
         for buffer in (
             self.mean_opacity, self.covariance, self.color, self.records,
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
-            self.command, self.quads, self.staging,
+            self.command, self.staging,
         ):  # fmt: skip
             buffer.release()
 

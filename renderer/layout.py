@@ -29,7 +29,7 @@ SLOTS = {
     "ORDER_IN": 1,
     "ORDER_OUT": 2,
     "HISTOGRAM": 3,  # uint (groups, RADIX)
-    "COMMAND": 4,  # uint (5,)      one indexed indirect draw
+    "COMMAND": 4,  # uint (5,)      one indirect draw
     # splat
     "ORDER": 1,  # uint (N,)      indices, near to far
     # decode
@@ -42,6 +42,9 @@ SLOTS = {
     "LAYER": 4,  # uint (n,)      which layer a plain splat is of
     "LAYER_WEIGHTS": 5,  # float          how much of each layer there is
     "OWN_OPACITY": 6,  # float (n,)     before the weight
+    "CONTROL": 6,  # float (A,)     a control value an anchor
+    "PALETTE": 3,  # vec4 (256,)    display sRGB
+    "TINT": 4,  # float (A,)     how much of the palette
 }
 WEIGHTS_BLOCK = 0  # uniform block
 

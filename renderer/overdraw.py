@@ -25,15 +25,15 @@ def count_overdraw(
     program = gpu.program("overdraw.vert", "overdraw.frag")
     program["size"].value, program["min_alpha"].value = view.size, settings.min_alpha
     target = gpu.target(view.size, "f4")
-    quads = gpu.ctx.vertex_array(program, [], index_buffer=arena.quads, index_element_size=4)
+    triangles = gpu.ctx.vertex_array(program, [])
     bind(records=arena.records, keys=arena.keys)
     with gpu.drawing_into(target):
         target.clear(0.0, 0.0, 0.0, 0.0)
         gpu.ctx.enable_only(moderngl.BLEND)
         gpu.ctx.blend_func = (moderngl.ONE, moderngl.ONE)
-        quads.render(moderngl.TRIANGLES, vertices=6 * arena.count)
+        triangles.render(moderngl.TRIANGLES, vertices=3 * arena.count)
     texture = target.color_attachments[0]
     number = np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)[::-1, :, 0]
-    for made in (quads, target, texture):
+    for made in (triangles, target, texture):
         made.release()
     return np.ascontiguousarray(number)

@@ -19,8 +19,8 @@ class Splatter:
         self._gpu = gpu
         self._program = gpu.program("splat.vert", "splat.frag")
         self._targets: dict[int, moderngl.Framebuffer] = {}
-        self._quads: moderngl.VertexArray | None = None
-        self._quads_of: Arena | None = None
+        # No attributes and no indices: the shader pulls what it draws from the arena.
+        self._triangles = gpu.ctx.vertex_array(self._program, [])
 
     def draw(
         self, arena: Arena, i: int, size: tuple[int, int], min_alpha: float, row: int = 0
@@ -33,9 +33,9 @@ class Splatter:
         with self._gpu.drawing_into(target):
             target.clear(0.0, 0.0, 0.0, 0.0)
             if arena.count:
-                self._draw_quads(arena, size, min_alpha, row * arena.count)
+                self._draw_triangles(arena, size, min_alpha, row * arena.count)
 
-    def _draw_quads(
+    def _draw_triangles(
         self, arena: Arena, size: tuple[int, int], min_alpha: float, first: int
     ) -> None:
         ctx = self._gpu.ctx
@@ -45,7 +45,7 @@ class Splatter:
         self._program["size"].value = size
         self._program["min_alpha"].value = min_alpha
         self._program["first"].value = first
-        self._vertex_array(arena).render_indirect(arena.command, moderngl.TRIANGLES, count=1)
+        self._triangles.render_indirect(arena.command, moderngl.TRIANGLES, count=1)
         ctx.memory_barrier()  # the next view's project overwrites what this draw still reads
 
     def texture(self, i: int) -> moderngl.Texture:
@@ -71,24 +71,11 @@ class Splatter:
         self._targets[i] = made
         return made
 
-    def _vertex_array(self, arena: Arena) -> moderngl.VertexArray:
-        """No attributes: an index buffer alone; the shader pulls what it draws from the arena."""
-        if self._quads_of is not arena:
-            if self._quads is not None:
-                self._quads.release()
-            self._quads = self._gpu.ctx.vertex_array(
-                self._program, [], index_buffer=arena.quads, index_element_size=4
-            )
-            self._quads_of = arena
-        return self._quads
-
     def release(self) -> None:
         for target in self._targets.values():
             _release_target(target)
         self._targets.clear()
-        if self._quads is not None:
-            self._quads.release()
-        self._quads = self._quads_of = None
+        self._triangles.release()
 
     def __enter__(self) -> "Splatter":
         return self

@@ -1,9 +1,9 @@
-// draw_command: how many splats are in the order -> the indexed indirect draw of their quads.
+// draw_command: how many splats are in the order -> the indirect draw of their triangles.
 layout(local_size_x = 1) in;
 
 layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
 layout(std430, binding = SLOT_COMMAND) writeonly buffer Command { uint command[]; };
 
 void main() {
-    command[0] = 6u * counts[COUNT_SORTED];  // indices: two triangles a splat; the rest stays 1 0 0 0
+    command[0] = 3u * counts[COUNT_SORTED];  // vertices: a triangle a splat; the rest stays 1 0 0
 }

@@ -1,5 +1,6 @@
-// overdraw: the quads of splat.vert in the order of the splats, for adding up instead of blending.
+// overdraw: the triangles of splat.vert in the order of the splats, for adding up instead of blending.
 #include "common/record.glsl"
+#include "common/triangle.glsl"
 
 layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
 layout(std430, binding = SLOT_KEYS) readonly buffer Keys { uint keys[]; };
@@ -9,9 +10,9 @@ out vec2 sigmas;  // place in the ellipse's own axes
 flat out float opacity;
 
 void main() {
-    uint i = uint(gl_VertexID) >> 2, corner = uint(gl_VertexID) & 3u;  // four corners a quad
+    uint i = uint(gl_VertexID) / 3u, corner = uint(gl_VertexID) % 3u;
     Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
-    sigmas = e.cut * vec2((corner & 1u) != 0u ? 1.0 : -1.0, (corner & 2u) != 0u ? 1.0 : -1.0);
+    sigmas = e.cut * TRIANGLE[corner];
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
     opacity = e.opacity;
     bool culled = keys[i] == CULLED_KEY;  // nobody wrote its record

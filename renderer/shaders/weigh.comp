@@ -1,4 +1,5 @@
 // weigh: opacity of plain splats = their own times how much of their layer there is.
+// Needs: OWN_CONTROL (1: each has a control value of its own, so a weight of its own).
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) buffer MeanOpacity { vec4 mean_opacity[]; };
@@ -11,5 +12,10 @@ uniform uint start;  // arena row of the first
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (!(i < count)) return;
-    mean_opacity[start + i].w = own_opacity[i] * layer_weights[layer[i]];
+#if OWN_CONTROL
+    float there = layer_weights[i];
+#else
+    float there = layer_weights[layer[i]];
+#endif
+    mean_opacity[start + i].w = own_opacity[i] * there;
 }

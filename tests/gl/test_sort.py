@@ -52,7 +52,7 @@ def test_32_bits_equal_the_stable_argsort(gpu, n, backend):
             expected = np.argsort(keys, kind="stable")
             np.testing.assert_array_equal(read(arena.order, np.uint32), expected, name)
             drawn = np.count_nonzero(keys != layout.CULLED_KEY)
-            assert read(arena.command, np.uint32).tolist() == [6 * drawn, 1, 0, 0, 0]
+            assert read(arena.command, np.uint32).tolist() == [3 * drawn, 1, 0, 0, 0]
 
 
 @pytest.mark.parametrize("backend", ["gl", "numpy"])

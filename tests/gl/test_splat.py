@@ -198,7 +198,7 @@ def test_what_is_not_a_number_never_reaches_the_target(gpu):
             image = splatter.image(0)
             assert np.isfinite(image).all()
             np.testing.assert_allclose(image[32, 32, 3], 0.5, atol=2e-2)
-            assert read(arena.command, np.uint32)[0] == 6
+            assert read(arena.command, np.uint32)[0] == 3
 
 
 def test_views_have_images_of_their_own_and_change_size(gpu):
