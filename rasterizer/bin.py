@@ -62,7 +62,10 @@ def bin_tiles(
 
 
 def sort_order(device: Device, found: Found) -> "Array":
-    """(n,) int32: the splats that project_arena entered, by their keys, stable."""
+    """(n,) int32: the splats that project_arena entered, by their keys, stable.
+
+    Once a projection: the first pass of the sort turns found.table into places to write to.
+    """
     status = device.view(found.status)
     visible = int(status[:, 0].sum(dtype=np.int64))
     kernels = device.program(KERNELS / "bin.cl")
