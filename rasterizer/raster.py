@@ -77,19 +77,34 @@ def rasterize_rgba_views(
 ) -> list[np.ndarray]:
     """What rasterize_rgba gives, of several views of the same size."""
     width, height = size
-    file, group, _ = FORMS[form or device.kind]
-    kernel = device.program(file, RGBA=1)["rasterize"]
-    images = []
-    for projected, tiles in views:
-        number = tiles.grid[0] * tiles.grid[1]
-        image, ends = device.empty((height, width, 4)), device.empty(number, np.int32)
-        device.launch(
-            kernel, number * group, group,
-            width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
-            0.0, 0.0, 0.0, image, None, ends,
-        )  # fmt: skip
-        images.append(image)
+    images = [device.empty((height, width, 4)) for _ in views]
+    inputs = [
+        (tiles.starts, tiles.instances, projected.record, image)
+        for (projected, tiles), image in zip(views, images, strict=True)
+    ]
+    draw_views = {"cpu": _draw_cpu, "gpu": _draw_gpu}[form or device.kind]
+    if views:
+        draw_views(device, inputs, size, views[0][1].grid)
     return [device.view(image) for image in images]
+
+
+def _draw_cpu(device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int]) -> None:
+    """Two views a launch, a work-item a tile of both."""
+    kernel = device.program(KERNELS / "draw_cpu.cl")["draw"]
+    for first in range(0, len(inputs), 2):
+        left, right = [*inputs[first : first + 2], [None] * 4][:2]
+        device.launch(kernel, grid[0] * grid[1], 1, *size, grid[0], *left, *right)
+
+
+def _draw_gpu(device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int]) -> None:
+    file, group, _ = FORMS["gpu"]
+    kernel = device.program(file, RGBA=1)["rasterize"]
+    ends = device.empty(grid[0] * grid[1], np.int32)
+    for starts, instances, record, image in inputs:
+        device.launch(
+            kernel, grid[0] * grid[1] * group, group,
+            *size, grid[0], starts, instances, record, 0.0, 0.0, 0.0, image, None, ends,
+        )  # fmt: skip
 
 
 def rasterize_backward(

@@ -1,4 +1,5 @@
-// raster, CPU form: one work-item a tile of 16x16 pixels, kept in registers and the first cache.
+// raster, CPU form, for training (draw_cpu.cl is for the screen): one work-item a tile of 16x16
+// pixels, kept in registers and the first cache.
 // A block is eight pixels, BLOCK_W x BLOCK_H, one vector.  Columns of blocks are numbered first
 // down, then right, so that a column's blocks are neighbouring bits of a mask.
 // Reads: tile_start (tiles + 1), instances, record.  Early stop: blocks whose transmittance is
@@ -15,11 +16,7 @@
 #define SHIFT_W 2                // log2 of BLOCK_W and BLOCK_H
 #define SHIFT_H 1
 #define BATCH 32
-#ifdef RGBA
-#define STOP 1e-4f  // as 3DGS; cannot be seen
-#else
 #define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
-#endif
 #define HALF_LOG2E 0.72134752044f
 
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
@@ -136,14 +133,10 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
       if (x >= width || y >= height) continue;
       const size_t at = (size_t)y * width + x;
-#ifdef RGBA  // premultiplied, alpha last, for drawing
-      vstore4((float4)(r[lane], g[lane], b[lane], 1 - a[lane]), at, image);
-#else
       image[at] = r[lane];
       image[at + plane] = g[lane];
       image[at + 2 * plane] = b[lane];
       transmittance[at] = a[lane];
-#endif
     }
   }
 }

@@ -1,0 +1,211 @@
+// draw, CPU form of rasterize for the screen alone: no gradients, premultiplied RGBA, several views.
+// One work-item a tile of 16x16 pixels; a block is 4x4 of them, one vector of sixteen floats.
+// Instances are taken in batches.  Per batch every block gets the bits of the splats whose ellipse
+// reaches it, and walks them with its pixels in registers: one unforeseen branch a block and batch,
+// not one a splat, and nothing of a pixel is read or written in between.
+#include "common/vector.cl"
+#include "common/tiles.cl"
+#define SIDE 4     // pixels of a block, and blocks of a tile
+#define BLOCKS 16  // bits of a ushort
+#define BATCH 32   // bits of a uint
+#define HALF_LOG2E 0.72134752044f
+#ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
+#define PREFETCH(address) __builtin_prefetch(address)
+#else
+#define PREFETCH(address)
+#endif
+// A pixel whose transmittance is below this is done: an eighth of a step of 8 bits.
+#define STOP (1.0f / 2048)
+
+#define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
+                         0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
+#define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
+                         2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
+
+typedef struct {
+  float splats[BATCH * RECORD];  // conic and cut times -log2(e) / 2: exponents of 2
+  uint takers[BLOCKS];           // per block: bit j where it takes splat j
+} Batch;
+
+// 2^x as in vector.cl, with a relative error of 2.6e-6: minimax of degree 4.
+inline float16 exp2_16(float16 x) {
+  const float16 shifted = x + 12582912.0f;
+  const float16 f = x - (shifted - 12582912.0f);
+  float16 p = 9.570096662e-3f;
+  p = fma(p, f, (float16)(5.591785991e-2f));
+  p = fma(p, f, (float16)(2.402474496e-1f));
+  p = fma(p, f, (float16)(6.931218148e-1f));
+  p = fma(p, f, (float16)(9.999992614e-1f));
+  return as_float16(as_int16(p) + (as_int16(shifted) << 23));
+}
+
+// Sixteen words of sixteen bits, turned: bit j of word k becomes bit k of word j.
+inline ushort16 turn_bits(ushort16 a) {
+  ushort16 other = a.s89abcdef01234567, low, high;
+  low = (a & (ushort16)0x00ff) | other << (ushort16)8;
+  high = (a & (ushort16)0xff00) | other >> (ushort16)8;
+  a = (ushort16)(low.lo, high.hi);
+  other = a.s45670123cdef89ab;
+  low = (a & (ushort16)0x0f0f) | (other & (ushort16)0x0f0f) << (ushort16)4;
+  high = (a & (ushort16)0xf0f0) | (other & (ushort16)0xf0f0) >> (ushort16)4;
+  a = (ushort16)(low.s0123, high.s4567, low.s89ab, high.scdef);
+  other = a.s23016745ab89efcd;
+  low = (a & (ushort16)0x3333) | (other & (ushort16)0x3333) << (ushort16)2;
+  high = (a & (ushort16)0xcccc) | (other & (ushort16)0xcccc) >> (ushort16)2;
+  a = (ushort16)(low.s01, high.s23, low.s45, high.s67, low.s89, high.sab, low.scd, high.sef);
+  other = a.s1032547698badcfe;
+  low = (a & (ushort16)0x5555) | (other & (ushort16)0x5555) << (ushort16)1;
+  high = (a & (ushort16)0xaaaa) | (other & (ushort16)0xaaaa) >> (ushort16)1;
+  return (ushort16)(low.s0, high.s1, low.s2, high.s3, low.s4, high.s5, low.s6, high.s7, low.s8,
+                    high.s9, low.sa, high.sb, low.sc, high.sd, low.se, high.sf);
+}
+
+// Columns of eight ellipses; x and y of the mean from the centre of the tile's first pixel.
+typedef struct {
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], cut[BATCH];
+} Columns;
+
+// Bit SIDE row + column of each block that the ellipse reaches, for eight splats from 8 g on: in
+// every row of blocks the interval of x, as in places_of_eight.cl.
+inline ushort8 blocks_of_eight(const Columns* e, int g, float x0, float y0) {
+  const float8 x = vload8(g, e->x) - x0, y = vload8(g, e->y) - y0;
+  const float8 a = vload8(g, e->a), b = vload8(g, e->b), cut = vload8(g, e->cut);
+  const float8 ey = vload8(g, e->half_y);
+  const float8 per_a = 1.0f / a, tilt = -b * per_a;
+  const float8 lean = -b / vload8(g, e->c) * vload8(g, e->half_x);
+  // 1.0001: float rounding must not lose a pixel.
+  const float8 most = 1.0001f * cut * per_a, per_yy = cut / fmax(ey * ey, FLT_MIN) * per_a;
+  float8 top = -y;
+  uint8 mask = 0;
+  for (int row = 0; row < SIDE; row++) {
+    const float8 bottom = top + (SIDE - 1);
+    const float8 up = fmin(fmax(lean, top), bottom), down = fmin(fmax(-lean, top), bottom);
+    const float8 right_x = x + tilt * up + sqrt(fmax(most - up * up * per_yy, 0.0f));
+    const float8 left_x = x + tilt * down - sqrt(fmax(most - down * down * per_yy, 0.0f));
+    const int8 right = convert_int8(floor(fmin(fmax(right_x, -1.0f), TILE - 1.0f))) >> 2;
+    const int8 left = convert_int8(ceil(fmin(fmax(left_x, 0.0f), (float)TILE))) >> 2;
+    const uint8 until = ((uint8)1 << as_uint8(right + 1)) - 1u;
+    const uint8 before = ((uint8)1 << as_uint8(left)) - 1u;
+    const int8 meets = (top <= ey) & (bottom >= -ey);
+    mask |= (until & ~before & as_uint8(meets)) << (uint8)(SIDE * row);
+    top += SIDE;
+  }
+  return convert_ushort8(mask);
+}
+
+// Fills a batch from the list [p, end) and returns how many it got.
+inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
+                 __global const float* record, Batch* batch) {
+  const int n = min(BATCH, end - p), ahead = min(BATCH, end - p - n);
+  for (int j = 0; j < ahead; j++) {  // of the next batch: the drawing of this one hides the misses
+    __global const float* from = record + (size_t)RECORD * instances[p + n + j];
+    PREFETCH(from);
+    PREFETCH(from + RECORD - 1);
+  }
+  Columns e;
+  const float h = -HALF_LOG2E;
+  for (int j = 0; j < n; j++) {
+    __global const float* from = record + (size_t)RECORD * instances[p + j];
+    const float8 s = vload8(0, from);
+    const float4 t = vload4(0, from + 8);
+    e.x[j] = s.s0;
+    e.y[j] = s.s1;
+    e.a[j] = s.s2;
+    e.b[j] = s.s3;
+    e.c[j] = s.s4;
+    e.half_x[j] = t.s1;
+    e.half_y[j] = t.s2;
+    e.cut[j] = t.s3;
+    vstore8(s * (float8)(1, 1, h, 2 * h, h, 1, 1, 1), 0, batch->splats + RECORD * j);
+    vstore4(t * (float4)(1, 1, 1, h), 0, batch->splats + RECORD * j + 8);
+  }
+  ushort blocks[BATCH];
+  for (int g = 0; g * LANES < n; g++)
+    vstore8(blocks_of_eight(&e, g, x0 + 0.5f, y0 + 0.5f), g, blocks);
+  uint16 takers = convert_uint16(turn_bits(vload16(0, blocks)));
+  if (n > 16) takers |= convert_uint16(turn_bits(vload16(1, blocks))) << (uint16)16;
+  vstore16(takers & (0xffffffffu >> (BATCH - n)), 0, batch->takers);
+  return n;
+}
+
+// Pixels of a block, (4 rows) of (4 pixels) of rgba, to the image.
+inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int y0, int width,
+                        int height, __global float* image) {
+  float rows[16 * SIDE];
+#define ROW(i, p, q, u, v)                                                                   \
+  vstore16((float16)(r.p, g.p, b.p, a.p, r.q, g.q, b.q, a.q, r.u, g.u, b.u, a.u, r.v, g.v, b.v, \
+                     a.v), i, rows)
+  ROW(0, s0, s1, s2, s3);
+  ROW(1, s4, s5, s6, s7);
+  ROW(2, s8, s9, sa, sb);
+  ROW(3, sc, sd, se, sf);
+#undef ROW
+  const int columns = min(SIDE, width - x0);
+  for (int i = 0; i < SIDE && y0 + i < height; i++) {
+    __global float* to = image + 4 * ((size_t)(y0 + i) * width + x0);
+    if (columns == SIDE)
+      vstore16(vload16(i, rows), 0, to);
+    else
+      for (int j = 0; j < columns; j++) vstore4(vload4(SIDE * i + j, rows), j, to);
+  }
+}
+
+inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
+                      __global const int* instances, __global const float* record,
+                      __global float* image) {
+  const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+  float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
+  for (int k = 0; k < BLOCKS; k++) {
+    const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
+    const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
+    // Pixels outside the image are done from the start.
+    const int16 inside = isless(x, (float16)(width)) & isless(y, (float16)(height));
+    T[k] = select((float16)(0), (float16)(1), inside);
+    R[k] = G[k] = B[k] = 0;
+  }
+  Batch batch;
+  uint open = 0xffff;
+  const int end = tile_start[tile + 1];
+  for (int p = tile_start[tile]; p < end && open;) {
+    p += fetch(p, end, x0, y0, instances, record, &batch);
+    for (int k = 0; k < BLOCKS; k++) {
+      uint left = open >> k & 1 ? batch.takers[k] : 0;
+      if (!left) continue;
+      const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
+      const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
+      float16 t = T[k], r = R[k], g = G[k], b = B[k];
+      for (; left; left &= left - 1) {
+        const float* s = batch.splats + RECORD * popcount(~left & (left - 1));  // lowest bit's
+        const float16 dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
+        const float16 power =
+            fma(dx, fma(s[CONIC_A], dx, s[CONIC_B] * dy), s[CONIC_C] * dy * dy);
+        const float16 alpha = fmin(s[OPACITY] * exp2_16(power), MAX_ALPHA);
+        const float16 w = select((float16)(0), alpha, power >= s[CUT]) * t;
+        r = fma(w, s[RED], r);
+        g = fma(w, s[GREEN], g);
+        b = fma(w, s[BLUE], b);
+        t -= w;
+      }
+      T[k] = t;
+      R[k] = r;
+      G[k] = g;
+      B[k] = b;
+      if (!(max8(fmax(t.lo, t.hi)) >= STOP)) open &= ~(1u << k);
+    }
+  }
+  for (int k = 0; k < BLOCKS; k++)
+    store_block(R[k], G[k], B[k], 1 - T[k], x0 + k % SIDE * SIDE, y0 + k / SIDE * SIDE, width,
+                height, image);
+}
+
+// One view, or the same tile of two views one after the other.
+__kernel void draw(int width, int height, int tiles_x, __global const int* starts_0,
+                   __global const int* instances_0, __global const float* record_0,
+                   __global float* image_0, __global const int* starts_1,
+                   __global const int* instances_1, __global const float* record_1,
+                   __global float* image_1) {
+  const int tile = get_global_id(0);
+  draw_tile(tile, width, height, tiles_x, starts_0, instances_0, record_0, image_0);
+  if (image_1)
+    draw_tile(tile, width, height, tiles_x, starts_1, instances_1, record_1, image_1);
+}
