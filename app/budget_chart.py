@@ -7,12 +7,16 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import median
+from typing import TYPE_CHECKING
 
 from app.budget import Budget, Choice, choose
 from app.chart_rows import write_text
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from runtime_models.model import AnchorModel, SplatLayers
+
+if TYPE_CHECKING:
+    from app.chart_measure import ChartRow, Pricing
 
 FORMAT = 1  # of the stored file, and of what the measure means: others are measured again
 FRAMES, SWEEP = 6, 3
@@ -105,8 +109,22 @@ def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
             priced = [(pricing.settings(named), pricing.row(named, False)) for named in work]
     finally:
         renderer.settings = kept
-    base = median(row.exact_ms for _, row in priced)  # a moment of load slows one row, not all
+    return budget_rows_of(priced)
+
+
+def budget_rows_of(priced: Sequence[tuple[RenderSettings, "ChartRow"]]) -> list[BudgetRow]:
+    """Rows as a budget takes them: a moment of load slows one row's ms, not its ratio."""
+    base = median(row.exact_ms for _, row in priced)
     return [BudgetRow(row.name, settings, row.ratio * base, row.db) for settings, row in priced]
+
+
+def keep_chart(pricing: "Pricing", renderer: Renderer, ctx, drawn: Drawn, rows: Sequence) -> None:
+    """Keeps a whole chart's rows of one eye in place of the quick one that would be measured."""
+    from app.chart_settings import settings_of
+
+    named = {each.name: each for each in settings_of(pricing.drawing, eyes=1)}
+    priced = [(pricing.settings(named[row.name]), row) for row in rows if row.name in named]
+    store_rows(stored_path(renderer, ctx, drawn), budget_rows_of(priced))
 
 
 def store_rows(path: Path, rows: Sequence[BudgetRow]) -> None:

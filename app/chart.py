@@ -89,6 +89,7 @@ def read_views(options: Options, size: tuple[int, int]) -> list:
 
 
 def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[int, int]) -> int:
+    from app.budget_chart import Drawn, keep_chart
     from app.chart_measure import ChartRow, Pricing, open_pair
     from app.chart_picture import draw_chart
     from app.chart_rows import RowsFile
@@ -107,6 +108,9 @@ def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[
         head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
         file = RowsFile(options.out / "rows.csv", ChartRow, head)
         measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
+        if len(models) == 1 and not (options.quick or cameras):
+            drawn = Drawn(models[0], x, size)
+            keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
     title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
     front = draw_chart(file.rows, title, options.out)
     print_front(front, len(file.rows), options.out)

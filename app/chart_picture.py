@@ -9,6 +9,7 @@ from app.chart_measure import ChartRow
 from app.pareto import pareto_front
 
 WIDTH, HEIGHTS, DPI = 8.3, (4.6, 3.4), 200  # inches: a README shows it 830 pixels wide
+SAME_SPEED = 0.02  # of the exact setting's: less than this is no difference
 TOP_DB = 100.0  # drawn here: equal, or so near that nothing can tell them apart
 FAMILIES = {  # name -> (colour, fields that belong to it)
     "order": ("#0072b2", ("key_bits", "order", "resort_frames", "resort_degrees", "stereo_sort")),
@@ -68,7 +69,9 @@ def _place(row: ChartRow) -> tuple[float, float]:
 def _panel(axis, rows: list[ChartRow], title: str) -> list[ChartRow]:
     """Dots, front and axes; returns the rows of the front, most alike first."""
     drawn = [row for row in rows if row.db == row.db and row.ratio > 0]
-    front = [drawn[i] for i in pareto_front([_place(row) for row in drawn])][::-1]
+    # The same speed within what a measurement can tell: then the row that stands first, exact.
+    alike = [(round(x / SAME_SPEED), y) for x, y in map(_place, drawn)]
+    front = [drawn[i] for i in pareto_front(alike)][::-1]
     axis.plot(*zip(*map(_place, front), strict=True), color=FRONT, lw=1.4, zorder=1)
     for name, (color, _) in FAMILIES.items():
         mine = [row for row in drawn if family(row.changes) == name]

@@ -184,7 +184,7 @@ def make_row(name=EXACT, eyes=1, ratio=1.0, db=MOST_DB, changes=""):
 def test_every_member_of_the_front_is_named_and_no_names_overlap(tmp_path):
     """Also where they crowd: 12 members within a few percent, as measured charts have them."""
     rng = np.random.default_rng(3)
-    speed, db = np.sort(rng.uniform(1.0, 1.2, 12)), np.sort(rng.uniform(30, 90, 12))[::-1]
+    speed, db = np.linspace(1.03, 1.27, 12), np.sort(rng.uniform(30, 90, 12))[::-1]
     rows = [make_row()] + [
         make_row(f"sort 1°, colours 2°, {i} px", ratio=1 / s, db=d, changes="key_bits=16")
         for i, (s, d) in enumerate(zip(speed, db, strict=True))
@@ -207,6 +207,14 @@ def test_every_member_of_the_front_is_named_and_no_names_overlap(tmp_path):
         assert frame.x0 <= box.x0 and box.x1 <= frame.x1 and frame.y0 <= box.y0 <= frame.y1
 
 
+def test_a_speed_that_no_measurement_can_tell_is_no_gain(tmp_path):
+    """1 % faster and equal: the exact setting stays on the front, named; 3 % faster beats it."""
+    near, faster = make_row("a", ratio=1 / 1.009), make_row("b", ratio=1 / 1.03)
+    assert [row.name for row in draw_chart([make_row(), near], "a title", tmp_path)] == [EXACT]
+    told = [row.name for row in draw_chart([make_row(), near, faster], "a title", tmp_path)]
+    assert told == ["b"]
+
+
 def test_rows_with_nan_are_not_drawn_as_good(tmp_path):
     rows = [make_row(), make_row("broken", ratio=0.1, db=float("nan"), changes="fade=1")]
     assert [row.name for row in draw_chart(rows, "a title", tmp_path)] == [EXACT]
@@ -217,6 +225,25 @@ def test_families_of_the_whole_table():
     assert seen >= {"", "order", "culls", "colour", "target and scale", "several of them"}
     assert family("target=rgba16f min_pixels=2") == "culls"
     assert family("target=rgba16f") == "target and scale"
+
+
+def test_a_whole_chart_is_what_a_budget_finds(package, tmp_path, monkeypatch):
+    """Every row of one eye is kept for --target-ms, which then measures nothing."""
+    from app import budget_chart
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    words = ["chart", str(package), "--out", str(tmp_path / "out"), "--size", "40x30",
+             "--drawing", "tiles", "--context", "none", "--frames", "2"]  # fmt: skip
+    assert cli.main(words) == 0
+    _, rows = read_table(tmp_path / "out" / "rows.csv")
+    assert [row["name"] for row in rows] == [named.name for named in settings_of("tiles")]
+    (stored,) = (tmp_path / "cache" / "shapeshift" / "charts").iterdir()
+    names = [row.name for row in budget_chart.read_rows(stored)]
+    assert names == [named.name for named in settings_of("tiles", eyes=1)]
+    monkeypatch.setattr(budget_chart, "measure", None)  # calling it would fail
+    words = ["render", str(package), "--out", str(tmp_path / "pictures"), "--size", "40x30",
+             "--drawing", "tiles", "--context", "none", "--target-ms", "1e6"]  # fmt: skip
+    assert cli.main(words) == 0
 
 
 def test_scenes_stand_side_by_side():
