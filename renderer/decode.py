@@ -6,7 +6,7 @@ from renderer.buffers import Arena
 from renderer.gpu import Gpu
 from renderer.layers import Layers
 from renderer.networks import Networks
-from runtime_models.evaluate import Evaluator
+from runtime_models.evaluate import Control, Evaluator
 from runtime_models.model import AnchorModel, SplatLayers
 
 MLPS = ("gl", "onnxruntime")
@@ -41,15 +41,15 @@ class Decoder:
             if isinstance(on_gpu, Layers):
                 on_gpu.place(arena, i)
 
-    def geometry(self, i: int, x: float) -> None:
-        """Means, covariances and opacities of object i at control value x."""
+    def geometry(self, i: int, x: Control) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
             arena.write_geometry(i, *model.geometry(x))
         else:
             model.geometry(arena, arena.starts[i], x)
 
-    def color(self, i: int, x: float, eye: np.ndarray, seen: np.ndarray | None = None) -> None:
+    def color(self, i: int, x: Control, eye: np.ndarray, seen: np.ndarray | None = None) -> None:
         """Colours of object i at x towards an eye (3,) in the object's frame; after geometry.
 
         seen: (A,) bool; the rest may keep what it has (compute passes colour all at once).

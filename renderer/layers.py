@@ -1,10 +1,12 @@
 """SplatLayers on the GPU: opacity weighed by x, harmonics to colour; no CPU work a view."""
 
+import moderngl
 import numpy as np
 
 from renderer import layout
 from renderer.buffers import Arena, bind
 from renderer.gpu import Gpu, groups_for
+from runtime_models.evaluate import Control
 from runtime_models.model import SplatLayers
 
 SH_ALIGN = 64  # splats; keeps parts of the coefficients to whole work groups
@@ -15,7 +17,8 @@ class Layers:
 
     def __init__(self, gpu: Gpu, model: SplatLayers) -> None:
         self._gpu, self._model = gpu, model
-        self._weigh = gpu.compute("weigh.comp")
+        self._weigh = gpu.compute("weigh.comp", OWN_CONTROL=0)
+        self._own_weights: moderngl.Buffer | None = None  # (N,), made when splats differ in x
         self._shade = gpu.compute("shade_sh.comp")
         count, coefficients, _ = model.sh.shape
         self._coefficients = coefficients
@@ -36,14 +39,22 @@ class Layers:
         model = self._model
         arena.write_geometry(i, model.means, model.scales, model.wxyz, model.opacity)
 
-    def geometry(self, arena: Arena, start: int, x: float) -> None:
-        """Opacities of the layers that there are at x -> rows start... of the arena."""
-        count = self._model.splat_count
-        self._weights.write(self._model.weights(x))
+    def geometry(self, arena: Arena, start: int, x: Control) -> None:
+        """Opacities of the layers that there are at x, or at (N,) one a splat -> rows start..."""
+        model = self._model
+        program, weights = self._weigh, self._weights
+        if np.ndim(x) == 0:
+            weights.write(model.weights(x))
+        else:
+            program = self._gpu.compute("weigh.comp", OWN_CONTROL=1)
+            if self._own_weights is None:
+                self._own_weights = self._gpu.reserve(4 * model.splat_count, "weights")
+            weights = self._own_weights
+            weights.write(model.weights(x)[model.layer, np.arange(model.splat_count)])
         bind(mean_opacity=arena.mean_opacity, layer=self._layer)
-        bind(layer_weights=self._weights, own_opacity=self._opacity)
-        groups = groups_for(count, layout.WORKGROUP)
-        self._gpu.run(self._weigh, groups, count=count, start=start)
+        bind(layer_weights=weights, own_opacity=self._opacity)
+        groups = groups_for(model.splat_count, layout.WORKGROUP)
+        self._gpu.run(program, groups, count=model.splat_count, start=start)
 
     def color(self, arena: Arena, start: int, eye: np.ndarray) -> None:
         """Colours towards an eye (3,) in the object's frame -> rows start... of the arena."""
@@ -57,7 +68,8 @@ class Layers:
             )  # fmt: skip
 
     def release(self) -> None:
-        for buffer in (self._opacity, self._layer, self._weights):
-            buffer.release()
+        for buffer in (self._opacity, self._layer, self._weights, self._own_weights):
+            if buffer is not None:
+                buffer.release()
         for _, _, buffer in self._parts:
             buffer.release()

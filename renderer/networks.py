@@ -9,6 +9,7 @@ import numpy as np
 from renderer import layout
 from renderer.buffers import PARTS, Arena, bind
 from renderer.gpu import Gpu, groups_for
+from runtime_models.evaluate import Control
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")  # their numbers in activation.glsl
@@ -47,8 +48,10 @@ class PackedMlp:
         return 16 * self.layers
 
 
-def pack_mlp(mlp: Mlp, features: int, d: int) -> PackedMlp:
-    """Pads and orders one network; its inputs become features, then direction; Psi is cut out."""
+def pack_mlp(mlp: Mlp, features: int, d: int, own_control: bool = False) -> PackedMlp:
+    """Pads and orders one network; its inputs become features, then direction; Psi is cut out, or
+    comes third with `own_control`.
+    """
     width_of = {"feature": features, "direction": DIRECTION, "control": d}
     at = np.cumsum([0, *(width_of[part] for part in mlp.inputs)])
     columns = {part: slice(at[i], at[i + 1]) for i, part in enumerate(mlp.inputs)}
@@ -65,6 +68,8 @@ def pack_mlp(mlp: Mlp, features: int, d: int) -> PackedMlp:
         seen[:, -4:-1] = first[:, columns["direction"]]
     control = first[:, columns["control"]] if "control" in columns else np.zeros((len(first), d))
 
+    if own_control:
+        seen = np.concatenate([seen, control], axis=1)
     weights = [seen, *(np.asarray(w, np.float64) for w in mlp.weights[1:])]
     header = np.zeros((len(weights), 4))
     parts = [header]
@@ -100,10 +105,12 @@ class Networks:
         rows[:, :features] = model.features
         self._anchors = gpu.upload(anchors, "the model's anchors")
         self._features = gpu.upload(rows, "the model's features")
-        self._heads = {name: self._prepare(name, model.networks[name]) for name in HEADS}
+        self._heads = {name: self._prepare(name) for name in HEADS}
+        self._own: dict[str, _Head] = {}  # for a control value an anchor, made when there is one
+        self._control: moderngl.Buffer | None = None  # of these values
 
-    def _prepare(self, name: str, mlp: Mlp) -> "_Head":
-        model, gpu = self._model, self._gpu
+    def _prepare(self, name: str, own_control: bool = False) -> "_Head":
+        model, gpu, mlp = self._model, self._gpu, self._model.networks[name]
         if name != "color" and "direction" in mlp.inputs:
             raise ValueError(f"the {name} network takes the view direction; only color may.")
         wanted = model.splats_per_anchor * SIZE_PER_SPLAT[name]
@@ -112,7 +119,7 @@ class Networks:
                 f"the {name} network gives {mlp.width_out} numbers an anchor, but "
                 f"{model.splats_per_anchor} splats take {wanted}; write one of the two anew."
             )
-        packed = pack_mlp(mlp, model.features.shape[1], len(model.encoding.encode(0.0)))
+        packed = pack_mlp(mlp, model.features.shape[1], model.encoding.d, own_control)
         block = min(gpu.max_uniforms, 65536)
         stored = packed.rows.nbytes > block
         if stored:
@@ -126,25 +133,42 @@ class Networks:
             weights.write(packed.rows)
         size = max(LEAST_VECS, 1 << (packed.widest - 1).bit_length())
         program = gpu.compute(
-            "decode_mlp.comp", LAYER_VECS=size, BLOCK_VECS=block // 16, STORED_WEIGHTS=int(stored)
-        )
+            "decode_mlp.comp", LAYER_VECS=size, BLOCK_VECS=block // 16, STORED_WEIGHTS=int(stored),
+            OWN_CONTROL=int(own_control),
+        )  # fmt: skip
         return _Head(name, mlp, packed, weights, stored, program)
 
-    def geometry(self, arena: Arena, start: int, x: float) -> None:
+    def _heads_for(self, x: Control) -> dict[str, "_Head"]:
+        """The networks, ready for a control value or for (A,) of them, one an anchor."""
+        if np.ndim(x) == 0:
+            for head in self._heads.values():
+                head.set_control(self._model, float(x))
+            return self._heads
+        if self._control is None:
+            self._own = {name: self._prepare(name, own_control=True) for name in HEADS}
+            self._control = self._gpu.reserve(4 * len(self._model.anchors), "control values")
+        encoding = self._model.encoding
+        for head in self._own.values():  # models share programs
+            head.program["control_vecs"].value = vecs(encoding.d)
+            head.program["spacing"].value = encoding.spacing
+            head.program["sigma"].value = encoding.sigma
+        self._control.write(np.ascontiguousarray(x, np.float32))
+        return self._own
+
+    def geometry(self, arena: Arena, start: int, x: Control) -> None:
         """Four networks at control x -> rows start... of the arena."""
+        heads = self._heads_for(x)
         k, count = self._model.splats_per_anchor, len(self._model.anchors)
         at_once = arena.staged // k  # anchors
         for first in range(0, count, at_once):
             n = min(at_once, count - first)
             for name, size in PARTS.items():
-                self._heads[name].set_control(self._model, x)
-                self._run(self._heads[name], arena.staging, arena.staging_at(name), size, first, n)
+                self._run(heads[name], arena.staging, arena.staging_at(name), size, first, n)
             arena.pack_staged(start + first * k, n * k, self._anchors, first)
 
-    def color(self, arena: Arena, start: int, x: float, eye: np.ndarray) -> None:
+    def color(self, arena: Arena, start: int, x: Control, eye: np.ndarray) -> None:
         """The colour network at x towards an eye (3,) in the object's frame -> rows start..."""
-        head = self._heads["color"]
-        head.set_control(self._model, x)
+        head = self._heads_for(x)["color"]
         head.program["eye"].value = tuple(float(v) for v in eye)
         self._run(head, arena.color, 4 * start, 4, 0, len(self._model.anchors))
 
@@ -153,6 +177,8 @@ class Networks:
     ) -> None:
         """Anchors first... through one network; splat j's numbers go to base + stride * j."""
         bind(anchors=self._anchors, features=self._features, output=output)
+        if self._control is not None:
+            bind(control=self._control)
         if head.stored:
             bind(weights=head.weights)
         else:
@@ -167,8 +193,10 @@ class Networks:
         )  # fmt: skip
 
     def release(self) -> None:
-        for head in self._heads.values():
+        for head in (*self._heads.values(), *self._own.values()):
             head.weights.release()
+        if self._control is not None:
+            self._control.release()
         self._anchors.release()
         self._features.release()
 

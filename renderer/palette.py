@@ -1,5 +1,6 @@
 """Palettes of thermal stops, and how much of a palette the control value asks for."""
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -47,24 +48,32 @@ def palette_colors(name: str) -> np.ndarray:
 
 
 def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
-    """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop.
+    """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop, or
+    has a selector that is: what a legend tells.
 
     The weight is 1 at a thermal stop and falls to 0 at the next stop that is not thermal.
     Name "" (the stop's colours are final) and weight 0: nothing to do.
     """
     best: tuple[str, float, Stop | None] = ("", 0.0, None)
     for thing in scene.objects:
-        stops = sorted(thing.model.stops, key=lambda s: s.x)
-        if not thing.visible or not any(s.kind == "thermal" for s in stops):
-            continue
-        hats = np.array(
-            [np.interp(thing.x, [s.x for s in stops], hat) for hat in np.eye(len(stops))]
-        )
-        thermal = hats * [s.kind == "thermal" for s in stops]
-        weight, stop = float(thermal.sum()), stops[int(np.argmax(thermal))]
-        if weight > best[1]:
-            best = (stop.palette, min(weight, 1.0), stop)
+        for x in (thing.x, *(selector.x for selector in thing.selectors)) if thing.visible else ():
+            weights, stop = thermal_weights(thing.model.stops, np.array([x]))
+            if stop is not None and weights[0] > best[1]:
+                best = (stop.palette, float(weights[0]), stop)
     return best
+
+
+def thermal_weights(stops: Sequence[Stop], x: np.ndarray) -> tuple[np.ndarray, Stop | None]:
+    """(n,) 0..1: how much of a palette each of the control values x (n,) asks for; and the thermal
+    stop that is nearest to most of them, None where no stop is thermal.
+    """
+    stops = sorted(stops, key=lambda s: s.x)
+    thermal = [stop for stop in stops if stop.kind == "thermal"]
+    if not thermal or not len(x):
+        return np.zeros(len(x)), None
+    hats = [np.interp(x, [s.x for s in stops], [s is t for s in stops]) for t in thermal]
+    nearest = thermal[int(np.argmax(np.sum(hats, axis=1)))]
+    return np.minimum(np.sum(hats, axis=0), 1.0), nearest
 
 
 def apply_palette(rgba: np.ndarray, name: str, weight: float) -> np.ndarray:

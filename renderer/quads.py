@@ -23,6 +23,8 @@ from renderer.settings import RenderSettings
 from renderer.sort import Sorter
 from renderer.splat import Splatter
 from renderer.timing import PassTimer
+from renderer.tint import Tinter
+from runtime_models.evaluate import Control
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import View
 
@@ -43,6 +45,7 @@ class QuadsDrawing:
         self._cadence = Cadence()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
         self._last = 0  # row of the counts of the view drawn last
+        self._tinter: Tinter | None = None  # made when a part alone shows a thermal stop
         self._arena: Arena | None = None
         self._decoder: Decoder | None = None
 
@@ -58,19 +61,27 @@ class QuadsDrawing:
         self._arena = Arena(self._gpu, [model.splat_count for model in models])
         self._decoder = Decoder(self._gpu, self._arena, models, self.backends["mlps"])
 
-    def decode_geometry(self, i: int, x: float) -> None:
-        """Means, covariances and opacities of object i at control value x."""
+    def decode_geometry(self, i: int, x: Control) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
         self._changed = True
         self._decoder.geometry(i, x)
 
     def decode_color(
-        self, i: int, x: float, eye_object: np.ndarray, seen: np.ndarray | None = None
+        self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None
     ) -> None:
         """Colours of object i at x, towards an eye (3,) in the object's frame.
 
         seen: (A,) bool, one an anchor: the rest may keep what it has.
         """
         self._decoder.color(i, x, eye_object, seen)
+
+    def tint(self, i: int, palette: np.ndarray, weights: np.ndarray) -> None:
+        """Mixes the colours of object i, just decoded, towards a palette (256, 3) by luminance;
+        weights (A,) 0..1, one an anchor (a splat of layers).
+        """
+        if self._tinter is None:
+            self._tinter = Tinter(self._gpu)
+        self._tinter.tint(self._arena, i, palette, weights)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
@@ -166,8 +177,9 @@ class QuadsDrawing:
 
     def close(self) -> None:
         self._release_arena()
-        for part in (self._splatter, self._sorter, self._projector):
-            part.release()
+        for part in (self._splatter, self._sorter, self._projector, self._tinter):
+            if part is not None:
+                part.release()
 
     def _release_arena(self) -> None:
         for part in (self._decoder, self._arena):

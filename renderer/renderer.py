@@ -10,14 +10,16 @@ import numpy as np
 
 from renderer.context import is_software
 from renderer.debug import debug_image, opaque, prepare_debug
+from renderer.false_colors import FalseColors, Tint, false_colors, same_tint
 from renderer.gpu import Gpu
-from renderer.palette import apply_palette, palette_colors, thermal_blend
+from renderer.palette import apply_palette, palette_colors
 from renderer.recolor import Colored, centre_of, color_key, reach_of, seen_anchors
 from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.model import AnchorModel, SplatLayers
+from scene.control import control_key, control_of
 from scene.metrics import psnr
 from scene.pose import View
 from scene.scene import Scene, SceneObject
@@ -32,7 +34,10 @@ class _Decoded:
 
     model: AnchorModel | SplatLayers
     colored: Colored
-    x: float | None = None  # control value of its geometry; None: not decoded yet
+    key: tuple | None = None  # control_key of x; None: not decoded yet
+    x: float | np.ndarray = 0.0  # control value of its geometry, or (A,) one an anchor
+    version: int = 0  # goes up with every other x
+    tint: Tint | None = None  # false colours of its own; None: as decoded
 
 
 class Renderer:
@@ -71,6 +76,8 @@ class Renderer:
         self._timer = PassTimer(ctx)
         self._scene = Scene(())
         self._decoded: list[_Decoded] = []
+        self._false_key: list | None = None  # what the next was chosen for
+        self._false_colors = FalseColors()
         self._drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
         self._sizes: list[tuple[int, int]] = []  # of the views of the last frame
@@ -92,18 +99,39 @@ class Renderer:
             if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
                 self._rebuild(scene)
             for i, (thing, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
-                if thing.visible and decoded.x != thing.x:
-                    self._drawing.decode_geometry(i, thing.x)
-                    decoded.x = thing.x
-                    self._geometry_runs += 1
+                if thing.visible and decoded.key != (key := control_key(thing)):
+                    self._decode_geometry(i, decoded, control_of(thing))
+                    decoded.key = key
+            self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
         self._drawing.place(poses)
         self._scene = scene
 
+    def _decode_geometry(self, i: int, decoded: _Decoded, x: float | np.ndarray) -> None:
+        """Geometry of object i at x, unless it lies in the arena already."""
+        if decoded.key is not None and np.array_equal(x, decoded.x):
+            return  # a selector changed where nothing is
+        self._drawing.decode_geometry(i, x)
+        decoded.x = x
+        decoded.version += 1
+        self._geometry_runs += 1
+
+    def _choose_false_colors(self, scene: Scene) -> None:
+        """Palettes for the picture or for single splats, as the control values ask for."""
+        state = [(d.version, o.visible) for d, o in zip(self._decoded, scene.objects, strict=True)]
+        if state == self._false_key:
+            return
+        self._false_key = state
+        self._false_colors = false_colors(scene, [decoded.x for decoded in self._decoded])
+        tints = self._false_colors.tints or [None] * len(self._decoded)
+        for decoded, tint in zip(self._decoded, tints, strict=True):
+            if not same_tint(tint, decoded.tint):
+                decoded.tint, decoded.colored.key = tint, None
+
     def _rebuild(self, scene: Scene) -> None:
         """A new arena for another set of objects; an empty one if the set does not fit."""
         models = [o.model for o in scene.objects]
-        self._scene, self._decoded = Scene(()), []
+        self._scene, self._decoded, self._false_key = Scene(()), [], None
         try:
             self._drawing.allocate(models)
         except ValueError:
@@ -169,9 +197,9 @@ class Renderer:
                 colored = decoded.colored
                 object_from_world = np.linalg.inv(thing.world_from_object.matrix())
                 eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
-                key = color_key(thing.model, thing.x, eye)
+                key = color_key(thing.model, decoded.version, eye)
                 stale = colored.is_stale(key, degrees)
-                wanted = self._wanted_anchors(i, thing, colored, stale, views)
+                wanted = self._wanted_anchors(i, thing, decoded, stale, views)
                 if stale:
                     colored.key = key
                     colored.anchors = wanted
@@ -179,23 +207,27 @@ class Renderer:
                     continue  # all that is seen has its colours
                 else:
                     colored.anchors |= wanted
-                self._drawing.decode_color(i, thing.x, eye, wanted)
+                self._drawing.decode_color(i, decoded.x, eye, wanted)
+                if decoded.tint is not None:
+                    palette = palette_colors(decoded.tint.name)
+                    self._drawing.tint(i, palette, decoded.tint.weights)
                 self._color_runs += 1
 
     def _wanted_anchors(
-        self, i: int, thing: SceneObject, colored: Colored, stale: bool, views: list[View]
+        self, i: int, thing: SceneObject, decoded: _Decoded, stale: bool, views: list[View]
     ) -> np.ndarray | None:
         """(A,) bool: the anchors that views see and whose colours are stale; None: all.
 
         Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
         """
+        colored = decoded.colored
         if not self.settings.skip_unseen or isinstance(thing.model, SplatLayers):
             if stale or colored.anchors is None:
                 return None
             return ~colored.anchors  # left out before: now all are wanted
         if not stale and colored.anchors is None:
             return None
-        reach_key = (thing.x, self.settings.min_alpha)
+        reach_key = (decoded.version, self.settings.min_alpha)
         if colored.reach_key != reach_key:
             colored.reach, colored.reach_key = None, reach_key
             if stale:  # how far splats reach is worth knowing once x rests
@@ -222,7 +254,7 @@ class Renderer:
         """
         if self._debug:
             return bilinear(self._debug[i][0], self._sizes[i])
-        name, weight, _ = thermal_blend(self._scene)
+        name, weight = self._false_colors.name, self._false_colors.weight
         rgba = apply_palette(bilinear(self.image(i), self._sizes[i]), name, weight)
         return rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(self.settings.background)
 
@@ -230,7 +262,7 @@ class Renderer:
         """Fills a GL framebuffer with view i as resolved() shows it."""
         if self._resolve is None:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
-        name, weight, _ = thermal_blend(self._scene)
+        name, weight = self._false_colors.name, self._false_colors.weight
         palette = palette_colors(name) if name and not self._debug else None
         image = opaque(self._debug[i][0]) if self._debug else self._drawing.presentable(i)
         background = self.settings.background

@@ -20,10 +20,11 @@ from rasterizer.quantize_keys import quantize_keys
 from rasterizer.raster import rasterize_rgba_views
 from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
+from rasterizer.tint import tint
 from renderer.cadence import Cadence
 from renderer.settings import RenderSettings
 from renderer.timing import PassTimer
-from runtime_models.evaluate import Evaluator
+from runtime_models.evaluate import Control, Evaluator
 from runtime_models.model import AnchorModel, SplatLayers
 from scene.pose import OPENCV_FROM_EYE, View
 
@@ -87,8 +88,8 @@ class TilesDrawing:
             for start, count, model in zip(starts, counts, models, strict=False)
         ]
 
-    def decode_geometry(self, i: int, x: float) -> None:
-        """Means, covariances and opacities of object i at control value x."""
+    def decode_geometry(self, i: int, x: Control) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
         slot = self._slots[i]
         self._changed = True
         splats = slot.evaluator.geometry(x)
@@ -99,7 +100,7 @@ class TilesDrawing:
         slot.placed = slot.sh is not None
 
     def decode_color(
-        self, i: int, x: float, eye_object: np.ndarray, seen: np.ndarray | None = None
+        self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None
     ) -> None:
         """Colours of object i at x, towards an eye (3,) in the object's frame.
 
@@ -114,6 +115,13 @@ class TilesDrawing:
         else:
             slot.colors = slot.evaluator.color(x, eye_object, seen, slot.colors)
             pack_color(self.device, slot.colors, slot.start, self._color)
+
+    def tint(self, i: int, palette: np.ndarray, weights: np.ndarray) -> None:
+        """Mixes the colours of object i, just decoded, towards a palette (256, 3) by luminance;
+        weights (A,) 0..1, one an anchor (a splat of layers).
+        """
+        slot = self._slots[i]
+        tint(self.device, palette, weights, slice(slot.start, slot.start + slot.count), self._color)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""

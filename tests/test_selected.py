@@ -1,0 +1,224 @@
+"""Scenes with selectors, drawn: against the oracle; decoded when something changed, then only."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rasterizer.device import NoDevice, open_device
+from rasterizer.tint import tint
+from renderer.false_colors import FalseColors, false_colors, tinted
+from renderer.palette import apply_palette, palette_colors, thermal_blend, thermal_weights
+from renderer.renderer import Renderer
+from runtime_models.evaluate import evaluate
+from runtime_models.model import Stop
+from scene.control import control_of
+from scene.pose import Pose
+from scene.scene import Scene, SceneObject
+from scene.selector import HalfSpace, Painted, Sphere
+from tests.splat_scenes import front_view, psnr_db, random_layers, random_model
+
+VIEW = front_view((160, 120))
+BALL = Sphere(centre=(0.2, 0, 0), radius=0.5, x=1.0, border=0.4)
+ASIDE = Pose(np.array([0.4, 0.1, 0]), np.array([0.8, 0, 0.6, 0]))
+STOPS = (Stop("RGB", 0.0), Stop("Hot", 0.5, "thermal", "ironbow"), Stop("Open", 1.0))
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    try:
+        with Renderer(None) as made:
+            yield made
+    except NoDevice as reason:
+        pytest.skip(str(reason))
+
+
+def scene_of(model, **changes) -> Scene:
+    return Scene((SceneObject("thing", model, **changes),))
+
+
+def drawn(renderer, scene) -> np.ndarray:
+    renderer.update(scene)
+    renderer.draw([VIEW])
+    return renderer.image().copy()
+
+
+@pytest.mark.parametrize("model", [random_model(400), random_layers(400, layers=2)], ids=["A", "N"])
+def test_the_arena_holds_what_the_plain_networks_give_at_every_control_value(renderer, model):
+    scene = scene_of(model, x=0.3, selectors=(BALL,))
+    drawn(renderer, scene)
+    x = control_of(scene.objects[0])
+    assert np.ndim(x) == 1 and len(np.unique(x)) > 10
+    wanted = evaluate(model, x, VIEW.world_from_eye.position)
+    mean_opacity = renderer._drawing.splat_points()[0]
+    color = renderer._drawing.device.download(renderer._drawing._color)
+    np.testing.assert_allclose(mean_opacity[:, :3], wanted.means, atol=1e-5)
+    np.testing.assert_allclose(mean_opacity[:, 3], wanted.opacity, atol=1e-5)
+    np.testing.assert_allclose(color[:, :3], wanted.color, atol=2e-5)
+
+
+def test_all_selected_is_the_picture_of_that_value(renderer):
+    model = random_model(300)
+    everywhere = HalfSpace(point=(0, 99, 0), normal=(0, 1, 0), x=0.75)
+    got = drawn(renderer, scene_of(model, selectors=(everywhere,)))
+    np.testing.assert_array_equal(got, drawn(renderer, scene_of(model, x=0.75)))
+    nowhere = replace(everywhere, point=(0, -99, 0))
+    got = drawn(renderer, scene_of(model, x=0.25, selectors=(nowhere,)))
+    np.testing.assert_array_equal(got, drawn(renderer, scene_of(model, x=0.25)))
+
+
+def runs(renderer, scene) -> tuple[int, int]:
+    renderer.update(scene)
+    stats = renderer.draw([VIEW])
+    return stats.geometry_runs, stats.color_runs
+
+
+def test_decoded_when_something_changed_and_only_then(renderer):
+    model = random_model(100)
+    scene = scene_of(model, selectors=(BALL,))
+    assert runs(renderer, scene) == (1, 1)
+    again = scene_of(model, selectors=(Sphere(**vars(BALL)),))
+    assert runs(renderer, again) == (0, 0), "equal, and another object"
+    assert runs(renderer, scene_of(model, selectors=(replace(BALL, border=0.3),))) == (1, 1)
+    moved = scene_of(model, selectors=(replace(BALL, border=0.3),), world_from_object=ASIDE)
+    assert runs(renderer, moved)[0] == 0, "it moves with its object"
+    in_world = (replace(BALL, border=0.3, space="world"),)
+    assert runs(renderer, scene_of(model, selectors=in_world))[0] == 0, "the same anchors"
+    assert runs(renderer, scene_of(model, selectors=in_world, world_from_object=ASIDE)) == (1, 1)
+    assert runs(renderer, scene_of(model, selectors=in_world, world_from_object=ASIDE)) == (0, 0)
+    assert runs(renderer, scene_of(model, world_from_object=ASIDE)) == (1, 1)
+    far = (Sphere(centre=(9, 9, 9), radius=1, x=1),)
+    assert runs(renderer, scene_of(model, world_from_object=ASIDE, selectors=far)) == (0, 0)
+
+
+def thermal(model):
+    return replace(model, stops=STOPS)
+
+
+def test_false_colours_are_the_pictures_where_all_is_alike():
+    model = thermal(random_model(20))
+    for x, weight in ((0.0, 0.0), (0.25, 0.5), (0.5, 1.0), (0.75, 0.5)):
+        found = false_colors(scene_of(model, x=x), [x])
+        assert found == FalseColors("ironbow" if weight else "", weight)
+    two = Scene((SceneObject("a", model, x=0.5), SceneObject("b", model, x=0.5)))
+    assert false_colors(two, [0.5, 0.5]) == FalseColors("ironbow", 1.0)
+    hidden = Scene((two.objects[0], replace(two.objects[1], x=0.0, visible=False)))
+    assert false_colors(hidden, [0.5, 0.0]) == FalseColors("ironbow", 1.0)
+    assert false_colors(Scene(()), []) == FalseColors()
+
+
+def test_false_colours_are_the_splats_where_parts_differ():
+    model, plain = thermal(random_model(20)), random_model(30)
+    x = np.linspace(0, 1, 20, dtype=np.float32)
+    found = false_colors(scene_of(model), [x])
+    assert found.name == "" and found.tints[0].name == "ironbow"
+    np.testing.assert_allclose(found.tints[0].weights, 1 - np.abs(x - 0.5) * 2, atol=1e-6)
+    two = Scene((SceneObject("a", model, x=0.5), SceneObject("b", plain, x=0.5)))
+    found = false_colors(two, [0.5, 0.5])
+    assert found.name == "" and found.tints[1] is None and (found.tints[0].weights == 1).all()
+
+
+def test_a_legend_tells_of_a_selector_too():
+    model = thermal(random_model(20))
+    ball = replace(BALL, x=0.4)
+    name, weight, stop = thermal_blend(scene_of(model, selectors=(ball,)))
+    assert (name, stop.name) == ("ironbow", "Hot") and weight == pytest.approx(0.8)
+    assert thermal_weights((), np.zeros(3))[1] is None
+
+
+@pytest.mark.parametrize(("anchors", "k"), [(1, 1), (64, 1), (65, 3), (300, 10)])
+def test_tint_is_the_slow_twins(anchors, k):
+    try:
+        device = open_device()
+    except NoDevice as reason:
+        pytest.skip(str(reason))
+    rng = np.random.default_rng(anchors)
+    color = np.zeros((anchors * k + 5, 4), np.float32)
+    color[:, :3] = rng.uniform(-0.1, 1.3, (len(color), 3))
+    color[3, 0] = np.nan
+    weights = rng.uniform(0, 1, anchors).astype(np.float32)
+    weights[-1:] = 1
+    array = device.upload(color)
+    tint(device, palette_colors("turbo"), weights, slice(3, 3 + anchors * k), array)
+    got = device.download(array)
+    np.testing.assert_array_equal(got[[0, 1, 2, -2, -1]], color[[0, 1, 2, -2, -1]])
+    wanted = tinted(color[3:-2, :3], "turbo", np.repeat(weights, k))
+    np.testing.assert_allclose(got[3:-2, :3], wanted, atol=2e-6)
+
+
+def test_tinting_one_splat_equals_the_picture_in_false_colours():
+    color = np.random.default_rng(0).uniform(0, 1, (50, 3))
+    alpha = np.full((50, 1), 0.7)
+    picture = apply_palette(np.concatenate([color * alpha, alpha], 1)[None], "ironbow", 0.6)
+    splats = tinted(color, "ironbow", np.full(50, 0.6))
+    np.testing.assert_allclose(picture[0, :, :3], splats * alpha, atol=1e-12)
+
+
+def test_only_the_selected_part_is_in_false_colours(renderer):
+    model = thermal(random_model(300))
+    ball = Sphere(centre=(0, 0, 0), radius=0.4, x=0.5)
+    scene = scene_of(model, selectors=(ball,))
+    renderer.update(scene)
+    renderer.draw([VIEW])
+    picture = renderer.resolved()
+    inside = control_of(scene.objects[0]) == 0.5
+    splats = evaluate(model, control_of(scene.objects[0]), VIEW.world_from_eye.position)
+    expected = tinted(splats.color, "ironbow", np.repeat(inside, 10).astype(float))
+    color = renderer._drawing.device.download(renderer._drawing._color)[:, :3]
+    np.testing.assert_allclose(color, expected, atol=1e-5)
+    np.testing.assert_allclose(picture, renderer.image()[..., :3], atol=1e-6)  # on black
+    renderer.draw([front_view((160, 120), distance=3.0)])  # decoded again, and tinted again
+    color = renderer._drawing.device.download(renderer._drawing._color)[:, :3]
+    there = front_view((160, 120), distance=3.0).world_from_eye.position
+    again = evaluate(model, control_of(scene.objects[0]), there).color
+    weights = np.repeat(inside, 10).astype(float)
+    np.testing.assert_allclose(color, tinted(again, "ironbow", weights), atol=1e-5)
+    renderer.update(scene_of(model))
+    renderer.draw([VIEW])
+    color = renderer._drawing.device.download(renderer._drawing._color)[:, :3]
+    plain = evaluate(model, 0.0, VIEW.world_from_eye.position).color
+    np.testing.assert_allclose(color, plain, atol=1e-5)
+
+
+def test_skipping_the_unseen_never_tints_twice(renderer):
+    model = thermal(random_model(300))
+    scene = scene_of(model, selectors=(replace(BALL, x=0.5),))
+    views = [VIEW, front_view((160, 120), distance=3.0), VIEW, front_view((90, 20), distance=1.0)]
+    pictures = []
+    for skip in (True, False):
+        renderer.settings = replace(renderer.settings, skip_unseen=skip)
+        renderer.update(Scene(()))
+        renderer.update(scene)
+        for view in views:
+            renderer.draw([view])
+            pictures.append(renderer.image().copy())
+    for got, want in zip(pictures[:4], pictures[4:], strict=True):
+        np.testing.assert_array_equal(got, want)
+
+
+@pytest.mark.parametrize("name", ["offset", "scale", "rotation", "opacity", "color"])
+@pytest.mark.parametrize("selectors", [(), (BALL,)])
+def test_a_network_of_nan_is_culled_and_no_pixel_is_nan(renderer, name, selectors):
+    model = random_model(60)
+    head = model.networks[name]
+    broken = replace(head, weights=(*head.weights[:-1], np.full_like(head.weights[-1], np.nan)))
+    model = replace(model, networks=model.networks | {name: broken})
+    renderer.update(scene_of(model, x=0.4, selectors=selectors))
+    stats = renderer.draw([VIEW])
+    assert (
+        stats.drawn == 0 and not renderer.image().any() and np.isfinite(renderer.resolved()).all()
+    )
+
+
+def test_pictures_are_alike_whatever_draws(renderer):
+    """Against the same scene made of two models, each of one value."""
+    model = random_model(300)
+    inside = model.anchors[:, 0] < 0
+    scene = scene_of(model, x=0.2, selectors=(Painted(inside, 0.9),))
+    got = drawn(renderer, scene)
+    parts = [
+        replace(model, anchors=model.anchors[rows], features=model.features[rows])
+        for rows in (inside, ~inside)
+    ]
+    both = Scene((SceneObject("in", parts[0], x=0.9), SceneObject("out", parts[1], x=0.2)))
+    assert psnr_db(got, drawn(renderer, both)) > 80
