@@ -74,7 +74,7 @@ class Evaluator:
         """
         model = self.model
         places = model.means if isinstance(model, SplatLayers) else model.anchors
-        if seen is None:
+        if seen is None or seen.all():
             return self._color(x, slice(None), directions(places, eye))
         rows = np.flatnonzero(seen)
         out = np.zeros((model.splat_count, 3), np.float32) if out is None else out

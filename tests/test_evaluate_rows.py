@@ -68,7 +68,7 @@ def test_what_is_not_seen_keeps_its_colour(kind, share, per_anchor):
     whole = evaluator.color(x, EYE)
     kept = np.full_like(whole, -7)
     got = evaluator.color(x, EYE, seen, kept)
-    assert got is kept
+    assert (got is kept) == (share < 1), "all of them are as quick without picking rows"
     splats = np.repeat(seen, len(whole) // 77)
     np.testing.assert_allclose(got[splats], whole[splats], atol=1e-6)
     assert (got[~splats] == -7).all()

@@ -71,16 +71,20 @@ def decoded(renderer, monkeypatch) -> list[int]:
 def test_a_turning_head_colours_newcomers_alone(renderer, monkeypatch):
     model = random_model(800, seed=1)
     asked = decoded(renderer, monkeypatch)
-    moved = replace(looking(0), world_from_eye=look_at((0.2, 0.1, 2.1), (0.2, 0, 0)))
-    views = [looking(0), moved, moved, looking(0), looking(3), looking(3), looking(20)]
+    # Beside the cloud: less than half of it is seen, else all of it would be coloured.
+    first, moved = looking(30), looking(31)
+    moved = replace(
+        moved, world_from_eye=Pose(np.array([0.2, 0.1, 2.1]), moved.world_from_eye.wxyz)
+    )
+    views = [first, moved, moved, first, looking(32), looking(32), looking(27)]
     frames = film(renderer, model, views, skip_unseen=True)
     runs = [run for _, run in frames]
     assert runs[:4] == [1, 1, 0, 1] and runs[5] == 0
     assert asked[0] == -1, "how far splats reach is not known while x changes"
     assert 0 < asked[1] < 800 and 0 < asked[2] < 800, "an eye that moved: all that is seen"
     assert sum(asked[3:]) < 800, "a head that turned: what came into view"
-    assert film(renderer, model, [looking(20)])[0][1] == 1, "without skipping the rest follows"
-    assert film(renderer, model, [looking(20), looking(90)])[1][1] == 0
+    assert film(renderer, model, [looking(27)])[0][1] == 1, "without skipping the rest follows"
+    assert film(renderer, model, [looking(27), looking(90)])[1][1] == 0
 
 
 def test_layers_are_coloured_as_a_whole(renderer, monkeypatch):
@@ -139,7 +143,7 @@ def test_seen_anchors_hold_every_drawn_splat(renderer):
         seen = seen_anchors(model.anchors, reach, TURNED.matrix(), [view], settings)
         assert (seen | ~drawn).all()
         left_out += np.count_nonzero(~seen)
-    assert left_out > 40 * 100, "it must leave out something to be of use"
+    assert left_out > 40 * 60, "it must leave out something to be of use"
 
 
 def test_keys_are_equal_where_colours_are():
