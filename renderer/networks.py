@@ -1,6 +1,7 @@
 """An AnchorModel on the GPU: anchors and features pinned, its five networks as compute passes."""
 
 import logging
+import math
 from dataclasses import dataclass
 
 import moderngl
@@ -183,7 +184,7 @@ class Networks:
             bind(weights=head.weights)
         else:
             head.weights.bind_to_uniform_block(layout.WEIGHTS_BLOCK)
-        low, high = head.mlp.clip or (-layout.HUGE, layout.HUGE)
+        low, high = head.mlp.clip or (-math.inf, math.inf)
         self._gpu.run(
             head.program, groups_for(count, layout.DECODE_WORKGROUP),
             first=first, count=count, base=base, stride=stride, size=SIZE_PER_SPLAT[head.name],
