@@ -49,6 +49,10 @@ class Options:
     """Leave out splats smaller than this: from the centre to where they end, pixels."""
     fade: float = 0.0
     """Part of each of these limits over which splats fade, 0 to 1; 0: they end at once."""
+    select: tuple[str, ...] = ()
+    """Parts with a control value X of their own (a number or a stop's name), smooth over a border
+    in metres: sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border]
+    half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border]; a later one lies over an earlier one."""
     target_ms: float | None = None
     """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
     machine; measured once, in seconds, and kept."""
@@ -71,6 +75,7 @@ def run(options: Options) -> int:
     from app.errors import UsageError
     from runtime_models.read_scene import read_model
     from scene.framing import default_background
+    from scene.scene import SceneObject
 
     controls = parse_controls(options.x)
     size = parse_size(options.size) if options.size else None
@@ -84,10 +89,11 @@ def run(options: Options) -> int:
     check_one_of(options, budget)
     model = read_model(options.scene, options.mode)
     views = choose_views(options, model, size)
+    selectors = [choose_selectors(options.select, model, view) for view in views]
     count = len(controls) * len(views)
     if count > MOST_VALUES:
         raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
-    pairs = [(x, view) for x in controls for view in views]
+    pairs = [(x, i) for x in controls for i in range(len(views))]
     paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
     taken = [p for p in paths if p.exists()]
     if taken and not options.overwrite:
@@ -101,7 +107,8 @@ def run(options: Options) -> int:
         if budget:
             drawn = Drawn(model, controls[0], views[0].size, 1 + (options.stereo > 0))
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
-        draw_all(renderer, model, pairs, paths, options.stereo)
+        things = [SceneObject("scene", model, x=x, selectors=selectors[i]) for x, i in pairs]
+        draw_all(renderer, things, [views[i] for _, i in pairs], paths, options.stereo)
     print(f"{count} picture{'s' * (count > 1)} in {options.out}", file=sys.stderr)
     return 0
 
@@ -140,8 +147,19 @@ def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
     return read_cameras(options.camera, size)
 
 
-def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: float) -> None:
-    """A picture for each pair of x and view; two eyes side by side where they are apart."""
+def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
+    """The selectors that the texts of --select stand for; a lens looks along the view."""
+    from app.errors import UsageError
+    from scene.read_selector import read_selector
+
+    try:
+        return tuple(read_selector(text, model.stops, view.world_from_eye) for text in texts)
+    except ValueError as error:
+        raise UsageError(f"--select {error}") from None
+
+
+def draw_all(renderer, things: list, views: list, paths: list[Path], eye_distance: float) -> None:
+    """A picture of each thing from its view; two eyes side by side where they are apart."""
     import numpy as np
     from rich.console import Console
     from rich.progress import track
@@ -149,14 +167,14 @@ def draw_all(renderer, model, pairs: list, paths: list[Path], eye_distance: floa
     from app.drawing import save_png
     from app.picture_legend import with_legend
     from renderer.debug import debug_legend
-    from scene.scene import Scene, SceneObject
+    from scene.scene import Scene
     from scene.stereo import stereo_pair
 
     console = Console(stderr=True)
-    work = list(zip(pairs, paths, strict=True))
-    for (x, view), path in track(work, "drawing", console=console, transient=True):
-        renderer.update(Scene((SceneObject("scene", model, x=x),)))
-        views = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
-        stats = renderer.draw(views)
-        picture = np.concatenate([renderer.resolved(i) for i in range(len(views))], axis=1)
+    work = list(zip(things, views, paths, strict=True))
+    for thing, view, path in track(work, "drawing", console=console, transient=True):
+        renderer.update(Scene((thing,)))
+        eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
+        stats = renderer.draw(eyes)
+        picture = np.concatenate([renderer.resolved(i) for i in range(len(eyes))], axis=1)
         save_png(with_legend(picture, debug_legend(renderer.settings.debug, stats)), path)
