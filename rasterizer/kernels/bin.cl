@@ -2,6 +2,7 @@
 // A work-item owns a contiguous chunk of splats, counts into a table of its own, and scatters from
 // its row of the scanned table: parallel, stable, and the same list for any number of chunks.
 #include "common/places_of_eight.cl"
+#define AHEAD 24  // splats: the next places are fetched while these are counted
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
 // Per splat its tiles; per chunk the (splat, depth key) pairs of its visible splats, packed at the
@@ -115,6 +116,7 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
   for (int t = 0; t < bins; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
+    PREFETCH(places + order[min(i + AHEAD, last - 1)]);
     const uint2 place = places[order[i]];
     sorted_places[i] = place;  // side by side for the next pass
 #define VISIT(tile, touched) mine[tile] += touched

@@ -9,11 +9,6 @@
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
 #define HALF_LOG2E 0.72134752044f
-#ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
-#define PREFETCH(address) __builtin_prefetch(address)
-#else
-#define PREFETCH(address)
-#endif
 // A pixel whose transmittance is below this is done: an eighth of a step of 8 bits.
 #define STOP (1.0f / 2048)
 

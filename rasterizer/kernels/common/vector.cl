@@ -1,5 +1,10 @@
 // Vector rows of a CPU: LANES floats at once.  Defines: floatv, intv, exp2v, sum helpers.
 #define LANES 8
+#ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
+#define PREFETCH(address) __builtin_prefetch(address)
+#else
+#define PREFETCH(address)
+#endif
 
 // 2^x for the exponents that a splat's falloff has, [-126, 0.1]; relative error 1e-7.
 // Outside that range the bits are garbage but never a trap: mask them.
