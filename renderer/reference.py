@@ -8,6 +8,7 @@ from renderer import layout
 from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.evaluate import evaluate
 from runtime_models.rotation import normalize, rotation_matrices
+from scene.control import control_of
 from scene.pose import View
 from scene.scene import Scene, SceneObject
 
@@ -91,7 +92,7 @@ def gate_object(
     camera_from_object = camera_from_world @ world_from_object
     object_from_world = np.linalg.inv(world_from_object)
     eye_object = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
-    splats = evaluate(thing.model, thing.x, eye_object)
+    splats = evaluate(thing.model, control_of(thing), eye_object)
     means, scales, wxyz, opacity, color = (
         np.asarray(a, np.float64)
         for a in (splats.means, splats.scales, splats.wxyz, splats.opacity, splats.color)

@@ -278,7 +278,6 @@ def spoil_selector(made: Poisoned, rng: np.random.Generator) -> Poisoned:
     whole = Sphere(centre=(0.2, 0, 0), radius=0.3, x=0.2, border=0.1)
     selectors = (whole, bad) if rng.random() < 0.5 else (bad,)
     made.objects = [SceneObject("cloud", model, selectors=selectors)]
-    made.exact = False
     return made
 
 
