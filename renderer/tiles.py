@@ -92,7 +92,7 @@ class TilesDrawing:
         """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
         slot = self._slots[i]
         self._changed = True
-        splats = slot.evaluator.geometry(x)
+        splats = slot.evaluator.geometry(x, unit=False)
         if slot.placed:
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return

@@ -48,18 +48,25 @@ class Evaluator:
             for name, mlp in model.networks.items():
                 self._networks[name] = kind(name, mlp, model, threads)
 
-    def geometry(self, x: Control) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,) negative = absent."""
+    def geometry(
+        self, x: Control, unit: bool = True
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,) negative = absent.
+
+        unit False: quaternions of any length, for one who divides by it anyway.
+        """
         model = self.model
         if isinstance(model, SplatLayers):
             weights = model.weights(x)  # (stops,) or (stops, N)
             there = weights[model.layer] if np.ndim(x) == 0 else _own(weights, model.layer)
             return model.means, model.scales, model.wxyz, model.opacity * there
         means = self._run("offset", x)  # (A, k * 3), from the anchor
-        means += np.tile(model.anchors, model.splats_per_anchor)
-        scales, wxyz = self._run("scale", x), self._run("rotation", x)
+        per_anchor = means.reshape(len(means), model.splats_per_anchor, 3)  # a view
+        per_anchor += model.anchors[:, None]
+        scales, wxyz = self._run("scale", x), self._run("rotation", x).reshape(-1, 4)
         opacity = self._run("opacity", x).reshape(-1)
-        return means.reshape(-1, 3), scales.reshape(-1, 3), normalize(wxyz.reshape(-1, 4)), opacity
+        wxyz = normalize(wxyz) if unit else wxyz
+        return means.reshape(-1, 3), scales.reshape(-1, 3), wxyz, opacity
 
     def color(
         self,

@@ -73,3 +73,11 @@ def test_what_is_not_seen_keeps_its_colour(kind, share, per_anchor):
     np.testing.assert_allclose(got[splats], whole[splats], atol=1e-6)
     assert (got[~splats] == -7).all()
     np.testing.assert_array_equal(evaluator.color(x, EYE, seen)[~splats], 0)
+
+
+def test_quaternions_as_they_come_point_the_same_way():
+    evaluator = Evaluator(make_random_model(50, k=4))
+    unit, raw = evaluator.geometry(0.6)[2], evaluator.geometry(0.6, unit=False)[2]
+    length = np.linalg.norm(raw, axis=1, keepdims=True)
+    assert np.ptp(length) > 0.01
+    np.testing.assert_allclose(unit, raw / length, atol=1e-6)
