@@ -1,10 +1,11 @@
 """The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from renderer import layout
+from renderer.false_colors import false_colors, tinted
 from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.evaluate import evaluate
 from runtime_models.rotation import normalize, rotation_matrices
@@ -39,7 +40,7 @@ def reference_image(
     """
     settings = settings or RenderSettings()
     eye = view.world_from_eye.position if eye is None else eye
-    objects = [gate_object(o, view, settings, eye) for o in scene.objects if o.visible]
+    objects = tint_objects(scene, [gate_object(o, view, settings, eye) for o in scene.objects])
     if not objects:
         return np.zeros((view.size[1], view.size[0], 4))
     depth, place, *ellipses = (
@@ -49,6 +50,19 @@ def reference_image(
     key = np.linalg.norm(place - eye, axis=1) if settings.order == "distance" else depth
     order = np.argsort(key, kind="stable")
     return blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
+
+
+def tint_objects(scene: Scene, objects: list[Projected]) -> list[Projected]:
+    """The visible ones, each splat in false colours where objects or parts differ in x."""
+    tints = false_colors(scene, [control_of(thing) for thing in scene.objects]).tints
+    out = []
+    for i, (thing, found) in enumerate(zip(scene.objects, objects, strict=True)):
+        if tints and tints[i]:
+            per_anchor = len(found.color) // len(tints[i].weights)
+            weights = np.repeat(tints[i].weights.astype(np.float64), per_anchor)
+            found = replace(found, color=tinted(found.color, tints[i].name, weights))
+        out += [found] if thing.visible else []
+    return out
 
 
 def reference_reasons(

@@ -9,13 +9,14 @@ from rasterizer.device import NoDevice, open_device
 from rasterizer.tint import tint
 from renderer.false_colors import FalseColors, false_colors, tinted
 from renderer.palette import apply_palette, palette_colors, thermal_blend, thermal_weights
+from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from runtime_models.evaluate import evaluate
 from runtime_models.model import Stop
 from scene.control import control_of
 from scene.pose import Pose
 from scene.scene import Scene, SceneObject
-from scene.selector import HalfSpace, Painted, Sphere
+from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
 from tests.splat_scenes import front_view, psnr_db, random_layers, random_model
 
 VIEW = front_view((160, 120))
@@ -210,7 +211,7 @@ def test_a_network_of_nan_is_culled_and_no_pixel_is_nan(renderer, name, selector
     )
 
 
-def test_pictures_are_alike_whatever_draws(renderer):
+def test_two_values_are_two_objects(renderer):
     """Against the same scene made of two models, each of one value."""
     model = random_model(300)
     inside = model.anchors[:, 0] < 0
@@ -222,3 +223,22 @@ def test_pictures_are_alike_whatever_draws(renderer):
     ]
     both = Scene((SceneObject("in", parts[0], x=0.9), SceneObject("out", parts[1], x=0.2)))
     assert psnr_db(got, drawn(renderer, both)) > 80
+
+
+def selected_scene() -> Scene:
+    """Two thermal objects with several selectors, one of them in the world, and plain layers."""
+    selectors = (
+        replace(BALL, x=0.5, space="world"),
+        Box(centre=(-0.4, 0, 0), half=(0.3, 0.5, 0.4), wxyz=(0.8, 0, 0.6, 0), x=1.0, border=0.1),
+        Lens(position=(0, 0, 4), wxyz=(1, 0, 0, 0), half_angle=0.06, x=0.25, border=0.2),
+    )
+    return Scene((
+        SceneObject("a", thermal(random_model(150)), ASIDE, 0.1, selectors=selectors),
+        SceneObject("b", thermal(random_model(80, seed=1)), x=0.6),
+        SceneObject("c", random_layers(100, layers=2), x=0.2, selectors=selectors[1:]),
+    ))  # fmt: skip
+
+
+def test_the_picture_is_the_oracles(renderer):
+    scene = selected_scene()
+    assert psnr_db(drawn(renderer, scene), reference_image(scene, VIEW)) > 60

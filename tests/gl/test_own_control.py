@@ -11,12 +11,17 @@ from renderer.decode import Decoder
 from renderer.false_colors import tinted
 from renderer.gpu import Gpu
 from renderer.palette import palette_colors
+from renderer.reference import reference_image
+from renderer.renderer import Renderer
 from renderer.tint import Tinter
 from runtime_models.evaluate import directions
 from runtime_models.model import AnchorModel, ControlEncoding
 from runtime_models.rotation import covariance, normalize
+from scene.scene import Scene
 from tests.gl.conftest import make_layers, make_mlp, make_model, read
 from tests.models import run_in_numpy
+from tests.splat_scenes import psnr_db
+from tests.test_selected import VIEW, selected_scene
 
 EYE = np.array([0.3, -0.2, 2.0])
 BLOCK = layout.DECODE_WORKGROUP
@@ -158,3 +163,19 @@ def test_tint_is_the_slow_twins(gpu, anchors, k):
     np.testing.assert_allclose(
         got[3:-2], tinted(color, "ironbow", np.repeat(weights, k)), atol=2e-6
     )
+
+
+@pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])
+def test_quads_draw_the_oracles_picture(ctx, mlps):
+    scene = selected_scene()
+    with Renderer(ctx, "quads", mlps, target="rgba32f") as renderer:
+        renderer.update(scene)
+        renderer.draw([VIEW])
+        assert psnr_db(renderer.image(), reference_image(scene, VIEW)) > 60
+        made = renderer._drawing.allocations
+        for step in range(1, 4):
+            ball = replace(scene.objects[0].selectors[0], radius=0.5 + 0.05 * step)
+            things = (replace(scene.objects[0], selectors=(ball,)), *scene.objects[1:])
+            renderer.update(Scene(things))
+            renderer.draw([VIEW])
+        assert renderer._drawing.allocations == made, "a selector that moves allocates nothing"
