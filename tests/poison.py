@@ -79,10 +79,8 @@ def make(seed: int) -> Poisoned:
         "background": spoil_background, "selector": spoil_selector,
     }  # fmt: skip
     made = makers[kind](start, rng)
-    if rng.random() < 0.15 and kind != "view":
-        made.views = [replace(v, world_from_eye=eye_at(side)) for side in (-0.03, 0.03)
-                      for v in made.views[:1]]  # fmt: skip
-        made.exact = False  # colours are those of the centre
+    if rng.random() < 0.2 and kind != "view":
+        made.views = [eye_of(view, side, rng.random() < 0.5) for side in (-0.03, 0.03)]
     if not plain(made.settings):
         made.exact = False
     return made
@@ -102,8 +100,15 @@ def walk(made: Poisoned) -> list[list[View]]:
     return [made.views, aside, made.views]
 
 
-def eye_at(side: float) -> Pose:
-    return Pose(np.array([side, 0, EYE]), IDENTITY.wxyz)
+def eye_of(view: View, side: float, leaning: bool) -> View:
+    """The eye `side` metres to the right, its lens leaning outwards as in a headset or not."""
+    left, right, down, up = view.tangents
+    outwards = 0.15 * np.sign(side) if leaning else 0.0
+    return replace(
+        view,
+        world_from_eye=Pose(np.array([side, 0, EYE]), IDENTITY.wxyz),
+        tangents=(left + outwards, right + outwards, down, up),
+    )
 
 
 def cloud(rng: np.random.Generator) -> SplatLayers:
