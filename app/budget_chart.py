@@ -18,8 +18,7 @@ from runtime_models.model import AnchorModel, SplatLayers
 if TYPE_CHECKING:
     from app.chart_measure import ChartRow, Pricing
 
-FORMAT = 1  # of the stored file, and of what the measure means: others are measured again
-FRAMES, SWEEP = 6, 3
+FORMAT = 2  # of the stored file, and of what the measure means: others are measured again
 
 
 @dataclass(frozen=True)
@@ -95,10 +94,10 @@ def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
 
     from app.chart_measure import Pricing, twin_of
     from app.chart_settings import settings_of
-    from app.chart_stage import make_stage
+    from app.chart_stage import QUICK, make_stage
 
     kept = renderer.settings
-    stage = make_stage([drawn.model], drawn.x, drawn.size, FRAMES, SWEEP)
+    stage = make_stage([drawn.model], drawn.x, drawn.size, QUICK)
     console = Console(stderr=True)
     try:
         with twin_of(renderer, ctx) as twin:

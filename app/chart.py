@@ -1,14 +1,12 @@
 """launch.py chart: what every named setting saves in time and costs in the picture."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
-FRAMES, SWEEP = 24, 7
-QUICK_FRAMES, QUICK_SWEEP = 8, 3
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
 
@@ -25,8 +23,8 @@ class Options:
     out: Annotated[Path, tyro.conf.arg(name="out")] = Path("out/chart")
     """Folder for rows.csv and the chart."""
     cameras: Path | None = None
-    """Views to measure from, any file that render's --camera takes; default: an arc of 2 degrees
-    a frame about the scene."""
+    """Views to measure from, any file that render's --camera takes; default: an arc about the
+    scene, 0.75 degrees a frame."""
     size: str = "1280x720"
     """WIDTHxHEIGHT in pixels."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
@@ -34,7 +32,7 @@ class Options:
     context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
     """Where GL comes from."""
     frames: int = 0
-    """Views on the arc; default 24, with --quick 8."""
+    """Views on the arc; default 32, with --quick 8."""
     x: float | None = None
     """Control value on the path, 0 to 1; default: the first stop of the first scene."""
     mode: Literal["cumulative", "exclusive"] = "cumulative"
@@ -94,13 +92,13 @@ def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[
     from app.chart_picture import draw_chart
     from app.chart_rows import RowsFile
     from app.chart_settings import settings_of
-    from app.chart_stage import digest, make_stage
+    from app.chart_stage import QUICK, Walk, digest, make_stage
     from scene.framing import default_background
 
     x = models[0].stops[0].x if options.x is None else options.x
-    frames = options.frames or (QUICK_FRAMES if options.quick else FRAMES)
-    sweep = QUICK_SWEEP if options.quick else SWEEP
-    stage = make_stage(models, x, size, frames, sweep, cameras)
+    walk = QUICK if options.quick else Walk()
+    walk = replace(walk, frames=options.frames or walk.frames)
+    stage = make_stage(models, x, size, walk, cameras)
     told = scene_line(options, stage, digest(models, cameras))
     with open_pair(options.context, options.drawing) as (renderers, ctx):
         background = default_background(models[0], (0.0, 0.0, 0.0))
@@ -162,12 +160,14 @@ def scene_line(options: Options, stage, contents: str) -> str:
     """What was drawn: names, splats, contents, and what near and far are there."""
     from collections import Counter
 
+    from app.chart_stage import WARM_UP
+
     names = Counter(path.name for path in options.scenes)
     words = [name if n == 1 else f"{n} x {name}" for name, n in names.items()]
     far = stage.distances
     return (
         f"{' + '.join(words)} ({stage.scene.splat_count:,} splats); contents {contents}; "
-        f"{len(stage.path) - 3} views; near {far.near:g} m, far {far.far:g} m"
+        f"{len(stage.path) - WARM_UP} views; near {far.near:g} m, far {far.far:g} m"
     )
 
 

@@ -13,12 +13,23 @@ from scene.framing import default_view, frame_points, framing_view, model_points
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene, SceneObject
 
-STEP = np.radians(2.0)  # of the path between two frames: a turn of 120 degrees a second at 60 Hz
 WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
 GAP = 1.05  # of the sum of two radii, between neighbours
 NEAR_PART, FAR_PART = 0.6, 0.9  # of the splats, see distances_of
 DISTANCE_VIEWS = 5
 EYE_DISTANCE = 0.032  # of the framed radius: a thing of 2 m radius is seen by a person's eyes
+
+
+@dataclass(frozen=True)
+class Walk:
+    """How the camera and x move."""
+
+    frames: int = 32  # on an arc about the scene
+    sweep: int = 7  # values of x from 0 to 1
+    step: float = 0.75  # degrees between two frames: 45 a second at 60 Hz, a brisk hand
+
+
+QUICK = Walk(frames=8, sweep=3, step=2.0)  # as wide an arc as kept colours need to show
 
 
 @dataclass(frozen=True)
@@ -44,11 +55,10 @@ def make_stage(
     models: Sequence[AnchorModel | SplatLayers],
     x: float,
     size: tuple[int, int],
-    frames: int,
-    sweep: int,
+    walk: Walk,
     cameras: Sequence[View] = (),
 ) -> Stage:
-    """`models` in a row along x, `frames` views on an arc before them, or those of `cameras`."""
+    """`models` in a row along x, seen from an arc before them or from the views of `cameras`."""
     scene = side_by_side(models, x)
     points = scene_points(scene)
     centre, radius = frame_points(*points)
@@ -57,16 +67,15 @@ def make_stage(
         path = (counted[0],) * WARM_UP + counted
     else:
         first = default_view(models[0], size) if len(models) == 1 else framing_view(*points, size)
-        path = arc(first, centre, frames)
-    xs = tuple(np.linspace(0, 1, sweep).tolist())
+        path = arc(first, centre, walk)
+    xs = tuple(np.linspace(0, 1, walk.sweep).tolist())
     return Stage(scene, path, xs, distances_of(points, path), EYE_DISTANCE * radius)
 
 
-def arc(first: View, centre: np.ndarray, frames: int) -> tuple[View, ...]:
-    """`frames` views about the vertical axis through `centre`, `first` in their middle."""
-    return tuple(
-        turned(first, centre, STEP * (i - frames // 2)) for i in range(-WARM_UP, frames)
-    )  # fmt: skip
+def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
+    """Views about the vertical axis through `centre`, `first` in the middle of those that count."""
+    step, half = np.radians(walk.step), walk.frames // 2
+    return tuple(turned(first, centre, step * (i - half)) for i in range(-WARM_UP, walk.frames))
 
 
 def side_by_side(models: Sequence[AnchorModel | SplatLayers], x: float) -> Scene:

@@ -14,7 +14,7 @@ from app.chart_measure import ChartRow, Pricing
 from app.chart_picture import draw_chart, family, name_points
 from app.chart_rows import RowsFile
 from app.chart_settings import EXACT, SETTINGS, settings_of
-from app.chart_stage import WARM_UP, digest, distances_of, make_stage, side_by_side
+from app.chart_stage import QUICK, WARM_UP, Walk, digest, distances_of, make_stage, side_by_side
 from app.comparison import MOST_DB
 from app.errors import UsageError
 from app.pareto import pareto_front
@@ -266,14 +266,14 @@ def test_scenes_stand_side_by_side():
 def test_near_and_far_are_in_the_scale_of_the_scene():
     """A scene ten times as large has them ten times as far; within them lie 60 and 90 %."""
     model = make_random_model(500)
-    stage = make_stage([model], 0.0, (40, 30), 8, 3)
+    stage = make_stage([model], 0.0, (40, 30), Walk(8, 3))
     near, far = stage.distances.near, stage.distances.far
     points = model_points(model)
     eye = stage.middle.world_from_eye.position
     inside = np.linalg.norm(points[0] - eye, axis=1)
     assert (inside < near).mean() == pytest.approx(0.6, abs=0.05)
     assert (inside < far).mean() == pytest.approx(0.9, abs=0.05)
-    large = make_stage([replace(model, anchors=model.anchors * 10)], 0.0, (40, 30), 8, 3)
+    large = make_stage([replace(model, anchors=model.anchors * 10)], 0.0, (40, 30), Walk(8, 3))
     assert large.distances.near == pytest.approx(10 * near, rel=1e-3)
     assert large.distances.far == pytest.approx(10 * far, rel=1e-3)
     nothing = (np.full((3, 3), np.nan), np.ones(3))
@@ -281,11 +281,22 @@ def test_near_and_far_are_in_the_scale_of_the_scene():
 
 
 def test_the_path_turns_evenly_about_the_scene():
-    stage = make_stage([make_random_model(50)], 0.0, (40, 30), 9, 5)
+    stage = make_stage([make_random_model(50)], 0.0, (40, 30), Walk(9, 5, step=1.5))
     assert len(stage.path) == WARM_UP + 9 and stage.xs == (0, 0.25, 0.5, 0.75, 1)
     forward = np.array([v.world_from_eye.matrix()[[0, 2], 2] for v in stage.path])
     turn = np.degrees(np.unwrap(np.arctan2(*forward.T)))
-    assert np.allclose(np.abs(np.diff(turn)), 2.0, atol=1e-9)
+    assert np.allclose(np.abs(np.diff(turn)), 1.5, atol=1e-9)
+
+
+def test_a_quick_path_is_wide_enough_to_show_what_is_kept():
+    """Colours kept for so many degrees, or orders, would else be priced as if they never aged."""
+    kept = [named.changes.get(field, 0.0) for named in SETTINGS if named.quick
+            for field in ("recolor_degrees", "resort_degrees")]  # fmt: skip
+    assert (QUICK.frames + WARM_UP - 1) * QUICK.step > 1.5 * max(kept) > 0
+    kept = [named.changes.get(field, 0.0) for named in SETTINGS
+            for field in ("recolor_degrees", "resort_degrees")]  # fmt: skip
+    assert Walk().frames * Walk().step > 2 * max(kept)
+    assert Walk().step < min(degrees for degrees in kept if degrees > 0)  # each keeps something
 
 
 def test_a_digest_is_of_the_contents():
