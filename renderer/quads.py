@@ -14,10 +14,12 @@ import numpy as np
 
 from renderer.buffers import Arena
 from renderer.cadence import Cadence, sort_frames
+from renderer.context import is_software
 from renderer.decode import Decoder
 from renderer.gpu import Gpu
 from renderer.layout import MOST_VIEWS
 from renderer.overdraw import count_overdraw
+from renderer.pair import LEAST_LOW_PASS, PairSplatter
 from renderer.project import Projector
 from renderer.settings import RenderSettings
 from renderer.sort import Sorter
@@ -41,6 +43,7 @@ class QuadsDrawing:
         self._projector = Projector(gpu)
         self._sorter = Sorter(gpu, sort)
         self._splatter = Splatter(gpu)
+        self._pair = PairSplatter(gpu) if is_software(gpu.ctx) else None
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._cadence = Cadence()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
@@ -116,10 +119,22 @@ class QuadsDrawing:
                 with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
                     self._sorter.sort(arena, settings.key_bits)
             with timer.time("splat"):
-                for row, view in enumerate(group):
-                    self._splatter.draw(arena, i, view.size, settings.min_alpha, row)
-                    i += 1
+                self._splat(group, i, settings)
+            i += len(group)
         self._last = len(groups[-1]) - 1
+
+    def _splat(self, group: list[View], i: int, settings: RenderSettings) -> None:
+        """Draws views that were projected together, from image i on; two at once where it pays."""
+        arena, shift = self._arena, None
+        alike = len(group) == 2 and group[0].size == group[1].size and arena.count
+        if self._pair is not None and alike and settings.low_pass >= LEAST_LOW_PASS:
+            shift = self._pair.shift(arena)
+        if shift is not None:
+            pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
+            self._pair.draw(arena, pictures, shift, settings.min_alpha)
+            return
+        for row, view in enumerate(group):
+            self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row)
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:

@@ -29,7 +29,7 @@ class Splatter:
 
         row: which of the views that were projected together.
         """
-        target = self._target(i, size)
+        target = self.target_of(i, size)
         with self._gpu.drawing_into(target):
             target.clear(0.0, 0.0, 0.0, 0.0)
             if arena.count:
@@ -61,7 +61,8 @@ class Splatter:
         rows = np.ascontiguousarray(pixels[::-1], np.float32)
         return rows / np.float32(255) if read is np.uint8 else rows
 
-    def _target(self, i: int, size: tuple[int, int]) -> moderngl.Framebuffer:
+    def target_of(self, i: int, size: tuple[int, int]) -> moderngl.Framebuffer:
+        """The image of view i to draw into, of this size and of the kind in use."""
         old, dtype = self._targets.get(i), DTYPES[self.target]
         if old is not None and old.size == tuple(size) and old.color_attachments[0].dtype == dtype:
             return old

@@ -1,0 +1,61 @@
+// pair: one triangle a splat around its two ellipses, those of the left and of the right view, in a
+// grid of pixels where the two lie close to each other; see renderer/pair.py.
+#include "common/record.glsl"
+#include "common/triangle.glsl"
+
+layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  // near to far
+layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
+layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
+uniform vec2 size;    // pixels of the grid
+uniform vec2 shifts;  // x in the grid minus x in the left and right picture, pixels
+uniform uint count;   // splats; records of the right view start there
+
+out vec4 sigmas;  // place in the axes of the left and of the right ellipse
+flat out vec3 color;
+flat out vec2 opacities;
+
+const vec2 NOWHERE = vec2(100.0);  // sigmas, where nothing is left of any splat
+
+// How far a matrix stretches: its largest singular value.
+float stretch(mat2 m) {
+    vec2 sum = vec2(m[0][0] + m[1][1], m[0][1] - m[1][0]);
+    vec2 difference = vec2(m[0][0] - m[1][1], m[0][1] + m[1][0]);
+    return 0.5 * (length(sum) + length(difference));
+}
+
+void main() {
+    uint triangle = uint(gl_VertexID) / 3u, corner = uint(gl_VertexID) % 3u;
+    uint i = order[counts[COUNT_SORTED] - 1u - triangle];
+    Ellipse left = unpack_record(records[2u * i], records[2u * i + 1u]);
+    i += count;
+    Ellipse right = unpack_record(records[2u * i], records[2u * i + 1u]);
+    left.center.x += shifts.x;
+    right.center.x += shifts.y;
+    bool in_left = left.cut > 0.0, in_right = right.cut > 0.0;  // else culled in that view
+
+    // In the axes of one ellipse that one is a disc of radius cut around 0, the other lies in a
+    // disc around `aside`.  Each edge of the triangle is moved out until both are behind it.
+    Ellipse e = left;
+    if (!in_left) e = right;
+    mat2 axes = mat2(e.major, e.minor);
+    vec2 aside = vec2(0.0);
+    float radius = 0.0;
+    if (in_left && in_right) {
+        aside = inverse(axes) * (right.center - left.center);
+        radius = right.cut * stretch(inverse(axes) * mat2(right.major, right.minor));
+    }
+    vec2 n = -0.5 * TRIANGLE[corner], m = -0.5 * TRIANGLE[(corner + 1u) % 3u];  // of two edges
+    float edge_n = max(e.cut, dot(n, aside) + radius), edge_m = max(e.cut, dot(m, aside) + radius);
+    vec2 s = vec2(edge_n * m.y - edge_m * n.y, n.x * edge_m - m.x * edge_n) /
+             (n.x * m.y - n.y * m.x);
+    vec2 pixel = e.center + axes * s;
+
+    sigmas = vec4(s, NOWHERE);
+    if (!in_left) sigmas = vec4(NOWHERE, s);
+    if (in_left && in_right) {
+        sigmas.zw = inverse(mat2(right.major, right.minor)) * (pixel - right.center);
+    }
+    color = e.color;
+    opacities = vec2(left.opacity, right.opacity);
+    gl_Position = vec4(2.0 * pixel / size - 1.0, 0.0, 1.0);
+}
