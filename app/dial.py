@@ -3,18 +3,15 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.budget import Choice, choose
 from app.quick_chart import QuickChart, QuickRow
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from scene.pose import View
 from scene.scene import Scene
-
-if TYPE_CHECKING:
-    from app.budget import Choice
 
 STEP_S = 0.04  # of measuring between two frames of the window; one measured frame at least
 TARGET_MS, FLOOR_DB = 33.0, 35.0  # where the dial stands at first
@@ -28,7 +25,7 @@ class Dial:
     floor_db: float = FLOOR_DB
     wanted: bool = False  # start measuring in the next frame
     rows: tuple[QuickRow, ...] = ()
-    choice: "Choice | None" = None
+    choice: Choice | None = None
     _chart: QuickChart | None = None
 
     @property
@@ -69,8 +66,6 @@ class Dial:
 
     def choose(self) -> None:
         """Chooses again from what was measured, for another target or floor."""
-        from app.budget import choose
-
         if self.rows:
             self.choice = choose(self.rows, self.target_ms, self.floor_db)
 

@@ -7,6 +7,7 @@ from statistics import median
 
 import numpy as np
 
+from app.budget import EXACT
 from app.comparison import MOST_DB, exact
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
@@ -98,7 +99,7 @@ class QuickChart:
                 self._exact_ms.append(ms)
             yield True
         base = median(self._exact_ms)
-        self.rows.append(QuickRow("exact", self._exact, base, MOST_DB))
+        self.rows.append(QuickRow(EXACT, self._exact, base, MOST_DB))
         for name, settings in self._settings.items():
             now = []
             for view in self._views[: BETWEEN + 1]:
@@ -112,7 +113,7 @@ class QuickChart:
                     errors.append(psnr(self._renderer.resolved(0), self._pictures[number]))
                 yield True
             ms = median(times) / median(now[1:]) * base
-            self.rows.append(QuickRow(name, settings, ms, min([*errors, MOST_DB])))
+            self.rows.append(QuickRow(name, settings, ms, float(np.min([*errors, MOST_DB]))))
 
     def _draw(self, settings: RenderSettings, view: View) -> float:
         """Milliseconds of a whole frame, decoding of colours included."""

@@ -1,8 +1,6 @@
 """What the viewer tells about speed and likeness: the last second, exact or not, the budget."""
 
-import sys
-from dataclasses import dataclass, replace
-from types import ModuleType
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,28 +174,6 @@ def test_at_rest_no_shortcut_of_time_is_left():
 # The budget
 
 
-@dataclass
-class Choice:
-    settings: RenderSettings
-    name: str
-    ms: float
-    db: float
-    sentence: str = "chosen"
-
-
-@pytest.fixture
-def first_fitting(monkeypatch):
-    """A stand-in for the budget's rule: the fastest row above the floor."""
-    module = ModuleType("app.budget")
-
-    def choose(rows, target_ms, floor_db):
-        row = min((r for r in rows if r.db >= floor_db), key=lambda r: r.ms)
-        return Choice(row.settings, row.name, row.ms, row.db)
-
-    module.choose = choose
-    monkeypatch.setitem(sys.modules, "app.budget", module)
-
-
 def test_turning_keeps_the_distance_to_the_centre_and_what_is_in_the_middle():
     centre = np.array([0.5, -0.2, 0.1])
     view = View(look_at(np.array([0.0, 1, 4]), centre), VIEW.tangents, 0.1, 50.0, (8, 6))
@@ -227,7 +203,7 @@ def test_the_quick_chart_prices_every_setting_against_exact():
         assert len(set(turns)) == len(turns)  # every frame of a setting moves, as a hand does
 
 
-def test_the_dial_measures_in_steps_and_chooses_again_without_measuring(first_fitting):
+def test_the_dial_measures_in_steps_and_chooses_again_without_measuring():
     renderer, dial = KnownRenderer(), Dial(floor_db=20.0)
     dial.start(renderer, Scene(()), VIEW, np.zeros(3), lambda: None)
     before = dial.progress
@@ -246,7 +222,7 @@ def test_the_dial_measures_in_steps_and_chooses_again_without_measuring(first_fi
     assert not dial.rows and dial.choice is None
 
 
-def test_measuring_can_be_stopped_and_keeps_what_was_known(first_fitting):
+def test_measuring_can_be_stopped_and_keeps_what_was_known():
     dial = Dial(wanted=True)
     dial.start(KnownRenderer(), Scene(()), VIEW, np.zeros(3), lambda: None)
     assert dial.measuring and not dial.wanted
