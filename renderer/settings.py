@@ -21,12 +21,11 @@ class RenderSettings:
 
     # The pixel
     min_alpha: float = 1 / 255  # a pixel's alpha below this is not drawn (3DGS)
-    # Tiles alone: what lies behind where less than this comes through is not drawn (3DGS: 1e-4).
-    min_through: float = 1e-4
     low_pass: float = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)  # display sRGB
     target: str = "rgba16f"  # what quads blend into; tiles blend float32 in registers
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
+    min_through: float = 1e-4  # tiles: a pixel is done when less than this comes through (3DGS)
 
     # Culls
     max_pixels: float = math.inf  # tau_lambda: one sigma of a splat's longer axis, pixels
@@ -59,7 +58,8 @@ class RenderSettings:
             told = f"background is {self.background}"
             raise ValueError(f"{told}, expected three values of display sRGB from 0 to 1.")
         for name, least, most in (
-            ("min_alpha", 1e-6, 1.0), ("min_through", 1e-6, 0.1), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
+            ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
+            ("min_through", 1e-6, 0.1),
             ("max_pixels", 0.0, math.inf), ("max_distance", 0.0, math.inf),
             ("min_pixels", 0.0, math.inf), ("fade", 0.0, 1.0), ("resort_frames", 0, 1_000_000),
             ("resort_degrees", 0.0, 180.0), ("recolor_degrees", 0.0, 180.0),
