@@ -88,8 +88,8 @@ def make(seed: int) -> Poisoned:
 
 def plain(settings: RenderSettings) -> bool:
     """Whether the first frame is what the oracle draws, to float rounding."""
-    whole = settings.render_scale == 1 and not settings.debug and settings.key_bits == 32
-    return whole and settings.target != "rgba8"
+    whole = settings.render_scale == 1 and not settings.debug and settings.min_through < 1e-3
+    return whole and settings.target != "rgba8" and settings.key_bits == 32
 
 
 def walk(made: Poisoned) -> list[list[View]]:
@@ -139,6 +139,7 @@ def settings_of(rng: np.random.Generator) -> RenderSettings:
         "resort_degrees": [0.0, 180.0], "stereo_sort": ["shared", "each"],
         "recolor_degrees": [0.0, 30.0], "skip_unseen": [False, True],
         "target": ["rgba16f", "rgba32f", "rgba8"], "render_scale": [1.0, 1.0, 0.5, 2.0],
+        "min_through": [1e-4, 1e-6, 0.1],
         "debug": [""] * 8 + ["culls", "birdseye", "overdraw", "depth", "object"],
     }  # fmt: skip
     return RenderSettings(**{n: v[rng.integers(len(v))] for n, v in choice.items()})
@@ -237,6 +238,7 @@ def spoil_settings(made: Poisoned, rng: np.random.Generator) -> Poisoned:
     names = (
         "min_alpha", "low_pass", "max_pixels", "max_distance", "min_pixels", "fade",
         "render_scale", "resort_frames", "resort_degrees", "recolor_degrees", "key_bits", "order",
+        "min_through",
     )  # fmt: skip
     name, value = names[rng.integers(len(names))], value_for(rng)
     made.told += f"; {name} = {value!r}"
