@@ -41,6 +41,12 @@ def draw_budget(stage: Stage, dial: Dial, ui_scale: float) -> None:
             "Times a dozen settings on this scene, on this machine, around this view. Then the "
             "dials above choose at once.", ui_scale,
         )  # fmt: skip
+    _, dial.dynamic = imgui.checkbox("fewer pixels while moving", dial.dynamic)
+    tip(
+        "Dynamic resolution: where frames are slower than the dial says, moving pictures get "
+        "fewer pixels, never below the floor once it is measured. At rest all are drawn.",
+        ui_scale,
+    )
     if dial.choice is not None:
         imgui.push_text_wrap_pos(0)
         imgui.text_unformatted(dial.choice.sentence)

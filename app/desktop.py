@@ -29,6 +29,8 @@ from renderer.renderer import Renderer
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
 from scene.pose import View
+from scene.read_selector import read_selector
+from scene.selector import Selector
 
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
 WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
@@ -53,6 +55,9 @@ class Options:
     """Never below this PSNR in dB against the exact picture, whatever the budget."""
     debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
     """Debug view to start in; G goes through them."""
+    select: tuple[str, ...] = ()
+    """Regions with an x of their own, as render takes them: sphere:x,y,z:radius:X[:border],
+    box:x,y,z:hx,hy,hz:X[:border], half:x,y,z:nx,ny,nz:X[:border], lens:degrees:X[:border]."""
     pictures: Path = Path("pictures")
     """Folder for the pictures that P saves."""
     screenshot: Path | None = None
@@ -75,10 +80,20 @@ def run(options: Options) -> int:
     stage = Stage(read_model)
     stage.open(options.scenes or (DEMO,), options.x)
     stage.settings = replace(stage.settings, debug=options.debug)
+    stage.regions.take(read_selectors(options.select, stage), 0)
     with Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             Viewer(window, renderer, stage, options).loop()
     return 0
+
+
+def read_selectors(texts: tuple[str, ...], stage: Stage) -> tuple[Selector, ...]:
+    """What --select says about the first object; UsageError, one sentence, for what is none."""
+    try:
+        stops = stage.scene.objects[0].model.stops
+        return tuple(read_selector(text, stops) for text in texts)
+    except ValueError as error:
+        raise UsageError(f"--select {error}") from None
 
 
 class Viewer:
@@ -144,6 +159,7 @@ class Viewer:
         now = self.readings.now = time.perf_counter()
         if fresh:
             self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
+            self.dial.seen((now - start) * 1e3, self._moving)
         self.readings.idle = not fresh
         if self._wanted and self._frames > 1:
             self._open_wanted()
@@ -164,12 +180,11 @@ class Viewer:
 
     def _busy(self) -> bool:
         """Whether the next frame is due without waiting for input."""
-        moving = self.camera.moving or push(self.window).any
         waiting = bool(self._wanted) or self.options.screenshot is not None
         sliding = not np.array_equal(self._free, self._free_wanted())
         measuring = self.dial.wanted or self.dial.measuring
         first = self._frames < WARM_UP
-        return moving or waiting or sliding or measuring or self.stage.playing or first
+        return self._moving or waiting or sliding or measuring or first
 
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
@@ -206,11 +221,13 @@ class Viewer:
 
     def _wish(self) -> Wish:
         """What the screen should show now."""
-        stage = self.stage
-        moving = self.camera.moving or push(self.window).any or stage.playing
-        moving = moving or self.dial.measuring
-        view = self.view()
-        return Wish(stage.shown(view), view, stage.settings, moving)
+        stage, view, moving = self.stage, self.view(), self._moving
+        settings = self.dial.while_moving(stage.settings) if moving else stage.settings
+        return Wish(stage.shown(view), view, settings, moving or self.dial.measuring)
+
+    @property
+    def _moving(self) -> bool:
+        return self.camera.moving or push(self.window).any or self.stage.playing
 
     def _turn_dial(self) -> None:
         """Measures a little for the budget where that is wanted, and takes over what it chose."""

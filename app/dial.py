@@ -6,14 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.budget import Choice, choose
+from app.budget import Choice, choose, least_scale
 from app.quick_chart import QuickChart, QuickRow
 from renderer.renderer import Renderer
+from renderer.resolution import Resolution
 from renderer.settings import RenderSettings
 from scene.pose import View
 from scene.scene import Scene
 
 STEP_S = 0.04  # of measuring between two frames of the window; one measured frame at least
+LEAST_SCALE = 0.5  # while moving, where no chart says how far down the floor allows
+SMALLEST_SCALE = 1 / 16  # that the renderer takes
 TARGET_MS, FLOOR_DB = 33.0, 35.0  # where the dial stands at first
 
 
@@ -26,7 +29,10 @@ class Dial:
     wanted: bool = False  # start measuring in the next frame
     rows: tuple[QuickRow, ...] = ()
     choice: Choice | None = None
+    dynamic: bool = False  # fewer pixels while something moves, where frames are too slow
     _chart: QuickChart | None = None
+    _resolution: Resolution | None = None
+    _wanted: tuple[float, float] = (0.0, 0.0)  # target and least scale that it was made for
 
     @property
     def measuring(self) -> bool:
@@ -68,6 +74,23 @@ class Dial:
         """Chooses again from what was measured, for another target or floor."""
         if self.rows:
             self.choice = choose(self.rows, self.target_ms, self.floor_db)
+
+    def while_moving(self, settings: RenderSettings) -> RenderSettings:
+        """`settings` with as many pixels as the target leaves time for; at rest all are drawn."""
+        if not self.dynamic:
+            self._resolution = None
+            return settings
+        least = least_scale(self.rows, self.floor_db) if self.rows else LEAST_SCALE
+        wanted = (self.target_ms, least)
+        if self._resolution is None or self._wanted != wanted:
+            self._resolution, self._wanted = Resolution(*wanted), wanted
+        scale = max(settings.render_scale * self._resolution.scale, SMALLEST_SCALE)
+        return replace(settings, render_scale=scale)
+
+    def seen(self, frame_ms: float, moving: bool) -> None:
+        """Takes the time of a frame that was drawn while something moved."""
+        if self._resolution is not None and moving and not self.measuring:
+            self._resolution.seen(frame_ms)
 
     def applied(self, settings: RenderSettings) -> RenderSettings:
         """The chosen setting over the background, and in the debug view, that `settings` has."""

@@ -91,9 +91,8 @@ def point_at(viewer: "Viewer", x: float, y: float) -> Hit | None:
     view = viewer.view()
     left, right, low, high = view.tangents
     in_eye = np.array([left + (right - left) * x / width, high + (low - high) * y / height, -1.0])
-    world_from_eye = view.world_from_eye.matrix()
-    pixel = (right - left) / width
-    return viewer.stage.pick(world_from_eye[:3, 3], world_from_eye[:3, :3] @ in_eye, 2 * pixel)
+    direction = view.world_from_eye.matrix()[:3, :3] @ in_eye
+    return viewer.stage.pick(view, direction, 2 * (right - left) / width)
 
 
 def is_painting(viewer: "Viewer") -> bool:

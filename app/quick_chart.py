@@ -27,6 +27,7 @@ QUICK = {  # name -> what differs from exact; pairs come from what pays most on 
     "1 px footprint": {"min_pixels": 1.0},
     "2 px footprint": {"min_pixels": 2.0, "fade": 0.2},
     "64 px splats": {"max_pixels": 64.0, "fade": 0.2},
+    "stop at 1/256": {"min_through": 1 / 256},
     "75 % scale": {"render_scale": 0.75},
     "50 % scale": {"render_scale": 0.5},
     "sort 4, colours 5\u00b0, 1 px": {
@@ -73,15 +74,17 @@ class QuickChart:
     ) -> None:  # fmt: skip
         self._renderer, self._scene, self._finish = renderer, scene, finish
         self._views = [turned(view, centre, STEP * i) for i in range(FRAMES + 1)]
-        self._exact = exact(renderer.settings, renderer.backends["drawing"])
+        drawing = renderer.backends["drawing"]
+        self._exact = exact(renderer.settings, drawing)
         self._settings = {
             name: replace(RenderSettings(background=self._exact.background), **changes)
             for name, changes in QUICK.items()
+            if "min_through" not in changes or not drawing.startswith("quads")
         }
         self._pictures: list[np.ndarray] = []
         self._exact_ms: list[float] = []
         self.rows: list[QuickRow] = []
-        self.frame, self.frames = 0, (FRAMES + 1) + len(QUICK) * (FRAMES + BETWEEN + 2)
+        self.frame, self.frames = 0, (FRAMES + 1) + len(self._settings) * (FRAMES + BETWEEN + 2)
         self._work = self._measure()
         self.done = False
 

@@ -7,6 +7,7 @@ import numpy as np
 from scene.pick import anchor_places
 from scene.pose import View
 from scene.scene import SceneObject
+from scene.selector import Box, HalfSpace, Lens, Painted, Selector, Sphere
 
 KINDS = ("box", "sphere", "half-space", "lens", "painted")
 FIRST_SIZE = 0.25  # of the scene's radius: half a box's side, a sphere's radius
@@ -28,7 +29,7 @@ class Region:
     border: float = 0.0  # metres over which x changes to what is outside
     centre: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) metres, object frame
     half: np.ndarray = field(default_factory=lambda: np.ones(3))  # (3,) metres; a sphere's: [0]
-    normal: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  # out of it
+    normal: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))  # into it
     tangent: float = LENS  # a lens' radius at a metre from the eye
     painted: np.ndarray | None = None  # (A,) bool, one an anchor or a plain splat
 
@@ -79,6 +80,24 @@ class Regions:
         self.placing = region.is_placed
         self.version += 1
         return region
+
+    def take(self, selectors: tuple[Selector, ...], index: int) -> None:
+        """Adds the regions that selectors of object `index` stand for; none is being edited."""
+        for selector in selectors:
+            region = region_of(selector, "", index)
+            count = sum(other.kind == region.kind for other in self.items) + 1
+            self.items = (*self.items, replace(region, name=f"{region.kind} {count}"))
+        self.version += 1
+
+    def selectors(self, index: int, view: View) -> tuple[Selector, ...]:
+        """Of the enabled regions of object `index`, in the list's order: a later one lies above."""
+        on = [region for region in self.items if region.enabled and region.index == index]
+        return tuple(selector_of(region, view) for region in on)
+
+    @property
+    def follow_the_eye(self) -> bool:
+        """Whether any enabled region is a lens."""
+        return any(region.kind == "lens" and region.enabled for region in self.items)
 
     def remove(self, number: int) -> None:
         self.items = self.items[:number] + self.items[number + 1 :]
@@ -133,6 +152,39 @@ class Regions:
         if changed:
             self.edit(self.chosen, painted=painted)
         return changed
+
+
+def selector_of(region: Region, view: View) -> Selector:
+    """What the scene knows a region as; a lens looks along `view`."""
+    inside = {"x": region.x, "border": region.border}
+    if region.kind == "box":
+        return Box(centre=region.centre, half=region.half, **inside)
+    if region.kind == "sphere":
+        return Sphere(centre=region.centre, radius=float(region.half[0]), **inside)
+    if region.kind == "half-space":
+        return HalfSpace(point=region.centre, normal=-region.normal, **inside)
+    if region.kind == "lens":
+        eye, angle = view.world_from_eye, float(np.arctan(region.tangent))
+        return Lens(position=eye.position, wxyz=eye.wxyz, half_angle=angle, **inside)
+    return Painted(region.painted, region.x)
+
+
+def region_of(selector: Selector, name: str, index: int) -> Region:
+    """The region that a selector of a command line stands for; the inverse of `selector_of`."""
+    common = {"name": name, "index": index, "x": selector.x}
+    if isinstance(selector, Painted):
+        return Region("painted", painted=selector.weight > 0.5, **common)
+    common["border"] = selector.border
+    if isinstance(selector, Box):
+        half = np.array(selector.half)
+        return Region("box", centre=np.array(selector.centre), half=half, **common)
+    if isinstance(selector, Sphere):
+        half = np.full(3, selector.radius)
+        return Region("sphere", centre=np.array(selector.centre), half=half, **common)
+    if isinstance(selector, HalfSpace):
+        centre, normal = np.array(selector.point), -np.array(selector.normal)
+        return Region("half-space", centre=centre, normal=normal, **common)
+    return Region("lens", tangent=float(np.tan(selector.half_angle)), **common)
 
 
 def same(one: object, other: object) -> bool:

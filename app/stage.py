@@ -92,11 +92,25 @@ class Stage:
 
     def shown(self, view: View) -> Scene:
         """The scene with its regions as `view` sees them; the same object until one changes."""
-        return self.scene
+        if not self.regions.items:
+            return self.scene
+        pose = view.world_from_eye
+        eye = (pose.position.tobytes(), pose.wxyz.tobytes()) if self.regions.follow_the_eye else ()
+        made_of = (self.scene, self.regions.version, eye)
+        before, scene = self._shown
+        if before is None or before[0] is not self.scene or before[1:] != made_of[1:]:
+            things = [
+                replace(thing, selectors=self.regions.selectors(index, view))
+                for index, thing in enumerate(self.scene.objects)
+            ]
+            scene = Scene(tuple(things))
+            self._shown = (made_of, scene)
+        return scene
 
-    def pick(self, origin: np.ndarray, direction: np.ndarray, spread: float) -> Hit | None:
-        """What a ray meets, of splats as they are now; `spread` is what the hand may be off."""
-        return self._picker.under(self.scene, origin, direction, spread)
+    def pick(self, view: View, direction: np.ndarray, spread: float) -> Hit | None:
+        """What a ray from the eye meets, of splats as they are now; `spread` is the hand's."""
+        origin = view.world_from_eye.position
+        return self._picker.under(self.shown(view), origin, direction, spread)
 
     def add_region(self, kind: str) -> None:
         """A region of the first object, in the middle of the scene until it is placed."""

@@ -7,6 +7,7 @@ import numpy as np
 from runtime_models.evaluate import Evaluator
 from runtime_models.model import AnchorModel, SplatLayers
 from runtime_models.rotation import rotation_matrices
+from scene.control import control_of
 from scene.scene import Scene, SceneObject
 
 SIGMAS = 3.0  # farther from its mean a splat takes no light worth counting
@@ -75,7 +76,7 @@ class Picker:
         return Hit(point, int(owner[first]), float(depth[first]))
 
     def _splats(self, index: int, thing: SceneObject) -> _Decoded:
-        model, x = thing.model, control(thing)
+        model, x = thing.model, control_of(thing)
         key = (id(model), np.asarray(x).tobytes())
         found = self._decoded.get(index)
         if found is None or found.key != key:
@@ -86,11 +87,6 @@ class Picker:
             axes = np.swapaxes(rotation_matrices(wxyz), 1, 2)
             found = self._decoded[index] = _Decoded(key, means, scales, axes, opacity)
         return found
-
-
-def control(thing: SceneObject) -> float:
-    """What the geometry of an object is decoded at."""
-    return thing.x
 
 
 def along(
