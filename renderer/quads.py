@@ -22,7 +22,7 @@ from renderer.overdraw import count_overdraw
 from renderer.pair import LEAST_LOW_PASS, PairSplatter
 from renderer.project import Projector
 from renderer.settings import RenderSettings
-from renderer.sort import Sorter
+from renderer.sort_check import working_sorter
 from renderer.splat import Splatter
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
@@ -37,11 +37,11 @@ class QuadsDrawing:
     """The arena of all objects in GL buffers, and the passes that draw it."""
 
     def __init__(self, gpu: Gpu, mlps: str, sort: str) -> None:
+        self._sorter, sort = working_sorter(gpu, sort)
         self.backends = {"drawing": "quads", "mlps": mlps, "sort": sort}
         self.decodes_on_gpu = mlps == "gl"  # says which clock times the decoding
         self._gpu = gpu
         self._projector = Projector(gpu)
-        self._sorter = Sorter(gpu, sort)
         self._splatter = Splatter(gpu)
         self._pair = PairSplatter(gpu) if is_software(gpu.ctx) else None
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
