@@ -4,7 +4,8 @@
 
 project: a compute kernel that streams the same bytes.  sort: a counting sort of the same 16-bit
 keys in compiled code.  draw: splats that fill the screen, with the fragments of tight quads.
-stereo: two views of the full size each, beside one.  On software GL CPU time is all of the work.
+stereo: two views of the full size each, beside one.  decode: the networks alone in onnxruntime, one
+thread, as the package holds them.  On software GL CPU time is all of the work.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from splat_scenes import shell  # noqa: E402
+from splat_scenes import random_model, shell  # noqa: E402
 
 from rasterizer.device import open_device  # noqa: E402
 from renderer import layout  # noqa: E402
@@ -27,11 +29,15 @@ from renderer.buffers import Arena, bind  # noqa: E402
 from renderer.context import open_context  # noqa: E402
 from renderer.gpu import Gpu, groups_for  # noqa: E402
 from renderer.project import Projector  # noqa: E402
+from renderer.quads import QuadsDrawing  # noqa: E402
+from renderer.renderer import Renderer  # noqa: E402
 from renderer.settings import RenderSettings  # noqa: E402
 from renderer.sort import Sorter, quantize  # noqa: E402
 from renderer.splat import Splatter  # noqa: E402
-from runtime_models.evaluate import evaluate  # noqa: E402
+from renderer.tiles import TilesDrawing  # noqa: E402
+from runtime_models.evaluate import Evaluator, directions, evaluate  # noqa: E402
 from scene.pose import View, look_at  # noqa: E402
+from scene.scene import Scene, SceneObject  # noqa: E402
 
 SIZE = (1280, 720)
 EYES = [View(look_at((x, 0.3, 4.5), (x, 0, 0)), (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)
@@ -84,7 +90,8 @@ class Passes:
     def __init__(self, gpu: Gpu, count: int) -> None:
         self.gpu, self.count = gpu, count
         self.arena = Arena(gpu, [count])
-        splats = evaluate(shell(count), 0.0, np.zeros(3))
+        self.layers = shell(count)
+        splats = evaluate(self.layers, 0.0, np.zeros(3))
         self.arena.write_geometry(0, splats.means, splats.scales, splats.wxyz, splats.opacity)
         self.arena.write_color(0, splats.color)
         self.arena.place([np.eye(4)])
@@ -172,14 +179,38 @@ class Passes:
                 return self.least_ms(lambda: splatter.draw(arena, 0, SIZE, 1 / 255), 3)
 
     def stereo_row(self) -> tuple:
-        def frame(views: int) -> None:
-            self.project(EXACT, views)
-            self.sorter.sort(self.arena, 32)
-            for row in range(views):
-                self.splatter.draw(self.arena, row, SIZE, 1 / 255, row)
+        """Whole frames, by the renderer."""
+        with Renderer(self.gpu.ctx, "quads") as renderer:
+            renderer.update(Scene((SceneObject("shell", self.layers),)))
+            two = self.least_ms(lambda: renderer.draw(EYES), 3)
+            one = self.least_ms(lambda: renderer.draw(EYES[:1]), 3)
+        return "two views (beside one)", two, one, 1.5
 
-        return "two views (beside one)", self.least_ms(lambda: frame(2), 3), self.least_ms(
-            lambda: frame(1), 3), 1.5  # fmt: skip
+    def decode_rows(self) -> list[tuple]:
+        """All five networks of ten splats an anchor: the default back end of software GL (tiles),
+        and into the arena of quads.
+        """
+        model, eye = random_model(self.count // 10), np.array([0.0, 0.3, 4.5])
+        plain = Evaluator(model, threads=1, fold=False)
+        seen = directions(model.anchors, eye)
+        rows = []
+
+        def networks_alone() -> None:
+            for name in model.networks:
+                plain._run(name, 0.4, seen if name == "color" else None)
+
+        def decode(drawing: QuadsDrawing | TilesDrawing) -> None:
+            drawing.decode_geometry(0, 0.4)
+            drawing.decode_color(0, 0.4, eye)
+
+        floor = self.least_ms(networks_alone)
+        for drawing in (TilesDrawing(), QuadsDrawing(self.gpu, "onnxruntime", "numpy")):
+            drawing.allocate([model])
+            name = drawing.backends["drawing"].split()[0]
+            ms = self.least_ms(partial(decode, drawing))
+            rows.append((f"decode for {name} (beside the networks alone)", ms, floor, 1.2))
+            drawing.close()
+        return rows
 
 
 def counting_sort_ms(passes: Passes, keys: np.ndarray, want: np.ndarray) -> float:
@@ -214,6 +245,7 @@ def main() -> None:
         for count in counts:
             passes = Passes(gpu, count)
             rows = [passes.draw_row(), passes.sort_row(), passes.stereo_row()]
+            rows += passes.decode_rows()
             if count == 400_000:
                 rows += passes.project_rows()
             for name, ms, floor, limit in rows:
