@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 KERNELS = Path(__file__).parent / "kernels"
+LEAST_THROUGH = 1e-4  # a pixel through which less comes is done (3DGS); cannot be seen
 # form: kernel file, work-items a tile forward, work-items a tile backward
 FORMS = {
     "cpu": (KERNELS / "raster_cpu.cl", 1, 1),
@@ -61,12 +62,13 @@ def rasterize_rgba(
     tiles: Tiles,
     size: tuple[int, int],
     form: str | None = None,
+    least_through: float = LEAST_THROUGH,
 ) -> np.ndarray:
     """(H, W, 4) float32 premultiplied over nothing, alpha = 1 - transmittance, row 0 on top.
 
-    Read only; on a CPU it is the device's own memory, which is reused when the array goes.
+    least_through: what lies behind less transmittance than that is not drawn.  Read only; on a CPU it is the device's own memory, which is reused when the array goes.
     """
-    return rasterize_rgba_views(device, [(projected, tiles)], size, form)[0]
+    return rasterize_rgba_views(device, [(projected, tiles)], size, form, least_through)[0]
 
 
 def rasterize_rgba_views(
@@ -74,6 +76,7 @@ def rasterize_rgba_views(
     views: list[tuple[Projected, Tiles]],
     size: tuple[int, int],
     form: str | None = None,
+    least_through: float = LEAST_THROUGH,
 ) -> list[np.ndarray]:
     """What rasterize_rgba gives, of several views of the same size."""
     width, height = size
@@ -84,21 +87,25 @@ def rasterize_rgba_views(
     ]
     draw_views = {"cpu": _draw_cpu, "gpu": _draw_gpu}[form or device.kind]
     if views:
-        draw_views(device, inputs, size, views[0][1].grid)
+        draw_views(device, inputs, size, views[0][1].grid, float(least_through))
     return [device.view(image) for image in images]
 
 
-def _draw_cpu(device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int]) -> None:
+def _draw_cpu(
+    device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int], least: float
+) -> None:
     """Two views a launch, a work-item a tile of both."""
     kernel = device.program(KERNELS / "draw_cpu.cl")["draw"]
     for first in range(0, len(inputs), 2):
         left, right = [*inputs[first : first + 2], [None] * 4][:2]
-        device.launch(kernel, grid[0] * grid[1], 1, *size, grid[0], *left, *right)
+        device.launch(kernel, grid[0] * grid[1], 1, *size, grid[0], least, *left, *right)
 
 
-def _draw_gpu(device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int]) -> None:
+def _draw_gpu(
+    device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int], least: float
+) -> None:
     file, group, _ = FORMS["gpu"]
-    kernel = device.program(file, RGBA=1)["rasterize"]
+    kernel = device.program(file, RGBA=1, STOP=least)["rasterize"]  # built once for each value
     ends = device.empty(grid[0] * grid[1], np.int32)
     for starts, instances, record, image in inputs:
         device.launch(

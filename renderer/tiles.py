@@ -145,7 +145,9 @@ class TilesDrawing:
             for size in {view.size for view in views}:
                 same = [i for i, view in enumerate(views) if view.size == size]
                 drawn = [(self._projected[i], tiles[i]) for i in same]
-                images = rasterize_rgba_views(self.device, drawn, size)
+                images = rasterize_rgba_views(
+                    self.device, drawn, size, least_through=settings.min_through
+                )
                 self._images.update(zip(same, images, strict=True))
 
     def _project(self, views: list[View], settings: RenderSettings) -> None:

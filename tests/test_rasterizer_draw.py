@@ -18,10 +18,10 @@ from rasterizer_scenes import (
 
 from rasterizer.bin import bin_tiles
 from rasterizer.project import Camera, Projected, project
-from rasterizer.raster import rasterize, rasterize_rgba, rasterize_rgba_views
+from rasterizer.raster import LEAST_THROUGH, rasterize, rasterize_rgba, rasterize_rgba_views
 from rasterizer.reference import project_reference, rasterize_reference
 
-STOP = 1 / 2048  # as in draw_cpu.cl
+STOP = LEAST_THROUGH
 BATCH = 32
 SIZES = [(1, 1), (3, 40), (15, 17), (16, 16), (17, 15), (33, 8), (83, 45)]
 
@@ -46,6 +46,22 @@ def check(splats: list, camera: Camera, least_db: float = 75) -> None:
     assert psnr(image, want) >= least_db
     # A pixel on the threshold of 1/255 may fall either way in float32, one at the stop ends there.
     assert np.abs(image - want).max() <= 1 / 255 + STOP
+
+
+@pytest.mark.parametrize("form", ["cpu", "gpu"])
+@pytest.mark.parametrize("least", [1e-5, 1e-4, 1 / 2048, 1 / 64, 0.1])
+def test_an_early_stop_costs_what_it_leaves_out_and_no_more(form, least):
+    """Behind `least` of transmittance lies at most that much colour, in every pixel."""
+    splats, camera = random_splats(400, seed=5, scale=0.3), off_centre_camera((60, 40))
+    splats[3][:] = 0.9
+    d = device()
+    projected = project(d, *upload(splats), camera)
+    binned = (projected, bin_tiles(d, projected, camera.size))
+    whole = rasterize_rgba(d, *binned, camera.size, form, least_through=1e-6).copy()
+    short = rasterize_rgba(d, *binned, camera.size, form, least_through=least)
+    error = np.abs(short - whole).max()
+    assert error <= least + 1e-6
+    assert error > 0 or least < 1e-4  # the shortcut is taken
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -9,8 +9,6 @@
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
 #define HALF_LOG2E 0.72134752044f
-// A pixel whose transmittance is below this is done: an eighth of a step of 8 bits.
-#define STOP (1.0f / 2048)
 
 #define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
                          0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
@@ -145,9 +143,10 @@ inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int 
   }
 }
 
+// least: a block is done when less than this comes through each of its pixels.
 inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
                       __global const int* instances, __global const float* record,
-                      __global float* image) {
+                      float least, __global float* image) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
@@ -185,7 +184,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       R[k] = r;
       G[k] = g;
       B[k] = b;
-      if (!(max8(fmax(t.lo, t.hi)) >= STOP)) open &= ~(1u << k);
+      if (!(max8(fmax(t.lo, t.hi)) >= least)) open &= ~(1u << k);
     }
   }
   for (int k = 0; k < BLOCKS; k++)
@@ -194,13 +193,13 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 }
 
 // One view, or the same tile of two views one after the other.
-__kernel void draw(int width, int height, int tiles_x, __global const int* starts_0,
+__kernel void draw(int width, int height, int tiles_x, float least, __global const int* starts_0,
                    __global const int* instances_0, __global const float* record_0,
                    __global float* image_0, __global const int* starts_1,
                    __global const int* instances_1, __global const float* record_1,
                    __global float* image_1) {
   const int tile = get_global_id(0);
-  draw_tile(tile, width, height, tiles_x, starts_0, instances_0, record_0, image_0);
+  draw_tile(tile, width, height, tiles_x, starts_0, instances_0, record_0, least, image_0);
   if (image_1)
-    draw_tile(tile, width, height, tiles_x, starts_1, instances_1, record_1, image_1);
+    draw_tile(tile, width, height, tiles_x, starts_1, instances_1, record_1, least, image_1);
 }

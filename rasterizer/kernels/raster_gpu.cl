@@ -1,9 +1,7 @@
 // raster, GPU form: one work-group a tile of 16x16 pixels; same inputs and outputs as raster_cpu.cl.
 #include "common/tiles.cl"
 #define PIXELS (TILE * TILE)
-#ifdef RGBA
-#define STOP 1e-4f  // as 3DGS; cannot be seen
-#else
+#ifndef STOP       // drawing for the screen says where it stops
 #define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
 #endif
 #define LANES 32  // of the backward pass: splats in flight
