@@ -66,7 +66,8 @@ def rasterize_rgba(
 ) -> np.ndarray:
     """(H, W, 4) float32 premultiplied over nothing, alpha = 1 - transmittance, row 0 on top.
 
-    least_through: what lies behind less transmittance than that is not drawn.  Read only; on a CPU it is the device's own memory, which is reused when the array goes.
+    least_through: what lies behind less transmittance than that is not drawn.  Read only; on a CPU
+    it is the device's own memory, which is reused when the array goes.
     """
     return rasterize_rgba_views(device, [(projected, tiles)], size, form, least_through)[0]
 
