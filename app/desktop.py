@@ -56,7 +56,7 @@ class Options:
     debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
     """Debug view to start in; G goes through them."""
     select: tuple[str, ...] = ()
-    """Regions with an x of their own, as render takes them: sphere:x,y,z:radius:X[:border],
+    """Regions with an x of their own, one after the other: sphere:x,y,z:radius:X[:border],
     box:x,y,z:hx,hy,hz:X[:border], half:x,y,z:nx,ny,nz:X[:border], lens:degrees:X[:border]."""
     pictures: Path = Path("pictures")
     """Folder for the pictures that P saves."""
@@ -134,7 +134,7 @@ class Viewer:
                 continue
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
-            if busy or redraw or self._note_ends(now):
+            if busy or redraw or self._note_ends(now) or self._idle_work_due(now):
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
@@ -228,6 +228,10 @@ class Viewer:
     @property
     def _moving(self) -> bool:
         return self.camera.moving or push(self.window).any or self.stage.playing
+
+    def _idle_work_due(self, now: float) -> bool:
+        """Whether the picture has rested so long that its error is to be measured."""
+        return self.shown.due(self._wish(), now)
 
     def _turn_dial(self) -> None:
         """Measures a little for the budget where that is wanted, and takes over what it chose."""

@@ -23,11 +23,9 @@ def section(name: str, open_first: bool = False) -> bool:
     return is_open
 
 
-def subsection(name: str, lit: bool, open_first: bool = False) -> bool:
+def subsection(name: str, lit: bool) -> bool:
     """A heading within a section, in the accent's colour when `lit`."""
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
-    if open_first:
-        flags |= imgui.TreeNodeFlags_.default_open
     imgui.push_style_color(
         imgui.Col_.text, imgui.ImVec4(*(theme.ACCENT if lit else theme.MUTED), 1)
     )

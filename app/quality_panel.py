@@ -31,7 +31,7 @@ def draw_quality(stage: Stage, readings: Readings, ui_scale: float) -> None:
     changed = shortcuts(settings)
     imgui.push_item_width(-1)
     for heading, names in GROUPS.items():
-        if not subsection(heading, any(n in changed for n in names), heading == "Culls"):
+        if not subsection(heading, any(n in changed for n in names)):
             continue
         if heading == "Culls":
             settings = _culls(settings, stage.radius, ui_scale)

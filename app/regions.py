@@ -11,7 +11,7 @@ from scene.selector import Box, HalfSpace, Lens, Painted, Selector, Sphere
 
 KINDS = ("box", "sphere", "half-space", "lens", "painted")
 FIRST_SIZE = 0.25  # of the scene's radius: half a box's side, a sphere's radius
-FIRST_BORDER = 0.05  # of the scene's radius
+FIRST_BORDER = 0.01  # of the scene's radius: on the way x may pass other stops, which shows
 LENS = 0.25  # tangent of half the lens' angle at first
 BRUSH = 24.0  # logical pixels, radius
 DEEP = 2.0  # brush radii behind the front: what lies deeper is another surface
