@@ -15,6 +15,8 @@ from renderer.gpu import Gpu
 from renderer.layout import CULLED_KEY
 
 MOST_ASIDE = 5.5  # pixels between the two ellipses of a splat, in the mean
+FARTHEST = 1e6  # pixels: any larger shift is refused as well
+STEP = 64  # pixels by which targets grow
 SAMPLES, RUN = 16, 256  # so many runs of so many records tell the disparity
 LEAST_LOW_PASS = 0.05  # px^2: thinner ellipses have no inverse in half floats
 
@@ -30,15 +32,17 @@ class PairSplatter:
         self._screen = gpu.ctx.vertex_array(self._move, [])
         self._targets: moderngl.Framebuffer | None = None
 
-    def shift(self, arena: Arena) -> int | None:
+    def shift(self, arena: Arena, width: int) -> int | None:
         """By how many pixels the right view, as just projected, has to move to lie on the left;
-        None where splats lie too differently, so that two draws are no slower.
+        None where splats lie too differently, so that two draws are no slower, and where the grid
+        for pictures of `width` pixels would be wider than the driver draws.
         """
         asides = disparities(arena)
         if not asides.size:
             return None
-        shift = int(np.rint(np.median(asides)))
-        return shift if np.abs(asides - shift).mean() <= MOST_ASIDE else None
+        shift = int(np.rint(np.clip(np.median(asides), -FARTHEST, FARTHEST)))
+        near = np.abs(asides - shift).mean() <= MOST_ASIDE
+        return shift if near and grid_width(width, shift) <= self._gpu.max_side else None
 
     def draw(
         self, arena: Arena, pictures: list[moderngl.Framebuffer], shift: int, min_alpha: float
@@ -47,7 +51,8 @@ class PairSplatter:
         ctx = self._gpu.ctx
         width, height = pictures[0].size
         first = (max(-shift, 0), max(shift, 0))  # column of the grid where each picture starts
-        both = self._target((width + abs(shift), height), pictures[0].color_attachments[0].dtype)
+        size = (grid_width(width, shift), height)
+        both = self._target(size, pictures[0].color_attachments[0].dtype)
         with self._gpu.drawing_into(both):
             both.clear(0.0, 0.0, 0.0, 0.0)
             ctx.enable_only(moderngl.BLEND)
@@ -66,16 +71,14 @@ class PairSplatter:
         ctx.memory_barrier()
 
     def _target(self, size: tuple[int, int], dtype: str) -> moderngl.Framebuffer:
-        """Two attachments; made anew when they are too small or of another kind.
-
-        Wider than asked by up to 64 pixels: the disparity changes from frame to frame.
+        """Two attachments of this height and at least this width; an old one that is wide enough
+        stays, since the disparity changes from frame to frame.
         """
         old = self._targets
-        width = -(-size[0] // 64) * 64
-        if old is not None and old.size == (width, size[1]):
+        if old is not None and old.width >= size[0] and old.height == size[1]:
             if old.color_attachments[0].dtype == dtype:
                 return old
-        made = [self._gpu.ctx.texture((width, size[1]), 4, dtype=dtype) for _ in range(2)]
+        made = [self._gpu.ctx.texture(size, 4, dtype=dtype) for _ in range(2)]
         self._gpu.allocations += 2
         self._release_targets()
         self._targets = self._gpu.ctx.framebuffer(made)
@@ -92,6 +95,11 @@ class PairSplatter:
         self._release_targets()
         self._triangles.release()
         self._screen.release()
+
+
+def grid_width(width: int, shift: int) -> int:
+    """Pixels across both pictures where they overlap but for `shift`; in steps, with room."""
+    return -(-(width + abs(shift)) // STEP) * STEP
 
 
 def disparities(arena: Arena) -> np.ndarray:

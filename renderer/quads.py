@@ -128,7 +128,7 @@ class QuadsDrawing:
         arena, shift = self._arena, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
         if self._pair is not None and alike and settings.low_pass >= LEAST_LOW_PASS:
-            shift = self._pair.shift(arena)
+            shift = self._pair.shift(arena, group[0].size[0])
         if shift is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
             self._pair.draw(arena, pictures, shift, settings.min_alpha)

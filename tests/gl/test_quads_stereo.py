@@ -118,6 +118,39 @@ def test_eyes_too_far_apart_are_drawn_one_by_one(ctx, monkeypatch):
         assert len(calls) == 1
 
 
+LENS = ((-0.4, 0.4, -0.3, 0.3), 0.05, 50, (320, 240))
+
+
+def test_a_moving_head_allocates_once_and_a_narrow_driver_draws_twice(ctx, monkeypatch):
+    scene = two_objects(1000)
+
+    def at(distance: float) -> list[View]:  # closer: more disparity
+        pose = front_view(distance=distance).world_from_eye
+        right = pose.matrix()[:3, 0]
+        return [
+            View(Pose(pose.position + side * right, pose.wxyz), *LENS) for side in (-0.032, 0.032)
+        ]
+
+    with Renderer(ctx, "quads") as renderer:
+        pair = renderer._drawing._pair
+        if pair is None:
+            pytest.skip("a GPU draws the views one after the other")
+        monkeypatch.setattr("renderer.pair.MOST_ASIDE", 1e9)
+        renderer.update(scene)
+        renderer.draw(at(0.6))
+        made = renderer._drawing.allocations
+        widest = pair._targets.width
+        for distance in (0.8, 3.0, 9.0, 0.7, 0.6):
+            renderer.draw(at(distance))
+        assert renderer._drawing.allocations == made and pair._targets.width == widest > 320
+        near = [renderer.image(i).copy() for i in range(2)]
+        monkeypatch.setattr(renderer._gpu, "max_side", 320)
+        monkeypatch.setattr(pair, "draw", lambda *a: pytest.fail("the grid is too wide"))
+        renderer.draw(at(0.6))
+        for i in range(2):
+            assert psnr_db(renderer.image(i), near[i]) > 60
+
+
 @pytest.mark.parametrize("count", [0, 1, 5, 255, 257])
 def test_few_splats_in_two_views(ctx, count):
     scene, views = alone(random_layers(count)), stereo_views((60, 50))
