@@ -35,7 +35,7 @@ class Decoder:
             elif mlps == "gl":
                 made[id(model)] = Networks(gpu, model)
             else:
-                made[id(model)] = Evaluator(model)
+                made[id(model)] = Evaluator(model, keep=True)
         self._models = [made[id(model)] for model in models]
         for i, on_gpu in enumerate(self._models):
             if isinstance(on_gpu, Layers):
@@ -45,7 +45,7 @@ class Decoder:
         """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
-            arena.write_geometry(i, *model.geometry(x))
+            arena.write_geometry(i, *model.geometry(x, unit=False))
         else:
             model.geometry(arena, arena.starts[i], x)
 

@@ -81,7 +81,7 @@ class TilesDrawing:
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
         )
-        evaluators = {id(model): Evaluator(model) for model in models}
+        evaluators = {id(model): Evaluator(model, keep=True) for model in models}
         sh = {id(m): upload_sh(device, m.sh) for m in models if isinstance(m, SplatLayers)}
         self._slots = [
             _Slot(int(start), count, evaluators[id(model)], sh.get(id(model)))

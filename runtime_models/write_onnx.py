@@ -13,7 +13,8 @@ def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
     """Gemm, Relu, ..., Gemm, then Clip, the head and Mul where the network has them.
 
     With first_bias="input" the first layer's bias is not stored: it is a second input "bias" of the
-    graph, (1, hidden) for all rows or (N, hidden).
+    graph, (1, hidden) for all rows or (N, hidden).  "input and rows": and a third, "rows"
+    (N, hidden), is added to the first layer, too.
     """
     from onnx import TensorProto, checker, helper, numpy_helper
 
@@ -31,9 +32,11 @@ def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
     for i, (weight, bias) in enumerate(zip(mlp.weights, mlp.biases, strict=True)):
         if i:
             value = apply("Relu", value)
-        from_outside = i == 0 and first_bias == "input"
-        label = "bias" if from_outside else constant(f"bias{i}", bias)
+        added = {"input": "bias", "input and rows": "rows"}.get(first_bias) if i == 0 else None
+        label = added or constant(f"bias{i}", bias)
         value = apply("Gemm", value, constant(f"weight{i}", weight), label, transB=1)
+        if added == "rows":
+            value = apply("Add", value, "bias")
     if mlp.clip is not None:
         value = apply("Clip", value, constant("low", mlp.clip[0]), constant("high", mlp.clip[1]))
     if mlp.head != "none":
@@ -46,8 +49,10 @@ def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
         return helper.make_tensor_value_info(label, TensorProto.FLOAT, shape)
 
     inputs = [shaped("input", "N", mlp.width_in)]
-    if first_bias == "input":
-        inputs.append(shaped("bias", "rows", len(mlp.biases[0])))
+    if first_bias != "stored":
+        inputs.append(shaped("bias", "biases", len(mlp.biases[0])))
+    if first_bias == "input and rows":
+        inputs.append(shaped("rows", "N", len(mlp.biases[0])))
     graph = helper.make_graph(
         nodes, name, inputs, [shaped("output", "N", mlp.width_out)], constants
     )
