@@ -3,7 +3,10 @@
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+
+import numpy as np
 
 from app.chart_measure import ChartRow
 from app.pareto import pareto_front
@@ -16,15 +19,16 @@ FAMILIES = {  # name -> (colour, fields that belong to it)
     "culls": ("#d55e00", ("min_alpha", "low_pass", "max_pixels", "max_distance", "min_pixels",
                           "fade")),
     "colour": ("#009e73", ("recolor_degrees", "skip_unseen")),
-    "target and scale": ("#cc79a7", ("target", "render_scale")),
+    "pixels": ("#cc79a7", ("target", "render_scale", "min_through")),
     "several of them": ("#56564f", ()),
 }  # fmt: skip
 INK, PALE, FRONT = "#222222", "#e4e4e0", "#a8a49a"
 TITLES = {1: "One eye", 2: "Two eyes, beside exact frames of two eyes{}"}
 REACHES = (9, 15, 24, 36, 50, 66, 84)  # points from a dot to its name: the first free place
-LINE_PARTS = tuple(i / 12 for i in range(3, 12))  # of a line to a name, from its own dot on
+BEADS = 60  # of each line of the front
+LINE_PARTS = np.arange(3, 12)[:, None] / 12  # of a line to a name, beyond its own dot
 CROSSING = 100.0  # square pixels that a point of the line under another name counts as
-SIDES = ((1, 1), (-1, -1))  # above a falling front there is room; below it dots
+SIDES = ((1, 1), (1, 0), (-1, -1))  # above a falling front there is room; below it dots
 
 
 def draw_chart(rows: Sequence[ChartRow], title: str, folder: Path) -> list[ChartRow]:
@@ -125,30 +129,31 @@ def name_points(axis, places, names, occupied) -> list:
     places: (x, y) of the names; occupied: (x, y) of all dots.  Returns the annotations; a name
     for which no place is free goes where it overlaps least.
     """
-    from matplotlib.transforms import Bbox
-
-    figure = axis.figure
-    pixels = figure.dpi / 72  # per point
-    dots = [axis.transData.transform(p) for p in occupied]
-    boxes = [Bbox.from_extents(x - 3 * pixels, y - 3 * pixels, x + 3 * pixels, y + 3 * pixels)
-             for x, y in dots]  # fmt: skip
-    legend = axis.get_legend()
-    if legend is not None:
-        boxes.append(legend.get_window_extent())
+    pixels = axis.figure.dpi / 72  # per point
+    dots = [axis.transData.transform(place) for place in occupied]
+    line = [axis.transData.transform(place) for place in places]
+    parts = np.linspace(0, 1, BEADS)[:, None]
+    beads = [start + (end - start) * parts for start, end in pairwise(line)]  # the front itself
+    taken = [
+        np.array([(*(dot - 3 * pixels), *(dot + 3 * pixels)) for dot in dots]).reshape(-1, 4),
+        *(np.hstack([each - pixels, each + pixels]) for each in beads),
+    ]
+    if axis.get_legend() is not None:
+        taken.append([axis.get_legend().get_window_extent().extents])
+    boxes = np.concatenate(taken)  # (B, 4) x0, y0, x1, y1 in pixels: what no name may cover
     written = []
-    for place, name in zip(places, names, strict=True):
+    for start, place, name in zip(line, places, names, strict=True):
         note = axis.annotate(name, place, xytext=(0, 0), textcoords="offset points", fontsize=8,
                              color=INK, zorder=5)  # fmt: skip
-        best = min(
-            (_overlap(note, place, reach, side, boxes), number, reach, side)
-            for number, (reach, side) in enumerate((r, s) for s in SIDES for r in REACHES)
+        _, _, reach, side = min(
+            (_overlap(note, start, reach, side, boxes), number, reach, side)
+            for number, (reach, side) in enumerate((r, s) for r in REACHES for s in SIDES)
         )
-        _, _, reach, side = best
         _move(note, reach, side)
-        box = note.get_window_extent()
-        boxes.append(Bbox.from_extents(box.x0 - 2, box.y0 - 2, box.x1 + 2, box.y1 + 2))
+        box = note.get_window_extent().extents
+        boxes = np.vstack([boxes, box + np.array([-2, -2, 2, 2])])
         if reach > REACHES[0]:
-            _lead(axis, place, box)
+            _lead(axis, start, box)
         written.append(note)
     return written
 
@@ -156,36 +161,33 @@ def name_points(axis, places, names, occupied) -> list:
 def _move(note, reach: float, side: tuple[int, int]) -> None:
     dx, dy = side
     note.xyann = (dx * reach * (0.6 if dy else 1), dy * reach * (0.8 if dx else 1))
-    note.set_ha({1: "left", 0: "center", -1: "right"}[dx])
+    note.set_ha({1: "left", -1: "right"}[dx])
     note.set_va({1: "bottom", 0: "center", -1: "top"}[dy])
 
 
-def _overlap(note, place, reach: float, side: tuple[int, int], boxes: list) -> float:
+def _overlap(note, start, reach: float, side: tuple[int, int], boxes: np.ndarray) -> float:
     """Square pixels of the name over others, beyond the axes, and of others under its line."""
     _move(note, reach, side)
-    box, frame = note.get_window_extent(), note.axes.get_window_extent()
-    cost = sum(_shared(box, other) for other in boxes)
-    cost += 4 * (box.width * box.height - _shared(box, frame))
+    box, frame = note.get_window_extent().extents, note.axes.get_window_extent().extents
+    inside = _shared(box, frame[None])
+    cost = _shared(box, boxes) + 4 * ((box[2] - box[0]) * (box[3] - box[1]) - inside)
     if reach > REACHES[0]:
-        start = note.axes.transData.transform(place)
-        end = (min(max(start[0], box.x0), box.x1), min(max(start[1], box.y0), box.y1))
-        steps = [start + (end - start) * part for part in LINE_PARTS]
-        cost += CROSSING * sum(other.contains(*step) for other in boxes for step in steps)
-    return round(cost, 1)
+        steps = start + (np.clip(start, box[:2], box[2:]) - start) * LINE_PARTS  # (P, 2)
+        under = (steps[:, None] >= boxes[:, :2]) & (steps[:, None] <= boxes[:, 2:])  # (P, B, 2)
+        cost += CROSSING * under.all(axis=2).sum()
+    return round(float(cost), 1)
 
 
-def _shared(a, b) -> float:
-    width = min(a.x1, b.x1) - max(a.x0, b.x0)
-    height = min(a.y1, b.y1) - max(a.y0, b.y0)
-    return max(width, 0) * max(height, 0)
+def _shared(box: np.ndarray, boxes: np.ndarray) -> float:
+    """Square pixels that a box (4,) shares with others (B, 4)."""
+    sides = np.minimum(box[2:], boxes[:, 2:]) - np.maximum(box[:2], boxes[:, :2])  # (B, 2)
+    return float(np.clip(sides, 0, None).prod(axis=1).sum())
 
 
-def _lead(axis, place: tuple[float, float], box) -> None:
-    """A thin line from a dot to its name where they are apart."""
-    x, y = axis.transData.transform(place)
-    end = (min(max(x, box.x0), box.x1), min(max(y, box.y0), box.y1))
-    axis.plot(*zip(place, axis.transData.inverted().transform(end), strict=True), color=INK,
-              lw=0.5, alpha=0.5, zorder=2, scalex=False, scaley=False)  # fmt: skip
+def _lead(axis, start: np.ndarray, box: np.ndarray) -> None:
+    """A thin line from a dot at `start` (pixels) to its name where they are apart."""
+    ends = axis.transData.inverted().transform([start, np.clip(start, box[:2], box[2:])])
+    axis.plot(*ends.T, color=INK, lw=0.5, alpha=0.5, zorder=2, scalex=False, scaley=False)
 
 
 def save_figure(figure, path: Path) -> None:

@@ -8,7 +8,7 @@ from renderer.settings import RenderSettings
 
 EXACT = "exact"
 # Fields that a drawing does not read: a setting with one of them is left out of its chart.
-NOT_READ = {"tiles": ("target",), "quads": ()}
+NOT_READ = {"tiles": ("target",), "quads": ("min_through",)}
 TAU_PIXELS = (0.0, 10.0, 20.0)  # tau_lambda of the paper's Table 3; 0 = none
 TAU_PLACES = ("", "near", "far")  # tau_dist: 20 and 40 m there, Distances of the scene here
 
@@ -75,6 +75,9 @@ SETTINGS = (
     Named("alpha from 2/255", {"min_alpha": 2 / 255}),
     Named("alpha from 4/255", {"min_alpha": 4 / 255}, quick=True),
     Named("no low-pass", {"low_pass": 0.0}),
+    Named("stop at 1/2048", {"min_through": 1 / 2048}, quick=True),
+    Named("stop at 1/256", {"min_through": 1 / 256}, quick=True),
+    Named("stop at 1/64", {"min_through": 1 / 64}),
     Named("75 % scale", {"render_scale": 0.75}, quick=True),
     Named("50 % scale", {"render_scale": 0.5}, quick=True),
     Named("16 bit, colours 2\u00b0, 1 px",
@@ -87,6 +90,10 @@ SETTINGS = (
     Named("4/255, from 2 px, 50 %", {**FAINT_AND_SMALL, "render_scale": 0.5}, quick=True),
     Named("sort 1\u00b0, colours 2\u00b0, 1 px, 75 %", {**COMBINED, "render_scale": 0.75}),
     Named("sort 1\u00b0, colours 2\u00b0, 1 px, 50 %", {**COMBINED, "render_scale": 0.5}),
+    Named("stop 1/2048, sort 1\u00b0, colours 2\u00b0",
+          {**AFTER_1, "recolor_degrees": 2.0, "min_through": 1 / 2048}),
+    Named("stop 1/256, 2/255, 1.5 px",
+          {"min_through": 1 / 256, "min_alpha": 2 / 255, "min_pixels": 1.5}, quick=True),
     *(row for row in _table_3() if row.eyes == 1),
     # Beside one eye, so that its ratio is what the second eye costs.
     Named("stereo", eyes=2, beside_eyes=1),
@@ -114,7 +121,9 @@ def named_settings(name: str, drawing: str) -> Named:
         told = "; ".join(row.name for row in SETTINGS)
         raise UsageError(f"there is no setting '{name}'; choose one of: {told}.")
     if found not in settings_of(drawing):
-        raise UsageError(f"setting '{name}' changes nothing in {drawing}; choose --drawing quads.")
+        other = next(each for each in NOT_READ if found in settings_of(each))
+        told = f"setting '{name}' changes nothing in {drawing}"
+        raise UsageError(f"{told}; choose --drawing {other}.")
     return found
 
 

@@ -222,9 +222,9 @@ def test_rows_with_nan_are_not_drawn_as_good(tmp_path):
 
 def test_families_of_the_whole_table():
     seen = {family(" ".join(f"{name}=1" for name in named.changes)) for named in SETTINGS}
-    assert seen >= {"", "order", "culls", "colour", "target and scale", "several of them"}
+    assert seen >= {"", "order", "culls", "colour", "pixels", "several of them"}
     assert family("target=rgba16f min_pixels=2") == "culls"
-    assert family("target=rgba16f") == "target and scale"
+    assert family("target=rgba16f") == "pixels"
 
 
 def test_a_whole_chart_is_what_a_budget_finds(package, tmp_path, monkeypatch):

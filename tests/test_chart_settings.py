@@ -47,7 +47,9 @@ def test_the_grid_of_table_3_is_whole():
 
 
 def test_what_a_drawing_does_not_read_is_left_out():
-    assert not any(field in n.changes for n in settings_of("tiles") for field in NOT_READ["tiles"])
+    for drawing, idle in NOT_READ.items():
+        assert not any(field in n.changes for n in settings_of(drawing) for field in idle)
+    assert any("min_through" in n.changes for n in settings_of("tiles"))
     targets = {n.changes.get("target") for n in settings_of("quads")}
     assert {"rgba8", "rgba16f"} <= targets
     known = {field.name for field in fields(RenderSettings)}
@@ -76,8 +78,10 @@ def test_exact_is_float_and_shortcuts_blend_as_the_viewer_does():
 def test_a_name_that_is_not_there_is_one_sentence():
     with pytest.raises(UsageError, match="no setting 'sort every 3'; choose one of: exact;"):
         named_settings("sort every 3", "tiles")
-    with pytest.raises(UsageError, match="'rgba8' changes nothing in tiles"):
+    with pytest.raises(UsageError, match="'rgba8' changes nothing in tiles; choose --drawing q"):
         named_settings("rgba8", "tiles")
+    with pytest.raises(UsageError, match="changes nothing in quads; choose --drawing tiles"):
+        named_settings("stop at 1/64", "quads")
     assert named_settings("rgba8", "quads").changes == {"target": "rgba8"}
 
 
