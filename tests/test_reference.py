@@ -120,9 +120,11 @@ def test_one_splat_never_hides_everything():
 def test_broken_splats_leave_no_trace():
     broken, whole = poisoned(random_layers(600))
     assert not all(np.isfinite(getattr(broken, name)).all() for name in FIELDS)
-    np.testing.assert_array_equal(
+    # Colours are float32 out of products whose rounding depends on how many there are.
+    np.testing.assert_allclose(
         reference_image(alone(broken), front_view((64, 64))),
         reference_image(alone(only(broken, whole)), front_view((64, 64))),
+        atol=1e-6,
     )
 
 
