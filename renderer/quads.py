@@ -22,7 +22,7 @@ from renderer.overdraw import count_overdraw
 from renderer.pair import LEAST_LOW_PASS, PairSplatter
 from renderer.project import Projector
 from renderer.settings import RenderSettings
-from renderer.sort_check import working_sorter
+from renderer.sort_check import checked_sorter
 from renderer.splat import Splatter
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
@@ -37,7 +37,7 @@ class QuadsDrawing:
     """The arena of all objects in GL buffers, and the passes that draw it."""
 
     def __init__(self, gpu: Gpu, mlps: str, sort: str) -> None:
-        self._sorter, sort = working_sorter(gpu, sort)
+        self._sorter, sort = checked_sorter(gpu, sort)
         self.backends = {"drawing": "quads", "mlps": mlps, "sort": sort}
         self.decodes_on_gpu = mlps == "gl"  # says which clock times the decoding
         self._gpu = gpu

@@ -79,7 +79,7 @@ def stable_order(keys: np.ndarray, bits: int = 32) -> np.ndarray:
 
     One or two passes over 16-bit halves, for which numpy has a radix sort.
     """
-    order = np.argsort(keys.astype(np.uint16), kind="stable")
+    order = np.argsort(keys.astype(np.uint16, copy=False), kind="stable")
     if bits == 32:
         high = (keys >> np.uint32(16)).astype(np.uint16)
         order = order[np.argsort(high[order], kind="stable")]
@@ -87,15 +87,13 @@ def stable_order(keys: np.ndarray, bits: int = 32) -> np.ndarray:
 
 
 def quantize(keys: np.ndarray) -> np.ndarray:
-    """Depth keys (float bits) as 0..65534 over their own range; CULLED_KEY becomes 65535.
+    """Depth keys (float bits) as uint16 0..65534 over their own range; CULLED_KEY becomes 65535.
 
     The twin of sort_quantize.comp.
     """
-    visible = keys != layout.CULLED_KEY
-    depth = np.where(visible, keys, 0).view(np.float32)
-    if not visible.any():
-        return np.full_like(keys, 65535)
-    nearest, farthest = depth[visible].min(), depth[visible].max()
-    scale = np.float32(65534) / np.maximum(farthest - nearest, np.float32(1e-30))
-    steps = np.clip((depth - nearest) * scale, np.float32(0), np.float32(65534)).astype(np.uint32)
-    return np.where(visible, steps, np.uint32(65535))
+    nearest = keys.min(initial=layout.CULLED_KEY)
+    farthest = keys.view(np.int32).max(initial=-1)  # CULLED_KEY is -1 here, depths are above
+    ends = np.array([nearest, farthest], np.int64).astype(np.uint32).view(np.float32)
+    steps = keys.view(np.float32) - ends[0]  # CULLED_KEY is a NaN, which fmin() tells from depths
+    steps *= np.float32(65534) / np.maximum(ends[1] - ends[0], np.float32(1e-30))
+    return np.fmin(steps, np.float32(65535), out=steps).astype(np.uint16)

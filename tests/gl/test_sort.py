@@ -97,6 +97,23 @@ def test_quantize_spans_the_range_and_survives_one_depth():
     np.testing.assert_array_equal(quantize(np.append(keys, culled[:1])), [0, 65534, 32767, 65535])
 
 
+@pytest.mark.parametrize("n", [0, 1, 2, 1000])
+@pytest.mark.parametrize("nearest, farthest", [(0.05, 0.05), (1e-40, 3e-40), (1e-6, 3e38), (2, 6)])
+def test_quantize_is_the_plain_formula_of_float32(n, nearest, farthest):
+    rng = np.random.default_rng(n)
+    depth = rng.uniform(nearest, farthest, n).astype(np.float32)
+    for culled in (0.0, 0.3, 1.0):
+        seen = rng.random(n) >= culled
+        keys = np.where(seen, depth.view(np.uint32), np.uint32(layout.CULLED_KEY))
+        expected = np.full(n, 65535)
+        if seen.any():
+            least, reach = depth[seen].min(), np.maximum(np.ptp(depth[seen]), np.float32(1e-30))
+            expected[seen] = np.minimum((depth[seen] - least) * (np.float32(65534) / reach), 65534)
+        steps = quantize(keys)
+        np.testing.assert_array_equal(steps, expected)
+        assert steps.dtype == np.uint16
+
+
 def test_stable_order_of_nothing():
     assert stable_order(np.zeros(0, np.uint32)).shape == (0,)
 
