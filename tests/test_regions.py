@@ -1,13 +1,19 @@
 """Regions as a person edits them, the brush, and their outlines in the picture; no window."""
 
+import dataclasses
+from pathlib import Path
+
 import numpy as np
 import pytest
 from models import make_random_model
 
 from app.outlines import on_screen, segments
-from app.regions import KINDS, Region, Regions, brushed
+from app.regions import KINDS, Region, Regions, brushed, region_of, selector_of
+from app.stage import Stage
+from runtime_models.model import SplatLayers, Stop
 from scene.pose import Pose, View, look_at
 from scene.scene import SceneObject
+from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
 
 SIZE = (400, 300)
 VIEW = View(look_at(np.array([0.0, 0, 4]), np.zeros(3)), (-0.4, 0.4, -0.3, 0.3), 0.1, 50.0, SIZE)
@@ -152,3 +158,83 @@ def test_segments_are_cut_where_they_pass_the_eye():
     np.testing.assert_allclose(places[0], in_pixels(lines[0]))
     np.testing.assert_allclose(places[1, 0], in_pixels(lines[2])[0])
     np.testing.assert_allclose(places[1, 1], in_pixels(np.array([[0.5, 0, 3.9]]))[0])
+
+
+# What the scene knows them as
+
+SELECTORS = (
+    Box(centre=(1.0, 2, 3), half=(0.5, 1, 2), x=0.25, border=0.1),
+    Sphere(centre=(1.0, 2, 3), radius=0.7, x=0.5),
+    HalfSpace(point=(0.1, 0.2, 0.3), normal=(0, 0, -1.0), x=1.0, border=0.2),
+    Lens(position=VIEW.world_from_eye.position, wxyz=VIEW.world_from_eye.wxyz,
+         half_angle=0.3, x=0.75),
+    Painted(np.arange(300) % 3 == 0, 1.0),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("selector", SELECTORS, ids=lambda s: type(s).__name__)
+def test_a_region_is_the_selector_it_came_from(selector, thing):
+    again = selector_of(region_of(selector, "name", 0), VIEW)
+    places = thing.model.anchors
+    if isinstance(selector, Lens):
+        assert again.half_angle == pytest.approx(selector.half_angle)
+        np.testing.assert_allclose(again.weights(places), selector.weights(places))
+    else:
+        assert again == selector
+
+
+def test_a_half_space_takes_the_side_that_its_arrow_points_to():
+    region = Region("half-space", "", centre=np.array([0, 1.0, 0]), normal=np.array([0, 1.0, 0]))
+    weights = selector_of(region, VIEW).weights(np.array([[0, 2.0, 0], [0, 0.5, 0]]))
+    np.testing.assert_array_equal(weights, [1, 0])
+
+
+def test_regions_of_a_command_are_named_and_none_is_being_edited(thing):
+    regions = Regions()
+    regions.take(SELECTORS[:2] + SELECTORS[:1], 0)
+    assert [r.name for r in regions.items] == ["box 1", "sphere 1", "box 2"]
+    assert regions.current is None and not regions.placing
+    regions.edit(1, enabled=False)
+    assert regions.selectors(0, VIEW) == (SELECTORS[0], SELECTORS[0])
+    assert regions.selectors(1, VIEW) == ()
+
+
+# The stage
+
+
+def test_the_stage_makes_a_scene_anew_only_when_something_changed(thing):
+    stage = Stage(lambda path: thing.model)
+    stage.open([Path("a"), Path("b")])
+    other = dataclasses.replace(VIEW, world_from_eye=look_at(np.array([3.0, 0, 4]), np.zeros(3)))
+    assert stage.shown(VIEW) is stage.scene  # without regions there is nothing to add
+    stage.add_region("box")
+    first = stage.shown(VIEW)
+    assert first is stage.shown(other) and len(first.objects[0].selectors) == 1
+    assert first.objects[1].selectors == ()
+    stage.regions.edit(0, x=0.5)
+    second = stage.shown(VIEW)
+    assert second is not first and second.objects[0].selectors[0].x == 0.5
+    stage.set_x(0, 0.3)
+    third = stage.shown(VIEW)
+    assert third is not second and third.objects[0].x == 0.3
+    stage.toggle_lens()
+    assert stage.shown(VIEW) is stage.shown(VIEW) is not stage.shown(other)
+    stage.show(stage.scene)
+    assert stage.regions.items == () and stage.shown(VIEW) is stage.scene
+
+
+def test_picking_sees_what_a_region_shows():
+    """A half-space hides the near layer of two: the ray goes on to the far one."""
+    means = np.array([[0, 0, 1], [0, 0, -1]], np.float32)
+    model = SplatLayers(
+        means, np.full((2, 3), 0.1, np.float32),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1)), np.full(2, 0.9, np.float32),
+        np.zeros((2, 1, 3), np.float32), np.zeros(2, np.int32),
+        (Stop("there", 0.0), Stop("not there", 1.0)), mode="exclusive",
+    )  # fmt: skip
+    stage = Stage(lambda path: model)
+    stage.open([Path("a")])
+    ray = np.array([0, 0, -1.0])
+    assert stage.pick(VIEW, ray, 0.001).point[2] == pytest.approx(1)
+    stage.regions.take((HalfSpace(point=(0, 0, 0), normal=(0, 0, -1.0), x=1.0),), 0)
+    assert stage.pick(VIEW, ray, 0.001).point[2] == pytest.approx(-1)

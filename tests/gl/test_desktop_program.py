@@ -79,6 +79,21 @@ def test_bad_input_is_one_sentence_before_any_window_opens(scene_file, tmp_path)
     assert_one_sentence(start(None, "view", scene_file, "--size", "12"), 2, "--size")
     assert_one_sentence(start(None, "view", scene_file, "--x", "nan"), 2, "--x")
     assert_one_sentence(start(None, "view", scene_file, "--frames", "0"), 2, "--frames")
+    assert_one_sentence(start(None, "view", scene_file, "--target-ms", "-1"), 2, "--target-ms")
+    assert_one_sentence(start(None, "view", scene_file, "--floor-db", "nan"), 2, "--floor-db")
+    assert_one_sentence(start(None, "view", scene_file, "--select", "cube:1"), 2, "cube", "sphere")
+
+
+def test_a_region_a_debug_view_and_a_budget_from_the_command_line(display, scene_file, tmp_path):
+    out = tmp_path / "window.png"
+    done = start(
+        display, "view", scene_file, "--screenshot", out, "--size", "800x600",
+        "--select", "sphere:0,0,0:0.5:0", "--debug", "culls", "--target-ms", "1000",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    picture = np.asarray(Image.open(out)).astype(int)
+    legend = picture[16:160, 300:460]
+    assert (np.abs(legend - np.array([77, 217, 102])).max(axis=2) < 40).sum() > 20  # "drawn"
 
 
 def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_file, tmp_path):
