@@ -236,7 +236,10 @@ class FoldedNetwork:
     def feature_part(self, features: np.ndarray) -> np.ndarray | None:
         """(A, hidden) what the first layer makes of all features, from the first use on."""
         if self._keeps and self._base is None:
-            self._base = np.asarray(features, np.float32) @ self._feature.T
+            # By a session as well: numpy's matrix product leaves threads spinning for milliseconds.
+            layer = Mlp((self._feature,), (np.zeros(len(self._feature), np.float32),))
+            session = open_session(write_onnx(layer, "features"), threads=1)
+            self._base = session.run(["output"], {"input": features})[0]
         return self._base
 
     def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:

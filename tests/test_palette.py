@@ -63,9 +63,7 @@ def test_an_unknown_palette_is_named_with_those_there_are():
         palette_colors("rainbowish")
 
 
-@pytest.mark.parametrize(
-    ("x", "weight"), [(0.0, 0), (0.1, 0.25), (0.4, 1), (0.7, 0.5), (1.0, 0)]
-)
+@pytest.mark.parametrize(("x", "weight"), [(0.0, 0), (0.1, 0.25), (0.4, 1), (0.7, 0.5), (1.0, 0)])
 def test_weight_is_a_hat_over_the_thermal_stop(x, weight):
     name, got, stop = thermal_blend(Scene((thing(x),)))
     assert got == pytest.approx(weight)

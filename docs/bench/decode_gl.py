@@ -96,8 +96,13 @@ def rows_of(gpu: Gpu, anchors: int) -> list[tuple]:
             ms = median_ms({"ours": work, "floor": lowest[job]})
             rows.append((told, job, ms["ours"], ms["floor"], limit))
 
-    evaluator = Evaluator(model)
-    parts = (lambda i, x: evaluator.geometry(x), lambda i, x, eye: evaluator.color(x, eye), int)
+    evaluator = Evaluator(model, keep=True)  # as the drawings have it
+    room = np.empty((model.splat_count, 3), np.float32)
+    parts = (
+        lambda i, x: evaluator.geometry(x, unit=False),
+        lambda i, x, eye: evaluator.color(x, eye, out=room),
+        int,
+    )
     add("networks alone", LIMITS["onnxruntime"], decoding(*parts))
     for mlps in MLPS:
         with Arena(gpu, [model.splat_count]) as arena, Decoder(gpu, arena, [model], mlps) as made:
