@@ -103,6 +103,7 @@ def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[
     with open_pair(options.context, options.drawing) as (renderers, ctx):
         background = default_background(models[0], (0.0, 0.0, 0.0))
         pricing = Pricing(renderers, ctx, stage, background)
+        on_cpu = draws_on_cpu(pricing.drawing, ctx)
         head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
         file = RowsFile(options.out / "rows.csv", ChartRow, head)
         measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
@@ -110,9 +111,17 @@ def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[
             drawn = Drawn(models[0], x, size)
             keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
     title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
-    front = draw_chart(file.rows, title, options.out)
+    front = draw_chart(file.rows, title, options.out, on_cpu)
     print_front(front, len(file.rows), options.out)
     return 0
+
+
+def draws_on_cpu(drawing: str, ctx) -> bool:
+    """Whether the processor makes the pixels: then its time is what a frame costs."""
+    from rasterizer.device import open_device
+    from renderer.context import is_software
+
+    return open_device().kind == "cpu" if drawing == "tiles" else is_software(ctx)
 
 
 def measure_rows(pricing, file, settings, pictures: bool) -> None:

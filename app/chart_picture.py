@@ -31,10 +31,19 @@ CROSSING = 100.0  # square pixels that a point of the line under another name co
 SIDES = ((1, 1), (1, 0), (-1, -1))  # above a falling front there is room; below it dots
 
 
-def draw_chart(rows: Sequence[ChartRow], title: str, folder: Path) -> list[ChartRow]:
-    """Writes chart.svg and chart.png; returns the front of one eye, exact to fastest."""
+def draw_chart(
+    rows: Sequence[ChartRow], title: str, folder: Path, on_cpu: bool = False
+) -> list[ChartRow]:
+    """Writes chart.svg and chart.png; returns the front of one eye, exact to fastest.
+
+    on_cpu: the processor draws, so its time is what a frame costs, and other load does not count;
+    `ratio` of the rows returned is that of processor time then.
+    """
     from matplotlib.figure import Figure
 
+    if on_cpu:
+        rows = [replace(row, ratio=row.cpu_ms / row.exact_cpu_ms) for row in rows]
+    clock = "processor time" if on_cpu else "frame time"
     panels = {eyes: [row for row in rows if row.eyes == eyes] for eyes in (1, 2)}
     panels[2], second_eye = _beside_two_eyes(panels[2])
     panels = {eyes: found for eyes, found in panels.items() if found}
@@ -45,7 +54,7 @@ def draw_chart(rows: Sequence[ChartRow], title: str, folder: Path) -> list[Chart
     fronts = {}
     for axis, (eyes, found) in zip(axes, panels.items(), strict=True):
         title = TITLES[eyes].format(second_eye) if len(panels) > 1 else ""
-        fronts[eyes] = _panel(axis, found, title)
+        fronts[eyes] = _panel(axis, found, title, clock)
     figure.draw_without_rendering()  # the layout is settled before names look for room
     figure.set_layout_engine("none")
     for axis, (eyes, found) in zip(axes, panels.items(), strict=True):
@@ -61,7 +70,7 @@ def _beside_two_eyes(rows: list[ChartRow]) -> tuple[list[ChartRow], str]:
     if second is None:
         return rows, ""
     plain = replace(second, name="exact", ratio=1.0, psnr_db=TOP_DB, sweep_psnr_db=TOP_DB)
-    told = f" ({second.ratio:.2f} times the time of one eye)"
+    told = f" ({second.ratio:.2f} times one eye)"
     return [plain, *(row for row in rows if row is not second)], told
 
 
@@ -70,7 +79,7 @@ def _place(row: ChartRow) -> tuple[float, float]:
     return 1 / row.ratio, min(row.db, TOP_DB)
 
 
-def _panel(axis, rows: list[ChartRow], title: str) -> list[ChartRow]:
+def _panel(axis, rows: list[ChartRow], title: str, clock: str) -> list[ChartRow]:
     """Dots, front and axes; returns the rows of the front, most alike first."""
     drawn = [row for row in rows if row.db == row.db and row.ratio > 0]
     # The same speed within what a measurement can tell: then the row that stands first, exact.
@@ -86,7 +95,7 @@ def _panel(axis, rows: list[ChartRow], title: str) -> list[ChartRow]:
     if plain:
         axis.scatter(*zip(*plain, strict=True), s=40, color=INK, marker="D", zorder=4,
                      edgecolors="white", linewidths=0.6, label="exact")  # fmt: skip
-    _style(axis, [_place(row) for row in drawn], title)
+    _style(axis, [_place(row) for row in drawn], title, clock)
     return front
 
 
@@ -101,7 +110,7 @@ def family(changes: str) -> str:
     return "several of them" if changed else ""
 
 
-def _style(axis, places: list[tuple[float, float]], title: str) -> None:
+def _style(axis, places: list[tuple[float, float]], title: str, clock: str) -> None:
     """Axes with room for names on every side, ticks that say what the top means."""
     fastest = max(x for x, _ in places)
     least = min(y for _, y in places)
@@ -112,7 +121,8 @@ def _style(axis, places: list[tuple[float, float]], title: str) -> None:
     axis.set_ylim(low - 4, TOP_DB + 12)
     ticks = [tick for tick in range(int(low), int(TOP_DB), 10)]
     axis.set_yticks([*ticks, TOP_DB], [*map(str, ticks), "equal"])
-    axis.set_xlabel("speed, times the exact setting in the same run", fontsize=9, color=INK)
+    told = f"speed by {clock}, times the exact setting in the same run"
+    axis.set_xlabel(told, fontsize=9, color=INK)
     axis.set_ylabel("worst PSNR to the exact picture, dB", fontsize=9, color=INK)
     axis.tick_params(labelsize=8, colors=INK)
     axis.grid(color=PALE, lw=0.6, zorder=0)

@@ -313,3 +313,13 @@ def test_the_command_line_holds_file_names_alone(tmp_path):
     options = chart.Options(scenes=(tmp_path / "a.shift",) * 2, cameras=tmp_path / "c.json", x=0.5)
     told = chart.command_line(options)
     assert told == "python3 launch.py chart a.shift a.shift --cameras c.json --x 0.5 --out DIR"
+
+
+def test_where_the_processor_draws_its_time_decides(tmp_path):
+    """Other load makes a frame late, not dear: wall ms of these two say the opposite."""
+    lucky, cheap = make_row("lucky", ratio=0.5, db=50), make_row("cheap", ratio=0.8, db=50)
+    rows = [make_row(), replace(lucky, cpu_ms=19.0), replace(cheap, cpu_ms=10.0)]
+    front = draw_chart(rows, "a title", tmp_path, on_cpu=True)
+    assert [(row.name, row.ratio) for row in front] == [(EXACT, 1.0), ("cheap", 0.5)]
+    assert [row.name for row in draw_chart(rows, "a title", tmp_path)] == [EXACT, "lucky"]
+    assert "processor time" not in (tmp_path / "chart.svg").read_text()
