@@ -87,16 +87,21 @@ def _panel(axis, rows: list[ChartRow], title: str, clock: str) -> list[ChartRow]
     front = [drawn[i] for i in pareto_front(alike)][::-1]
     axis.plot(*zip(*map(_place, front), strict=True), color=FRONT, lw=1.4, zorder=1)
     for name, (color, _) in FAMILIES.items():
-        mine = [row for row in drawn if family(row.changes) == name]
+        mine = [row for row in drawn if family_of(row) == name]
         if mine:
             axis.scatter(*zip(*map(_place, mine), strict=True), s=26, color=color, zorder=3,
                          edgecolors="white", linewidths=0.6, label=name)  # fmt: skip
-    plain = [_place(row) for row in drawn if not row.changes or row.name == "exact"]
+    plain = [_place(row) for row in drawn if not family_of(row)]
     if plain:
         axis.scatter(*zip(*plain, strict=True), s=40, color=INK, marker="D", zorder=4,
                      edgecolors="white", linewidths=0.6, label="exact")  # fmt: skip
     _style(axis, [_place(row) for row in drawn], title, clock)
     return front
+
+
+def family_of(row: ChartRow) -> str:
+    """Its kind, "" for exact; defaults under another name are the half-float target of quads."""
+    return "" if row.name == "exact" else family(row.changes) or "pixels"
 
 
 def family(changes: str) -> str:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from app import chart, cli
 from app.chart_measure import ChartRow, Pricing
-from app.chart_picture import draw_chart, family, name_points
+from app.chart_picture import draw_chart, family, family_of, name_points
 from app.chart_rows import RowsFile
 from app.chart_settings import EXACT, SETTINGS, settings_of
 from app.chart_stage import QUICK, WARM_UP, Walk, digest, distances_of, make_stage, side_by_side
@@ -323,3 +323,10 @@ def test_where_the_processor_draws_its_time_decides(tmp_path):
     assert [(row.name, row.ratio) for row in front] == [(EXACT, 1.0), ("cheap", 0.5)]
     assert [row.name for row in draw_chart(rows, "a title", tmp_path)] == [EXACT, "lucky"]
     assert "processor time" not in (tmp_path / "chart.svg").read_text()
+
+
+def test_only_the_exact_row_is_drawn_as_exact():
+    """Of quads exact blends into float32: the default target is a shortcut with a price."""
+    assert family_of(make_row(EXACT, changes="target=rgba32f")) == ""
+    assert family_of(make_row("rgba16f", db=56)) == "pixels"
+    assert family_of(make_row("from 2 px", changes="min_pixels=2")) == "culls"
