@@ -9,12 +9,14 @@ from typing import Annotated, Literal
 
 import tyro
 
+from app.opening import ReadingOptions, open_model
+
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     """Time frames on an orbit and an x sweep, and measure the image error beside them."""
 
     scene: Annotated[Path, tyro.conf.Positional]
@@ -35,8 +37,6 @@ class Options:
     """Drawing back end: GL quads or OpenCL tiles."""
     context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
     """Where GL comes from."""
-    mode: Literal["cumulative", "exclusive"] = "cumulative"
-    """How a folder of layers adds up."""
     settings: str = ""
     """A setting by its name in the chart, such as "sort every 4"; wrong names list them all."""
     target: Literal["", "rgba8", "rgba16f", "rgba32f"] = ""
@@ -53,7 +53,6 @@ def run(options: Options) -> int:
     from app.drawing import open_renderer, parse_size
     from app.errors import UsageError
     from app.measure import Measure
-    from runtime_models.read_scene import read_model
 
     size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
     quality_size = parse_size(options.quality_size, "--quality-size")
@@ -64,7 +63,7 @@ def run(options: Options) -> int:
         raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
     if options.json not in (None, STANDARD_OUTPUT):
         check_result_path(options.json)
-    model = read_model(options.scene, options.mode)
+    model = open_model(options.scene, options)
     x = model.stops[0].x if options.x is None else options.x
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         if budget:

@@ -7,12 +7,14 @@ from typing import Annotated, Literal
 
 import tyro
 
+from app.opening import ReadingOptions, open_model
+
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     """Price at least 24 settings: frame time and image error beside those of the exact one.
 
     Writes rows.csv, chart.svg and chart.png.  Rows that are there are kept: Ctrl-C loses nothing.
@@ -35,8 +37,6 @@ class Options:
     """Views on the arc; default 32, with --quick 8."""
     x: float | None = None
     """Control value on the path, 0 to 1; default: the first stop of the first scene."""
-    mode: Literal["cumulative", "exclusive"] = "cumulative"
-    """How a folder of layers adds up."""
     quick: bool = False
     """About ten settings, fewer frames, no SSIM."""
     decode: bool = False
@@ -69,9 +69,8 @@ def run(options: Options) -> int:
 
 def read_models(options: Options) -> list:
     """The models in order; a scene that is named twice is read once and shared."""
-    from runtime_models.read_scene import read_model
 
-    known = {path: read_model(path, options.mode) for path in dict.fromkeys(options.scenes)}
+    known = {path: open_model(path, options) for path in dict.fromkeys(options.scenes)}
     return [known[path] for path in options.scenes]
 
 

@@ -14,6 +14,7 @@ from app.drawing import parse_size
 from app.errors import UsageError
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
+from app.opening import ReadingOptions, open_model
 from app.outlines import draw_brush, draw_outlines
 from app.panel import draw_note, draw_panel, draw_problem, free_area
 from app.pictures import write_numbered_png, write_png
@@ -27,7 +28,6 @@ from renderer.context import describe
 from renderer.debug import debug_legend
 from renderer.renderer import Renderer
 from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
 from scene.pose import View
 from scene.read_selector import read_selector
 from scene.selector import Selector
@@ -40,7 +40,7 @@ LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took lo
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     scenes: tyro.conf.Positional[tuple[Path, ...]] = ()
     """Packages, .shift, .ply or .splat files, or folders of PLY layers; none: the bundled demo."""
     x: float | None = None
@@ -77,7 +77,7 @@ def run(options: Options) -> int:
     for name, value in (("--target-ms", options.target_ms), ("--floor-db", options.floor_db)):
         if value is not None and not 0 < value < np.inf:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
-    stage = Stage(read_model)
+    stage = Stage(lambda path: open_model(path, options))
     stage.open(options.scenes or (DEMO,), options.x)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)

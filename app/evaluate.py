@@ -9,9 +9,11 @@ from typing import Annotated, Literal
 
 import tyro
 
+from app.opening import ReadingOptions, open_model
+
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     """Compare a scene with the held-out photos of a capture (every 8th, unless it says which)."""
 
     scene: Annotated[Path, tyro.conf.Positional]
@@ -31,12 +33,11 @@ class Options:
 def run(options: Options) -> int:
     from app.bench import write_json
     from rasterizer.device import open_device
-    from runtime_models.read_scene import read_model
     from scene.read_capture import read_capture
     from training.evaluate import evaluate_model, report
 
     started = time.perf_counter()
-    model, capture = read_model(options.scene), read_capture(options.capture)
+    model, capture = open_model(options.scene, options), read_capture(options.capture)
     scores = evaluate_model(
         open_device(), model, capture, options.downscale, options.masks, options.background
     )

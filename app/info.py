@@ -3,27 +3,27 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
+from app.opening import ReadingOptions, open_model
+
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     """Say what is in a scene."""
 
     scene: Annotated[Path, tyro.conf.Positional]
     """A package, a .ply, a .splat or a folder of PLY layers."""
     json: bool = False
     """JSON on standard output instead of a table."""
-    mode: Literal["cumulative", "exclusive"] = "cumulative"
-    """How a folder of layers adds up."""
 
 
 def run(options: Options) -> int:
-    from runtime_models.read_scene import describe, read_model
+    from runtime_models.read_scene import describe
 
-    facts = describe(read_model(options.scene, options.mode), options.scene)
+    facts = describe(open_model(options.scene, options), options.scene)
     if options.json:
         print(json.dumps(facts, indent=1, ensure_ascii=False))
     else:

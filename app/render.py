@@ -8,11 +8,13 @@ from typing import Annotated, Literal
 
 import tyro
 
+from app.opening import ReadingOptions, open_model
+
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     """Draw a scene into PNG files."""
 
     scene: Annotated[Path, tyro.conf.Positional]
@@ -36,8 +38,6 @@ class Options:
     """Drawing back end: GL quads or OpenCL tiles."""
     context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
     """Where GL comes from."""
-    mode: Literal["cumulative", "exclusive"] = "cumulative"
-    """How a folder of layers adds up."""
     debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
     """Instead of the picture: which splats are left out and why, the same from above, how many
     splats lie over each pixel, how far they are, which object they are of; with a legend."""
@@ -73,7 +73,6 @@ def run(options: Options) -> int:
         parse_size,
     )
     from app.errors import UsageError
-    from runtime_models.read_scene import read_model
     from scene.framing import default_background
     from scene.scene import SceneObject
 
@@ -87,7 +86,7 @@ def run(options: Options) -> int:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
     settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
     check_one_of(options, budget)
-    model = read_model(options.scene, options.mode)
+    model = open_model(options.scene, options)
     views = choose_views(options, model, size)
     selectors = [choose_selectors(options.select, model, view) for view in views]
     count = len(controls) * len(views)

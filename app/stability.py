@@ -7,11 +7,13 @@ from typing import Annotated, Literal
 
 import tyro
 
+from app.opening import ReadingOptions, open_model
+
 FAILED = 1  # exit code: a case went past its bound
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(ReadingOptions):
     """Draw a scene in the cases where splat renderers fail, and hold every figure to its bound.
 
     Writes stability.csv (case, figure, measured, bound, verdict, and why the bound is where it is)
@@ -40,8 +42,6 @@ class Options:
     """Drawing back end: GL quads or OpenCL tiles."""
     context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
     """Where GL comes from."""
-    mode: Literal["cumulative", "exclusive"] = "cumulative"
-    """How a folder of layers adds up."""
     overwrite: bool = False
     """Start anew where the folder holds the table of another scene, size or drawing."""
 
@@ -50,12 +50,11 @@ def run(options: Options) -> int:
     from app.drawing import make_folder, open_renderer, parse_size
     from app.stability_cases.stage import Stage
     from app.stability_cases.table import open_table
-    from runtime_models.read_scene import read_model
     from scene.framing import default_background
 
     size = parse_size(options.size)
     names = choose_cases(options)
-    model = read_model(options.scene, options.mode)
+    model = open_model(options.scene, options)
     make_folder(options.out)
 
     def reopen():

@@ -16,6 +16,17 @@ class BadFile(ValueError):
 
 
 @dataclass(frozen=True)
+class Finding:
+    """What is wrong in a file, and what was done about it: lint, and the word at every opening."""
+
+    what: str  # with its rows: "12 positions are NaN or Inf"
+    count: int  # rows it concerns; 0 = the file as a whole
+    done: str  # "dropped", "kept, invisible", "read as metres", ...
+    rows: tuple[int, ...] = ()  # the first few, counted from 0 in the file
+    file: str = ""
+
+
+@dataclass(frozen=True)
 class Stop:
     """A named place on the slider: one modality, layer or style."""
 
@@ -76,6 +87,7 @@ class AnchorModel:
     encoding: ControlEncoding
     stops: tuple[Stop, ...]
     provenance: dict = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
@@ -98,6 +110,12 @@ class SplatLayers:
     stops: tuple[Stop, ...]
     mode: str = "cumulative"  # cumulative: stop i shows layers 0..i; exclusive: layer i alone
     provenance: dict = field(default_factory=dict)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, float64: what was taken off
+    #                                   all means; files far from 0 are re-centred, exports put back
+    antialiased: bool = False  # trained with the screen filter that keeps energy (Mip-Splatting)
+    labels: np.ndarray | None = None  # (N,) int32 object of each splat; 0 = background
+    extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) columns kept for export
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         check(

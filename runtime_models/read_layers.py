@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.formats import read_plain
 from runtime_models.model import BadFile, SplatLayers, Stop
-from runtime_models.read_ply import PlainSplats, read_ply
-from runtime_models.read_splat import read_splat
+from runtime_models.plain_splats import Reading
 
 MODES = ("cumulative", "exclusive")
 
@@ -25,31 +25,23 @@ def number_aware(path: Path) -> list[tuple[int, str]]:
     return [(int(part) if i % 2 else 0, part) for i, part in enumerate(parts)]
 
 
-def is_splat(path: Path) -> bool:
-    """The .splat format has no mark inside: its name alone tells."""
-    return path.suffix.lower() == ".splat"
-
-
-def read_plain(path: Path) -> PlainSplats:
-    return read_splat(path) if is_splat(path) else read_ply(path)
-
-
-def read_layers(paths: list[Path], mode: str = "cumulative") -> SplatLayers:
+def read_layers(paths: list[Path], reading: Reading | None = None) -> SplatLayers:
     """One SplatLayers; stop i of n lies at i / (n - 1) and has its file's name.
 
     cumulative: stop i shows files 0..i; exclusive: file i alone.  Raises BadFile.
     """
-    if mode not in MODES:
-        raise BadFile(f"layer mode is {mode!r}, expected one of {list(MODES)}.")
+    reading = reading or Reading()
+    if reading.mode not in MODES:
+        raise BadFile(f"layer mode is {reading.mode!r}, expected one of {list(MODES)}.")
     if not paths:
-        raise BadFile("no files were given; at least one .ply or .splat is needed.")
+        raise BadFile("no files were given; at least one file of splats is needed.")
     paths = [Path(path) for path in paths]
-    parts = [read_plain(path) for path in paths]
+    parts = [read_plain(path, reading) for path in paths]
     width = max(p.sh.shape[1] for p in parts)  # files of a lower degree get zeros
     sh = [np.pad(p.sh, ((0, 0), (0, width - p.sh.shape[1]), (0, 0))) for p in parts]
     last = max(len(paths) - 1, 1)
     stops = tuple(Stop(path.stem, i / last, "layer") for i, path in enumerate(paths))
-    kinds = sorted({"splat" if is_splat(path) else "ply" for path in paths})
+    kinds = sorted({part.format for part in parts})
     provenance = {"format": " + ".join(kinds), "files": [path.name for path in paths]}
     if dropped := sum(p.dropped for p in parts):
         provenance["dropped_rows"] = dropped
@@ -61,6 +53,8 @@ def read_layers(paths: list[Path], mode: str = "cumulative") -> SplatLayers:
         np.concatenate(sh),
         np.repeat(np.arange(len(parts), dtype=np.int32), [len(p.means) for p in parts]),
         stops,
-        mode,
+        reading.mode,
         provenance,
+        antialiased=any(p.antialiased for p in parts),
+        findings=tuple(f for p in parts for f in p.findings),
     )

@@ -1,14 +1,13 @@
-"""INRIA's 3DGS PLY to plain splats, turned into our axes."""
+"""INRIA's 3DGS PLY to plain splats."""
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.model import BadFile
-from runtime_models.rotation import normalize
-from runtime_models.spherical_harmonics import COEFFICIENTS, HALF_TURN_SIGNS
+from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.spherical_harmonics import COEFFICIENTS
 
 TYPES = {"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8", "uchar": "u1",
          "uint8": "u1", "char": "i1", "int8": "i1", "short": "<i2", "int16": "<i2", "ushort": "<u2",
@@ -19,21 +18,8 @@ GEOMETRY = ("x", "y", "z", "opacity", "scale_0", "scale_1", "scale_2",
             "rot_0", "rot_1", "rot_2", "rot_3", "f_dc_0", "f_dc_1", "f_dc_2")  # fmt: skip
 
 
-@dataclass(frozen=True)
-class PlainSplats:
-    """One file's splats in our axes; SplatLayers joins several."""
-
-    means: np.ndarray  # (N, 3) metres
-    scales: np.ndarray  # (N, 3) metres, one sigma
-    wxyz: np.ndarray  # (N, 4) unit
-    opacity: np.ndarray  # (N,) 0..1
-    sh: np.ndarray  # (N, M, 3)
-    dropped: int = 0  # rows with NaN or Inf that were left out
-
-
-def read_ply(path: str | Path) -> PlainSplats:
+def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
     """Splats of a binary 3DGS PLY of SH degree 0 to 3.  Raises BadFile."""
-    path = Path(path)
     table = read_table(path)
     rest = [name for name in table.dtype.names if name.startswith("f_rest_")]
     count = len(rest) // 3 + 1
@@ -46,12 +32,15 @@ def read_ply(path: str | Path) -> PlainSplats:
     if rest:  # channel-major: all of red, then green, then blue
         by_channel = columns(table, "f_rest_", len(rest)).reshape(-1, 3, count - 1)
         sh[:, 1:] = by_channel.transpose(0, 2, 1)
-    with np.errstate(over="ignore"):
-        opacity = 1 / (1 + np.exp(-table["opacity"].astype(np.float32)))
-        scales = np.exp(columns(table, "scale_", 3))
-    means = np.stack([table[axis] for axis in "xyz"], 1).astype(np.float32, copy=False)
-    wxyz = columns(table, "rot_", 4)
-    return turn_half(drop_broken(means, scales, wxyz, opacity, sh, path))
+    return RawSplats(
+        means=np.stack([table[axis] for axis in "xyz"], 1).astype(np.float32, copy=False),
+        scales=columns(table, "scale_", 3),
+        wxyz=columns(table, "rot_", 4),
+        opacity=table["opacity"].astype(np.float32),
+        sh=sh,
+        file=path.name,
+        format="ply",
+    )
 
 
 def columns(table: np.ndarray, prefix: str, count: int) -> np.ndarray:
@@ -102,27 +91,3 @@ def read_table(path: Path) -> np.ndarray:
             f"file holds {found}; it is cut off or its header is wrong."
         )
     return np.memmap(path, row, "r", start, (count,))
-
-
-def drop_broken(means, scales, wxyz, opacity, sh, path: Path) -> PlainSplats:
-    """Rows with NaN or Inf go (an infinite logit is a plain 0 or 1 by now); unit quaternions."""
-    good = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(wxyz).all(1)
-    good &= np.isfinite(opacity) & np.isfinite(sh).all((1, 2))
-    if not good.any():
-        raise BadFile(f"{path.name}: not one of {len(means)} splats is finite.")
-    if not good.all():
-        means, scales, wxyz, opacity, sh = (a[good] for a in (means, scales, wxyz, opacity, sh))
-    return PlainSplats(means, scales, normalize(wxyz), opacity, sh, int((~good).sum()))
-
-
-def turn_half(splats: PlainSplats) -> PlainSplats:
-    """From COLMAP's axes (y down, z forward) into ours: half a turn about x."""
-    w, x, y, z = splats.wxyz.T  # (0, 1, 0, 0) * (w, x, y, z)
-    return PlainSplats(
-        splats.means * np.array([1, -1, -1], np.float32),
-        splats.scales,
-        np.stack([-x, w, -z, y], 1),
-        splats.opacity,
-        splats.sh * HALF_TURN_SIGNS[: splats.sh.shape[1], None],
-        splats.dropped,
-    )

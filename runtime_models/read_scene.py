@@ -3,17 +3,19 @@
 import zipfile
 from pathlib import Path
 
+from runtime_models.formats import format_of
 from runtime_models.model import AnchorModel, BadFile, Mlp, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
-from runtime_models.read_layers import is_splat, layer_files, read_layers
+from runtime_models.plain_splats import Reading
+from runtime_models.read_layers import layer_files, read_layers
 from runtime_models.read_package import read_package
 
 KNOWN = "a package (folder or .shift), a 3DGS .ply, a .splat, or a folder of such .ply files"
 
 
-def read_model(path: str | Path, mode: str = "cumulative") -> AnchorModel | SplatLayers:
-    """The model in a file or folder; `mode`: how a folder of layers adds up.  Raises BadFile."""
-    path = Path(path)
+def read_model(path: str | Path, reading: Reading | None = None) -> AnchorModel | SplatLayers:
+    """The model in a file or folder, read as `reading` says.  Raises BadFile."""
+    path, reading = Path(path), reading or Reading()
     if not path.exists():
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if path.name == MANIFEST:
@@ -24,28 +26,32 @@ def read_model(path: str | Path, mode: str = "cumulative") -> AnchorModel | Spla
         layers = layer_files(path)
         if not layers:
             raise BadFile(f"{path} holds nothing to show; wanted is {KNOWN}.")
-        return read_layers(layers, mode)
-    with path.open("rb") as file:
-        start = file.read(4)
-    if start[:3] == b"ply" or is_splat(path):
-        return read_layers([path], mode)
-    if start[:2] == b"PK" or zipfile.is_zipfile(path):
+        return read_layers(layers, reading)
+    if is_package(path):
         return read_package(path)
+    if format_of(path):
+        return read_layers([path], reading)
     raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
+
+
+def is_package(path: Path) -> bool:
+    """A zip, by content; whether it is whole is for the reader to say."""
+    with path.open("rb") as file:
+        return file.read(2) == b"PK" or zipfile.is_zipfile(path)
 
 
 def describe(model: AnchorModel | SplatLayers, path: str | Path) -> dict:
     """What `launch.py info --json` prints; `path` is where the model was read from."""
-    is_package = isinstance(model, AnchorModel)
+    anchored = isinstance(model, AnchorModel)
     facts = {
-        "format": FORMAT if is_package else model.provenance.get("format", "splats"),
-        "anchors": len(model.anchors) if is_package else 0,
+        "format": FORMAT if anchored else model.provenance.get("format", "splats"),
+        "anchors": len(model.anchors) if anchored else 0,
         "splats": model.splat_count,
-        "sh_degree": None if is_package else round(model.sh.shape[1] ** 0.5) - 1,
+        "sh_degree": None if anchored else round(model.sh.shape[1] ** 0.5) - 1,
         "stops": [{"name": s.name, "x": s.x, "kind": s.kind} for s in model.stops],
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
-    if not is_package:
+    if not anchored:
         return facts | {"mode": model.mode}
     encoding = model.encoding
     return facts | {

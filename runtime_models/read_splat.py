@@ -5,20 +5,27 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import BadFile
-from runtime_models.read_ply import PlainSplats, drop_broken, turn_half
+from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.spherical_harmonics import C0
 
 ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("wxyz", "u1", 4)])
 
 
-def read_splat(path: str | Path) -> PlainSplats:
+def read_raw_splat(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0.  Raises BadFile."""
-    path = Path(path)
     size = path.stat().st_size
     if size == 0 or size % ROW.itemsize:
         raise BadFile(f"{path.name} has {size} bytes, expected a multiple of 32: it is cut off.")
     table = np.fromfile(path, ROW)
     rgba = table["rgba"].astype(np.float32) / 255
-    sh = ((rgba[:, None, :3] - 0.5) / C0).astype(np.float32)
-    wxyz = (table["wxyz"].astype(np.float32) - 128) / 128
-    return turn_half(drop_broken(table["mean"], table["scale"], wxyz, rgba[:, 3], sh, path))
+    return RawSplats(
+        means=table["mean"],
+        scales=table["scale"],
+        wxyz=(table["wxyz"].astype(np.float32) - 128) / 128,
+        opacity=rgba[:, 3],
+        sh=((rgba[:, None, :3] - 0.5) / C0).astype(np.float32),
+        file=path.name,
+        format="splat",
+        log_scales=False,
+        logits=False,
+    )

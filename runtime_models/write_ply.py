@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.read_ply import PlainSplats, turn_half
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.turn import turn_half
 from runtime_models.whole_file import write_whole
 
 

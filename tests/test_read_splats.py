@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from runtime_models.evaluate import Evaluator
+from runtime_models.formats import read_plain as read_ply
 from runtime_models.model import BadFile
+from runtime_models.plain_splats import PlainSplats, Reading
 from runtime_models.read_layers import read_layers
-from runtime_models.read_ply import PlainSplats, read_ply, turn_half
 from runtime_models.read_scene import describe, read_model
-from runtime_models.read_splat import ROW, read_splat
+from runtime_models.read_splat import ROW
 from runtime_models.rotation import covariance
 from runtime_models.spherical_harmonics import shade
+from runtime_models.turn import turn_half
 from runtime_models.write_ply import write_ply
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -171,7 +173,7 @@ def test_splat_rows_by_hand(tmp_path):
     row["mean"], row["scale"] = [1, 2, 3], [0.1, 0.2, 0.3]
     row["rgba"], row["wxyz"] = [255, 0, 128, 51], [255, 128, 128, 128]
     row.tofile(tmp_path / "a.splat")
-    splats = read_splat(tmp_path / "a.splat")
+    splats = read_ply(tmp_path / "a.splat")
     np.testing.assert_allclose(splats.means[0], [1, -2, -3])
     np.testing.assert_allclose(splats.opacity, 0.2)
     color = shade(splats.sh, np.eye(3, dtype=np.float32)[:2])
@@ -217,7 +219,7 @@ def test_files_of_several_degrees_and_kinds_make_one_scene(tmp_path):
     write_ply(some_splats(4, 4, seed=2), tmp_path / "b.ply")
     np.zeros(5, ROW).tofile(tmp_path / "c.splat")
     files = [tmp_path / name for name in ("a.ply", "b.ply", "c.splat")]
-    both = {mode: read_layers(files, mode) for mode in ("cumulative", "exclusive")}
+    both = {mode: read_layers(files, Reading(mode)) for mode in ("cumulative", "exclusive")}
     layers = both["cumulative"]
     assert layers.sh.shape == (12, 16, 3) and layers.layer.tolist() == [0] * 3 + [1] * 4 + [2] * 5
     assert (layers.sh[3:7, 4:] == 0).all() and (layers.sh[7:, 1:] == 0).all()
@@ -230,7 +232,7 @@ def test_files_of_several_degrees_and_kinds_make_one_scene(tmp_path):
 
 def test_a_mode_of_no_meaning_and_no_files_are_one_sentence(tmp_path):
     with pytest.raises(BadFile, match="layer mode is 'sideways', expected one of"):
-        read_layers([tmp_path / "a.ply"], "sideways")
+        read_layers([tmp_path / "a.ply"], Reading("sideways"))
     with pytest.raises(BadFile, match="no files were given"):
         read_layers([])
 

@@ -28,7 +28,7 @@ from peer_pages.browser import NPM_PACKAGES, CannotRun, browser_frames  # noqa: 
 from app.drawing import save_png  # noqa: E402
 from renderer.reference import reference_image  # noqa: E402
 from renderer.renderer import Renderer  # noqa: E402
-from runtime_models.read_ply import PlainSplats  # noqa: E402
+from runtime_models.plain_splats import PlainSplats  # noqa: E402
 from runtime_models.read_scene import read_model  # noqa: E402
 from runtime_models.write_ply import write_ply  # noqa: E402
 from scene.framing import fit_distance, frame_points, view_from  # noqa: E402
@@ -147,11 +147,11 @@ def main() -> int:
     parser.add_argument("--peers", nargs="+", choices=PEERS, default=list(PEERS))
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
-    layers = read_model(options.scene, "cumulative")
+    layers = read_model(options.scene)
     bigger = (layers.means * SCALE, layers.scales * SCALE)
     splats = PlainSplats(*bigger, layers.wxyz, layers.opacity, layers.sh)
     write_ply(splats, options.work / "splats.ply")
-    model = read_model(options.work / "splats.ply", "cumulative")
+    model = read_model(options.work / "splats.ply")
     rows = []
     for size in SIZES:
         rows += measure(options, model, size)

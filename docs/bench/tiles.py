@@ -247,7 +247,7 @@ def main() -> int:
         prototype = Prototype(device, options.prototype)
     elif options.prototype:
         sys.stderr.write(f"The prototype is left out: there is no {options.prototype}.\n")
-    leg = read_model(options.leg, "cumulative")
+    leg = read_model(options.leg)
     three = side_by_side(leg, 3)
     sys.stderr.write("The scene of 410k splats is the first one three times, without SH.\n")
     words = f"python docs/bench/tiles.py {options.leg.name} --poses {options.poses}"

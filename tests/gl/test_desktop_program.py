@@ -42,7 +42,7 @@ def assert_one_sentence(done, code: int, *words: str) -> None:
 
 @pytest.fixture(scope="module")
 def scene_file(tmp_path_factory) -> Path:
-    from runtime_models.read_ply import PlainSplats
+    from runtime_models.plain_splats import PlainSplats
     from runtime_models.write_ply import write_ply
 
     path = tmp_path_factory.mktemp("scene") / "ball.ply"

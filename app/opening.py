@@ -1,0 +1,84 @@
+"""How every command opens its scene: the options of reading, progress, a word on what is wrong."""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from runtime_models.model import AnchorModel, Finding, SplatLayers
+from runtime_models.plain_splats import Reading
+
+PATIENCE_S = 1.0  # what takes longer shows a progress bar
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingOptions:
+    """What a command that opens scenes takes beside its own options."""
+
+    mode: Literal["cumulative", "exclusive"] = "cumulative"
+    """How a folder of layers adds up."""
+    up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = ""
+    """The file's axis that points up, where it is not the one its format has; write --up=-Z."""
+    flip: bool = False
+    """Turn the scene upside down."""
+    strict: bool = False
+    """Refuse a file that needs repair instead of repairing it."""
+    max_splats: int = 0
+    """Show no more splats than this, those that show most; 0: all."""
+
+    def reading(self) -> Reading:
+        """The same for readers.  Raises UsageError."""
+        from app.errors import UsageError
+
+        if self.max_splats < 0:
+            raise UsageError(f"--max-splats is {self.max_splats}, expected 0 (all) or more.")
+        return Reading(self.mode, self.up, self.flip, self.strict, self.max_splats)
+
+
+def open_model(path: Path, options: ReadingOptions) -> AnchorModel | SplatLayers:
+    """The model in a file or folder; progress and findings go to stderr.  Raises BadFile."""
+    from dataclasses import replace
+
+    from runtime_models.read_scene import read_model
+
+    with progress_after(PATIENCE_S) as told:
+        model = read_model(path, replace(options.reading(), told=told))
+    for finding in model.findings:
+        print(sentence(finding), file=sys.stderr)
+    return model
+
+
+def sentence(finding: Finding) -> str:
+    """A finding in one line."""
+    rows = f" (rows {', '.join(map(str, finding.rows))}" if finding.rows else ""
+    if rows:
+        rows += ", ...)" if finding.count > len(finding.rows) else ")"
+    return f"{finding.file}: {finding.what}{rows}: {finding.done}."
+
+
+@contextmanager
+def progress_after(seconds: float) -> Iterator:
+    """told(what, part 0..1) that shows a bar from `seconds` on."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    began, bar, task = time.monotonic(), None, None
+
+    def told(what: str, part: float) -> None:
+        nonlocal bar, task
+        if bar is None:
+            if time.monotonic() - began < seconds:
+                return
+            bar = Progress(console=Console(stderr=True), transient=True)
+            bar.start()
+            task = bar.add_task(what, total=1.0)
+        bar.update(task, description=what, completed=part)
+
+    try:
+        yield told
+    finally:
+        if bar is not None:
+            bar.stop()

@@ -1,0 +1,52 @@
+"""The formats of plain splats, one row each: how a file is recognised, and who reads it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from runtime_models.model import BadFile
+from runtime_models.plain_splats import PlainSplats, RawSplats, Reading
+
+HEAD = 1 << 16  # bytes of a file that are looked at
+
+
+@dataclass(frozen=True)
+class Format:
+    name: str
+    endings: tuple[str, ...]  # lower case; of one without a mark they alone tell
+    has_mark: Callable[[bytes, Path], bool] | None  # by the first HEAD bytes; None: no mark inside
+    read: Callable[[Path, Reading], RawSplats]
+
+    def fits(self, head: bytes, path: Path) -> bool:
+        if self.has_mark is None:
+            return path.name.lower().endswith(self.endings)
+        return self.has_mark(head, path)
+
+
+def formats() -> tuple[Format, ...]:
+    """All of them, in the order in which they are tried."""
+    from runtime_models.read_ply import read_raw_ply
+    from runtime_models.read_splat import read_raw_splat
+
+    return (
+        Format("3DGS PLY", (".ply",), lambda head, path: head[:3] == b"ply", read_raw_ply),
+        Format(".splat", (".splat",), None, read_raw_splat),
+    )
+
+
+def format_of(path: Path) -> Format | None:
+    """The format of a file of plain splats, None where it is none."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    return next((form for form in formats() if form.fits(head, path)), None)
+
+
+def read_plain(path: Path, reading: Reading | None = None) -> PlainSplats:
+    """One file of plain splats, judged and turned into our axes.  Raises BadFile."""
+    from runtime_models.lint import judge
+
+    reading, form = reading or Reading(), format_of(path)
+    if form is None:
+        names = ", ".join(form.name for form in formats())
+        raise BadFile(f"{path} is of no known format of splats; known are {names}.")
+    return judge(form.read(path, reading), reading)

@@ -1,0 +1,72 @@
+"""One file of plain splats: how it is wished, as it is written, and as the program takes it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from runtime_models.model import Finding
+
+AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
+COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a file or folder is to be read; every reader takes it."""
+
+    mode: str = "cumulative"  # how layers add up: cumulative | exclusive
+    up: str = ""  # the file's axis that points up, one of AXES; "" = what its format says
+    flip: bool = False  # half a turn about z after that: upside down
+    strict: bool = False  # refuse what would be repaired
+    most_splats: int = 0  # no more than these, the ones that show most; 0 = all
+    told: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
+
+    def tell(self, what: str, part: float) -> None:
+        if self.told:
+            self.told(what, part)
+
+
+@dataclass
+class RawSplats:
+    """A file's splats as they are written, in its axes and its coding: not judged, not turned.
+
+    The arrays are the reader's own: whoever judges them may change them in place.
+    """
+
+    means: np.ndarray  # (N, 3) float32, or float64 where the file holds that
+    scales: np.ndarray  # (N, 3) float32, natural logarithms of one sigma, or metres
+    wxyz: np.ndarray  # (N, 4) float32, of any length
+    opacity: np.ndarray  # (N,) float32, logits, or 0..1
+    sh: np.ndarray  # (N, M, 3) float32, M = 1, 4, 9 or 16
+    file: str  # for messages
+    format: str  # "3DGS PLY", "spz v3", ...
+    log_scales: bool = True
+    logits: bool = True
+    up: str = COLMAP_UP  # the axis that points up by the format's convention
+    antialiased: bool = False
+    labels: np.ndarray | None = None  # (N,) int32
+    extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) other columns, as filed
+    findings: tuple[Finding, ...] = ()  # what the reader itself saw
+
+
+@dataclass(frozen=True)
+class PlainSplats:
+    """One file's splats in our axes and units; SplatLayers joins several."""
+
+    means: np.ndarray  # (N, 3) float32 metres, from `origin`
+    scales: np.ndarray  # (N, 3) metres, one sigma
+    wxyz: np.ndarray  # (N, 4) unit
+    opacity: np.ndarray  # (N,) 0..1
+    sh: np.ndarray  # (N, M, 3)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # float64 metres, our axes
+    antialiased: bool = False
+    labels: np.ndarray | None = None  # (N,) int32
+    extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) each
+    findings: tuple[Finding, ...] = ()
+    format: str = "3DGS PLY"
+
+    @property
+    def dropped(self) -> int:
+        """Rows of the file that are not here."""
+        return sum(f.count for f in self.findings if f.done == "dropped")
