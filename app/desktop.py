@@ -20,6 +20,7 @@ from app.panel import draw_note, draw_panel, draw_problem, free_area
 from app.pictures import write_numbered_png, write_png
 from app.readings import Readings
 from app.scale_bar import draw_scale_bar
+from app.sections import Hooks
 from app.shown import Shown, Wish
 from app.slider import draw_slider_bar
 from app.stage import Stage
@@ -36,6 +37,7 @@ DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
 WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
 NOTE_S = 3.0  # how long a note stays
 SLEEP_S = 0.5  # longest wait for input while nothing moves
+POLL_S = 0.03  # the same while a thread works at something that the window waits for
 LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took long
 
 
@@ -102,6 +104,8 @@ class Viewer:
     def __init__(self, window: Window, renderer: Renderer, stage: Stage, options: Options) -> None:
         self.window, self.renderer, self.stage, self.options = window, renderer, stage, options
         self.overlay = options.panel
+        self.hooks = Hooks()
+        self._polling = False  # a hook waits for something that is under way
         names = describe(window.ctx) | renderer.backends
         self.readings = Readings(
             machine={key.replace("_", " "): str(v) for key, v in names.items()},
@@ -126,7 +130,7 @@ class Viewer:
         last = time.perf_counter()
         while not self.window.closing:
             busy = self._busy()
-            redraw = self.window.wait(0.0 if busy else SLEEP_S)
+            redraw = self.window.wait(0.0 if busy else POLL_S if self._polling else SLEEP_S)
             now = time.perf_counter()
             if self.window.minimised:
                 last = now
@@ -134,7 +138,7 @@ class Viewer:
                 continue
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
-            if busy or redraw or self._note_ends(now) or self._idle_work_due(now):
+            if busy or redraw or self._polling or self._note_ends(now) or self._idle_work_due(now):
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
@@ -146,6 +150,7 @@ class Viewer:
             self.take(event)
         self.stage.advance(seconds)
         self.camera.step(seconds, push(self.window))
+        self._polling = any([work() for work in self.hooks.each_frame])
         self._follow_overlay(seconds)
         self._turn_dial()
         fresh = self._draw_splats()
@@ -270,7 +275,7 @@ class Viewer:
             debug, stats = self.stage.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), left, scale)
             covered = [
-                draw_panel(self.stage, self.dial, self.readings, scale),
+                draw_panel(self.stage, self.dial, self.readings, scale, self.hooks.sections),
                 draw_slider_bar(self.stage, left, scale),
             ]
         if not self.save_picture:  # a note is no part of a picture
@@ -300,6 +305,8 @@ class Viewer:
         if self.stage.scene is not before:
             self.camera = self._first_camera()
             self.dial.forget()
+            for changed in self.hooks.opened:
+                changed()
             self.window.set_title(f"Shapeshift \u2013 {wanted[0].name}")
 
     @property

@@ -1,6 +1,6 @@
 """The panel at the left: its frame, times and counts, keys, messages; sections from beside it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from imgui_bundle import imgui
@@ -13,6 +13,7 @@ from app.play_panel import draw_play
 from app.quality_panel import draw_quality
 from app.readings import Readings
 from app.regions_panel import draw_regions
+from app.sections import Section
 from app.stage import AS_FILED, Stage
 from app.theme import Box
 from renderer.palette import PALETTES
@@ -52,8 +53,13 @@ KEYS = (
 )
 
 
-def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float) -> Box:
-    """The whole left panel; changes the stage's settings and palette.  Returns where it is."""
+def draw_panel(
+    stage: Stage, dial: Dial, readings: Readings, ui_scale: float, more: Sequence[Section] = ()
+) -> Box:
+    """The whole left panel; changes the stage's settings and palette.  Returns where it is.
+
+    `more` are the sections that other parts of the program add, after those of the scene.
+    """
     imgui.set_next_window_pos(Vec(MARGIN * ui_scale, MARGIN * ui_scale))
     screen = imgui.get_io().display_size
     beside = free_area((screen.x, screen.y), len(stage.sliders), ui_scale)[0] > 0
@@ -77,6 +83,11 @@ def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float) ->
         draw_quality(stage, readings, ui_scale)
     if section("Regions", open_first=bool(stage.regions.items)):
         draw_regions(stage, ui_scale)
+    for other in more:
+        if section(other.name, other.open_first):
+            imgui.push_id(other.name)
+            other.draw(ui_scale)
+            imgui.pop_id()
     if section("Play"):
         draw_play(stage, ui_scale)
     if section("Look"):

@@ -127,6 +127,14 @@ class Regions:
         local = np.linalg.inv(world_from_object) @ np.append(point, 1.0)
         self.edit(self.chosen, index=index, centre=local[:3])
 
+    def fit_painted(self, index: int, thing: SceneObject) -> None:
+        """Unpaints the regions of object `index` where it now has another number of splats."""
+        count = len(anchor_places(thing.model))
+        for number, region in enumerate(self.items):
+            painted = region.painted
+            if region.index == index and painted is not None and len(painted) != count:
+                self.edit(number, painted=np.zeros(count, bool))
+
     def toggle_lens(self, thing: SceneObject) -> bool:
         """Switches the lens on or off, adding one the first time; returns whether it is on."""
         for number, region in enumerate(self.items):

@@ -70,6 +70,20 @@ class Stage:
         self.regions.clear()
         self.regions.radius = self.radius
 
+    def replace_model(self, index: int, model: Model) -> None:
+        """Another model of the same thing: x, sweep, regions, camera and settings stay.
+
+        For finer levels of detail.  What was painted on another number of splats is unpainted.
+        """
+        objects, filed = list(self.scene.objects), list(self._filed)
+        filed[index] = model
+        if self.palette != AS_FILED:
+            model = with_palette(model, self.palette)
+        objects[index] = replace(objects[index], model=model)
+        self.scene, self._filed = Scene(tuple(objects)), tuple(filed)
+        self._points = scene_points(self.scene)
+        self.regions.fit_painted(index, self.scene.objects[index])
+
     def drop(self, paths: Sequence[Path]) -> bool:
         """Opens what was dropped on the window; False, and a sentence in `problem`, when bad."""
         try:

@@ -1,0 +1,26 @@
+"""What other parts of the program add to the viewer: a section of the panel, work every frame."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading of the panel that folds, with what lies under it."""
+
+    name: str
+    draw: Callable[[float], None]  # called with ui_scale between imgui.begin and end
+    open_first: bool = False
+
+
+@dataclass
+class Hooks:
+    """Lists that whoever adds to the viewer appends to, before or while it runs."""
+
+    sections: list[Section] = field(default_factory=list)  # after Regions, in this order
+    each_frame: list[Callable[[], bool]] = field(default_factory=list)
+    # each_frame: called in every frame, in the window's thread, before the splats are drawn;
+    # True = something is under way, call again in 30 ms even if nobody touches anything
+    opened: list[Callable[[], None]] = field(default_factory=list)  # after every change of scene
+    status: list[Callable[[], str]] = field(default_factory=list)  # short words for the status
+    #                                                                line; "" = nothing to say
