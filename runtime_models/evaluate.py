@@ -117,6 +117,10 @@ class Evaluator:
             per_row[rows] = colors.reshape(rows.size, -1)
         return out
 
+    def color_along(self, x: Control, direction: np.ndarray) -> np.ndarray:
+        """(N, 3) display sRGB where each anchor is looked at along its direction (A, 3), unit."""
+        return self._color(x, slice(None), direction)
+
     def _color(
         self,
         x: Control,

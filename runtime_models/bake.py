@@ -1,0 +1,127 @@
+"""Any model at one control value as plain splats: what an export writes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from runtime_models.evaluate import Control, Evaluator
+from runtime_models.model import AnchorModel, BadFile, Finding, SplatLayers
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.spherical_harmonics import COEFFICIENTS, basis, shade
+
+LEAST_ALPHA = 1 / 255  # no renderer draws a fainter splat
+DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3
+BLOCK = 1 << 16  # splats at a time of what is colored anew: bounds the memory
+
+# (colours (n, 3) as the model has them, their rows in the model) -> colours (n, 3) as shown
+Recolor = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def bake(
+    model: AnchorModel | SplatLayers,
+    x: Control,
+    eye: np.ndarray | None = None,
+    sh_degree: int = 3,
+    recolor: Recolor | None = None,
+) -> PlainSplats:
+    """The splats of a model at x, one value or one an anchor (layers: a splat), that are there.
+
+    Colours that depend on the direction become spherical harmonics of `sh_degree`, the best in
+    least squares over all directions alike; trained harmonics are cut at that degree, which is the
+    same.  recolor: false colours, laid over before that.  eye (3,), metres in the object's frame:
+    where a model is seen from whose shape depends on it; the others need none.
+    """
+    if sh_degree not in range(len(COEFFICIENTS)):
+        raise BadFile(f"spherical harmonics of degree {sh_degree} are asked for; 0 to 3 are known.")
+    count = COEFFICIENTS[sh_degree]
+    evaluator = Evaluator(model)
+    means, scales, wxyz, opacity = evaluator.geometry(x)
+    there = find_present(means, scales, wxyz, opacity)
+    if not there.any():
+        raise BadFile(f"none of {len(there):,} splats is there at this x; choose another one.")
+    if isinstance(model, SplatLayers):
+        sh = model.sh[there, :count]
+        if recolor:
+            sh = recolored(sh, lambda color, rows: recolor(color, np.flatnonzero(there)[rows]))
+    else:
+        sh = fit_colors(evaluator, x, count, recolor)[there]
+    return as_plain(model, [a[there] for a in (means, scales, wxyz, opacity)], sh, there)
+
+
+def find_present(
+    means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
+) -> np.ndarray:
+    """(N,) bool: finite, and opaque enough to be drawn."""
+    there = opacity >= LEAST_ALPHA  # NaN is not
+    for array in (means, scales, wxyz):
+        there &= np.isfinite(array).all(axis=1)
+    return there
+
+
+def as_plain(
+    model: AnchorModel | SplatLayers, geometry: list[np.ndarray], sh: np.ndarray, there: np.ndarray
+) -> PlainSplats:
+    """The rows that are there, with what the model knows about them."""
+    findings = ()
+    if absent := int(len(there) - there.sum()):
+        findings = (Finding(f"{absent:,} splats are absent at this x", absent, "left out"),)
+    means, scales, wxyz, opacity = geometry
+    opacity = np.minimum(opacity, 1)
+    plain = PlainSplats(means, scales, wxyz, opacity, sh, findings=findings, format="baked")
+    if not isinstance(model, SplatLayers):
+        return plain
+    return replace(
+        plain,
+        origin=model.origin,
+        antialiased=model.antialiased,
+        labels=None if model.labels is None else model.labels[there],
+        extra={name: column[there] for name, column in model.extra.items()},
+    )
+
+
+def spread_directions(count: int) -> np.ndarray:
+    """(count, 3) float32 unit directions, evenly over the sphere (a golden spiral)."""
+    step = np.arange(count) + 0.5
+    z = 1 - 2 * step / count
+    turn = np.pi * (1 + 5**0.5) * step
+    radius = np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], 1).astype(np.float32)
+
+
+def fit_rows(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (D, 3), and (D, count) what a colour along each adds to every coefficient."""
+    directions = spread_directions(DIRECTIONS)
+    solve = np.linalg.pinv(basis(directions.astype(np.float64), count))  # (count, D)
+    return directions, solve.T.astype(np.float32)
+
+
+def fit_colors(evaluator: Evaluator, x: Control, count: int, recolor: Recolor | None) -> np.ndarray:
+    """(N, count, 3) harmonics of the colour network's output.
+
+    One direction after the other for all anchors: the sum over directions is the least-squares
+    solution, so that nothing but it and the colours of one direction is held.
+    """
+    model = evaluator.model
+    sh = np.zeros((model.splat_count, count, 3), np.float32)
+    rows = np.arange(model.splat_count)
+    for direction, parts in zip(*fit_rows(count), strict=True):
+        color = evaluator.color_along(x, np.tile(direction, (len(model.anchors), 1)))
+        color = recolor(color, rows) if recolor else color
+        color -= np.float32(0.5)
+        for coefficient, part in enumerate(parts):
+            sh[:, coefficient] += part * color
+    return sh
+
+
+def recolored(sh: np.ndarray, recolor: Recolor) -> np.ndarray:
+    """(N, M, 3) harmonics of what `recolor` makes of the colours of harmonics (N, M, 3)."""
+    out = np.zeros_like(sh)
+    directions, parts = fit_rows(sh.shape[1])
+    for start in range(0, len(sh), BLOCK):
+        rows = np.arange(start, min(start + BLOCK, len(sh)))
+        for direction, part in zip(directions, parts, strict=True):
+            color = shade(sh[rows], np.tile(direction, (len(rows), 1)))
+            color = recolor(color, rows).astype(np.float32) - np.float32(0.5)
+            out[rows] += part[:, None] * color[:, None]
+    return out
