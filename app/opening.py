@@ -18,8 +18,9 @@ PATIENCE_S = 1.0  # what takes longer shows a progress bar
 class ReadingOptions:
     """What a command that opens scenes takes beside its own options."""
 
-    mode: Literal["cumulative", "exclusive"] = "cumulative"
-    """How a folder of layers adds up."""
+    mode: Literal["", "cumulative", "exclusive"] = ""
+    """How layers add up; without it as the files suggest: a thermal pair exclusive, other layers
+    cumulative."""
     up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = ""
     """The file's axis that points up, where it is not the one its format has; write --up=-Z."""
     flip: bool = False

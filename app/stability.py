@@ -96,8 +96,8 @@ def subject(options: Options, renderer, model) -> str:
 
     backends = ", ".join(renderer.backends.values())
     return (
-        f"{options.scene.name}, {model.splat_count} splats, {options.mode}, {options.size}, "
-        f"{options.steps} steps, {options.rounds} rounds, {backends}, {processor()}"
+        f"{options.scene.name}, {model.splat_count} splats, {options.mode or 'cumulative'}, "
+        f"{options.size}, {options.steps} steps, {options.rounds} rounds, {backends}, {processor()}"
     )
 
 

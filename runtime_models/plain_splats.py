@@ -15,7 +15,7 @@ COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
 class Reading:
     """How a file or folder is to be read; every reader takes it."""
 
-    mode: str = "cumulative"  # how layers add up: cumulative | exclusive
+    mode: str = ""  # how layers add up: cumulative | exclusive; "" = what the files suggest
     up: str = ""  # the file's axis that points up, one of AXES; "" = what its format says
     flip: bool = False  # half a turn about z after that: upside down
     strict: bool = False  # refuse what would be repaired
