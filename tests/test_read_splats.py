@@ -130,22 +130,24 @@ BROKEN = {
     "cut off": (lambda d: d[:-1], "promises 20 splats of 68 bytes, the file holds 19"),
     "lying count": (change_header(b"vertex 20", b"vertex 99999999"), "promises 99999999"),
     "no end": (lambda d: d[:40], "header is missing or never ends"),
-    "ascii": (change_header(b"binary_little_endian", b"ascii"), "not a binary little-endian"),
+    "unknown": (change_header(b"binary_little_endian", b"binary_middle"), "none of PLY's formats"),
+    "ascii": (change_header(b"binary_little_endian", b"ascii"), "an ASCII PLY and has words"),
     "point cloud": (change_header(b"opacity", b"opacitx"), "has no opacity: a point cloud"),
     "odd f_rest": (change_header(b" nx", b" f_rest_0"), "has 1 f_rest columns"),
     "twice": (change_header(b"float ny", b"float nx"), "names a property twice"),
     "lists": (change_header(b"float nx", b"list uchar"), "a property of a type"),
     "no splats": (change_header(b"vertex 20", b"vertex 0"), "holds no splats"),
-    "no number": (change_header(b"vertex 20", b"vertex -2"), "and how many there are"),
-    "no elements": (change_header(b"element", b"comment"), r"has the elements \[\]"),
+    "no number": (change_header(b"vertex 20", b"vertex -2"), "does not say how many"),
+    "no elements": (change_header(b"element", b"comment"), "a property before any element"),
     "long number": (
         change_header(b"vertex 20", b"vertex " + b"9" * 5000),
-        "and how many there are",
+        "does not say how many",
     ),
     "no properties": (lambda d: d[: d.index(b"property")] + b"end_header\n", "has no x:"),
-    "more elements": (
-        change_header(b"property", b"element face 2\nproperty"),
-        "elements .'vertex', 'face'",
+    "another element": (change_header(b"vertex 20", b"points 20"), "has the elements .'points'"),
+    "lists before": (
+        change_header(b"element", b"element face 2\nproperty list uchar int i\nelement"),
+        "elements .'face', 'vertex'.*before any with lists",
     ),
 }
 
