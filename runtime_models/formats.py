@@ -25,10 +25,12 @@ class Format:
 
 def formats() -> tuple[Format, ...]:
     """All of them, in the order in which they are tried."""
+    from runtime_models.read_compressed_ply import has_chunks, read_raw_compressed_ply
     from runtime_models.read_ply import read_raw_ply
     from runtime_models.read_splat import read_raw_splat
 
     return (
+        Format("compressed PLY", (".ply",), has_chunks, read_raw_compressed_ply),
         Format("3DGS PLY", (".ply",), lambda head, path: head[:3] == b"ply", read_raw_ply),
         Format(".splat", (".splat",), None, read_raw_splat),
     )
@@ -41,12 +43,20 @@ def format_of(path: Path) -> Format | None:
     return next((form for form in formats() if form.fits(head, path)), None)
 
 
+def read_raw(path: Path, reading: Reading) -> RawSplats:
+    """One file of plain splats as it is written, with its labels.  Raises BadFile."""
+    from runtime_models.read_labels import with_labels
+
+    form = format_of(path)
+    if form is None:
+        names = ", ".join(form.name for form in formats())
+        raise BadFile(f"{path} is of no known format of splats; known are {names}.")
+    return with_labels(form.read(path, reading), path)
+
+
 def read_plain(path: Path, reading: Reading | None = None) -> PlainSplats:
     """One file of plain splats, judged and turned into our axes.  Raises BadFile."""
     from runtime_models.lint import judge
 
-    reading, form = reading or Reading(), format_of(path)
-    if form is None:
-        names = ", ".join(form.name for form in formats())
-        raise BadFile(f"{path} is of no known format of splats; known are {names}.")
-    return judge(form.read(path, reading), reading)
+    reading = reading or Reading()
+    return judge(read_raw(path, reading), reading)
