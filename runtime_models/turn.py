@@ -1,14 +1,19 @@
 """Turns plain splats: places, quaternions and spherical harmonics together."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from runtime_models.blocks import each_block
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import AXES, PlainSplats
 from runtime_models.spherical_harmonics import HALF_TURN_SIGNS, basis
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
+PLACE_SIGNS = np.array([1, -1, -1], np.float32)  # of that half turn
+QUATERNION_SIGNS = np.array([-1, 1, -1, 1], np.float32)  # of x w z y
+HARMONIC_SIGNS = np.repeat(HALF_TURN_SIGNS, 3)  # of every channel
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0])  # about z
 OURS_FROM_UP = {
     "+Y": np.eye(3),
@@ -31,28 +36,46 @@ def turn(splats: PlainSplats, rotation: np.ndarray) -> PlainSplats:
     """The splats after a rotation (3, 3) of the world about its zero."""
     if np.array_equal(rotation, np.eye(3)):
         return splats
-    if np.array_equal(rotation, HALF_TURN):
-        return turn_half(splats)
-    count = splats.sh.shape[1]
-    return replace(
-        splats,
-        means=(splats.means @ rotation.T).astype(np.float32),
-        wxyz=turn_quaternions(splats.wxyz, rotation),
-        sh=np.einsum("ij,njc->nic", turn_harmonics(rotation, count), splats.sh, optimize=True),
-        origin=tuple(map(float, rotation @ np.array(splats.origin))),
-    )
+    means, wxyz, sh = splats.means.copy(), splats.wxyz.copy(), splats.sh.copy()
+    turn_rows = turner(rotation, sh.shape[1])
+    each_block(len(means), lambda rows, _: turn_rows(means[rows], wxyz[rows], sh[rows]))
+    origin = tuple(map(float, rotation @ np.array(splats.origin)))
+    return replace(splats, means=means, wxyz=wxyz, sh=sh, origin=origin)
 
 
 def turn_half(splats: PlainSplats) -> PlainSplats:
     """Half a turn about x, its own inverse: from COLMAP's axes (y down, z forward) and back."""
-    w, x, y, z = splats.wxyz.T  # (0, 1, 0, 0) * (w, x, y, z)
-    return replace(
-        splats,
-        means=splats.means * np.array([1, -1, -1], np.float32),
-        wxyz=np.stack([-x, w, -z, y], 1),
-        sh=splats.sh * HALF_TURN_SIGNS[: splats.sh.shape[1], None],
-        origin=tuple(float(c) for c in HALF_TURN @ np.array(splats.origin)),
-    )
+    return turn(splats, HALF_TURN)
+
+
+def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
+    """A function that turns, in place, rows of means (n, 3), wxyz (n, 4) and sh (n, count, 3)."""
+    if np.array_equal(rotation, np.eye(3)):
+        return lambda means, wxyz, sh: None
+    if np.array_equal(rotation, HALF_TURN):
+        return turn_rows_half
+    harmonics = turn_harmonics(rotation, count)
+
+    def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+        means[:] = means @ rotation.T
+        wxyz[:] = turn_quaternions(wxyz, rotation)
+        sh[:, 1:] = np.einsum("ij,njc->nic", harmonics[1:, 1:], sh[:, 1:], optimize=True)
+
+    return turn_rows
+
+
+def turn_rows_half(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+    """Half a turn about x, in place: nothing but signs, and quaternions (0, 1, 0, 0) * wxyz."""
+    means *= PLACE_SIGNS
+    wxyz[:] = wxyz.take((1, 0, 3, 2), axis=1)
+    wxyz *= QUATERNION_SIGNS
+    if sh.shape[1] == 1:
+        return
+    if sh.flags.c_contiguous:
+        flat = sh.reshape(len(sh), -1)  # one long loop a splat, not many of three
+        flat *= HARMONIC_SIGNS[: flat.shape[1]]
+    else:
+        sh *= HALF_TURN_SIGNS[: sh.shape[1], None]
 
 
 def turn_quaternions(wxyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
