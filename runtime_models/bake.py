@@ -45,7 +45,7 @@ def bake(
         if recolor:
             sh = recolored(sh, lambda color, rows: recolor(color, np.flatnonzero(there)[rows]))
     else:
-        sh = fit_colors(evaluator, x, count, recolor)[there]
+        sh = fit_colors(evaluator, x, count, there, recolor)
     return as_plain(model, [a[there] for a in (means, scales, wxyz, opacity)], sh, there)
 
 
@@ -96,19 +96,19 @@ def fit_rows(count: int) -> tuple[np.ndarray, np.ndarray]:
     return directions, solve.T.astype(np.float32)
 
 
-def fit_colors(evaluator: Evaluator, x: Control, count: int, recolor: Recolor | None) -> np.ndarray:
-    """(N, count, 3) harmonics of the colour network's output.
+def fit_colors(
+    evaluator: Evaluator, x: Control, count: int, there: np.ndarray, recolor: Recolor | None
+) -> np.ndarray:
+    """(N there, count, 3) harmonics of the colour network's output.
 
     One direction after the other for all anchors: the sum over directions is the least-squares
     solution, so that nothing but it and the colours of one direction is held.
     """
-    model = evaluator.model
-    sh = np.zeros((model.splat_count, count, 3), np.float32)
-    rows = np.arange(model.splat_count)
+    rows, anchors = np.flatnonzero(there), len(evaluator.model.anchors)
+    sh = np.zeros((len(rows), count, 3), np.float32)
     for direction, parts in zip(*fit_rows(count), strict=True):
-        color = evaluator.color_along(x, np.tile(direction, (len(model.anchors), 1)))
-        color = recolor(color, rows) if recolor else color
-        color -= np.float32(0.5)
+        color = evaluator.color_along(x, np.tile(direction, (anchors, 1)))[rows]
+        color = (recolor(color, rows) if recolor else color) - np.float32(0.5)
         for coefficient, part in enumerate(parts):
             sh[:, coefficient] += part * color
     return sh

@@ -26,12 +26,14 @@ class Format:
 def formats() -> tuple[Format, ...]:
     """All of them, in the order in which they are tried."""
     from runtime_models.read_compressed_ply import has_chunks, read_raw_compressed_ply
+    from runtime_models.read_gltf import is_gltf, read_raw_gltf
     from runtime_models.read_ply import read_raw_ply
     from runtime_models.read_splat import read_raw_splat
 
     return (
         Format("compressed PLY", (".ply",), has_chunks, read_raw_compressed_ply),
         Format("3DGS PLY", (".ply",), lambda head, path: head[:3] == b"ply", read_raw_ply),
+        Format("glTF", (".glb", ".gltf"), is_gltf, read_raw_gltf),
         Format(".splat", (".splat",), None, read_raw_splat),
     )
 

@@ -1,0 +1,221 @@
+"""glTF 2.0 (.glb, .gltf) with KHR_gaussian_splatting, release candidate of 2026, to plain splats.
+
+Its compression by spz (KHR_gaussian_splatting_compression_spz_2) is read, too.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.gltf_files import Asset
+from runtime_models.gltf_nodes import moved, placed_meshes
+from runtime_models.model import Finding
+from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.spherical_harmonics import C0
+
+SPLATS = "KHR_gaussian_splatting"
+SPZ = "KHR_gaussian_splatting_compression_spz_2"
+PREFIX = f"{SPLATS}:"
+NAME = "glTF"
+# Required extensions that do not touch what is read here: materials are ignored by the extension.
+HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
+MOST_REPEATED = 4  # times the file's bytes that its splats may take, where nodes share a mesh
+ALWAYS_ALLOWED = 64 << 20  # bytes, whatever the file's size
+ROW = 11  # floats of a splat beside its harmonics
+
+
+def is_gltf(head: bytes, path: Path) -> bool:
+    """A .glb by its first bytes; a .gltf is JSON like others, so by its ending, too."""
+    plain = path.name.lower().endswith(".gltf") and head.lstrip()[:1] == b"{"
+    return head[:4] == b"glTF" or plain
+
+
+def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
+    """The splats of all nodes of the scene, where these stand.  Raises BadFile."""
+    asset = Asset(path)
+    for name in asset.item(asset.json, "extensionsRequired", list, []):
+        if not str(name).startswith(HARMLESS):
+            raise asset.refuse(f"it needs the extension {str(name)[:60]}, which is not read here.")
+    placed = [
+        (primitive, matrix)
+        for mesh, matrix in placed_meshes(asset)
+        for primitive in splat_primitives(asset, mesh)
+    ]
+    if not placed:
+        meshes = len(asset.item(asset.json, "meshes", list, []))
+        raise asset.refuse(
+            f"its scene has no Gaussian splats ({meshes} mesh{'es' * (meshes != 1)}, none shown "
+            f"with {SPLATS}); export them with that extension."
+        )
+    refuse_repeats(asset, [primitive for primitive, _ in placed])
+    parts = []
+    for number, (primitive, matrix) in enumerate(placed):
+        reading.tell(f"reading {path.name}", number / len(placed))
+        parts.append(moved(read_primitive(asset, primitive, reading), matrix, asset))
+    return joined(parts, path)
+
+
+def splat_primitives(asset: Asset, mesh: object) -> list[dict]:
+    """The primitives of a mesh that are splats."""
+    rows = asset.item(asset.entry("meshes", mesh), "primitives", list, [])
+    if not all(isinstance(row, dict) for row in rows):
+        raise asset.refuse(f"mesh {mesh} has a primitive that is no object.")
+    return [row for row in rows if SPLATS in asset.item(row, "extensions", dict, {})]
+
+
+def refuse_repeats(asset: Asset, primitives: list[dict]) -> None:
+    """Few bytes that many nodes or attributes share must not become many gigabytes."""
+    wanted = 0
+    for primitive in primitives:
+        attributes = asset.item(primitive, "attributes", dict, {})
+        if "POSITION" in attributes and compressed_view(asset, primitive) is None:
+            floats = ROW + 3 * sum(name.startswith(f"{PREFIX}SH_") for name in attributes)
+            wanted += 4 * floats * asset.count(attributes["POSITION"])
+    size = asset.path.stat().st_size + asset.size_beside()
+    if wanted > MOST_REPEATED * size + ALWAYS_ALLOWED:
+        raise asset.refuse(
+            f"its {size:,} bytes stand for {wanted:,} of splats; the same ones are used over and "
+            "over, or a count in it is wrong."
+        )
+
+
+def compressed_view(asset: Asset, primitive: dict) -> int | None:
+    """The buffer view of the spz file that a primitive's splats are in, if they are."""
+    splats = asset.item(primitive["extensions"], SPLATS, dict, {})
+    inner = asset.item(splats, "extensions", dict, {})
+    return asset.item(asset.item(inner, SPZ, dict, {}), "bufferView", int)
+
+
+def read_primitive(asset: Asset, primitive: dict, reading: Reading) -> RawSplats:
+    """The splats of one primitive in its mesh's own axes."""
+    splats = asset.item(primitive["extensions"], SPLATS, dict, {})
+    findings = unusual(asset, splats)
+    view = compressed_view(asset, primitive)
+    if view is not None:
+        raw = read_spz_view(asset, view, "colorSpace" in splats, reading)
+    else:
+        raw = read_attributes(asset, asset.item(primitive, "attributes", dict, {}))
+    if asset.item(splats, "colorSpace", str, "") == "lin_rec709_display":
+        raw.sh = display_from_linear(raw.sh)
+        what = f"colours of {len(raw.means):,} splats are linear"
+        done = "turned into display colours one by one; where they overlap they blend otherwise"
+        findings.append(Finding(what, len(raw.means), done, file=asset.path.name))
+    raw.findings = (*raw.findings, *findings)
+    return raw
+
+
+def unusual(asset: Asset, splats: dict) -> list[Finding]:
+    """What the extension's object asks for beyond what is drawn here."""
+    known = {
+        "kernel": ("ellipse",),
+        "colorSpace": ("srgb_rec709_display", "lin_rec709_display"),
+        "projection": ("perspective",),
+    }
+    findings = []
+    for name, values in known.items():
+        value = asset.item(splats, name, str, values[0])
+        if value not in values:
+            what = f"{name} is {value[:40]!r}"
+            findings.append(Finding(what, 0, f"drawn as {values[0]}", file=asset.path.name))
+    return findings
+
+
+def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
+    """Splats of a primitive's accessors."""
+
+    def read(name: str, width: int) -> np.ndarray:
+        if name not in attributes:
+            raise asset.refuse(f"a splat primitive has no {name}; export it again.")
+        array = asset.read(attributes[name], name, width)
+        if len(array) != count:
+            raise asset.refuse(f"{name} has {len(array)} rows, POSITION has {count}.")
+        return array
+
+    if "POSITION" not in attributes:
+        raise asset.refuse("a splat primitive has no POSITION; export it again.")
+    count = asset.count(attributes["POSITION"])
+    means, xyzw = read("POSITION", 3), read(f"{PREFIX}ROTATION", 4)
+    scales, opacity = read(f"{PREFIX}SCALE", 3), read(f"{PREFIX}OPACITY", 1)
+    names = harmonic_names(asset, attributes)
+    sh = np.empty((count, len(names), 3), np.float32)
+    for coefficient, name in enumerate(names):
+        sh[:, coefficient] = read(name, 3)
+    return RawSplats(
+        means=np.array(means),  # out of the file: who judges them may write into them
+        scales=np.array(scales),
+        wxyz=xyzw[:, [3, 0, 1, 2]],
+        opacity=np.array(opacity[:, 0]),
+        sh=sh,
+        file=asset.path.name,
+        format=NAME,
+        log_scales=False,
+        logits=False,
+        up="+Y",
+    )
+
+
+def harmonic_names(asset: Asset, attributes: dict) -> list[str]:
+    """The attributes of the spherical harmonics, by degree and order; whole degrees alone."""
+    names: list[str] = []
+    for degree in range(4):
+        row = [f"{PREFIX}SH_DEGREE_{degree}_COEF_{n}" for n in range(2 * degree + 1)]
+        there = sum(name in attributes for name in row)
+        if there not in (0, len(row)) or (there and len(names) < degree**2):
+            raise asset.refuse(f"of its harmonics of degree {degree} or below some are missing.")
+        names += row if there else []
+    if not names:
+        raise asset.refuse(f"a splat primitive has no {PREFIX}SH_DEGREE_0_COEF_0: no colours.")
+    return names
+
+
+def read_spz_view(asset: Asset, view: int, turned: bool, reading: Reading) -> RawSplats:
+    """Splats of an spz file within a buffer view.
+
+    turned: by the extension's text it is stored half a turn about +Y from the scene (spz is right,
+    up, back; glTF names its axes left, up, front).  Drafts, which name no colour space, are as
+    stored.
+    """
+    from runtime_models.read_spz import read_spz_bytes
+
+    data, _ = asset.view(view)
+    raw = read_spz_bytes(data.tobytes(), asset.path.name, reading)
+    raw.format = f"{NAME} with {raw.format}"
+    return moved(raw, np.diag([-1.0, 1, -1, 1]), asset) if turned else raw
+
+
+def display_from_linear(sh: np.ndarray) -> np.ndarray:
+    """(N, M, 3) harmonics of display sRGB from such of linear light.
+
+    Exact for the mean colour; what varies with direction is scaled by the curve's slope there.
+    """
+    mean = np.clip(0.5 + C0 * sh[:, :1], 0, None)  # (N, 1, 3)
+    with np.errstate(invalid="ignore"):
+        low = mean <= 0.0031308
+        power = np.maximum(mean, 0.0031308)
+        shown = np.where(low, 12.92 * mean, 1.055 * power ** (1 / 2.4) - 0.055)
+        slope = np.where(low, 12.92, 1.055 / 2.4 * power ** (1 / 2.4 - 1))
+        out = sh * slope
+        out[:, :1] = (shown - 0.5) / C0
+    return out.astype(np.float32)
+
+
+def joined(parts: list[RawSplats], path: Path) -> RawSplats:
+    """One set of splats; those of fewer harmonics get zeros."""
+    if len(parts) == 1:
+        return parts[0]
+    width = max(part.sh.shape[1] for part in parts)
+    sh = [np.pad(p.sh, ((0, 0), (0, width - p.sh.shape[1]), (0, 0))) for p in parts]
+    return RawSplats(
+        means=np.concatenate([part.means for part in parts]),
+        scales=np.concatenate([part.scales for part in parts]),
+        wxyz=np.concatenate([part.wxyz for part in parts]),
+        opacity=np.concatenate([part.opacity for part in parts]),
+        sh=np.concatenate(sh),
+        file=path.name,
+        format=" + ".join(sorted({part.format for part in parts})),
+        log_scales=False,
+        logits=False,
+        up="+Y",
+        antialiased=any(part.antialiased for part in parts),
+        findings=tuple(finding for part in parts for finding in part.findings),
+    )

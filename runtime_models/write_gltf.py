@@ -1,0 +1,102 @@
+"""Plain splats to a .glb, glTF 2.0 with KHR_gaussian_splatting; its axes are ours."""
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.gltf_files import BINARY_CHUNK, JSON_CHUNK, MAGIC
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.read_gltf import PREFIX, SPLATS
+from runtime_models.spherical_harmonics import C0
+from runtime_models.whole_file import write_whole
+
+KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+FLOAT, BYTE = 5126, 5121
+POINTS = 0
+
+
+def write_gltf(splats: PlainSplats, path: str | Path) -> None:
+    """Atomic.  Far places stay exact: the origin stands in the node, in float64.
+
+    COLOR_0 is for programs that know no splats and show points.
+    """
+    arrays = attributes_of(splats)
+    views, accessors, place = [], [], 0
+    for name, array in arrays.items():
+        views.append({"buffer": 0, "byteOffset": place, "byteLength": array.nbytes})
+        accessor = {
+            "bufferView": len(accessors),
+            "componentType": BYTE if array.dtype == np.uint8 else FLOAT,
+            "count": len(array),
+            "type": KINDS[array.shape[1]],
+        }
+        if array.dtype == np.uint8:
+            accessor["normalized"] = True
+        if name == "POSITION":  # glTF demands its bounds
+            accessor["min"] = array.min(axis=0).tolist()
+            accessor["max"] = array.max(axis=0).tolist()
+        accessors.append(accessor)
+        place += array.nbytes
+    primitive = {
+        "attributes": {name: number for number, name in enumerate(arrays)},
+        "mode": POINTS,
+        "extensions": {
+            SPLATS: {
+                "kernel": "ellipse",
+                "colorSpace": "srgb_rec709_display",
+                "sortingMethod": "cameraDistance",
+                "projection": "perspective",
+            }
+        },
+    }
+    node = {"mesh": 0}
+    if any(splats.origin):
+        node["translation"] = list(splats.origin)
+    asset = {
+        "asset": {"version": "2.0", "generator": "Shapeshift"},
+        "extensionsUsed": [SPLATS],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [node],
+        "meshes": [{"primitives": [primitive]}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": place}],
+    }
+    write_whole(Path(path), pack(asset, [array.tobytes() for array in arrays.values()]))
+
+
+def attributes_of(splats: PlainSplats) -> dict[str, np.ndarray]:
+    """Attribute name -> (N, width), little endian, in the order in which they are written."""
+    diffuse = np.clip(0.5 + C0 * splats.sh[:, 0], 0, 1)  # display
+    linear = np.where(diffuse <= 0.04045, diffuse / 12.92, ((diffuse + 0.055) / 1.055) ** 2.4)
+    points = np.column_stack([linear, splats.opacity.clip(0, 1)])
+    arrays = {
+        "POSITION": splats.means,
+        "COLOR_0": np.round(points * 255).astype(np.uint8),
+        f"{PREFIX}ROTATION": splats.wxyz[:, [1, 2, 3, 0]],
+        f"{PREFIX}SCALE": splats.scales,
+        f"{PREFIX}OPACITY": splats.opacity.clip(0, 1)[:, None],
+    }
+    for number in range(splats.sh.shape[1]):
+        degree = int(number**0.5)
+        name = f"{PREFIX}SH_DEGREE_{degree}_COEF_{number - degree**2}"
+        arrays[name] = splats.sh[:, number]
+    return {
+        name: np.ascontiguousarray(array, None if array.dtype == np.uint8 else "<f4")
+        for name, array in arrays.items()
+    }
+
+
+def pack(asset: dict, blocks: list[bytes]) -> bytes:
+    """The two chunks of a binary glTF, each filled up to four bytes."""
+    text = json.dumps(asset, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    size = sum(map(len, blocks))
+    fill = -size % 4
+    total = 12 + 8 + len(text) + 8 + size + fill
+    head = struct.pack("<4sII", MAGIC, 2, total) + struct.pack("<II", len(text), JSON_CHUNK)
+    binary = struct.pack("<II", size + fill, BINARY_CHUNK)
+    return b"".join([head, text, binary, *blocks, bytes(fill)])
