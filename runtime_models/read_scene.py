@@ -8,6 +8,13 @@ from runtime_models.model import AnchorModel, BadFile, Mlp, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import layer_files, read_layers
+from runtime_models.read_output_folder import (
+    in_run,
+    newest_cloud,
+    read_file,
+    read_pair,
+    thermal_pair,
+)
 from runtime_models.read_package import read_package
 
 KNOWN = "a package (folder or .shift), a 3DGS .ply, a .splat, or a folder of such .ply files"
@@ -23,14 +30,18 @@ def read_model(path: str | Path, reading: Reading | None = None) -> AnchorModel 
     if path.is_dir():
         if (path / MANIFEST).exists():
             return read_package(path)
+        if (pair := thermal_pair(path)) is not None:
+            return read_pair(pair, path, reading)
+        if (cloud := newest_cloud(path)) is not None:
+            return in_run(read_model(cloud.parent, reading), path, cloud)
         layers = layer_files(path)
         if not layers:
             raise BadFile(f"{path} holds nothing to show; wanted is {KNOWN}.")
-        return read_layers(layers, reading)
+        return read_layers(layers, reading) if len(layers) > 1 else read_file(layers[0], reading)
     if is_package(path):
         return read_package(path)
     if format_of(path):
-        return read_layers([path], reading)
+        return read_file(path, reading)
     raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import STOP_KINDS, BadFile, Stop
+from runtime_models.stop_names import guess_kind
 from scene.capture import Capture, Photo
 from scene.photo import load_photo, open_image
 
@@ -18,8 +19,6 @@ TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, fr
 COLMAP_UP = (0.0, -1.0, 0.0)
 CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they do not agree
 PLAIN_BORDER = 0.5  # share of a photo's border that must have exactly one colour
-COLOR_NAMES = {"rgb", "color", "colour", "visible", "images", "photo"}
-THERMAL_NAMES = ("therm", "lwir", "infrared")
 
 
 @dataclass(frozen=True)
@@ -137,13 +136,6 @@ def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
         Stop(name, float(x), guess_kind(name, len(names)))
         for name, x in zip(names, xs, strict=True)
     )
-
-
-def guess_kind(name: str, stops: int) -> str:
-    low = name.lower()
-    if low == "ir" or any(word in low for word in THERMAL_NAMES):
-        return "thermal"
-    return "rgb" if low in COLOR_NAMES or stops == 1 else "layer"
 
 
 def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import BadFile, Stop
+from runtime_models.stop_names import guess_kind
 from scene.capture import Capture, Photo
 from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
-    guess_kind,
     image_size,
     rigid,
     split_every_8th,
