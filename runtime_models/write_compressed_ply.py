@@ -1,0 +1,101 @@
+"""Plain splats to PlayCanvas's compressed PLY, in COLMAP's axes: inverse of read_compressed_ply."""
+
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.morton import morton_order
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.read_compressed_ply import (
+    BITS_11_10_11,
+    BITS_8888,
+    CHUNK,
+    COLORS,
+    PACKED,
+    POSITIONS,
+    SCALES,
+    SH_SPAN,
+)
+from runtime_models.spherical_harmonics import C0
+from runtime_models.turn import turn_half
+from runtime_models.whole_file import write_whole
+
+LOG_SCALES = (-20.0, 20.0)  # 2e-9 m to 5e8 m, as the format's own writer cuts them
+
+
+def write_compressed_ply(splats: PlainSplats, path: str | Path) -> None:
+    """Atomic; sorted along the Z-curve, so that chunks are small and their codes fine.
+
+    Half a code's step is lost: 1/4094 (y 1/2046) of a chunk's extent in place and logarithm of
+    scale, 1/510 in opacity and of a chunk's range in colour, 7e-4 in a quaternion's entries, 1/64
+    in the other harmonics (1/32 at their ends, which are -4 and 4).
+    """
+    back = turn_half(splats)
+    order = morton_order(back.means)
+    means = back.means[order].astype(np.float64) + back.origin
+    with np.errstate(divide="ignore"):  # a scale of 0 has the smallest logarithm
+        scales = np.log(back.scales[order]).clip(*LOG_SCALES)
+    colors = back.sh[order, 0] * C0 + 0.5
+    places, place_shares = ranged(means)
+    sizes, size_shares = ranged(scales)
+    shades, shade_shares = ranged(colors)
+    packed = [
+        pack(place_shares, BITS_11_10_11),
+        pack_smallest_three(back.wxyz[order]),
+        pack(size_shares, BITS_11_10_11),
+        pack(np.column_stack([shade_shares, back.opacity[order]]), BITS_8888),
+    ]
+    rest = back.sh[order, 1:].transpose(0, 2, 1).reshape(len(order), -1)  # all of red first
+    bytes_of_rest = np.clip((rest / SH_SPAN + 0.5) * 256, 0, 255).astype(np.uint8)
+    tables = [
+        np.concatenate([places, sizes, shades], axis=1).astype("<f4"),
+        np.stack(packed, axis=1).astype("<u4"),
+        bytes_of_rest,
+    ]
+    head = header(len(tables[0]), len(order), rest.shape[1], splats.antialiased)
+    write_whole(Path(path), head + b"".join(t.tobytes() for t in tables))
+
+
+def header(chunks: int, splats: int, rest: int, antialiased: bool) -> bytes:
+    """The text at the beginning of the file."""
+    lines = ["ply", "format binary_little_endian 1.0", "comment written by Shapeshift"]
+    lines += ["comment SplatRenderMode: mip"] * antialiased
+    lines += [f"element chunk {chunks}"]
+    lines += [f"property float {name}" for name in POSITIONS + SCALES + COLORS]
+    lines += [f"element vertex {splats}", *(f"property uint {name}" for name in PACKED)]
+    if rest:
+        lines += [f"element sh {splats}", *(f"property uchar f_rest_{i}" for i in range(rest))]
+    return "\n".join([*lines, "end_header", ""]).encode()
+
+
+def ranged(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(chunks, 6) float32 least and most of each chunk; (N, 3) shares 0..1 of the way between."""
+    starts = np.arange(0, len(values), CHUNK)
+    ends = [
+        reduce.reduceat(values, starts).astype(np.float32) for reduce in (np.minimum, np.maximum)
+    ]
+    low, high = (np.repeat(end.astype(np.float64), CHUNK, axis=0)[: len(values)] for end in ends)
+    span = high - low  # of what a reader sees: the ends are rounded to float32
+    shares = (values - low) / np.where(span > 0, span, 1.0)
+    return np.concatenate(ends, axis=1), shares.clip(0, 1)
+
+
+def pack(shares: np.ndarray, bits: tuple[tuple[int, int], ...]) -> np.ndarray:
+    """(N,) words of shares (N, k) in 0..1, rounded to the nearest code."""
+    out = np.zeros(len(shares), np.uint32)
+    for share, (shift, largest) in zip(shares.T, bits, strict=True):
+        out |= np.rint(share * largest).astype(np.uint32) << np.uint32(shift)
+    return out
+
+
+def pack_smallest_three(wxyz: np.ndarray) -> np.ndarray:
+    """(N,) words: 2 bits for which entry of a unit quaternion is the largest, 10 for each other."""
+    largest = np.abs(wxyz).argmax(axis=1)
+    rows = np.arange(len(wxyz))
+    out = largest.astype(np.uint32)
+    sign = np.where(wxyz[rows, largest] < 0, -1, 1)  # q and -q turn alike
+    for step in (1, 2, 3):
+        place = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[largest, step - 1]
+        share = wxyz[rows, place] * sign * 0.5**0.5 + 0.5
+        out = out << np.uint32(10) | np.rint(share * 1023).clip(0, 1023).astype(np.uint32)
+    return out
