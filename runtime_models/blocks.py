@@ -8,7 +8,7 @@ from contextvars import copy_context
 
 BLOCK = 2048  # rows: half a megabyte of a splat's 62 floats; 512 to 4096 are as fast
 THREADS = min(4, os.cpu_count() or 1)  # memory is the limit; numpy lets go of the interpreter
-WORTH_A_THREAD = 16 * BLOCK  # rows
+WORTH_A_THREAD = 16  # blocks
 
 
 def each_block(
@@ -16,21 +16,22 @@ def each_block(
     work: Callable[..., None],
     tell: Callable[[float], None] | None = None,
     tool: Callable[[], AbstractContextManager] = nullcontext,
+    block: int = BLOCK,
 ) -> None:
     """Calls work(rows, own) for slices of range(count), several at once and in no set order.
 
     own: what the context `tool()` gives, entered once a thread (an open file, a buffer).
     tell(part done 0..1) is called by the calling thread alone.  The first error ends it all.
     """
-    blocks = iter(range(0, count, BLOCK))  # next() of it is atomic
+    blocks = iter(range(0, count, block))  # next() of it is atomic
     errors: list[BaseException] = []
 
     def run(tell: Callable[[float], None] | None = None) -> None:
         with tool() as own:
             for first in blocks_left(blocks, errors):
-                work(slice(first, min(first + BLOCK, count)), own)
+                work(slice(first, min(first + block, count)), own)
                 if tell:
-                    tell(min(first + BLOCK, count) / count)
+                    tell(min(first + block, count) / count)
 
     def run_beside() -> None:
         try:
@@ -39,7 +40,7 @@ def each_block(
             errors.append(error)  # raised again by the caller
 
     threads = []
-    for _ in range(THREADS - 1 if count > WORTH_A_THREAD else 0):
+    for _ in range(THREADS - 1 if count > WORTH_A_THREAD * block else 0):
         context = copy_context()  # numpy's errstate is the caller's
         threads.append(threading.Thread(target=context.run, args=(run_beside,), daemon=True))
     for thread in threads:

@@ -51,23 +51,65 @@ def check_mode(mode: str) -> None:
 def join_layers(
     parts: list[PlainSplats], stops: tuple[Stop, ...], mode: str, files: list[str]
 ) -> SplatLayers:
-    """Part i as the layer of stop i; `files` are what they were read from, for the provenance."""
-    width = max(p.sh.shape[1] for p in parts)  # files of a lower degree get zeros
-    sh = [np.pad(p.sh, ((0, 0), (0, width - p.sh.shape[1]), (0, 0))) for p in parts]
+    """Part i as the layer of stop i; `files` are what they were read from, for the provenance.
+
+    Takes the parts over: the list is empty afterwards, so that each array goes once it is copied.
+    """
+    counts, last = [len(part.means) for part in parts], len(parts) - 1
     kinds = sorted({part.format for part in parts})
     provenance = {"format": " + ".join(kinds), "files": list(files)}
-    if dropped := sum(p.dropped for p in parts):
+    if dropped := sum(part.dropped for part in parts):
         provenance["dropped_rows"] = dropped
+    origin, antialiased = parts[0].origin, any(part.antialiased for part in parts)
+    findings = tuple(finding for part in parts for finding in part.findings)
+    width = max(part.sh.shape[1] for part in parts)  # files of a lower degree get zeros
+    pieces = [vars(part).copy() for part in parts]
+    parts.clear()
+    shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
+    means = [moved(piece.pop("means"), shift) for piece, shift in zip(pieces, shifts, strict=True)]
+    columns = sorted({name for piece in pieces for name in piece["extra"]})
+    labels = [piece.pop("labels") for piece in pieces]
     return SplatLayers(
-        np.concatenate([p.means for p in parts]),
-        np.concatenate([p.scales for p in parts]),
-        np.concatenate([p.wxyz for p in parts]),
-        np.concatenate([p.opacity for p in parts]),
-        np.concatenate(sh),
-        np.repeat(np.arange(len(parts), dtype=np.int32), [len(p.means) for p in parts]),
+        joined(means, counts),
+        *(joined([p.pop(name) for p in pieces], counts) for name in ("scales", "wxyz", "opacity")),
+        joined([widened(piece.pop("sh"), width) for piece in pieces], counts),
+        np.repeat(np.arange(last + 1, dtype=np.int32), counts),
         stops,
         mode or "cumulative",
         provenance,
-        antialiased=any(p.antialiased for p in parts),
-        findings=tuple(f for p in parts for f in p.findings),
+        origin=origin,
+        antialiased=antialiased,
+        labels=joined(labels, counts) if any(x is not None for x in labels) else None,
+        extra={
+            name: joined([piece["extra"].pop(name, None) for piece in pieces], counts)
+            for name in columns
+        },
+        findings=findings,
     )
+
+
+def moved(means: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """(N, 3) float32 places after a shift (3,) in float64."""
+    return (means + shift).astype(np.float32) if shift.any() else means
+
+
+def widened(sh: np.ndarray, width: int) -> np.ndarray:
+    """(N, width, 3): coefficients of a higher degree are zero."""
+    more = width - sh.shape[1]
+    return np.pad(sh, ((0, 0), (0, more), (0, 0))) if more else sh
+
+
+def joined(arrays: list[np.ndarray | None], counts: list[int]) -> np.ndarray:
+    """One array of the parts, the only part itself; None stands for zeros.  Empties the list."""
+    if len(arrays) == 1:
+        return arrays.pop()
+    known = [array for array in arrays if array is not None]
+    kind = np.result_type(*known)
+    out = np.empty((sum(counts), *known[0].shape[1:]), kind)  # takes memory as it is filled
+    del known
+    first = 0
+    for count in counts:
+        part = arrays.pop(0)
+        out[first : first + count] = 0 if part is None else part
+        first += count
+    return out

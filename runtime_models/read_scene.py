@@ -16,13 +16,20 @@ from runtime_models.read_output_folder import (
     thermal_pair,
 )
 from runtime_models.read_package import read_package
+from runtime_models.thin import thin
 
 KNOWN = "a package (folder or .shift), a 3DGS .ply, a .splat, or a folder of such .ply files"
 
 
 def read_model(path: str | Path, reading: Reading | None = None) -> AnchorModel | SplatLayers:
     """The model in a file or folder, read as `reading` says.  Raises BadFile."""
-    path, reading = Path(path), reading or Reading()
+    reading = reading or Reading()
+    model = read_whole(Path(path), reading)
+    return thin(model, reading.most_splats) if isinstance(model, SplatLayers) else model
+
+
+def read_whole(path: Path, reading: Reading) -> AnchorModel | SplatLayers:
+    """The model with all its splats."""
     if not path.exists():
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if path.name == MANIFEST:
