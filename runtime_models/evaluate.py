@@ -4,30 +4,38 @@ from dataclasses import replace
 
 import numpy as np
 
+from runtime_models.evaluate_scaffold import ScaffoldEvaluator
 from runtime_models.model import (
     SIZE_PER_SPLAT,
     AnchorModel,
     ControlEncoding,
     Mlp,
+    Model,
+    ScaffoldModel,
     SplatLayers,
     Splats,
 )
 from runtime_models.rotation import normalize
+from runtime_models.session import BATCH, open_session
 from runtime_models.spherical_harmonics import shade
 from runtime_models.write_onnx import write_onnx
 
 Control = float | np.ndarray  # of everything, or (A,) one an anchor (layers: one a splat)
-BATCH = 16384  # anchors a run: bounds the memory; half and twice as many are no faster
 
 
-def evaluate(model: AnchorModel | SplatLayers, x: Control, eye: np.ndarray) -> Splats:
+def follows_eye(model: Model) -> bool:
+    """Whether more than a model's colours depends on the eye: opacity, scales and rotations."""
+    return isinstance(model, ScaffoldModel)
+
+
+def evaluate(model: Model, x: Control, eye: np.ndarray) -> Splats:
     """The splats at control x seen from `eye` (3,), metres in the object's frame.
 
     Runs the networks as a package holds them, on every input, Psi(x) too: the plain twin of
     Evaluator, which is for one set of splats after the other.
     """
     evaluator = Evaluator(model, fold=False)
-    return Splats(*evaluator.geometry(x), evaluator.color(x, eye))
+    return Splats(*evaluator.geometry(x, eye=eye), evaluator.color(x, eye))
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -54,7 +62,7 @@ class Evaluator:
 
     def __init__(
         self,
-        model: AnchorModel | SplatLayers,
+        model: Model,
         threads: int = 1,
         fold: bool = True,
         keep: bool = False,
@@ -66,19 +74,25 @@ class Evaluator:
         self._threads = threads
         self._own: tuple[np.ndarray, np.ndarray] | None = None  # x (A,) and its Psi (A, d)
         self._centres: np.ndarray | None = None  # (A, k * 3) the anchor of every splat
-        if isinstance(model, AnchorModel):
+        self._scaffold: ScaffoldEvaluator | None = None
+        if isinstance(model, ScaffoldModel):
+            self._scaffold = ScaffoldEvaluator(model, threads)
+        elif isinstance(model, AnchorModel):
             kind = FoldedNetwork if fold else WholeNetwork
             for name, mlp in model.networks.items():
                 self._networks[name] = kind(name, mlp, model, threads)
 
     def geometry(
-        self, x: Control, unit: bool = True
+        self, x: Control, unit: bool = True, eye: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,) negative = absent.
 
         unit False: quaternions of any length, for one who divides by it anyway.
+        eye: (3,) metres in the object's frame; a model that follows_eye needs it (ValueError).
         """
         model = self.model
+        if self._scaffold is not None:
+            return self._scaffold.geometry(eye, unit)
         if isinstance(model, SplatLayers):
             weights = model.weights(x)  # (stops,) or (stops, N)
             there = weights[model.layer] if np.ndim(x) == 0 else _own(weights, model.layer)
@@ -105,6 +119,8 @@ class Evaluator:
         out: written to and given back, where there is one.
         """
         model = self.model
+        if self._scaffold is not None:
+            return self._scaffold.color(eye)
         places = model.means if isinstance(model, SplatLayers) else model.anchors
         if seen is None or seen.all():
             return self._color(x, slice(None), directions(places, eye), out)
@@ -257,13 +273,3 @@ class FoldedNetwork:
         if base is not None:
             given["rows"] = base
         return self._session.run(["output"], given)[0]
-
-
-def open_session(data: bytes, threads: int):
-    """An onnxruntime session on the CPU of an ONNX file's bytes."""
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads  # 1 measured fastest for these small networks
-    options.log_severity_level = 3
-    return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])

@@ -8,6 +8,8 @@ from runtime_models.shapes import check
 
 HEADS = ("offset", "scale", "rotation", "opacity", "color")
 SIZE_PER_SPLAT = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1, "color": 3}
+SCAFFOLD_HEADS = {"opacity": 1, "covariance": 7, "color": 3}  # numbers a splat
+OCTREE_RULES = ("round", "floor", "ceil", "progressive")
 STOP_KINDS = ("rgb", "thermal", "layer", "style")
 
 
@@ -56,7 +58,8 @@ class ControlEncoding:
 class Mlp:
     """Fully connected, ReLU between layers, then y = gain * head(clip(z)).
 
-    `inputs` names the concatenated parts in order, out of "feature", "direction" and "control".
+    `inputs` names the concatenated parts in order, out of "feature", "direction" and "control";
+    of a ScaffoldModel out of "feature", "direction", "distance" and "level".
     """
 
     weights: tuple[np.ndarray, ...]  # each (out, in) float32
@@ -144,11 +147,61 @@ class SplatLayers:
 
 
 @dataclass(frozen=True)
+class Octree:
+    """Which anchors of an Octree-GS model are drawn from how far: the rule it was trained with."""
+
+    level: np.ndarray  # (A,) float32, 0 = the coarsest
+    extra: np.ndarray  # (A,) float32, added to the level that the distance asks for
+    places: np.ndarray  # (A, 3) metres: where distances are measured to
+    standard_m: float  # from farther away level 0 alone is drawn
+    fork: float = 2.0  # so many times nearer, one level finer
+    rule: str = "round"  # one of OCTREE_RULES: how the asked level becomes a whole one
+
+    def __post_init__(self) -> None:
+        check(level=(self.level, "A"), extra=(self.extra, "A"), places=(self.places, "A 3"))
+
+
+@dataclass(frozen=True)
+class ScaffoldModel:
+    """A Scaffold-GS or Octree-GS model: everything but a splat's place depends on the eye."""
+
+    anchors: np.ndarray  # (A, 3) metres, object frame
+    features: np.ndarray  # (A, F)
+    offsets: np.ndarray  # (A, k, 3) metres, from the anchor
+    scales: np.ndarray  # (A, 3) metres, what the scales of its splats are a part of
+    networks: dict[str, Mlp]  # keys SCAFFOLD_HEADS, and "bank" where features are mixed by the view
+    stops: tuple[Stop, ...] = (Stop("RGB", 0.0),)
+    octree: Octree | None = None
+    provenance: dict = field(default_factory=dict)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres, as of SplatLayers
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        check(
+            anchors=(self.anchors, "A 3"),
+            features=(self.features, "A F"),
+            offsets=(self.offsets, "A K 3"),
+            scales=(self.scales, "A 3"),
+        )
+
+    @property
+    def splats_per_anchor(self) -> int:
+        return self.offsets.shape[1]
+
+    @property
+    def splat_count(self) -> int:
+        return len(self.anchors) * self.splats_per_anchor
+
+
+@dataclass(frozen=True)
 class Splats:
-    """What both kinds decode to at one x and one eye position."""
+    """What all kinds decode to at one x and one eye position."""
 
     means: np.ndarray  # (N, 3) metres
     scales: np.ndarray  # (N, 3) metres, one sigma
     wxyz: np.ndarray  # (N, 4) unit
     opacity: np.ndarray  # (N,), negative = absent
     color: np.ndarray  # (N, 3) display sRGB 0..1
+
+
+Model = AnchorModel | SplatLayers | ScaffoldModel
