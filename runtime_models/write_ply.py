@@ -102,7 +102,7 @@ def records(
         with np.errstate(divide="ignore"):
             table["opacity"] = np.log(opacity) - np.log1p(-opacity)
             table["scale"] = np.log(np.maximum(splats.scales[rows], 0, dtype=np.float64))
-        table["rot"] = wxyz
+        table["rot"] = -wxyz  # the same turn; two halves make -1, and so the file's own numbers
         for name, column in extra.items():
             if name in NORMAL:
                 table["normal"][:, NORMAL.index(name)] = column[rows]
