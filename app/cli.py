@@ -16,6 +16,7 @@ COMMANDS = {
     "chart": ("chart", "what each shortcut saves in time and costs in the picture"),
     "stability": ("stability", "the cases where splat renderers fail, each held to a bound"),
     "info": ("info", "what is in a scene"),
+    "export": ("export", "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat"),
     "train": ("train", "posed photos of several modalities to a scene"),
     "eval": ("evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
     "demo": ("demo", "make the bundled demo again: ray-trace its capture, train it"),

@@ -24,13 +24,15 @@ def bake(
     eye: np.ndarray | None = None,
     sh_degree: int = 3,
     recolor: Recolor | None = None,
+    keep: np.ndarray | None = None,
 ) -> PlainSplats:
     """The splats of a model at x, one value or one an anchor (layers: a splat), that are there.
 
     Colours that depend on the direction become spherical harmonics of `sh_degree`, the best in
     least squares over all directions alike; trained harmonics are cut at that degree, which is the
     same.  recolor: false colours, laid over before that.  eye (3,), metres in the object's frame:
-    where a model is seen from whose shape depends on it; the others need none.
+    where a model is seen from whose shape depends on it; the others need none.  keep (N,) bool: of
+    the model's splats no others are written.
     """
     if sh_degree not in range(len(COEFFICIENTS)):
         raise BadFile(f"spherical harmonics of degree {sh_degree} are asked for; 0 to 3 are known.")
@@ -40,13 +42,18 @@ def bake(
     there = find_present(means, scales, wxyz, opacity)
     if not there.any():
         raise BadFile(f"none of {len(there):,} splats is there at this x; choose another one.")
+    absent = int(len(there) - there.sum())
+    if keep is not None:
+        there &= keep
+    if not there.any():
+        raise BadFile("nothing of what was chosen is there at this x; choose another one.")
     if isinstance(model, SplatLayers):
         sh = model.sh[there, :count]
         if recolor:
             sh = recolored(sh, lambda color, rows: recolor(color, np.flatnonzero(there)[rows]))
     else:
         sh = fit_colors(evaluator, x, count, there, recolor)
-    return as_plain(model, [a[there] for a in (means, scales, wxyz, opacity)], sh, there)
+    return as_plain(model, [a[there] for a in (means, scales, wxyz, opacity)], sh, there, absent)
 
 
 def find_present(
@@ -60,11 +67,15 @@ def find_present(
 
 
 def as_plain(
-    model: AnchorModel | SplatLayers, geometry: list[np.ndarray], sh: np.ndarray, there: np.ndarray
+    model: AnchorModel | SplatLayers,
+    geometry: list[np.ndarray],
+    sh: np.ndarray,
+    there: np.ndarray,
+    absent: int,
 ) -> PlainSplats:
     """The rows that are there, with what the model knows about them."""
     findings = ()
-    if absent := int(len(there) - there.sum()):
+    if absent:
         findings = (Finding(f"{absent:,} splats are absent at this x", absent, "left out"),)
     means, scales, wxyz, opacity = geometry
     opacity = np.minimum(opacity, 1)

@@ -1,0 +1,136 @@
+"""What the command and the viewer's panel export: a scene as it is shown, as plain splats."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import UsageError
+from renderer.false_colors import tinted
+from renderer.palette import palette_colors, thermal_weights
+from runtime_models.bake import Recolor, bake
+from runtime_models.model import SplatLayers
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.write_plain import cut, merged, placed, writer_of
+from scene.control import control_of
+from scene.framing import default_view
+from scene.scene import SceneObject
+from scene.selector import Selector
+
+ANY_SIZE = (640, 360)  # of the view whose eye is asked for
+
+
+@dataclass(frozen=True)
+class Part:
+    """What of one object is exported."""
+
+    thing: SceneObject  # with its x, its regions and its pose
+    inside: tuple[Selector, ...] | None = None  # what lies in any of them; None: all
+    label: int | None = None  # the splats of this object within it; None: all
+
+
+@dataclass(frozen=True)
+class Look:
+    """How it is exported."""
+
+    sh_degree: int = 3  # at most
+    palette: bool = True  # thermal stops in their false colours, as they are shown
+    eye: tuple[float, float, float] | None = None  # world metres, None: the first view's
+
+
+def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
+    """Writes the parts into one file, all or nothing; gives back what was written.
+
+    told(what, part done 0..1).  Raises BadFile and UsageError.
+    """
+    writer = writer_of(path)
+    look = replace(look, sh_degree=min(look.sh_degree, writer.sh_degree))
+    baked = []
+    for number, part in enumerate(parts):
+        told(f"baking {part.thing.name}", number / (len(parts) + 1))
+        baked.append(bake_part(part, look))
+    told(f"writing {path.name}", len(parts) / (len(parts) + 1))
+    splats = cut(merged(baked), look.sh_degree)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writer.write(splats, path)
+    return splats
+
+
+def bake_part(part: Part, look: Look) -> PlainSplats:
+    """One object as plain splats, where it stands in the world."""
+    thing = part.thing
+    if not isinstance(thing.model, SplatLayers) and look.eye is None:
+        view = default_view(thing.model, ANY_SIZE)
+        eye = view.world_from_eye.position
+    else:
+        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+        eye = (object_from_world @ np.append(look.eye or (0, 0, 0), 1.0))[:3]
+    x = control_of(thing)
+    recolor = shown_colors(thing, x) if look.palette else None
+    splats = bake(thing.model, x, eye, look.sh_degree, recolor, chosen_rows(part))
+    named = [replace(finding, file=thing.name) for finding in splats.findings]
+    pose = thing.world_from_object
+    splats = replace(splats, findings=tuple(named))
+    return placed(splats, pose.matrix()[:3, :3], pose.position)
+
+
+def shown_colors(thing: SceneObject, x: float | np.ndarray) -> Recolor | None:
+    """Lays the palette of the thermal stop over colours, as much as x asks for."""
+    weights, stop = thermal_weights(thing.model.stops, np.atleast_1d(x))
+    if stop is None or not stop.palette or not weights.any():
+        return None
+    palette_colors(stop.palette)  # an unknown one is refused before the work begins
+    model = thing.model
+    each = 1 if isinstance(model, SplatLayers) else model.splats_per_anchor
+
+    def recolor(color: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        mine = weights[rows // each] if len(weights) > 1 else np.broadcast_to(weights, len(rows))
+        return tinted(color, stop.palette, mine).astype(np.float32)
+
+    return recolor
+
+
+def chosen_rows(part: Part) -> np.ndarray | None:
+    """(N,) bool of the model's splats that are inside and have the label; None: all.
+
+    Anchors are inside or not, with all their splats, as regions take them.
+    """
+    model, keep = part.thing.model, None
+    each = 1 if isinstance(model, SplatLayers) else model.splats_per_anchor
+    if part.inside is not None:
+        # Weights of selectors mix as control values do: from 0 outside of all to 1 inside.
+        marked = tuple(replace(selector, x=1.0) for selector in part.inside)
+        weight = control_of(replace(part.thing, x=0.0, selectors=marked))
+        keep = np.repeat(np.broadcast_to(weight, model.splat_count // each) >= 0.5, each)
+        if not keep.any():
+            raise UsageError(f"nothing of {part.thing.name} lies inside; choose another place.")
+    if part.label is None:
+        return keep
+    labels = model.labels if isinstance(model, SplatLayers) else None
+    if labels is None:
+        raise UsageError(f"--label {part.label}: {part.thing.name} has no labels of objects.")
+    of_label = labels == part.label
+    if not of_label.any():
+        known = ", ".join(map(str, np.unique(labels)[:20]))
+        raise UsageError(f"--label {part.label}: {part.thing.name} has the labels {known}.")
+    return of_label if keep is None else keep & of_label
+
+
+def check_output(path: Path, inputs: Sequence[Path], overwrite: bool) -> None:
+    """Refuses a path that is an input under any name, and what exists unless it may be replaced."""
+    for given in inputs:
+        if given.is_dir() and path.resolve().is_relative_to(given.resolve()):
+            raise UsageError(f"--out {path} lies in {given}, which is read; choose another folder.")
+        if path.exists() and os.path.samefile(path, given):
+            raise UsageError(f"--out {path} is the scene that is read; choose another name.")
+    if path.exists() and not overwrite:
+        raise UsageError(f"--out {path} exists; --overwrite replaces it.")
+    if path.is_dir() != is_folder(path) and path.exists():
+        raise UsageError(f"--out {path} is of another kind than what is written; choose another.")
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path without a known ending stands for a package in a folder."""
+    return not path.suffix

@@ -1,0 +1,78 @@
+"""The formats that plain splats are written in: by ending, with what each can hold."""
+
+import importlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import BadFile
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.read_layers import joined, moved, widened
+from runtime_models.spherical_harmonics import COEFFICIENTS
+from runtime_models.turn import turn
+
+
+@dataclass(frozen=True)
+class Writer:
+    name: str
+    ending: str
+    sh_degree: int  # the highest that it holds
+    function: str  # of the module of the same name
+
+    def write(self, splats: PlainSplats, path: Path) -> None:
+        """Atomic; what the format cannot hold is lost."""
+        module = importlib.import_module(f"runtime_models.{self.function}")
+        getattr(module, self.function)(splats, path)
+
+
+WRITERS = (  # of two endings that fit a name, the longer one stands first
+    Writer("compressed PLY", ".compressed.ply", 3, "write_compressed_ply"),
+    Writer("3DGS PLY", ".ply", 3, "write_ply"),
+    Writer("spz", ".spz", 3, "write_spz"),
+    Writer("glTF", ".glb", 3, "write_gltf"),
+    Writer(".splat", ".splat", 0, "write_splat"),
+)
+
+
+def writer_of(path: Path) -> Writer:
+    """Who writes a file of that name.  Raises BadFile."""
+    for writer in WRITERS:
+        if path.name.lower().endswith(writer.ending):
+            return writer
+    endings = ", ".join(writer.ending for writer in WRITERS)
+    raise BadFile(f"{path} has no ending that can be written; known are {endings}.")
+
+
+def cut(splats: PlainSplats, sh_degree: int) -> PlainSplats:
+    """Without harmonics above a degree: the best of that degree, as they are orthogonal."""
+    return replace(splats, sh=splats.sh[:, : COEFFICIENTS[sh_degree]])
+
+
+def placed(splats: PlainSplats, rotation: np.ndarray, position: np.ndarray) -> PlainSplats:
+    """The splats after a rotation (3, 3) about zero and a shift (3,) in metres, exactly."""
+    turned = turn(splats, rotation)
+    origin = tuple(float(a + b) for a, b in zip(turned.origin, position, strict=True))
+    return replace(turned, origin=origin)
+
+
+def merged(parts: list[PlainSplats]) -> PlainSplats:
+    """One set of splats, from the first part's origin; what a part lacks is zero."""
+    if len(parts) == 1:
+        return parts[0]
+    origin, counts = parts[0].origin, [len(part.means) for part in parts]
+    shifts = [np.subtract(part.origin, origin) for part in parts]  # metres, float64
+    width = max(part.sh.shape[1] for part in parts)
+    columns = sorted({name for part in parts for name in part.extra})
+    labels = [part.labels for part in parts]
+    return PlainSplats(
+        joined([moved(p.means, s) for p, s in zip(parts, shifts, strict=True)], counts),
+        *(joined([getattr(p, n) for p in parts], counts) for n in ("scales", "wxyz", "opacity")),
+        joined([widened(part.sh, width) for part in parts], counts),
+        origin=origin,
+        antialiased=any(part.antialiased for part in parts),
+        labels=joined(labels, counts) if any(x is not None for x in labels) else None,
+        extra={n: joined([part.extra.get(n) for part in parts], counts) for n in columns},
+        findings=tuple(finding for part in parts for finding in part.findings),
+        format="baked",
+    )
