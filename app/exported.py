@@ -11,7 +11,8 @@ from app.errors import UsageError
 from renderer.false_colors import tinted
 from renderer.palette import palette_colors, thermal_weights
 from runtime_models.bake import Recolor, bake
-from runtime_models.model import SplatLayers
+from runtime_models.evaluate import follows_eye
+from runtime_models.model import Finding, SplatLayers
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_plain import cut, merged, placed, writer_of
 from scene.control import control_of
@@ -61,19 +62,28 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
 def bake_part(part: Part, look: Look) -> PlainSplats:
     """One object as plain splats, where it stands in the world."""
     thing = part.thing
-    if not isinstance(thing.model, SplatLayers) and look.eye is None:
-        view = default_view(thing.model, ANY_SIZE)
-        eye = view.world_from_eye.position
-    else:
-        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
-        eye = (object_from_world @ np.append(look.eye or (0, 0, 0), 1.0))[:3]
+    eye, said = eye_of(thing, look)
     x = control_of(thing)
     recolor = shown_colors(thing, x) if look.palette else None
     splats = bake(thing.model, x, eye, look.sh_degree, recolor, chosen_rows(part))
-    named = [replace(finding, file=thing.name) for finding in splats.findings]
+    named = [replace(finding, file=thing.name) for finding in (*splats.findings, *said)]
     pose = thing.world_from_object
     splats = replace(splats, findings=tuple(named))
     return placed(splats, pose.matrix()[:3, :3], pose.position)
+
+
+def eye_of(thing: SceneObject, look: Look) -> tuple[np.ndarray | None, tuple[Finding, ...]]:
+    """From where an object is seen (3,), in its frame, if that matters, and a word about it."""
+    if not follows_eye(thing.model):
+        return None, ()
+    if look.eye is None:
+        eye = default_view(thing.model, ANY_SIZE).world_from_eye.position
+    else:
+        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+        eye = (object_from_world @ np.append(look.eye, 1.0))[:3]
+    place = ",".join(f"{c:.4g}" for c in eye)
+    what = "which splats there are and their shape depend on the eye"
+    return eye, (Finding(what, 0, f"baked as seen from {place}; --eye chooses another place"),)
 
 
 def shown_colors(thing: SceneObject, x: float | np.ndarray) -> Recolor | None:

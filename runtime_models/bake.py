@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.evaluate import Control, Evaluator
-from runtime_models.model import AnchorModel, BadFile, Finding, SplatLayers
+from runtime_models.evaluate import Control, Evaluator, follows_eye
+from runtime_models.model import AnchorModel, BadFile, Finding, Model, ScaffoldModel, SplatLayers
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.spherical_harmonics import COEFFICIENTS, basis, shade
 
@@ -19,7 +19,7 @@ Recolor = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def bake(
-    model: AnchorModel | SplatLayers,
+    model: Model,
     x: Control,
     eye: np.ndarray | None = None,
     sh_degree: int = 3,
@@ -32,13 +32,15 @@ def bake(
     least squares over all directions alike; trained harmonics are cut at that degree, which is the
     same.  recolor: false colours, laid over before that.  eye (3,), metres in the object's frame:
     where a model is seen from whose shape depends on it; the others need none.  keep (N,) bool: of
-    the model's splats no others are written.
+    the model's splats no others are written.  Raises BadFile.
     """
+    if follows_eye(model) and eye is None:
+        raise BadFile("the splats of such a scene depend on the eye; say from where it is seen.")
     if sh_degree not in range(len(COEFFICIENTS)):
         raise BadFile(f"spherical harmonics of degree {sh_degree} are asked for; 0 to 3 are known.")
     count = COEFFICIENTS[sh_degree]
     evaluator = Evaluator(model)
-    means, scales, wxyz, opacity = evaluator.geometry(x)
+    means, scales, wxyz, opacity = evaluator.geometry(x, eye=eye)
     there = find_present(means, scales, wxyz, opacity)
     if not there.any():
         raise BadFile(f"none of {len(there):,} splats is there at this x; choose another one.")
@@ -52,7 +54,7 @@ def bake(
         if recolor:
             sh = recolored(sh, lambda color, rows: recolor(color, np.flatnonzero(there)[rows]))
     else:
-        sh = fit_colors(evaluator, x, count, there, recolor)
+        sh = fit_colors(lambda d: evaluator.color_along(x, d, eye), model, count, there, recolor)
     return as_plain(model, [a[there] for a in (means, scales, wxyz, opacity)], sh, there, absent)
 
 
@@ -60,14 +62,14 @@ def find_present(
     means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
 ) -> np.ndarray:
     """(N,) bool: finite, and opaque enough to be drawn."""
-    there = opacity >= LEAST_ALPHA  # NaN is not
+    there = opacity >= LEAST_ALPHA  # NaN is not; what is absent has 0 or less
     for array in (means, scales, wxyz):
         there &= np.isfinite(array).all(axis=1)
     return there
 
 
 def as_plain(
-    model: AnchorModel | SplatLayers,
+    model: Model,
     geometry: list[np.ndarray],
     sh: np.ndarray,
     there: np.ndarray,
@@ -80,6 +82,8 @@ def as_plain(
     means, scales, wxyz, opacity = geometry
     opacity = np.minimum(opacity, 1)
     plain = PlainSplats(means, scales, wxyz, opacity, sh, findings=findings, format="baked")
+    if isinstance(model, ScaffoldModel):
+        return replace(plain, origin=model.origin)
     if not isinstance(model, SplatLayers):
         return plain
     return replace(
@@ -108,17 +112,21 @@ def fit_rows(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fit_colors(
-    evaluator: Evaluator, x: Control, count: int, there: np.ndarray, recolor: Recolor | None
+    color_along: Callable[[np.ndarray], np.ndarray],
+    model: AnchorModel | ScaffoldModel,
+    count: int,
+    there: np.ndarray,
+    recolor: Recolor | None,
 ) -> np.ndarray:
-    """(N there, count, 3) harmonics of the colour network's output.
+    """(N there, count, 3) harmonics of what the colour network gives along directions (A, 3).
 
     One direction after the other for all anchors: the sum over directions is the least-squares
     solution, so that nothing but it and the colours of one direction is held.
     """
-    rows, anchors = np.flatnonzero(there), len(evaluator.model.anchors)
+    rows, anchors = np.flatnonzero(there), len(model.anchors)
     sh = np.zeros((len(rows), count, 3), np.float32)
     for direction, parts in zip(*fit_rows(count), strict=True):
-        color = evaluator.color_along(x, np.tile(direction, (anchors, 1)))[rows]
+        color = color_along(np.tile(direction, (anchors, 1)))[rows]
         color = (recolor(color, rows) if recolor else color) - np.float32(0.5)
         for coefficient, part in enumerate(parts):
             sh[:, coefficient] += part * color

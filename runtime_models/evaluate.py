@@ -133,8 +133,15 @@ class Evaluator:
             per_row[rows] = colors.reshape(rows.size, -1)
         return out
 
-    def color_along(self, x: Control, direction: np.ndarray) -> np.ndarray:
-        """(N, 3) display sRGB where each anchor is looked at along its direction (A, 3), unit."""
+    def color_along(
+        self, x: Control, direction: np.ndarray, eye: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(N, 3) display sRGB where each anchor is looked at along its direction (A, 3), unit.
+
+        eye: as of geometry.
+        """
+        if self._scaffold is not None:
+            return self._scaffold.color_along(eye, direction)
         return self._color(x, slice(None), direction)
 
     def _color(

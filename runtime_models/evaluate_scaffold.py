@@ -146,10 +146,19 @@ class ScaffoldEvaluator:
 
     def color(self, eye: np.ndarray) -> np.ndarray:
         """(N, 3) display sRGB seen from an eye (3,); of splats that are absent, 0."""
-        look, model = self.look(eye), self.model
+        return self._color_of(self.look(eye))
+
+    def _color_of(self, look: Look) -> np.ndarray:
+        model = self.model
         color = np.zeros((len(model.anchors), 3 * model.splats_per_anchor), np.float32)
         color[look.rows] = self._heads["color"].run(look.rows, look.parts)
         return color.reshape(-1, 3)
+
+    def color_along(self, eye: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """The same with each anchor looked at along its direction (A, 3), else as from the eye."""
+        look = self.look(eye)
+        turned = replace(look, parts=look.parts | {"direction": direction[look.rows]})
+        return self._color_of(turned)
 
 
 def sigmoid(z: np.ndarray) -> np.ndarray:
