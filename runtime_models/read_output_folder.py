@@ -15,7 +15,7 @@ import numpy as np
 
 from runtime_models.formats import formats, read_plain, read_raw
 from runtime_models.lint import judge
-from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
+from runtime_models.model import BadFile, Model, SplatLayers, Stop
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.read_layers import join_layers
 from runtime_models.spherical_harmonics import COEFFICIENTS
@@ -25,9 +25,6 @@ CLOUD = "point_cloud.ply"
 NUMBER = re.compile(r"(?:iteration|point_cloud)_([0-9]{1,18})", re.ASCII)
 PAIR = ("color", "thermal")
 NO_SPLATS = {"input.ply", "points3d.ply"}  # what a run started from: points
-
-Model = AnchorModel | SplatLayers
-
 
 def newest_cloud(folder: Path) -> Path | None:
     """The cloud of the largest iteration in a run's folder; None where it is no such folder."""
@@ -127,11 +124,10 @@ def thermal_twin(raw: RawSplats) -> RawSplats:
 
 def in_run(model: Model, folder: Path, cloud: Path) -> Model:
     """The model of a run's newest cloud, its files named from the run's folder."""
-    if not isinstance(model, SplatLayers):
-        return model
     inside = cloud.parent.relative_to(folder)
     files = [str(inside / name) for name in model.provenance.get("files", ())]
-    stops = model.stops
-    if len(stops) == 1:
-        stops = (replace(stops[0], name=folder.resolve().name or stops[0].name),)
-    return replace(model, stops=stops, provenance=model.provenance | {"files": files})
+    model = replace(model, provenance=model.provenance | {"files": files})
+    if isinstance(model, SplatLayers) and len(model.stops) == 1:
+        name = folder.resolve().name or model.stops[0].name
+        model = replace(model, stops=(replace(model.stops[0], name=name),))
+    return model

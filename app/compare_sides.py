@@ -1,0 +1,119 @@
+"""What is compared: a scene at one x, or a folder of pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from app.errors import UsageError
+from app.opening import ReadingOptions, open_model
+from runtime_models.model import BadFile, Model, Stop
+
+PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+SCENE_MARKS = ("scene.json", "meta.json", "lod-meta.json")  # folders of these hold no photographs
+LARGEST_PICTURE = 1 << 27  # pixels
+
+
+@dataclass(frozen=True)
+class SceneSide:
+    """A scene as it is at x."""
+
+    name: str
+    model: Model
+    x: float
+    stated: bool = True  # x was given; else the first stop's was taken
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) float64 metres: where the model's own zero lies in the file's world."""
+        return np.array(getattr(self.model, "origin", (0.0, 0.0, 0.0)), np.float64)
+
+
+@dataclass(frozen=True)
+class PictureSide:
+    """Pictures that are there already, in the order of their names."""
+
+    name: str
+    files: tuple[Path, ...]
+
+
+def open_side(text: str, options: ReadingOptions) -> SceneSide | PictureSide:
+    """What a path, or a path with @stop or @x, stands for.  Raises BadFile, UsageError."""
+    path, at = split_stop(text)
+    if not at and (files := pictures_in(path)):
+        return PictureSide(path.name, files)
+    model = open_model(path, options)
+    name = path.resolve().name
+    if not at:
+        return SceneSide(name, model, min((s.x for s in model.stops), default=0.0), False)
+    return SceneSide(f"{name} @ {at}", model, x_of(at, model.stops, text))
+
+
+def split_stop(text: str) -> tuple[Path, str]:
+    """(path, stop or ""): a path that is there as it is written has no stop."""
+    before, sign, at = text.rpartition("@")
+    if not sign or not before or not at or Path(text).exists():
+        return Path(text), ""
+    return Path(before), at
+
+
+def x_of(at: str, stops: Sequence[Stop], text: str) -> float:
+    """The control value that a stop's name, in any case, or a number in 0..1 says."""
+    for stop in stops:
+        if stop.name.casefold() == at.casefold():
+            return stop.x
+    try:
+        x = float(at)
+    except ValueError:
+        names = ", ".join(stop.name for stop in stops)
+        raise UsageError(f"'{text}': there is no stop '{at}'; the stops are {names}.") from None
+    if not 0 <= x <= 1:
+        raise UsageError(f"'{text}': x is {at}, expected 0 to 1.")
+    return x
+
+
+def pictures_in(path: Path) -> tuple[Path, ...]:
+    """The pictures of a folder that is no scene, or the one picture that a file is; () for none."""
+    if path.is_file():
+        return (path,) if path.suffix.lower() in PICTURES else ()
+    if not path.is_dir() or any((path / mark).exists() for mark in SCENE_MARKS):
+        return ()
+    from runtime_models.read_layers import layer_files
+    from runtime_models.read_output_folder import newest_cloud
+
+    if layer_files(path) or newest_cloud(path) is not None:
+        return ()
+    return tuple(sorted(f for f in path.iterdir() if f.suffix.lower() in PICTURES and f.is_file()))
+
+
+def match_pictures(a: PictureSide, b: PictureSide) -> tuple[list[tuple[str, Path, Path]], str]:
+    """((name, a's file, b's file), ...) by equal names, else in order; and how, for a word on it.
+
+    Raises BadFile where neither fits.
+    """
+    by_name = [{f.stem: f for f in side.files} for side in (a, b)]
+    common = [stem for stem in by_name[0] if stem in by_name[1]]
+    if common:
+        left = len(a.files) + len(b.files) - 2 * len(common)
+        told = f"matched by name{f', {left} without a partner left out' if left else ''}"
+        return [(stem, by_name[0][stem], by_name[1][stem]) for stem in common], told
+    if len(a.files) != len(b.files):
+        raise BadFile(
+            f"{a.name} holds {len(a.files)} pictures and {b.name} {len(b.files)}, and no two have "
+            "a name in common; give folders of equal names or equal numbers."
+        )
+    return [(f.stem, f, g) for f, g in zip(a.files, b.files, strict=True)], "matched in order"
+
+
+def read_picture(path: Path) -> np.ndarray:
+    """(H, W, 3) float32 display sRGB 0..1; what is see-through lies over black.  Raises BadFile."""
+    from scene.photo import open_image, read_pixels
+
+    with open_image(path) as image:
+        width, height = image.size
+    if width * height > LARGEST_PICTURE:
+        raise BadFile(
+            f"{path} has {width}x{height} pixels, at most {LARGEST_PICTURE:,} are compared."
+        )
+    return read_pixels(path)[0]
