@@ -19,7 +19,7 @@ class Format:
 
     def fits(self, head: bytes, path: Path) -> bool:
         if self.has_mark is None:
-            return path.name.lower().endswith(self.endings)
+            return path.is_file() and path.name.lower().endswith(self.endings)
         return self.has_mark(head, path)
 
 
@@ -28,20 +28,24 @@ def formats() -> tuple[Format, ...]:
     from runtime_models.read_compressed_ply import has_chunks, read_raw_compressed_ply
     from runtime_models.read_gltf import is_gltf, read_raw_gltf
     from runtime_models.read_ply import read_raw_ply
+    from runtime_models.read_sog import is_sog, read_raw_sog
     from runtime_models.read_splat import read_raw_splat
 
     return (
         Format("compressed PLY", (".ply",), has_chunks, read_raw_compressed_ply),
         Format("3DGS PLY", (".ply",), lambda head, path: head[:3] == b"ply", read_raw_ply),
         Format("glTF", (".glb", ".gltf"), is_gltf, read_raw_gltf),
+        Format("SOG", (".sog", "meta.json"), is_sog, read_raw_sog),
         Format(".splat", (".splat",), None, read_raw_splat),
     )
 
 
 def format_of(path: Path) -> Format | None:
-    """The format of a file of plain splats, None where it is none."""
-    with path.open("rb") as file:
-        head = file.read(HEAD)
+    """The format of a file of plain splats, or of a folder that stands for one; None: no format."""
+    head = b""
+    if not path.is_dir():
+        with path.open("rb") as file:
+            head = file.read(HEAD)
     return next((form for form in formats() if form.fits(head, path)), None)
 
 

@@ -1,0 +1,129 @@
+"""The files of a SOG: out of its folder or its zip, never more of them than its splats need."""
+
+import io
+import json
+import zipfile
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from runtime_models.model import BadFile
+from runtime_models.package_files import DAMAGED
+
+META = "meta.json"
+LARGEST_META = 16 << 20  # bytes
+SMALL = 1 << 16  # bytes that any file may have
+# Pillow on a damaged or hostile picture; DecompressionBombError is no ValueError.
+UNREADABLE = (
+    UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError,
+    EOFError, RuntimeError, MemoryError,
+)  # fmt: skip
+
+
+class SogFiles:
+    """A SOG's folder (or its meta.json) or zip; names that would leave it are refused."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.name = path, path.name
+        self.folder = path if path.is_dir() else path.parent if path.name == META else None
+
+    def meta(self) -> dict:
+        """What meta.json says.  Raises BadFile."""
+        return parse_json(self.read(META, LARGEST_META), f"{self.name}: its {META}")
+
+    def image(self, name: str, least: int, most: int) -> np.ndarray:
+        """(H, W, 4) uint8 of a WebP with `least` to `most` pixels.  Raises BadFile."""
+        data = self.read(name, 8 * most + SMALL)  # more than it would take uncoded
+        try:
+            with Image.open(io.BytesIO(data), formats=("WEBP",)) as picture:
+                width, height = picture.size
+                if not least <= width * height <= most:
+                    raise BadFile(
+                        f"{self.name}: {name[:60]!r} has {width} x {height} pixels, expected "
+                        f"{least:,} to {most:,}; export it again."
+                    )
+                return np.asarray(picture.convert("RGBA"))
+        except BadFile:
+            raise
+        except UNREADABLE:
+            raise BadFile(f"{self.name}: {name[:60]!r} is no WebP that can be read.") from None
+
+    def bytes_of(self, names: list[str]) -> int:
+        """How many bytes the named files take on the disk; of a zip, all of it."""
+        if self.folder is None:
+            return self.path.stat().st_size
+        return sum(self._file(name).stat().st_size for name in names)
+
+    def read(self, name: str, limit: int) -> bytes:
+        """One file.  Raises BadFile: a name outside, no such file, more than `limit` bytes."""
+        if self.folder is not None:
+            file = self._file(name)
+            with file.open("rb") as stream:
+                return self._bounded(stream, name, limit, file.stat().st_size)
+        check_name(name, self.name)
+        try:
+            with zipfile.ZipFile(self.path) as archive:
+                entry = find_entry(archive, name)
+                if entry is None or entry.compress_size > self.path.stat().st_size:
+                    raise BadFile(f"{self.name} does not hold {name[:60]!r} just once; copy it.")
+                with archive.open(entry) as stream:
+                    return self._bounded(stream, name, limit, entry.file_size)
+        except BadFile:
+            raise
+        except DAMAGED:
+            raise BadFile(f"{self.name}: {name[:60]!r} cannot be unpacked; copy it.") from None
+
+    def _file(self, name: str) -> Path:
+        return file_inside(self.folder, name, self.name)
+
+    def _bounded(self, stream: IO[bytes], name: str, limit: int, stated: int) -> bytes:
+        if stated <= limit and len(data := stream.read(limit + 1)) <= limit:
+            return data
+        raise BadFile(
+            f"{self.name}: {name[:60]!r} has more than the {limit:,} bytes that its splats need."
+        )
+
+
+def check_name(name: str, said_by: str) -> None:
+    """Raises BadFile where a name, as a file states it, leads out of its folder."""
+    outside = any(part in ("", ".", "..") for part in name.split("/"))
+    if outside or set(name) & set("\\:\0"):
+        raise BadFile(f"{said_by} names the file {name[:60]!r}, which is none of its own.")
+
+
+def file_inside(folder: Path, name: str, said_by: str) -> Path:
+    """The file of that name in the folder or below.  Raises BadFile: outside, or none there."""
+    check_name(name, said_by)
+    file = folder / name
+    if not file.resolve().is_relative_to(folder.resolve()):  # a link that leads outside
+        raise BadFile(f"{said_by} names the file {name[:60]!r}, which is none of its own.")
+    if not file.is_file():
+        raise BadFile(f"{said_by} lacks {name[:60]!r}; copy the whole folder.")
+    return file
+
+
+def find_entry(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo | None:
+    """The one file of that name beside meta.json: at the top, or in the one folder at the top."""
+    entries = archive.infolist()
+    tops = {e.filename.removesuffix(META) for e in entries if is_meta(e.filename)}
+    top = "" if "" in tops or len(tops) != 1 else tops.pop()
+    found = [e for e in entries if e.filename == top + name]
+    return found[0] if len(found) == 1 else None
+
+
+def is_meta(name: str) -> bool:
+    """Whether that is meta.json at the top of a zip or in a folder at its top."""
+    return name == META or (name.endswith("/" + META) and name.count("/") == 1)
+
+
+def parse_json(data: bytes, name: str) -> dict:
+    """The object that a JSON text is; `name` is for messages.  Raises BadFile."""
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        raise BadFile(f"{name} is no JSON; copy it again.") from None
+    if not isinstance(found, dict):
+        raise BadFile(f"{name} is no JSON object; export it again.")
+    return found
