@@ -3,8 +3,10 @@
 import zipfile
 from pathlib import Path
 
+import numpy as np
+
 from runtime_models.formats import format_of
-from runtime_models.model import AnchorModel, BadFile, Mlp, SplatLayers
+from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import layer_files, read_layers
@@ -16,19 +18,23 @@ from runtime_models.read_output_folder import (
     thermal_pair,
 )
 from runtime_models.read_package import read_package
+from runtime_models.read_scaffold import is_scaffold, read_scaffold
 from runtime_models.thin import thin
 
-KNOWN = "a package (folder or .shift), a 3DGS .ply, a .splat, or a folder of such .ply files"
+KNOWN = (
+    "a package (folder or .shift), a 3DGS .ply, a .splat, a folder of such .ply files, or the "
+    "folder of a Scaffold-GS run"
+)
 
 
-def read_model(path: str | Path, reading: Reading | None = None) -> AnchorModel | SplatLayers:
+def read_model(path: str | Path, reading: Reading | None = None) -> Model:
     """The model in a file or folder, read as `reading` says.  Raises BadFile."""
     reading = reading or Reading()
     model = read_whole(Path(path), reading)
     return thin(model, reading.most_splats) if isinstance(model, SplatLayers) else model
 
 
-def read_whole(path: Path, reading: Reading) -> AnchorModel | SplatLayers:
+def read_whole(path: Path, reading: Reading) -> Model:
     """The model with all its splats."""
     if not path.exists():
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
@@ -37,6 +43,8 @@ def read_whole(path: Path, reading: Reading) -> AnchorModel | SplatLayers:
     if path.is_dir():
         if (path / MANIFEST).exists():
             return read_package(path)
+        if is_scaffold(path):
+            return read_scaffold(path, reading)
         if (pair := thermal_pair(path)) is not None:
             return read_pair(pair, path, reading)
         if (cloud := newest_cloud(path)) is not None:
@@ -47,6 +55,8 @@ def read_whole(path: Path, reading: Reading) -> AnchorModel | SplatLayers:
         return read_layers(layers, reading) if len(layers) > 1 else read_file(layers[0], reading)
     if is_package(path):
         return read_package(path)
+    if is_scaffold(path):
+        return read_scaffold(path, reading)
     if format_of(path):
         return read_file(path, reading)
     raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
@@ -58,26 +68,43 @@ def is_package(path: Path) -> bool:
         return file.read(2) == b"PK" or zipfile.is_zipfile(path)
 
 
-def describe(model: AnchorModel | SplatLayers, path: str | Path) -> dict:
+def describe(model: Model, path: str | Path) -> dict:
     """What `launch.py info --json` prints; `path` is where the model was read from."""
     anchored = isinstance(model, AnchorModel)
+    plain = isinstance(model, SplatLayers)
     facts = {
         "format": FORMAT if anchored else model.provenance.get("format", "splats"),
-        "anchors": len(model.anchors) if anchored else 0,
+        "anchors": 0 if plain else len(model.anchors),
         "splats": model.splat_count,
-        "sh_degree": None if anchored else round(model.sh.shape[1] ** 0.5) - 1,
+        "sh_degree": round(model.sh.shape[1] ** 0.5) - 1 if plain else None,
         "stops": [{"name": s.name, "x": s.x, "kind": s.kind} for s in model.stops],
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
-    if not anchored:
+    if plain:
         return facts | {"mode": model.mode}
-    encoding = model.encoding
-    return facts | {
+    networks = {
         "splats_per_anchor": model.splats_per_anchor,
         "feature_width": model.features.shape[1],
-        "encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing},
         "heads": {name: describe_head(mlp) for name, mlp in model.networks.items()},
     }
+    if isinstance(model, ScaffoldModel):
+        return facts | networks | describe_octree(model)
+    encoding = model.encoding
+    return (
+        facts
+        | networks
+        | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
+    )
+
+
+def describe_octree(model: ScaffoldModel) -> dict:
+    """What a Scaffold-GS model says beside its networks."""
+    facts = {"appearance": model.provenance.get("appearance")}
+    if (octree := model.octree) is not None:
+        levels, counts = np.unique(octree.level, return_counts=True)
+        facts["levels"] = {f"{level:g}": int(n) for level, n in zip(levels, counts, strict=True)}
+        facts["level_rule"] = octree.rule
+    return facts
 
 
 def describe_head(mlp: Mlp) -> dict:
@@ -88,7 +115,7 @@ def describe_head(mlp: Mlp) -> dict:
     }
 
 
-def files_of(model: AnchorModel | SplatLayers, path: Path) -> list[Path]:
+def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
     if path.name == MANIFEST:
         path = path.parent
