@@ -24,8 +24,10 @@ class Options(ReadingOptions):
     x: tuple[str, ...] = ("0",)
     """Control values in 0..1, or sweep:N."""
     camera: str = "orbit"
-    """orbit, front, or a file: a JSON list of {"matrix": 4x4 world_from_eye, "fov_y": radians},
-    the cameras.json that 3DGS writes, or a capture (transforms.json, a COLMAP folder)."""
+    """orbit, front, auto (cameras that lie with the scene), or a file or folder of cameras, see
+    docs/cameras.md: ours, cameras.json, transforms.json, camera_path.json, _vr.json, COLMAP."""
+    fov_y: float = 0.0
+    """Degrees from top to bottom, for a camera file that says nothing about the lens."""
     frames: int = 1
     """Pictures on the orbit (per control value); a camera file gives its own number."""
     size: str = ""
@@ -135,15 +137,18 @@ def choose_settings(options: Options):
 
 def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
     """The views that --camera stands for; `size` None leaves the pixels to the camera file."""
+    from app.camera_files import scene_cameras
     from scene.framing import default_view, frame_points, model_points, orbit_path
-    from scene.read_cameras import read_cameras
 
     if options.camera == "front" or (options.camera == "orbit" and options.frames == 1):
         return [default_view(model, size or (640, 360))]
     if options.camera == "orbit":
         centre, radius = frame_points(*model_points(model))
         return orbit_path(options.frames, centre, radius, size or (640, 360))
-    return read_cameras(options.camera, size)
+    cameras = scene_cameras(options.camera, options.scene, model, options, size)
+    for note in cameras.notes:
+        print(note, file=sys.stderr)
+    return list(cameras.views)
 
 
 def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:

@@ -4,7 +4,8 @@ from pathlib import Path
 
 from runtime_models.model import BadFile
 from scene.capture import Capture
-from scene.read_colmap import find_model, read_colmap
+from scene.colmap_tables import find_model
+from scene.read_colmap import read_colmap
 from scene.read_transforms import read_transforms
 
 TABLES = ("transforms.json", "transforms_multimodal.json", "cameras.json")

@@ -16,25 +16,14 @@ from scene.capture_rules import (
     spread_stops,
     stop_from,
 )
+from scene.colmap_tables import TABLES, check_points, find_model, read_tables
 from scene.pose import View
 from scene.read_transforms import STRAIGHT, read_json
-
-MODELS = ("sparse/0", "sparse", "colmap/sparse/0", ".")
-TABLES = ("cameras", "images", "points3D")
-
-
-def find_model(folder: Path) -> Path | None:
-    """The folder with cameras, images and points3D, all .bin or all .txt; None without one."""
-    for name in MODELS:
-        for ending in (".bin", ".txt"):
-            if (folder / name / f"images{ending}").is_file():
-                return folder / name
-    return None
 
 
 def read_colmap(folder: Path) -> Capture:
     """Sub-folders of images/ are modalities; capture.json may say more (docs/capture.md)."""
-    model = load_model(find_model(folder))
+    model = load_model(*find_model(folder))
     posed = sorted((i for i in model.images.values() if i.has_pose), key=lambda i: i.name)
     if not posed:
         raise BadFile(f"{folder}: the COLMAP model holds no posed image; run the mapper again")
@@ -63,13 +52,16 @@ def read_colmap(folder: Path) -> Capture:
     return world.capture(folder, stops, photos, points, colors, background, guessed)
 
 
-def load_model(folder: Path):
+def load_model(folder: Path, ending: str):
+    """pycolmap's Reconstruction; the counts are checked first, which it takes memory for."""
     import pycolmap
 
-    ending = ".bin" if (folder / "images.bin").is_file() else ".txt"
     missing = [t + ending for t in TABLES if not (folder / (t + ending)).is_file()]
     if missing:
         raise BadFile(f"{folder}: {', '.join(missing)} missing; copy the whole COLMAP model")
+    read_tables(folder, ending)
+    if ending == ".bin":
+        check_points(folder / "points3D.bin")
     try:
         return pycolmap.Reconstruction(folder)
     except (RuntimeError, ValueError, IndexError, MemoryError) as error:

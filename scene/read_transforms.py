@@ -87,7 +87,7 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[dict]]:
 def read_json(file: Path) -> dict:
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise BadFile(f"{file}: not JSON ({error}); write it again") from None
     if not isinstance(data, dict):
         raise BadFile(f"{file}: holds a {type(data).__name__}; an object with 'frames' is wanted")

@@ -1,0 +1,49 @@
+"""The cameras that a command follows through a scene: found, read, moved to where the scene is."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from runtime_models.model import AnchorModel, SplatLayers
+    from scene.camera_list import CameraList, CameraReading
+
+AUTO = "auto"
+
+
+def camera_reading(options, size: tuple[int, int] | None = None) -> "CameraReading":
+    """The same of options with fov_y (degrees), up and flip.  Raises UsageError."""
+    from app.errors import UsageError
+    from scene.camera_list import CameraReading
+
+    if not (options.fov_y == 0 or 0 < options.fov_y < 180):
+        raise UsageError(f"--fov-y is {options.fov_y}, expected degrees between 0 and 180.")
+    return CameraReading(size, math.radians(options.fov_y), options.up, options.flip)
+
+
+def scene_cameras(
+    camera: str, scene: Path, model: "AnchorModel | SplatLayers", options,
+    size: tuple[int, int] | None = None,
+) -> "CameraList":  # fmt: skip
+    """What --camera names, a path or auto, as the model's own origin sees it.
+
+    Raises UsageError where nothing lies with the scene, BadFile where it cannot be read.
+    """
+    from app.errors import UsageError
+    from scene.read_cameras import find_cameras, find_floor, read_camera_list
+
+    path = Path(camera)
+    if camera == AUTO:
+        path = find_cameras(scene) or find_floor(scene)
+        if path is None:
+            raise UsageError(f"no cameras lie with {scene}; give --camera a file of them.")
+    return in_scene(read_camera_list(path, camera_reading(options, size)), model)
+
+
+def in_scene(cameras: "CameraList", model: "AnchorModel | SplatLayers") -> "CameraList":
+    """The cameras where the model is: one that was re-centred has an origin of its own."""
+    from scene.camera_list import moved
+
+    origin = getattr(model, "origin", (0.0, 0.0, 0.0))
+    return replace(cameras, views=tuple(moved(cameras.views, [-c for c in origin])))

@@ -1,0 +1,116 @@
+"""launch.py cameras: what is in a file of cameras, or the same in another form."""
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Options:
+    """List the cameras of a file or folder, or write them in another form."""
+
+    cameras: Annotated[Path, tyro.conf.Positional]
+    """JSON of our own, 3DGS's cameras.json, transforms.json, nerfstudio's camera_path.json,
+    splatapult's _vr.json, a COLMAP model, or a folder with one of them."""
+    out: Path | None = None
+    """File to write, or for COLMAP the folder that gets sparse/0."""
+    to: Literal["", "ours", "inria", "transforms", "nerfstudio", "vr", "colmap-bin",
+                "colmap-txt"] = ""  # fmt: skip
+    """Form to write; without it our own, or COLMAP's where --out has no ending."""
+    fov_y: float = 0.0
+    """Degrees from top to bottom, for a file that says nothing about the lens."""
+    up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = ""
+    """Axis of the file's world that points up, where it is not its format's; write --up=-Z."""
+    flip: bool = False
+    """Turn the cameras upside down, as --flip does with a scene."""
+    json: bool = False
+    """The list as JSON on standard output."""
+    overwrite: bool = False
+    """Replace what --out names; the input itself is never replaced."""
+
+
+def run(options: Options) -> int:
+    from app.camera_files import camera_reading
+    from app.errors import UsageError
+    from scene.read_cameras import read_camera_list
+
+    if options.to and options.out is None:
+        raise UsageError("--to wants --out, the file or folder to write.")
+    cameras = read_camera_list(options.cameras, camera_reading(options))
+    for note in cameras.notes:
+        print(note, file=sys.stderr)
+    if options.out is not None:
+        write(options, cameras)
+    elif options.json:
+        print(json.dumps(facts_of(cameras), indent=1, ensure_ascii=False))
+    else:
+        print_table(cameras)
+    return 0
+
+
+def write(options: Options, cameras) -> None:
+    """Writes the views in the wished form, beside what is there, never over the input."""
+    from app.errors import UsageError
+    from scene.write_cameras import paths_of, write_cameras
+
+    form = options.to or ("ours" if options.out.suffix else "colmap-bin")
+    for path in paths_of(options.out, form):
+        if path.exists() and is_part(path.resolve(), options.cameras.resolve()):
+            raise UsageError(f"{path} belongs to what is read; choose another --out.")
+        if path.exists() and not options.overwrite:
+            raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
+    written = write_cameras(cameras, options.out, form)
+    count = len(cameras.views)
+    if form == "vr" and count > 1:
+        print(f"A floor has one view: the first of {count} is taken.", file=sys.stderr)
+        count = 1
+    names = f"{written[0]}" if len(written) == 1 else f"{written[0].parent}"
+    print(f"{count} camera{'s' * (count > 1)} in {names}", file=sys.stderr)
+
+
+def is_part(path: Path, source: Path) -> bool:
+    """Whether a file is what is read, lies in it, or is another table of the same COLMAP model."""
+    tables = ("cameras", "images", "points3D")
+    beside = path.parent == source.parent and path.suffix == source.suffix != ".json"
+    return path == source or source in path.parents or (beside and source.stem in tables)
+
+
+def facts_of(cameras) -> dict:
+    """What --json prints: our own list, and what is known about the file."""
+    from scene.write_own_cameras import own_rows
+
+    return {
+        "format": cameras.format,
+        "count": len(cameras.views),
+        "fps": cameras.fps,
+        "notes": list(cameras.notes),
+        "cameras": own_rows(cameras),
+    }
+
+
+def print_table(cameras) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=f"{cameras.format}, {len(cameras.views)} cameras", title_justify="left")
+    for name in ("", "name", "place, metres", "looks along", "degrees", "pixels"):
+        table.add_column(name)
+    for i, (view, name) in enumerate(zip(cameras.views, cameras.names, strict=True)):
+        pose, (_, _, low, high) = view.world_from_eye, view.tangents
+        degrees = math.degrees(math.atan(high) - math.atan(low))
+        ahead = -pose.matrix()[:3, 2]
+        table.add_row(
+            str(i),
+            Text(name),  # names may hold brackets
+            " ".join(f"{c:.3f}" for c in pose.position),
+            " ".join(f"{c:+.2f}" for c in ahead),
+            f"{degrees:.1f}",
+            f"{view.size[0]}x{view.size[1]}",
+        )
+    Console().print(table)
