@@ -19,6 +19,9 @@ from runtime_models.read_output_folder import (
 )
 from runtime_models.read_package import read_package
 from runtime_models.read_scaffold import is_scaffold, read_scaffold
+from runtime_models.read_sog import is_sog
+from runtime_models.read_streamed import TREE, is_streamed, read_sog_folder, read_streamed
+from runtime_models.sog_files import META
 from runtime_models.thin import thin
 
 KNOWN = (
@@ -40,9 +43,15 @@ def read_whole(path: Path, reading: Reading) -> Model:
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if path.name == MANIFEST:
         path = path.parent
+    if is_streamed(path):
+        return read_streamed(path, reading)
+    if path.name == META and format_of(path):
+        path = path.parent
     if path.is_dir():
         if (path / MANIFEST).exists():
             return read_package(path)
+        if is_sog(b"", path):
+            return read_sog_folder(path, reading)
         if is_scaffold(path):
             return read_scaffold(path, reading)
         if (pair := thermal_pair(path)) is not None:
@@ -63,9 +72,10 @@ def read_whole(path: Path, reading: Reading) -> Model:
 
 
 def is_package(path: Path) -> bool:
-    """A zip, by content; whether it is whole is for the reader to say."""
+    """A zip that is no SOG, by content; whether it is whole is for the reader to say."""
     with path.open("rb") as file:
-        return file.read(2) == b"PK" or zipfile.is_zipfile(path)
+        head = file.read(2)
+    return (head == b"PK" or zipfile.is_zipfile(path)) and not is_sog(head, path)
 
 
 def describe(model: Model, path: str | Path) -> dict:
@@ -117,7 +127,7 @@ def describe_head(mlp: Mlp) -> dict:
 
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
-    if path.name == MANIFEST:
+    if path.name in (MANIFEST, META, TREE):
         path = path.parent
     if not path.is_dir():
         return [path]

@@ -18,7 +18,7 @@ LARGEST_PALETTE = 1 << 16  # sets; labels have 16 bits
 FREE_SPLATS = 1 << 16  # each beyond these takes a byte of the files at least; of real ones 8
 FIRST_MODE = 252  # the alpha of a quaternion says which entry is the largest: 252 is w
 LARGEST_NUMBER = 1e38  # of float32
-HEAD = 1 << 12  # bytes of a meta.json that tell what it is
+HEAD = 1 << 16  # bytes of a meta.json that tell what it is
 
 
 def is_sog(head: bytes, path: Path) -> bool:
@@ -87,6 +87,10 @@ class Sog:
             raise self.bad(f"{part} needs names of files")
         return names
 
+    def file_names(self) -> list[str]:
+        """All pictures."""
+        return [name for part in PICTURES for name in self.names(part)]
+
     def section(self, part: str) -> dict:
         found = self.meta.get(part)
         if not isinstance(found, dict):
@@ -137,7 +141,7 @@ def open_sog(path: Path) -> Sog:
     if type(count) is not int or count < 1:
         raise BadFile(f"{path.name} does not say how many splats there are; export it again.")
     sog = Sog(files, meta, version, count)
-    size = files.bytes_of([name for part in PICTURES for name in sog.names(part)])
+    size = files.bytes_of(sog.file_names())
     if count > size + FREE_SPLATS:
         raise BadFile(
             f"{path.name} states {count:,} splats, its {size:,} bytes cannot hold them; it is cut "
