@@ -26,6 +26,10 @@ class NoDevice(RuntimeError):
     """No OpenCL device can be used.  The message says what to install."""
 
 
+class NoMemory(NoDevice):
+    """The device's memory is full.  The message says what was asked for."""
+
+
 @dataclass(frozen=True)
 class Device:
     """One OpenCL device with its queue.  Arrays come from a pool: freed ones are reused."""
@@ -38,12 +42,21 @@ class Device:
     units: int  # compute units: how many work-groups run at once
     pool: object = field(repr=False)
     programs: dict = field(default_factory=dict, repr=False)
+    most_bytes: int = 0  # of one array, as the driver says; 0: it says nothing
 
     def empty(self, shape, dtype=np.float32) -> "Array":
         """A device array with undefined contents."""
+        import pyopencl as cl
         from pyopencl.array import Array
 
-        return Array(self.queue, shape, dtype, allocator=self.pool)
+        try:
+            return Array(self.queue, shape, dtype, allocator=self.pool)
+        except cl.MemoryError as error:
+            size = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+            raise NoMemory(
+                f"{self.name} has no room for {size:,} bytes more; open the scene with "
+                "--max-splats, or draw it with --drawing quads."
+            ) from error
 
     def zeros(self, shape, dtype=np.float32) -> "Array":
         """A device array of zeros."""
@@ -193,6 +206,7 @@ def _opened(device: "cl.Device") -> Device:
         _kind(device),
         device.max_compute_units,
         MemoryPool(ImmediateAllocator(queue)),
+        most_bytes=device.max_mem_alloc_size,
     )
 
 

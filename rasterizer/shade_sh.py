@@ -13,14 +13,23 @@ if TYPE_CHECKING:
 KERNEL = Path(__file__).parent / "kernels" / "shade_sh.cl"
 LANES = 8  # splats a block
 RUN = 32  # blocks a work-item
+UPLOADED = 1 << 16  # splats at a time, a multiple of LANES
 
 
 def upload_sh(device: Device, sh: np.ndarray) -> "Array":
     """The coefficients (n, M, 3) as shade_sh reads them: (blocks, 3 M, 8) on the device."""
     count, coefficients = sh.shape[:2]
-    padded = np.zeros((-(-count // LANES) * LANES, 3 * coefficients), np.float32)
-    padded[:count] = np.reshape(sh, (count, 3 * coefficients))
-    return device.upload(padded.reshape(-1, LANES, 3 * coefficients).transpose(0, 2, 1))
+    width = 3 * coefficients
+    array = device.empty((-(-count // LANES), width, LANES))
+    for first in range(0, count, UPLOADED):  # in parts: a scene is large, and it is here twice
+        rows = np.reshape(sh[first : first + UPLOADED], (-1, width))
+        blocks = -(-len(rows) // LANES)
+        if len(rows) % LANES:
+            rows = np.pad(rows, ((0, blocks * LANES - len(rows)), (0, 0)))
+        part = rows.reshape(blocks, LANES, width).transpose(0, 2, 1)
+        start = first // LANES
+        array[start : start + blocks].set(np.ascontiguousarray(part, np.float32))
+    return array
 
 
 def shade_sh(

@@ -26,7 +26,8 @@ import moderngl
 import numpy as np
 
 from renderer import layout
-from renderer.gpu import Gpu, TooLarge, groups_for
+from renderer.gpu import Gpu, groups_for
+from renderer.limits import too_many
 
 STAGED_SPLATS = 1 << 20  # decoded at a time; bounds the staging buffer to 46 MB
 STAGED_FLOATS = 11  # mean or offset 3, scale 3, rotation 4, opacity 1
@@ -44,17 +45,22 @@ def fitting_splats(gpu: Gpu) -> int:
     return min(gpu.max_block // (16 * layout.RECORD_VECS), gpu.max_groups * layout.WORKGROUP)
 
 
+def limit_of(gpu: Gpu) -> str:
+    """Which of the driver's limits makes fitting_splats what it is."""
+    row = 16 * layout.RECORD_VECS
+    if gpu.max_block // row <= gpu.max_groups * layout.WORKGROUP:
+        limit = f"GL_MAX_SHADER_STORAGE_BLOCK_SIZE is {gpu.max_block:,} bytes"
+        return f"{limit}, a splat takes {row} of one buffer"
+    return f"GL_MAX_COMPUTE_WORK_GROUP_COUNT is {gpu.max_groups:,} groups of {layout.WORKGROUP}"
+
+
 class Arena:
     """The splats of all objects, and what a frame makes of them."""
 
     def __init__(self, gpu: Gpu, counts: list[int]) -> None:
         self.count = sum(counts)
         if not self.count <= fitting_splats(gpu):
-            raise TooLarge(
-                f"the scene has {self.count:,} splats and this driver draws "
-                f"{fitting_splats(gpu):,} at most (GL_MAX_SHADER_STORAGE_BLOCK_SIZE is "
-                f"{gpu.max_block:,} bytes); leave objects out, or use a driver with larger blocks."
-            )
+            raise too_many(self.count, fitting_splats(gpu), limit_of(gpu), "tiles")
         self.gpu = gpu
         self.starts = [0, *np.cumsum(counts, dtype=int).tolist()]  # rows of object i: [i], [i + 1]
         n = self.count

@@ -7,13 +7,9 @@ import moderngl
 import numpy as np
 
 from renderer import shader
-from runtime_models.model import BadFile
+from renderer.limits import TooLarge
 
 LARGEST_INT = 2**31 - 1  # a driver that says more, or less than nothing, has no such limit
-
-
-class TooLarge(BadFile):
-    """A scene does not fit the driver's buffers.  The message says which limit and what fits."""
 
 
 class Gpu:
@@ -34,7 +30,8 @@ class Gpu:
         if size > self.max_block:
             raise TooLarge(
                 f"{what} needs {size:,} bytes; this driver's storage blocks hold "
-                f"{self.max_block:,} (GL_MAX_SHADER_STORAGE_BLOCK_SIZE)."
+                f"{self.max_block:,} (GL_MAX_SHADER_STORAGE_BLOCK_SIZE); give --max-splats, or "
+                "draw with --drawing tiles."
             )
         self.allocations += 1
         buffer = self.ctx.buffer(reserve=max(size, 4))

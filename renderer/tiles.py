@@ -22,10 +22,11 @@ from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
 from rasterizer.tint import tint
 from renderer.cadence import Cadence
+from renderer.limits import check_tiles
 from renderer.settings import RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.evaluate import Control, Evaluator
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model, SplatLayers
 from scene.pose import OPENCV_FROM_EYE, View
 
 SAMPLE = 4096  # splats, for a median
@@ -66,8 +67,9 @@ class TilesDrawing:
         self._world_from_objects = np.zeros((0, 4, 4))
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
 
-    def allocate(self, models: list[AnchorModel | SplatLayers]) -> None:
+    def allocate(self, models: list[Model]) -> None:
         """Room for these objects; what was decoded before is gone."""
+        check_tiles(self.device, models)
         counts = [model.splat_count for model in models]
         starts = np.concatenate([[0], np.cumsum(counts, dtype=int)])
         self.splats = int(starts[-1])
@@ -88,11 +90,14 @@ class TilesDrawing:
             for start, count, model in zip(starts, counts, models, strict=False)
         ]
 
-    def decode_geometry(self, i: int, x: Control) -> None:
-        """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
+    def decode_geometry(self, i: int, x: Control, eye_object: np.ndarray | None = None) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
+
+        eye_object: (3,) in the object's frame, for a model that follows it.
+        """
         slot = self._slots[i]
         self._changed = True
-        splats = slot.evaluator.geometry(x, unit=False)
+        splats = slot.evaluator.geometry(x, unit=False, eye=eye_object)
         if slot.placed:
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return

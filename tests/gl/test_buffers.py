@@ -6,7 +6,8 @@ import pytest
 from renderer import buffers, layout
 from renderer.buffers import Arena, fitting_splats
 from renderer.decode import Decoder
-from renderer.gpu import Gpu, TooLarge, groups_for
+from renderer.gpu import Gpu, groups_for
+from renderer.limits import TooLarge
 from renderer.project import Projector
 from renderer.settings import RenderSettings
 from renderer.sort import Sorter
@@ -79,6 +80,7 @@ def test_a_scene_over_the_driver_s_limit_is_refused_with_what_fits(ctx):
     said = str(refusal.value)
     assert "101 splats" in said and "100 at most" in said
     assert "GL_MAX_SHADER_STORAGE_BLOCK_SIZE is 3,200 bytes" in said and "\n" not in said
+    assert "--max-splats 100 " in said
 
 
 def test_the_driver_s_own_limits_are_known(gpu):

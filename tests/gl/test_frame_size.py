@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rasterizer.device import NoDevice
-from renderer.gpu import TooLarge
+from renderer.limits import TooLarge
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.resample import bilinear

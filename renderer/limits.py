@@ -1,0 +1,40 @@
+"""How many splats a device can hold, and one sentence for a scene that has more."""
+
+from math import inf
+
+from rasterizer.device import Device
+from rasterizer.project import RECORD
+from runtime_models.model import AnchorModel, BadFile, SplatLayers
+
+MOST_INDEX = 2**31 - 1  # the kernels count floats with 32 bits and a sign
+
+
+class TooLarge(BadFile):
+    """A scene does not fit a device's buffers.  The message says which limit and what fits."""
+
+
+def too_many(count: int, most: int, limit: str, instead: str) -> TooLarge:
+    """The refusal of `count` splats where `most` fit; `limit` names what they do not fit into,
+    `instead` the other way of drawing.
+    """
+    return TooLarge(
+        f"the scene has {count:,} splats and this driver draws {most:,} at most ({limit}); open it "
+        f"with --max-splats {most} to see those that show most, or draw it with "
+        f"--drawing {instead}."
+    )
+
+
+def check_tiles(device: Device, models: list[AnchorModel | SplatLayers]) -> None:
+    """Raises TooLarge where an array of these objects' splats is longer than the device allows."""
+    count = sum(model.splat_count for model in models)
+    most = MOST_INDEX // RECORD
+    if not count <= most:
+        raise too_many(count, most, "the kernels count with 32 bits", "quads")
+    sh = [model.sh for model in models if isinstance(model, SplatLayers)]
+    largest = 4 * max(
+        [RECORD, *(3 * array.shape[1] for array in sh)]
+    )  # bytes a splat
+    most = int(min((device.most_bytes or inf) // largest, most))
+    if not count <= most:
+        limit = f"CL_DEVICE_MAX_MEM_ALLOC_SIZE is {device.most_bytes:,} bytes"
+        raise too_many(count, most, f"{limit}, a splat takes {largest} of one array", "quads")
