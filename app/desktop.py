@@ -14,17 +14,19 @@ from app.drawing import parse_size
 from app.errors import UsageError
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
-from app.opening import ReadingOptions, open_model
+from app.opening import ReadingOptions
 from app.outlines import draw_brush, draw_outlines
 from app.panel import draw_note, draw_panel, draw_problem, free_area
 from app.pictures import write_numbered_png, write_png
 from app.readings import Readings
+from app.refine import Refiner, attach_refiner
 from app.scale_bar import draw_scale_bar
 from app.sections import Hooks
 from app.shown import Shown, Wish
 from app.slider import draw_slider_bar
 from app.stage import Stage
 from app.window import Event, Window
+from app.wipe import comparing
 from renderer.context import describe
 from renderer.debug import debug_legend
 from renderer.renderer import Renderer
@@ -66,6 +68,8 @@ class Options(ReadingOptions):
     """Write a picture of the whole window here after --frames frames, and end."""
     frames: int = 3
     """How many frames to draw before the --screenshot."""
+    compare: str = ""
+    """Another scene (or scene@stop, scene@x) to compare with: a line parts the two pictures."""
     panel: Annotated[bool, tyro.conf.arg(help="Show the overlay; H switches it.")] = True
 
 
@@ -79,13 +83,17 @@ def run(options: Options) -> int:
     for name, value in (("--target-ms", options.target_ms), ("--floor-db", options.floor_db)):
         if value is not None and not 0 < value < np.inf:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
-    stage = Stage(lambda path: open_model(path, options))
+    refiner = Refiner(options)
+    stage = Stage(refiner.open)
     stage.open(options.scenes or (DEMO,), options.x)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
-    with Window("Shapeshift", size) as window:
+    with refiner, Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
-            Viewer(window, renderer, stage, options).loop()
+            viewer = Viewer(window, renderer, stage, options)
+            attach_refiner(viewer, refiner)
+            with comparing(viewer, options):
+                viewer.loop()
     return 0
 
 
@@ -258,6 +266,8 @@ class Viewer:
             self.shown.measure(wish)
         force = self.options.screenshot is not None or self._frames < WARM_UP
         fresh = self.shown.draw(wish, self.window.screen(), force)
+        for draw in self.hooks.over:
+            draw(wish)
         if fresh:
             self.readings.stats.ms["overlay"] = self._overlay_ms  # of the frame before
         self.shown.read(wish, now)
@@ -286,6 +296,8 @@ class Viewer:
     def _draw_marks(self, scale: float) -> None:
         """Outlines of the regions, and the brush while there is one."""
         stage, window = self.stage, self.window
+        for draw in self.hooks.marks:
+            draw(scale)
         if self.overlay or stage.regions.placing:
             draw_outlines(stage.regions, stage.scene, self.view(), scale)
         if is_painting(self) and window.on_scene:
@@ -311,9 +323,9 @@ class Viewer:
 
     @property
     def _last_frame(self) -> bool:
-        """Whether a --screenshot is due: enough frames, and the budget has chosen."""
+        """Whether a --screenshot is due: enough frames, the budget has chosen, all is read."""
         measuring = self.dial.wanted or self.dial.measuring
-        return self._frames >= self.options.frames and not measuring
+        return self._frames >= self.options.frames and not measuring and not self._polling
 
     def _save_pictures(self) -> None:
         """Writes the picture that a key or --screenshot asked for, of what is on the screen."""

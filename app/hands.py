@@ -18,6 +18,8 @@ LOOK = 0.003
 
 def take(viewer: "Viewer", event: Event) -> None:
     """Lets one input event act."""
+    if any(takes(event) for takes in viewer.hooks.takes):
+        return
     camera = viewer.camera
     height = viewer.window.logical_size[1]
     match event:

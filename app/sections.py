@@ -2,6 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from app.shown import Wish
+    from app.window import Event
 
 
 @dataclass(frozen=True)
@@ -24,3 +29,9 @@ class Hooks:
     opened: list[Callable[[], None]] = field(default_factory=list)  # after every change of scene
     status: list[Callable[[], str]] = field(default_factory=list)  # short words for the status
     #                                                                line; "" = nothing to say
+    # over: called once the splats are on the screen, before the overlay, in every frame
+    over: list[Callable[["Wish"], None]] = field(default_factory=list)
+    # marks: called with ui_scale; over the picture, under the panel, not in saved pictures
+    marks: list[Callable[[float], None]] = field(default_factory=list)
+    # takes: sees every event first; True = it was for this
+    takes: list[Callable[["Event"], bool]] = field(default_factory=list)
