@@ -6,8 +6,8 @@ from renderer.buffers import Arena
 from renderer.gpu import Gpu
 from renderer.layers import Layers
 from renderer.networks import Networks
-from runtime_models.evaluate import Control, Evaluator
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.evaluate import Control, Evaluator, follows_eye
+from runtime_models.model import Model, SplatLayers
 
 MLPS = ("gl", "onnxruntime")
 
@@ -16,12 +16,11 @@ class Decoder:
     """Decodes the objects of one arena.  Objects with the same model share what lies on the GPU.
 
     mlps "gl": networks run in compute passes; "onnxruntime": on the CPU, then uploaded (ten times
-    faster where GL is software).  Plain splats are decoded by GL with either.
+    faster where GL is software).  With either, plain splats are decoded by GL, and models that follow
+    the eye on the CPU.
     """
 
-    def __init__(
-        self, gpu: Gpu, arena: Arena, models: list[AnchorModel | SplatLayers], mlps: str = "gl"
-    ) -> None:
+    def __init__(self, gpu: Gpu, arena: Arena, models: list[Model], mlps: str = "gl") -> None:
         if mlps not in MLPS:
             raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
         self._arena = arena
@@ -32,7 +31,7 @@ class Decoder:
                 continue
             if isinstance(model, SplatLayers):
                 made[id(model)] = Layers(gpu, model)
-            elif mlps == "gl":
+            elif mlps == "gl" and not follows_eye(model):
                 made[id(model)] = Networks(gpu, model)
             else:
                 made[id(model)] = Evaluator(model, keep=True)
@@ -41,11 +40,14 @@ class Decoder:
             if isinstance(on_gpu, Layers):
                 on_gpu.place(arena, i)
 
-    def geometry(self, i: int, x: Control) -> None:
-        """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
+    def geometry(self, i: int, x: Control, eye: np.ndarray | None = None) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
+
+        eye: (3,) in the object's frame, for a model that follows it.
+        """
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
-            arena.write_geometry(i, *model.geometry(x, unit=False))
+            arena.write_geometry(i, *model.geometry(x, unit=False, eye=eye))
         else:
             model.geometry(arena, arena.starts[i], x)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from renderer.palette import LUMINANCE, STEPS, palette_colors, thermal_weights
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model, SplatLayers
 from scene.scene import Scene
 
 
@@ -57,9 +57,9 @@ def same_tint(one: Tint | None, other: Tint | None) -> bool:
     return one.name == other.name and np.array_equal(one.weights, other.weights)
 
 
-def count_controls(model: AnchorModel | SplatLayers) -> int:
+def count_controls(model: Model) -> int:
     """How many parts of a model can have a control value of their own."""
-    return len(model.anchors) if isinstance(model, AnchorModel) else model.splat_count
+    return model.splat_count if isinstance(model, SplatLayers) else len(model.anchors)
 
 
 def tinted(color: np.ndarray, name: str, weights: np.ndarray) -> np.ndarray:

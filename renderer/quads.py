@@ -26,8 +26,8 @@ from renderer.sort_check import checked_sorter
 from renderer.splat import Splatter
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
-from runtime_models.evaluate import Control
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.evaluate import Control, follows_eye
+from runtime_models.model import Model
 from scene.pose import View
 
 SAMPLE = 4096  # splats, for a median
@@ -39,6 +39,7 @@ class QuadsDrawing:
     def __init__(self, gpu: Gpu, mlps: str, sort: str) -> None:
         self._sorter, sort = checked_sorter(gpu, sort)
         self.backends = {"drawing": "quads", "mlps": mlps, "sort": sort}
+        self._mlps = mlps
         self.decodes_on_gpu = mlps == "gl"  # says which clock times the decoding
         self._gpu = gpu
         self._projector = Projector(gpu)
@@ -57,17 +58,22 @@ class QuadsDrawing:
         """How many buffers and textures were ever made."""
         return self._gpu.allocations
 
-    def allocate(self, models: list[AnchorModel | SplatLayers]) -> None:
+    def allocate(self, models: list[Model]) -> None:
         """Room for these objects; what was decoded before is gone."""
         self._release_arena()
         self._changed = True
         self._arena = Arena(self._gpu, [model.splat_count for model in models])
-        self._decoder = Decoder(self._gpu, self._arena, models, self.backends["mlps"])
+        self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
+        on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
+        self.backends["mlps"] = f"{self._mlps}, Scaffold-GS onnxruntime" if on_cpu else self._mlps
 
-    def decode_geometry(self, i: int, x: Control) -> None:
-        """Means, covariances and opacities of object i at control value x; (A,): one an anchor."""
+    def decode_geometry(self, i: int, x: Control, eye_object: np.ndarray | None = None) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
+
+        eye_object: (3,) in the object's frame, for a model that follows it.
+        """
         self._changed = True
-        self._decoder.geometry(i, x)
+        self._decoder.geometry(i, x, eye_object)
 
     def decode_color(
         self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None

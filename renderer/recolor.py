@@ -7,12 +7,18 @@ import numpy as np
 
 from renderer.layout import JACOBIAN_MARGIN
 from renderer.settings import RenderSettings
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.evaluate import follows_eye
+from runtime_models.model import Model, SplatLayers
 from scene.pose import View
 
 
-def color_key(model: AnchorModel | SplatLayers, x: float, eye: np.ndarray) -> tuple:
-    """What the colours of a model depend on: equal keys, equal colours.  x: or a number of it."""
+def color_key(model: Model, x: float, eye: np.ndarray) -> tuple:
+    """What the colours of a model depend on: equal keys, equal colours.  x: or a number of it.
+
+    Of a model that follows the eye, its opacities, scales and rotations as well.
+    """
+    if follows_eye(model):
+        return None, tuple(eye)
     if isinstance(model, SplatLayers):
         return None, tuple(eye) if model.sh.shape[1] > 1 else None
     inputs = model.networks["color"].inputs
@@ -38,7 +44,7 @@ class Colored:
         return not degrees > 0 or _angle(self.key[1], key[1], self.centre) > math.radians(degrees)
 
 
-def centre_of(model: AnchorModel | SplatLayers) -> np.ndarray:
+def centre_of(model: Model) -> np.ndarray:
     """(3,) metres: the middle of a model's anchors or splats, (0, 0, 0) where it has none."""
     places = model.means if isinstance(model, SplatLayers) else model.anchors
     with np.errstate(invalid="ignore"):

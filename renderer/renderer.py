@@ -18,7 +18,8 @@ from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.timing import PassTimer
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.evaluate import follows_eye
+from runtime_models.model import Model, SplatLayers
 from scene.control import control_key, control_of
 from scene.metrics import psnr
 from scene.pose import View
@@ -32,7 +33,7 @@ CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort":
 class _Decoded:
     """What of an object lies in the arena now."""
 
-    model: AnchorModel | SplatLayers
+    model: Model
     colored: Colored
     key: tuple | None = None  # control_key of x; None: not decoded yet
     x: float | np.ndarray = 0.0  # control value of its geometry, or (A,) one an anchor
@@ -111,10 +112,11 @@ class Renderer:
         """Geometry of object i at x, unless it lies in the arena already."""
         if decoded.key is not None and np.array_equal(x, decoded.x):
             return  # a selector changed where nothing is
-        self._drawing.decode_geometry(i, x)
+        if not follows_eye(decoded.model):  # else with the colours, once the eye is known
+            self._drawing.decode_geometry(i, x)
+            self._geometry_runs += 1
         decoded.x = x
         decoded.version += 1
-        self._geometry_runs += 1
 
     def _choose_false_colors(self, scene: Scene) -> None:
         """Palettes for the picture or for single splats, as the control values ask for."""
@@ -185,7 +187,10 @@ class Renderer:
         return replace(self.settings, target=target)
 
     def _decode_colors(self, views: list[View]) -> None:
-        """Runs the colours of the visible objects for the centre of the eyes, where it moved."""
+        """Runs the colours of the visible objects for the centre of the eyes, where it moved.
+
+        And the geometry of those that follow the eye: as often, and one for both eyes as well.
+        """
         eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
         degrees = self.settings.recolor_degrees
         with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
@@ -207,6 +212,9 @@ class Renderer:
                     continue  # all that is seen has its colours
                 else:
                     colored.anchors |= wanted
+                if follows_eye(thing.model):
+                    self._drawing.decode_geometry(i, decoded.x, eye)
+                    self._geometry_runs += 1
                 self._drawing.decode_color(i, decoded.x, eye, wanted)
                 if decoded.tint is not None:
                     palette = palette_colors(decoded.tint.name)
@@ -221,7 +229,8 @@ class Renderer:
         Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
         """
         colored = decoded.colored
-        if not self.settings.skip_unseen or isinstance(thing.model, SplatLayers):
+        whole = isinstance(thing.model, SplatLayers) or follows_eye(thing.model)
+        if not self.settings.skip_unseen or whole:
             if stale or colored.anchors is None:
                 return None
             return ~colored.anchors  # left out before: now all are wanted

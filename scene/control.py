@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, Stop
+from runtime_models.model import SplatLayers, Stop
 from scene.scene import SceneObject
 
 SNAP = 0.02  # of the slider's range: nearer than this to a stop is on the stop
@@ -32,7 +32,7 @@ def control_of(thing: SceneObject) -> float | np.ndarray:
     if not thing.selectors:
         return thing.x
     model = thing.model
-    places = model.anchors if isinstance(model, AnchorModel) else model.means  # (A, 3) metres
+    places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
     x = np.full(len(places), thing.x)
     for selector in thing.selectors:
         weights = selector.weights(_in_space(places, thing, selector.space))

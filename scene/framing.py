@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model, SplatLayers
 from scene.pose import View, look_at, perspective
 from scene.scene import Scene
 
@@ -126,11 +126,11 @@ def orbit_path(
     return [view_from(eye, centre, radius, size, fov_y) for eye in eyes]
 
 
-def model_points(model: AnchorModel | SplatLayers) -> tuple[np.ndarray, np.ndarray]:
+def model_points(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) and opacity (N,) that stand for a model without decoding it."""
-    if isinstance(model, AnchorModel):
-        return model.anchors, np.ones(len(model.anchors), np.float32)
-    return model.means, model.opacity
+    if isinstance(model, SplatLayers):
+        return model.means, model.opacity
+    return model.anchors, np.ones(len(model.anchors), np.float32)
 
 
 def scene_points(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -155,7 +155,7 @@ def framing_view(means: np.ndarray, opacity: np.ndarray, size: tuple[int, int]) 
     return orbit_path(1, centre, radius, size, distance=distance, start=start)[0]
 
 
-def default_view(model: AnchorModel | SplatLayers, size: tuple[int, int]) -> View:
+def default_view(model: Model, size: tuple[int, int]) -> View:
     """The first look at a model: provenance["view"] where it has one, else `framing_view`.
 
     provenance["view"] is {"eye": [x, y, z], "target": [x, y, z], "fov_y": radians}, metres in the
@@ -170,7 +170,7 @@ def default_view(model: AnchorModel | SplatLayers, size: tuple[int, int]) -> Vie
 
 
 def default_background(
-    model: AnchorModel | SplatLayers, otherwise: tuple[float, float, float]
+    model: Model, otherwise: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     """Display sRGB of provenance["background"], what the photos stood before, or `otherwise`."""
     found = model.provenance.get("background")

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from runtime_models.evaluate import Evaluator
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.evaluate import Evaluator, follows_eye
+from runtime_models.model import Model, SplatLayers
 from runtime_models.rotation import rotation_matrices
 from scene.control import control_of
 from scene.scene import Scene, SceneObject
@@ -26,7 +26,7 @@ class Hit:
 
 @dataclass
 class _Decoded:
-    """The splats of one object as they are at its present control value."""
+    """The splats of one object as they are at its present control value (and for one eye)."""
 
     key: tuple
     means: np.ndarray  # (N, 3) metres, object frame
@@ -61,7 +61,7 @@ class Picker:
             object_from_world = np.linalg.inv(thing.world_from_object.matrix())
             eye = object_from_world[:3, :3] @ origin + object_from_world[:3, 3]
             depth, alpha = along(
-                self._splats(index, thing), eye, object_from_world[:3, :3] @ ray, spread
+                self._splats(index, thing, eye), eye, object_from_world[:3, :3] @ ray, spread
             )
             depths.append(depth)
             alphas.append(alpha)
@@ -75,15 +75,16 @@ class Picker:
         point = np.asarray(origin, np.float64) + depth[first] * ray
         return Hit(point, int(owner[first]), float(depth[first]))
 
-    def _splats(self, index: int, thing: SceneObject) -> _Decoded:
+    def _splats(self, index: int, thing: SceneObject, eye: np.ndarray) -> _Decoded:
         model, x = thing.model, control_of(thing)
-        key = (id(model), np.asarray(x).tobytes())
+        place = tuple(eye) if follows_eye(model) else None
+        key = (id(model), np.asarray(x).tobytes(), place)
         found = self._decoded.get(index)
         if found is None or found.key != key:
             evaluator = self._evaluators.get(index)
             if evaluator is None or evaluator.model is not model:
                 evaluator = self._evaluators[index] = Evaluator(model)
-            means, scales, wxyz, opacity = evaluator.geometry(x)
+            means, scales, wxyz, opacity = evaluator.geometry(x, eye=eye)
             axes = np.swapaxes(rotation_matrices(wxyz), 1, 2)
             found = self._decoded[index] = _Decoded(key, means, scales, axes, opacity)
         return found
@@ -112,6 +113,6 @@ def along(
     return depth[met], np.minimum(alpha[met], 0.99)
 
 
-def anchor_places(model: AnchorModel | SplatLayers) -> np.ndarray:
+def anchor_places(model: Model) -> np.ndarray:
     """(A, 3) metres in the object's frame: what one control value each can be painted on."""
-    return model.anchors if isinstance(model, AnchorModel) else model.means
+    return model.means if isinstance(model, SplatLayers) else model.anchors

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model
 from scene.pose import UNIT_SLACK, Pose
 from scene.selector import Selector, check_x
 
@@ -15,7 +15,7 @@ IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 @dataclass(frozen=True)
 class SceneObject:
     name: str
-    model: AnchorModel | SplatLayers
+    model: Model
     world_from_object: Pose = IDENTITY
     x: float = 0.0  # control value in [0, 1]
     label: int = 0  # 0 = background

@@ -9,8 +9,8 @@ import numpy as np
 from rasterizer.bin import bin_tiles
 from rasterizer.project import LEAST_ALPHA, project
 from rasterizer.raster import rasterize
-from runtime_models.evaluate import Evaluator
-from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
+from runtime_models.evaluate import Evaluator, follows_eye
+from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
 from training.metrics import psnr, ssim
@@ -30,21 +30,32 @@ class Score:
 class Painter:
     """Draws a model as a package holds it, through onnxruntime and the rasterizer."""
 
-    def __init__(self, device, model: AnchorModel | SplatLayers) -> None:
+    def __init__(self, device, model: Model) -> None:
         self.device, self.evaluator = device, Evaluator(model)
         self.x: float | None = None
 
     def set_control(self, x: float) -> int:
-        """Decode the geometry for x; returns how many splats are not absent."""
+        """Decode the geometry for x; returns how many splats are not absent.
+
+        Of a model that follows the eye that is done for every picture, and all splats count.
+        """
         if x != self.x:
-            geometry = self.evaluator.geometry(x)
-            self.alive = int((geometry[3] >= LEAST_ALPHA).sum())
-            self.geometry = [self.device.upload(np.asarray(a, np.float32)) for a in geometry]
             self.x = x
+            self.alive = self.evaluator.model.splat_count
+            if not follows_eye(self.evaluator.model):
+                self.alive = self._decode(None)
         return self.alive
+
+    def _decode(self, eye: np.ndarray | None) -> int:
+        """Geometry at the last control value; returns how many splats are not absent."""
+        geometry = self.evaluator.geometry(self.x, eye=eye)
+        self.geometry = [self.device.upload(np.asarray(a, np.float32)) for a in geometry]
+        return int((geometry[3] >= LEAST_ALPHA).sum())
 
     def picture(self, view: View, background: tuple[float, float, float]) -> np.ndarray:
         """(H, W, 3) float32 of the model at the last control value."""
+        if follows_eye(self.evaluator.model):
+            self._decode(view.world_from_eye.position)
         color = self.evaluator.color(self.x, view.world_from_eye.position)
         color = self.device.upload(np.asarray(color, np.float32))
         projected = project(self.device, *self.geometry, color, camera_of(view))
@@ -53,7 +64,7 @@ class Painter:
         return self.device.download(frame.image).transpose(1, 2, 0)
 
 
-def stop_for(model: AnchorModel | SplatLayers, capture_stop: Stop) -> Stop:
+def stop_for(model: Model, capture_stop: Stop) -> Stop:
     """The model's stop of the same name as the capture's.  Raises BadFile."""
     for stop in model.stops:
         if stop.name == capture_stop.name:
@@ -67,7 +78,7 @@ def stop_for(model: AnchorModel | SplatLayers, capture_stop: Stop) -> Stop:
 
 def evaluate_model(
     device,
-    model: AnchorModel | SplatLayers,
+    model: Model,
     capture: Capture,
     downscale: int | None = None,
     masks: str = "object",
