@@ -27,6 +27,7 @@ def formats() -> tuple[Format, ...]:
     """All of them, in the order in which they are tried."""
     from runtime_models.read_compressed_ply import has_chunks, read_raw_compressed_ply
     from runtime_models.read_gltf import is_gltf, read_raw_gltf
+    from runtime_models.read_ksplat import read_raw_ksplat
     from runtime_models.read_ply import read_raw_ply
     from runtime_models.read_sog import is_sog, read_raw_sog
     from runtime_models.read_splat import read_raw_splat
@@ -38,6 +39,7 @@ def formats() -> tuple[Format, ...]:
         Format("glTF", (".glb", ".gltf"), is_gltf, read_raw_gltf),
         Format("SOG", (".sog", "meta.json"), is_sog, read_raw_sog),
         Format("spz", (".spz",), has_spz_mark, read_raw_spz),
+        Format(".ksplat", (".ksplat",), None, read_raw_ksplat),
         Format(".splat", (".splat",), None, read_raw_splat),
     )
 
