@@ -45,6 +45,8 @@ def print_table(facts: dict) -> None:
                 f"{name}: {' → '.join(map(str, head['layers']))}, {head['activation']}"
                 for name, head in value.items()
             )
+        elif key == "labels":
+            value = "\n".join(f"{label}: {count:,} splats" for label, count in value.items())
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
         table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets

@@ -14,6 +14,7 @@ from renderer.classify import Points, classify, eye_places, runs
 from renderer.debug_map import birdseye
 from renderer.points import dim, dot_size, paint_points
 from renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
+from runtime_models.model import Model
 from scene.pose import View
 from scene.scene import Scene
 
@@ -46,6 +47,7 @@ DISTANT = np.float32(
 )  # fmt: skip
 LEGEND_STEPS = 5  # rows that stand for a ramp
 DEBUG_NAMES = tuple(name for name in DEBUG_VIEWS if name)
+MOST_LABELS = 24  # rows of a legend
 RECOLORED = ("depth", "object")  # drawn with other colours than the scene's
 
 
@@ -73,12 +75,16 @@ def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndar
         part = np.clip(np.nan_to_num(depth / farthest_depth(depth)), 0, 1)
         return np.repeat(part[:, None], 3, axis=1)
     colors = np.empty((len(depth), 3), np.float32)
+    ranks = [label_ranks(thing.model)[1] for thing in scene.objects]
+    counts = [len(parts) for parts in object_parts(scene)]
+    firsts = np.cumsum([0, *counts])
     for i, start, end in runs(points[1], len(scene.objects)):
         # Its near side bright and its far side dark, or an object would be a flat shape.
         mine = np.nan_to_num(depth[start:end])
         near, far = np.percentile(mine, [2, 98])
         shade = 1 - 0.75 * np.clip((mine - near) / max(far - near, 1e-6), 0, 1)
-        colors[start:end] = np.outer(shade, object_color(i))
+        table = np.array([object_color(k) for k in range(firsts[i], firsts[i] + counts[i])])
+        colors[start:end] = shade[:, None] * table[ranks[i]]
     return colors
 
 
@@ -185,12 +191,39 @@ def object_poses(scene: Scene) -> np.ndarray:
 
 
 def object_counts(scene: Scene) -> dict[str, float]:
-    """Splats of each object by its name; equal names get a number."""
+    """Splats of each part of each object by its name; equal names get a number."""
     counts: dict[str, float] = {}
-    for i, thing in enumerate(scene.objects):
-        name = thing.name if thing.name not in counts else f"{thing.name} {i + 1}"
-        counts[name] = float(thing.model.splat_count)
+    for i, (thing, parts) in enumerate(zip(scene.objects, object_parts(scene), strict=True)):
+        for label, count in parts:
+            name = thing.name if label is None else f"{thing.name}, label {label}"
+            counts[name if name not in counts else f"{name} {i + 1}"] = float(count)
     return counts
+
+
+def object_parts(scene: Scene) -> list[list[tuple[int | None, int]]]:
+    """For each object (label, splats) of its commonest labels; one (None, all) without labels."""
+    parts = []
+    for thing in scene.objects:
+        labels, ranks = label_ranks(thing.model)
+        counts = np.bincount(np.ravel(ranks), minlength=len(labels)).tolist()
+        alone = [(None, thing.model.splat_count)]
+        parts.append(alone if not labels else list(zip(labels, counts, strict=True)))
+    return parts
+
+
+def label_ranks(model: Model) -> tuple[list[int], np.ndarray | int]:
+    """The labels in order, the commonest first, MOST_LABELS at most; and each splat's place there.
+
+    What has a rarer label counts to the last one.  ([], 0) for a model without labels.
+    """
+    labels = getattr(model, "labels", None)
+    if labels is None:
+        return [], 0
+    found, which, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    ranks = np.empty(len(found), np.intp)
+    ranks[order] = np.minimum(np.arange(len(found)), MOST_LABELS - 1)
+    return found[order[:MOST_LABELS]].tolist(), ranks[which]
 
 
 def object_color(i: int) -> tuple[float, float, float]:

@@ -91,7 +91,7 @@ def describe(model: Model, path: str | Path) -> dict:
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
     if plain:
-        return facts | {"mode": model.mode}
+        return facts | {"mode": model.mode} | describe_labels(model)
     networks = {
         "splats_per_anchor": model.splats_per_anchor,
         "feature_width": model.features.shape[1],
@@ -105,6 +105,14 @@ def describe(model: Model, path: str | Path) -> dict:
         | networks
         | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
     )
+
+
+def describe_labels(model: SplatLayers) -> dict:
+    """Splats of each label, where there are labels."""
+    if model.labels is None:
+        return {}
+    labels, counts = np.unique(model.labels, return_counts=True)
+    return {"labels": {str(label): int(n) for label, n in zip(labels, counts, strict=True)}}
 
 
 def describe_octree(model: ScaffoldModel) -> dict:

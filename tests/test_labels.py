@@ -84,3 +84,22 @@ def test_a_column_of_other_numbers_is_kept_as_it_is(tmp_path, bad):
 def test_nan_features_get_some_label():
     labels = most_likely(np.full((2, 4), np.nan, np.float32), np.ones((3, 4)), np.zeros(3))
     assert ((labels >= 0) & (labels < 3)).all()
+
+
+def test_the_object_view_counts_labels_and_colours_them():
+    from dataclasses import replace
+
+    from splat_scenes import random_layers
+
+    from renderer.debug import MOST_LABELS, label_ranks, object_counts
+    from scene.scene import Scene, SceneObject
+
+    plain = random_layers(60)
+    labels = np.repeat([5, 0, 9], [10, 30, 20]).astype(np.int32)
+    found, ranks = label_ranks(replace(plain, labels=labels))
+    assert found == [0, 9, 5] and ranks.tolist() == [2] * 10 + [0] * 30 + [1] * 20
+    things = (SceneObject("a", replace(plain, labels=labels)), SceneObject("b", plain))
+    told = object_counts(Scene(things))
+    assert told == {"a, label 0": 30, "a, label 9": 20, "a, label 5": 10, "b": 60}
+    many = label_ranks(replace(plain, labels=np.arange(60, dtype=np.int32)))
+    assert len(many[0]) == MOST_LABELS and many[1].max() == MOST_LABELS - 1
