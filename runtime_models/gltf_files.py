@@ -5,7 +5,6 @@ follows any path before it looks at a size, which is not for files from stranger
 """
 
 import base64
-import binascii
 import json
 import os
 from pathlib import Path
@@ -94,7 +93,7 @@ class Asset:
             raise self.refuse("a buffer's data: URI is not in base64.")
         try:
             return np.frombuffer(base64.b64decode(text, validate=True), np.uint8)
-        except binascii.Error:
+        except ValueError:  # binascii.Error, and letters that are not ASCII
             raise self.refuse("a buffer's data: URI is damaged.") from None
 
     def _beside(self, uri: str) -> np.ndarray:
@@ -159,10 +158,10 @@ WANTED = {dict: "an object", list: "a list", int: "a whole number from 0", str: 
           bool: "true or false"}  # fmt: skip
 
 
-def split_glb(data: np.ndarray, name: str) -> tuple[bytes, np.ndarray]:
-    """The JSON text and the binary chunk of a .glb; of a .gltf all is text."""
+def split_glb(data: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """The bytes of the JSON and of the binary chunk of a .glb; of a .gltf all is JSON."""
     if data[:4].tobytes() != MAGIC:
-        return data.tobytes(), np.zeros(0, np.uint8)
+        return data, np.zeros(0, np.uint8)
     if len(data) < 20:
         raise BadFile(f"{name} ends within its header; it is cut off.")
     _, version, length = np.frombuffer(data[:12].tobytes(), "<u4")
@@ -179,17 +178,20 @@ def split_glb(data: np.ndarray, name: str) -> tuple[bytes, np.ndarray]:
         place += 8 + size
     if JSON_CHUNK not in found:
         raise BadFile(f"{name} has no JSON chunk; it is damaged.")
-    return found[JSON_CHUNK].tobytes(), found.get(BINARY_CHUNK, np.zeros(0, np.uint8))
+    return found[JSON_CHUNK], found.get(BINARY_CHUNK, np.zeros(0, np.uint8))
 
 
-def parse_json(text: bytes, name: str) -> dict:
+def parse_json(data: np.ndarray, name: str) -> dict:
     """The JSON's object.  Raises BadFile, also for what would take too much memory or depth."""
-    if sum(text.count(mark) for mark in (b"{", b"[", b",", b":")) > MOST_MARKS:
-        raise BadFile(f"{name} has more than {MOST_MARKS:,} entries in its JSON; it is no scene.")
     try:
+        text = str(data, "utf-8-sig")
+        if sum(map(text.count, "{[,:")) > MOST_MARKS:
+            raise BadFile(f"{name} has more than {MOST_MARKS:,} entries in its JSON: no scene.")
         found = json.loads(text)
     except RecursionError:
         raise BadFile(f"{name} has JSON that is nested too deep.") from None
+    except BadFile:
+        raise
     except ValueError as error:  # JSON and UTF-8 errors, and numbers of thousands of digits
         raise BadFile(f"{name} has damaged JSON ({error}).") from None
     if not isinstance(found, dict):

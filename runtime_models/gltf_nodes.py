@@ -9,6 +9,7 @@ from runtime_models.plain_splats import RawSplats
 from runtime_models.rotation import normalize, rotation_matrices
 from runtime_models.turn import quaternion_of, turn_harmonics
 
+PLACES = {"matrix", "translation", "rotation", "scale"}
 EVEN = 1e-5  # how much the scales of a node may differ and still be one
 BLOCK = 1 << 16  # splats at a time whose shapes are decomposed
 
@@ -26,10 +27,12 @@ def placed_meshes(asset: Asset) -> list[tuple[int, np.ndarray]]:
         if index in seen:
             raise asset.refuse(f"node {index} hangs on two nodes or on itself.")
         seen.add(index)
-        with np.errstate(over="ignore", invalid="ignore"):
-            world_from_node = world_from_parent @ local_matrix(asset, node, index)
-        if not np.isfinite(world_from_node).all():
-            raise asset.refuse(f"node {index} stands at infinity.")
+        world_from_node = world_from_parent
+        if PLACES & node.keys():
+            with np.errstate(over="ignore", invalid="ignore"):
+                world_from_node = world_from_parent @ local_matrix(asset, node, index)
+            if not np.isfinite(world_from_node).all():
+                raise asset.refuse(f"node {index} stands at infinity.")
         if "mesh" in node:
             found.append((node["mesh"], world_from_node))
         children = asset.item(node, "children", list, [])
@@ -52,18 +55,21 @@ def scene_roots(asset: Asset, count: int) -> list:
 def local_matrix(asset: Asset, node: dict, index: int) -> np.ndarray:
     """(4, 4) parent_from_node of a matrix, or of translation, rotation (xyzw) and scale."""
     if "matrix" in node:
-        return numbers(asset, node, "matrix", 16, None, index).reshape(4, 4).T
-    x, y, z, w = numbers(asset, node, "rotation", 4, (0, 0, 0, 1), index)
+        return numbers(asset, node, "matrix", 16, index).reshape(4, 4).T
     out = np.eye(4)
-    turn = rotation_matrices(normalize(np.array([[w, x, y, z]])))[0]
-    out[:3, :3] = turn * numbers(asset, node, "scale", 3, (1, 1, 1), index)
-    out[:3, 3] = numbers(asset, node, "translation", 3, (0, 0, 0), index)
+    if "rotation" in node:
+        x, y, z, w = numbers(asset, node, "rotation", 4, index)
+        out[:3, :3] = rotation_matrices(normalize(np.array([[w, x, y, z]])))[0]
+    if "scale" in node:
+        out[:3, :3] *= numbers(asset, node, "scale", 3, index)
+    if "translation" in node:
+        out[:3, 3] = numbers(asset, node, "translation", 3, index)
     return out
 
 
-def numbers(asset: Asset, node: dict, name: str, count: int, otherwise, index: int) -> np.ndarray:
+def numbers(asset: Asset, node: dict, name: str, count: int, index: int) -> np.ndarray:
     """(count,) float64 of a node's list."""
-    found = asset.item(node, name, list, otherwise)
+    found = asset.item(node, name, list)
     plain = all(isinstance(n, int | float) and abs(n) < 1e30 for n in found)
     if len(found) != count or not plain:
         raise asset.refuse(f"node {index} has a {name} that is not {count} finite numbers.")
