@@ -188,9 +188,10 @@ def unpack_harmonics(coded: np.ndarray, header: Header, out: np.ndarray) -> None
     if header.level == 2:
         values *= (header.most - header.least) / 255
         values += header.least
+    # Degree 3 is beyond GaussianSplats3D; gaussforge, which writes it, takes all bands as one.
+    bands = {0: (), 9: (3,), 24: (3, 5), 45: (15,)}[coded.shape[1]]
     first = 1
-    for band in range(1, HARMONICS.index(coded.shape[1]) + 1):
-        size = 2 * band + 1
+    for size in bands:
         columns = 3 * (first - 1)
         part = values[:, columns : columns + 3 * size].reshape(-1, 3, size)
         out[:, first : first + size] = part.transpose(0, 2, 1)
