@@ -55,7 +55,10 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
     told(f"writing {path.name}", len(parts) / (len(parts) + 1))
     splats = cut(merged(baked), look.sh_degree)
     path.parent.mkdir(parents=True, exist_ok=True)
-    writer.write(splats, path)
+    try:
+        writer.write(splats, path)
+    except ValueError as error:  # the format cannot hold them
+        raise UsageError(f"{writer.name}: {error}") from None
     return splats
 
 

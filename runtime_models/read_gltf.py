@@ -3,6 +3,7 @@
 Its compression by spz (KHR_gaussian_splatting_compression_spz_2) is read, too.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from runtime_models.gltf_nodes import moved, placed_meshes
 from runtime_models.model import Finding
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.spherical_harmonics import C0
+from runtime_models.turn import ours_from_file
 
+HALF_TURN_Y = np.diag([-1.0, 1, -1])
 SPLATS = "KHR_gaussian_splatting"
 SPZ = "KHR_gaussian_splatting_compression_spz_2"
 PREFIX = f"{SPLATS}:"
@@ -20,7 +23,8 @@ NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
 HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
 MOST_REPEATED = 4  # times the file's bytes that its splats may take, where nodes share a mesh
-ALWAYS_ALLOWED = 64 << 20  # bytes, whatever the file's size
+MOST_UNPACKED = 64  # times the file's bytes that splats out of spz may take, all together
+ALWAYS_ALLOWED = 48 << 20  # bytes, whatever the file's size
 ROW = 11  # floats of a splat beside its harmonics
 
 
@@ -48,10 +52,14 @@ def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
             f"with {SPLATS}); export them with that extension."
         )
     refuse_repeats(asset, [primitive for primitive, _ in placed])
-    parts = []
+    parts, room = [], MOST_UNPACKED * path.stat().st_size + ALWAYS_ALLOWED
     for number, (primitive, matrix) in enumerate(placed):
         reading.tell(f"reading {path.name}", number / len(placed))
         parts.append(moved(read_primitive(asset, primitive, reading), matrix, asset))
+        if compressed_view(asset, primitive) is not None:
+            room -= 4 * len(parts[-1].means) * (ROW + 3 * parts[-1].sh.shape[1])
+        if room < 0:
+            raise asset.refuse("its few bytes of spz unpack to far more than scenes do.")
     return joined(parts, path)
 
 
@@ -179,8 +187,10 @@ def read_spz_view(asset: Asset, view: int, turned: bool, reading: Reading) -> Ra
 
     data, _ = asset.view(view)
     raw = read_spz_bytes(data.tobytes(), asset.path.name, reading)
-    raw.format = f"{NAME} with {raw.format}"
-    return moved(raw, np.diag([-1.0, 1, -1, 1]), asset) if turned else raw
+    matrix = np.eye(4)
+    matrix[:3, :3] = (HALF_TURN_Y if turned else np.eye(3)) @ ours_from_file(raw.up)
+    metres = replace(raw, scales=np.exp(raw.scales), log_scales=False, up="+Y")
+    return replace(moved(metres, matrix, asset), format=f"{NAME} with {raw.format}")
 
 
 def display_from_linear(sh: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from runtime_models.plain_splats import PlainSplats, Reading
 from runtime_models.read_gltf import display_from_linear, read_raw_gltf
 from runtime_models.rotation import covariance
 from runtime_models.spherical_harmonics import C0, shade
+from runtime_models.turn import turn
 from runtime_models.write_gltf import write_gltf
 from tests.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
 
@@ -215,6 +216,35 @@ def test_primitives_of_other_degrees_and_other_kinds_are_merged(tmp_path):
     splats = raw(write_glb(tmp_path / "a.glb", asset, data))
     assert splats.sh.shape == (7, 9, 3) and not splats.sh[4:, 1:].any()
     np.testing.assert_array_equal(splats.means[4:], low["POSITION"])
+
+
+@pytest.mark.parametrize("draft", [False, True])
+def test_spz_within(tmp_path, draft):
+    """The extension stores it half a turn about +Y away; drafts, without a colour space, do not."""
+    from runtime_models.write_spz import write_spz
+
+    splats = plain_splats(30, 2)
+    write_spz(splats, tmp_path / "a.spz", version=2)
+    alone, data = read_plain(tmp_path / "a.spz"), (tmp_path / "a.spz").read_bytes()
+    asset, _ = make_asset(splat_arrays(1))
+    asset["bufferViews"] = [{"buffer": 0, "byteLength": len(data)}]
+    asset["buffers"] = [{"byteLength": len(data)}]
+    asset["accessors"] = [{"componentType": 5126, "count": 30, "type": "VEC3"}] * 5
+    extension = asset["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]
+    extension["extensions"] = {"KHR_gaussian_splatting_compression_spz_2": {"bufferView": 0}}
+    if draft:
+        del extension["colorSpace"]
+    asset["extensionsRequired"] = ["KHR_gaussian_splatting_compression_spz_2"]
+    asset["nodes"][0]["translation"] = [0, 5, 0]
+    within = read_plain(write_glb(tmp_path / "a.glb", asset, data))
+    turned = alone if draft else turn(alone, np.diag([-1.0, 1, -1]))
+    np.testing.assert_allclose(within.means, turned.means + [0, 5, 0], atol=1e-6)
+    np.testing.assert_allclose(within.scales, turned.scales, rtol=1e-6)
+    np.testing.assert_allclose(within.opacity, turned.opacity)
+    np.testing.assert_allclose(within.sh, turned.sh, atol=1e-6)
+    likeness = np.abs((within.wxyz * turned.wxyz).sum(1))
+    np.testing.assert_allclose(likeness, 1, atol=1e-6)
+    assert within.format == "glTF with spz v2"
 
 
 # Colour spaces, other kernels
