@@ -16,8 +16,8 @@ class Decoder:
     """Decodes the objects of one arena.  Objects with the same model share what lies on the GPU.
 
     mlps "gl": networks run in compute passes; "onnxruntime": on the CPU, then uploaded (ten times
-    faster where GL is software).  With either, plain splats are decoded by GL, and models that follow
-    the eye on the CPU.
+    faster where GL is software).  Either way GL decodes plain splats, and the CPU
+    models that follow the eye.
     """
 
     def __init__(self, gpu: Gpu, arena: Arena, models: list[Model], mlps: str = "gl") -> None:

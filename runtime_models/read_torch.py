@@ -16,6 +16,7 @@ from runtime_models.tensor_pickle import Storage, Tensor, tensors_in
 INDEX = "data.pkl"
 LARGEST_INDEX = 16 << 20  # bytes
 MOST_DIMENSIONS = 8
+LONGEST = 1 << 31  # of a tensor that holds nothing
 OLD_MAGIC = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # torch.save before 1.6
 
 
@@ -128,7 +129,7 @@ def _view(tensor: Tensor, numbers: np.ndarray, name: str, path: Path) -> np.ndar
         (n - 1) * step for n, step in zip(size, tensor.stride, strict=True) if n
     )
     inside = count <= len(numbers) and (count == 0 or last < len(numbers))
-    if not inside or len(size) > MOST_DIMENSIONS or max(size, default=0) > len(numbers):
+    if not inside or len(size) > MOST_DIMENSIONS or max(size, default=0) > LONGEST:
         raise BadFile(
             f"{path.name}: tensor {name} of {list(size)[:8]} numbers reaches beyond its storage of "
             f"{len(numbers):,}; the file is damaged, save it again."

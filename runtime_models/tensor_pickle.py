@@ -107,7 +107,7 @@ def _name_tensors(tree: object, found: dict[str, Tensor], file: str) -> None:
         if isinstance(node, dict):
             inside = node.items()
         elif isinstance(node, list | tuple):
-            inside = enumerate(node)
+            inside = dict(enumerate(node)).items()
         if len(inside) + nodes + len(todo) > MOST_NODES:
             raise BadFile(f"{file}: its tensors are nested or named beyond reason; save it again.")
         below = [(f"{name}.{key}" if name else str(key), part) for key, part in inside]
