@@ -52,7 +52,8 @@ def thermal_pair(folder: Path) -> tuple[Path, Path] | None:
     clouds = [newest_of(folder.glob(f"point_cloud_{name}/iteration_*/{CLOUD}")) for name in PAIR]
     if None not in clouds:
         return tuple(clouds)
-    endings = tuple(ending for form in formats() for ending in form.endings)
+    names = [ending for form in formats() for ending in form.endings]
+    endings = tuple(name for name in names if name.startswith("."))
     files = {file.name: file for file in splat_files(folder, endings)}
     inner = [sub for sub in folder.iterdir() if sub.is_dir()]
     if not any(is_thermal_name(sub.name) for sub in inner):

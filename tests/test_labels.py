@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from torch_files import save_tensors
+from torch_files import write_tensors
 
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import RawSplats
@@ -26,7 +26,7 @@ def features(count: int, width: int = 16) -> dict[str, np.ndarray]:
 def test_labels_are_the_largest_of_the_classifier(tmp_path, count):
     rng = np.random.default_rng(5)
     weight, bias = rng.normal(size=(9, 16, 1, 1)), rng.normal(size=9)
-    save_tensors(tmp_path / CLASSIFIER, {"weight": weight, "bias": bias})
+    write_tensors(tmp_path / CLASSIFIER, {"weight": weight, "bias": bias})
     extra = features(count)
     labels = with_labels(raw(count, extra), tmp_path / "a.ply").labels
     assert labels.dtype == np.int32 and len(labels) == count
@@ -44,7 +44,7 @@ def test_without_a_classifier_a_finding_says_which_file_is_wanted(tmp_path):
 
 
 def test_a_classifier_of_another_width_is_refused(tmp_path):
-    save_tensors(tmp_path / CLASSIFIER, {"weight": np.ones((3, 8, 1, 1)), "bias": np.ones(3)})
+    write_tensors(tmp_path / CLASSIFIER, {"weight": np.ones((3, 8, 1, 1)), "bias": np.ones(3)})
     with pytest.raises(BadFile, match="takes 8"):
         with_labels(raw(4, features(4)), tmp_path / "a.ply")
 
@@ -61,7 +61,7 @@ def test_a_classifier_of_another_width_is_refused(tmp_path):
     ],
 )
 def test_what_is_no_classifier_is_refused(tmp_path, tensors):
-    save_tensors(tmp_path / CLASSIFIER, tensors)
+    write_tensors(tmp_path / CLASSIFIER, tensors)
     with pytest.raises(BadFile, match=CLASSIFIER):
         read_classifier(tmp_path / CLASSIFIER)
 
