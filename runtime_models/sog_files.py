@@ -13,7 +13,7 @@ from runtime_models.model import BadFile
 from runtime_models.package_files import DAMAGED
 
 META = "meta.json"
-LARGEST_META = 16 << 20  # bytes
+LARGEST_META = 4 << 20  # bytes; real ones have some kilobytes
 SMALL = 1 << 16  # bytes that any file may have
 # Pillow on a damaged or hostile picture; DecompressionBombError is no ValueError.
 UNREADABLE = (
@@ -35,20 +35,20 @@ class SogFiles:
 
     def image(self, name: str, least: int, most: int) -> np.ndarray:
         """(H, W, 4) uint8 of a WebP with `least` to `most` pixels.  Raises BadFile."""
-        data = self.read(name, 8 * most + SMALL)  # more than it would take uncoded
+        data = self.read(name, 5 * most + SMALL)  # more than uncoded pixels take
+        width, height = webp_size(data)
+        if not least <= width * height <= most:
+            raise BadFile(
+                f"{self.name}: {name[:60]!r} has {width} x {height} pixels, expected {least:,} to "
+                f"{most:,}; it is no WebP or not of this scene, export it again."
+            )
         try:
             with Image.open(io.BytesIO(data), formats=("WEBP",)) as picture:
-                width, height = picture.size
-                if not least <= width * height <= most:
-                    raise BadFile(
-                        f"{self.name}: {name[:60]!r} has {width} x {height} pixels, expected "
-                        f"{least:,} to {most:,}; export it again."
-                    )
-                return np.asarray(picture.convert("RGBA"))
-        except BadFile:
-            raise
+                if picture.size == (width, height):
+                    return np.asarray(picture.convert("RGBA"))
         except UNREADABLE:
-            raise BadFile(f"{self.name}: {name[:60]!r} is no WebP that can be read.") from None
+            pass
+        raise BadFile(f"{self.name}: {name[:60]!r} is no WebP that can be read; copy it again.")
 
     def bytes_of(self, names: list[str]) -> int:
         """How many bytes the named files take on the disk; of a zip, all of it."""
@@ -79,11 +79,28 @@ class SogFiles:
         return file_inside(self.folder, name, self.name)
 
     def _bounded(self, stream: IO[bytes], name: str, limit: int, stated: int) -> bytes:
-        if stated <= limit and len(data := stream.read(limit + 1)) <= limit:
+        if stated <= limit and len(data := stream.read(stated + 1)) <= stated:
             return data
         raise BadFile(
             f"{self.name}: {name[:60]!r} has more than the {limit:,} bytes that its splats need."
         )
+
+
+def webp_size(data: bytes) -> tuple[int, int]:
+    """Pixels across and down by a WebP's first bytes, (0, 0) where it is none.
+
+    Pillow says the same, but warns of large pictures before it is asked whether one is wanted.
+    """
+    kind, bits = data[12:16], int.from_bytes(data[21:25], "little")
+    if data[:4] != b"RIFF" or data[8:12] != b"WEBP" or len(data) < 30:
+        return 0, 0
+    if kind == b"VP8L":  # lossless: 14 bits each, less 1
+        return (bits & 16383) + 1, (bits >> 14 & 16383) + 1
+    if kind == b"VP8X":  # extended: 24 bits each, less 1
+        width, height = (int.from_bytes(data[at : at + 3], "little") + 1 for at in (24, 27))
+        return width, height
+    width, height = (int.from_bytes(data[at : at + 2], "little") & 16383 for at in (26, 28))
+    return width, height  # lossy
 
 
 def check_name(name: str, said_by: str) -> None:
