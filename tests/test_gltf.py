@@ -238,7 +238,7 @@ def test_spz_within(tmp_path, draft):
     asset["nodes"][0]["translation"] = [0, 5, 0]
     within = read_plain(write_glb(tmp_path / "a.glb", asset, data))
     turned = alone if draft else turn(alone, np.diag([-1.0, 1, -1]))
-    np.testing.assert_allclose(within.means, turned.means + [0, 5, 0], atol=1e-6)
+    np.testing.assert_allclose(within.means, np.add(turned.means, (0, 5, 0)), atol=1e-6)
     np.testing.assert_allclose(within.scales, turned.scales, rtol=1e-6)
     np.testing.assert_allclose(within.opacity, turned.opacity)
     np.testing.assert_allclose(within.sh, turned.sh, atol=1e-6)

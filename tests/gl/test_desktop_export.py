@@ -1,0 +1,120 @@
+"""The panel's section "Export" under Xvfb: what is written, in the background, and what is said."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from desktop_stand import ball, run_frames
+
+from app.export_panel import EVERYTHING, REGIONS, attach_export
+from runtime_models.formats import read_plain
+from runtime_models.write_plain import WRITERS
+
+pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
+
+
+@pytest.fixture
+def panel(viewer):
+    return attach_export(viewer)
+
+
+def finish(viewer, panel, seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while panel.running:
+        assert time.monotonic() < end
+        run_frames(viewer, 1)
+
+
+def exported(viewer) -> list[Path]:
+    folder = viewer.options.pictures.parent / "exports"
+    return sorted(folder.iterdir()) if folder.exists() else []
+
+
+@pytest.mark.parametrize("writer", WRITERS, ids=lambda writer: writer.ending)
+def test_every_format_is_written_and_said(viewer, panel, writer):
+    panel.ending = writer.ending
+    panel.start()
+    finish(viewer, panel)
+    (path,) = exported(viewer)
+    assert path.name == f"ball-x0.00{writer.ending}"
+    assert path.name in viewer.readings.note and "splats" in viewer.readings.note
+    assert len(read_plain(path).means) == len(ball().means)
+
+
+def test_no_file_is_written_over(viewer, panel):
+    for _ in range(3):
+        panel.start()
+        finish(viewer, panel)
+    names = [path.name for path in exported(viewer)]
+    assert names == ["ball-x0.00-2.ply", "ball-x0.00-3.ply", "ball-x0.00.ply"]
+
+
+def test_it_is_as_shown(viewer, panel):
+    """x and palette of now: the ball of the stub is green, at the thermal stop it is not."""
+    viewer.stage.set_x(0, 1.0)
+    panel.start()
+    viewer.stage.set_x(0, 0.0)  # moved meanwhile: not in the file
+    finish(viewer, panel)
+    panel.palette = False
+    viewer.stage.set_x(0, 1.0)
+    panel.start()
+    finish(viewer, panel)
+    tinted, plain = (read_plain(path) for path in reversed(exported(viewer)))
+    green = plain.sh[0, 0]
+    assert green[1] > green[0] and not tinted.sh[0, 0, 1] > tinted.sh[0, 0, 0]
+    assert exported(viewer)[-1].name == "ball-x1.00.ply"
+
+
+def test_inside_the_regions_and_one_object(viewer, panel):
+    stage = viewer.stage
+    one = stage.scene.objects[0]
+    stage.show(replace(stage.scene, objects=(one, replace(one, name="other"))))
+    panel.forget()
+    assert panel._choices()[0] == [EVERYTHING, 0, 1]
+    stage.add_region("half-space")
+    stage.regions.edit(0, centre=np.zeros(3), normal=np.array([0.0, 1, 0]), border=0.0)
+    assert panel._choices()[0][-1] == REGIONS
+    panel.what = REGIONS
+    panel.start()
+    finish(viewer, panel)
+    panel.what = 1
+    panel.start()
+    finish(viewer, panel)
+    panel.what = EVERYTHING
+    panel.start()
+    finish(viewer, panel)
+    upper = read_plain(viewer.options.pictures.parent / "exports" / "ball-x0.00.ply")
+    assert upper.means[:, 1].min() >= -1e-6 and 800 < len(upper.means) < 1200
+    folder = viewer.options.pictures.parent / "exports"
+    assert len(read_plain(folder / "other-x0.00.ply").means) == 2000
+    assert len(read_plain(folder / "ball and 1 more-x0.00.ply").means) == 4000
+
+
+def test_what_goes_wrong_is_in_the_box_and_leaves_nothing(viewer, panel, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("app.export_panel.export", full)
+    panel.start()
+    finish(viewer, panel)
+    assert "No space left" in viewer.stage.problem and not exported(viewer)
+    viewer.stage.problem = ""
+    (viewer.options.pictures.parent / "exports").rmdir()
+    (viewer.options.pictures.parent / "exports").write_text("a file")
+    panel.start()
+    assert viewer.stage.problem and not panel.running
+
+
+def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
+    from threading import Event
+
+    go = Event()
+    monkeypatch.setattr("app.export_panel.export", lambda *_: go.wait(20) and ball())
+    panel.start()
+    run_frames(viewer, 3)
+    assert panel.running and panel.poll()
+    go.set()
+    finish(viewer, panel)
+    assert not viewer.stage.problem
