@@ -3,9 +3,10 @@
 import numpy as np
 
 from runtime_models.model import BadFile, Finding
+from runtime_models.odd_rows import odd_rows
+from runtime_models.own_units import to_own_units
 from runtime_models.plain_splats import PlainSplats, RawSplats, Reading
-from runtime_models.rotation import normalize
-from runtime_models.turn import ours_from_file, turn
+from runtime_models.turn import ours_from_file
 
 FEW = 10  # rows that a finding names
 
@@ -14,39 +15,51 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     """The splats in our units and axes, and what was found wrong.  Raises BadFile.
 
     Rows with NaN or Inf go (an infinite logit is a plain 0 or 1, an infinitely small scale is
-    legal); quaternions become unit ones.
+    legal); quaternions become unit ones.  The arrays of `raw` are changed and become the result's.
     """
-    with np.errstate(over="ignore"):
-        opacity = 1 / (1 + np.exp(-raw.opacity)) if raw.logits else raw.opacity
-        scales = np.exp(raw.scales) if raw.log_scales else raw.scales
-    good = np.isfinite(raw.means).all(1) & np.isfinite(scales).all(1)
-    good &= np.isfinite(raw.wxyz).all(1)
-    good &= np.isfinite(opacity) & np.isfinite(raw.sh).all((1, 2))
-    if not good.any():
-        raise BadFile(f"{raw.file}: not one of {len(good)} splats is finite.")
-    findings = list(raw.findings)
-    arrays = [raw.means, scales, raw.wxyz, opacity, raw.sh]
-    if not good.all():
-        rows = np.flatnonzero(~good)
-        found = finding_of("splats have NaN or Inf", rows, "dropped", raw.file)
+    findings, count = list(raw.findings), len(raw.means)
+    odd = odd_rows(raw)
+    bad = odd[~finite(raw, odd)]
+    if len(bad) == count:
+        raise BadFile(f"{raw.file}: not one of {count} splats is finite.")
+    if len(bad):
+        found = finding_of("splats have NaN or Inf", bad, "dropped", raw.file)
         if reading.strict:
             raise BadFile(f"{raw.file}: {found.what}; --strict repairs nothing, export it again.")
         findings.append(found)
-        arrays = [a[good] for a in arrays]
-    means, scales, wxyz, opacity, sh = arrays
-    plain = PlainSplats(
-        means.astype(np.float32, copy=False),
-        scales,
-        normalize(wxyz),
-        opacity,
-        sh,
+        drop(raw, bad)
+    to_own_units(raw, ours_from_file(reading.up or raw.up, reading.flip))
+    return PlainSplats(
+        raw.means.astype(np.float32, copy=False),
+        raw.scales,
+        raw.wxyz,
+        raw.opacity,
+        raw.sh,
         antialiased=raw.antialiased,
-        labels=raw.labels if raw.labels is None else raw.labels[good],
-        extra={name: column[good] for name, column in raw.extra.items()},
+        labels=raw.labels,
+        extra=raw.extra,
         findings=tuple(findings),
         format=raw.format,
     )
-    return turn(plain, ours_from_file(reading.up or raw.up, reading.flip))
+
+
+def finite(raw: RawSplats, rows: np.ndarray) -> np.ndarray:
+    """(n,) bool: rows that can be drawn."""
+    with np.errstate(over="ignore"):
+        scales = np.exp(raw.scales[rows]) if raw.log_scales else raw.scales[rows]
+    good = np.isfinite(raw.means[rows]).all(1) & np.isfinite(scales).all(1)
+    good &= np.isfinite(raw.wxyz[rows]).all(1) & np.isfinite(raw.sh[rows]).all((1, 2))
+    return good & ~(np.isnan(raw.opacity[rows]) if raw.logits else ~np.isfinite(raw.opacity[rows]))
+
+
+def drop(raw: RawSplats, rows: np.ndarray) -> None:
+    """Takes rows out of the arrays of a file, one array after the other."""
+    kept = np.ones(len(raw.means), bool)
+    kept[rows] = False
+    for name in ("means", "scales", "wxyz", "opacity", "sh"):
+        setattr(raw, name, getattr(raw, name)[kept])
+    raw.labels = raw.labels if raw.labels is None else raw.labels[kept]
+    raw.extra = {name: column[kept] for name, column in raw.extra.items()}
 
 
 def finding_of(what: str, rows: np.ndarray, done: str, file: str) -> Finding:

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.blocks import each_block
+from runtime_models.blocks import BLOCK, each_block
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import AXES, PlainSplats
 from runtime_models.spherical_harmonics import HALF_TURN_SIGNS, basis
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
 PLACE_SIGNS = np.array([1, -1, -1], np.float32)  # of that half turn
+TILED_SIGNS = np.tile(PLACE_SIGNS, BLOCK)
 QUATERNION_SIGNS = np.array([-1, 1, -1, 1], np.float32)  # of x w z y
 HARMONIC_SIGNS = np.repeat(HALF_TURN_SIGNS, 3)  # of every channel
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0])  # about z
@@ -66,7 +67,11 @@ def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
 
 def turn_rows_half(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
     """Half a turn about x, in place: nothing but signs, and quaternions (0, 1, 0, 0) * wxyz."""
-    means *= PLACE_SIGNS
+    if means.flags.c_contiguous and len(means) <= BLOCK:
+        flat = means.reshape(-1)  # one long loop, not one of three for each
+        flat *= TILED_SIGNS[: flat.size]
+    else:
+        means *= PLACE_SIGNS
     wxyz[:] = wxyz.take((1, 0, 3, 2), axis=1)
     wxyz *= QUATERNION_SIGNS
     if sh.shape[1] == 1:
