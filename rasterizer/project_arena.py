@@ -61,7 +61,7 @@ class SortFrames:
 def project_arena(
     device: Device, mean_opacity, covariance, color, object_index, world_from_object,
     cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
-    into: list[Projected] | None = None,
+    into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (),
 ) -> list[Projected]:  # fmt: skip
     """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
 
@@ -72,6 +72,8 @@ def project_arena(
     each view for itself.  With one frame for two views both share the pairs to be sorted.
     into: an earlier result, whose arrays are filled again where they fit (making them anew takes
     longer than projecting 10,000 splats).
+    antialiased: one an object, or none where no object is: opacity falls as the low pass grows the
+    ellipse, by sqrt(det / det with it) (Mip-Splatting's 2D filter, gsplat's "antialiased").
     """
     limits = limits or Limits()
     sort = sort or SortFrames(tuple(camera.camera_from_world for camera in cameras))
@@ -84,11 +86,16 @@ def project_arena(
         into = _room(device, count, orders, grids)
     projected = [replace(p, low_pass=limits.low_pass) for p in into]
     poses = _poses(cameras, sort, world_from_object)
+    variant = {"VIEWS": views, "ORDERS": orders}
+    if any(antialiased):
+        flags = np.array(antialiased, np.float32)
+        poses = np.concatenate([poses.reshape(len(flags), -1), flags[:, None]], axis=1)
+        variant["ANTIALIASED"] = 1
     frame = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     buffers = [_buffers(p) for p in projected]
     found = projected[0].found
     device.launch(
-        device.program(KERNEL, VIEWS=views, ORDERS=orders)["project_arena"], len(found.status), 1,
+        device.program(KERNEL, **variant)["project_arena"], len(found.status), 1,
         count, found.chunk, sort.by_distance, sort.keep_outside,
         device.constants(np.concatenate(frame)), mean_opacity, covariance, color, object_index,
         *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),

@@ -57,11 +57,15 @@ def limit_of(gpu: Gpu) -> str:
 class Arena:
     """The splats of all objects, and what a frame makes of them."""
 
-    def __init__(self, gpu: Gpu, counts: list[int]) -> None:
+    def __init__(
+        self, gpu: Gpu, counts: list[int], antialiased: tuple[bool, ...] | None = None
+    ) -> None:
+        """Room for objects of so many splats; antialiased: one an object, None: no object is."""
         self.count = sum(counts)
         if not self.count <= fitting_splats(gpu):
             raise too_many(self.count, fitting_splats(gpu), limit_of(gpu), "tiles")
         self.gpu = gpu
+        self.antialiased = antialiased or (False,) * len(counts)
         self.starts = [0, *np.cumsum(counts, dtype=int).tolist()]  # rows of object i: [i], [i + 1]
         n = self.count
         self.mean_opacity = gpu.reserve(16 * n)

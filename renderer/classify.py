@@ -39,10 +39,15 @@ def rows_of(frame_from_objects: np.ndarray) -> np.ndarray:
 
 
 def classify(
-    points: Points, poses: np.ndarray, view: View, settings: RenderSettings
+    points: Points,
+    poses: np.ndarray,
+    view: View,
+    settings: RenderSettings,
+    antialiased: tuple[bool, ...] = (),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """reason (N,) uint8 (0 drawn, else 1 + index into CULL_REASONS), pixel (2, N) row 0 on top,
     depth (N,) metres.  Colours are not looked at: one that is not finite culls, too.
+    antialiased: one an object; none: no object is.
     """
     mean_opacity, owner, covariance = points
     count = len(owner)
@@ -75,7 +80,8 @@ def classify(
                 (np.float32(up) - tangent_y) * np.float32(focal_y),
             ]
         )
-        reason = gate(place, pixel, a, b, c, mean_opacity[:, 3], view, settings)
+        thin = np.array(antialiased, bool)[owner] if any(antialiased) else None
+        reason = gate(place, pixel, a, b, c, mean_opacity[:, 3], thin, view, settings)
     return reason, pixel, depth
 
 
@@ -95,7 +101,7 @@ def dot(u: list[np.ndarray], v: list[np.ndarray]) -> np.ndarray:
 
 def gate(
     place: np.ndarray, pixel: np.ndarray, bare_a: np.ndarray, b: np.ndarray, bare_c: np.ndarray,
-    opacity: np.ndarray, view: View, settings: RenderSettings,
+    opacity: np.ndarray, antialiased: np.ndarray | None, view: View, settings: RenderSettings,
 ) -> np.ndarray:  # fmt: skip
     """(N,) uint8 as project.comp: the last gate first, so that the first that fails counts."""
     least, low_pass = np.float32(settings.min_alpha), np.float32(settings.low_pass)
@@ -108,8 +114,13 @@ def gate(
     mid, off = (a + c) / 2, (a - c) / 2
     major = mid + np.sqrt(off * off + b * b)  # px^2
     bare = np.maximum(bare_a * bare_c - b * b, 0)
-    minor = (bare + low_pass * (bare_a + bare_c) + low_pass * low_pass) / major
-    cut = np.sqrt(np.maximum(2 * np.log(opacity / least), 0))
+    determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass
+    minor = determinant / major
+    seen = opacity  # on the screen
+    if antialiased is not None:
+        kept = np.fmin(np.sqrt(bare / determinant), 1)
+        seen = np.where(antialiased, opacity * kept, opacity)
+    cut = np.sqrt(np.maximum(2 * np.log(seen / least), 0))
     sigma = np.sqrt(major)
     reach = cut * sigma  # pixels
     shaped = np.isfinite(pixel[0] + pixel[1] + major + minor + cut) & (minor > 0)
@@ -123,14 +134,14 @@ def gate(
         shaped & (major <= largest * largest),
         reach >= smallest,
     ]
-    if settings.fade > 0:
-        faded = opacity.copy()
+    if settings.fade > 0 or antialiased is not None:
+        faded = seen.copy()
         for within, limit in (
             (largest - sigma, settings.max_pixels),
             (farthest - np.sqrt(distance2), settings.max_distance),
             (reach - smallest, settings.min_pixels),
         ):
-            if 0 < limit < layout.HUGE:
+            if settings.fade > 0 and 0 < limit < layout.HUGE:
                 faded *= np.clip(within * np.float32(1 / (settings.fade * limit)), 0, 1)
         passes.append(faded >= least)
     reason = np.zeros(len(opacity), np.uint8)

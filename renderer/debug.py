@@ -14,7 +14,7 @@ from renderer.classify import Points, classify, eye_places, runs
 from renderer.debug_map import birdseye
 from renderer.points import dim, dot_size, paint_points
 from renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
-from runtime_models.model import Model
+from runtime_models.model import Model, is_antialiased
 from scene.pose import View
 from scene.scene import Scene
 
@@ -112,7 +112,8 @@ def debug_image(
     points, poses = drawing.splat_points(), object_poses(scene)
     if settings.debug == "depth":
         return depth_picture(rgba, -eye_places(points, poses, view.eye_from_world())[2])
-    reason, pixel, depth = classify(points, poses, view, settings)
+    antialiased = tuple(is_antialiased(thing.model) for thing in scene.objects)
+    reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
     told = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
     colors = np.float32([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)])

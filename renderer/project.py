@@ -22,10 +22,13 @@ class Projector:
         self._gpu = gpu
         self._variant(1, False, RenderSettings())  # a broken shader is told at the start
 
-    def _variant(self, views: int, own_frame: bool, settings: RenderSettings) -> ComputeShader:
+    def _variant(
+        self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False
+    ) -> ComputeShader:
         return self._gpu.compute(
             "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
             KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
+            ANTIALIASED=int(antialiased),
         )  # fmt: skip
 
     def project(
@@ -61,16 +64,21 @@ class Projector:
             mean_opacity=arena.mean_opacity, covariance=arena.covariance, color=arena.color,
             records=arena.records, keys=arena.keys, counts=arena.counts,
         )  # fmt: skip
-        program = self._variant(len(views), len(frames) > len(views), settings)
-        set_uniforms(
-            program, keep_outside=keep_outside, tangents=_each(v.tangents for v in views),
-            size=_each(v.size for v in views), near=_each(v.near for v in views),
-            **limits(settings),
-        )  # fmt: skip
-        if len(views) > 1:
-            set_uniforms(program, count=arena.count)
+        programs = {
+            kind: self._variant(len(views), len(frames) > len(views), settings, kind)
+            for kind in set(arena.antialiased)
+        }
+        for program in programs.values():
+            set_uniforms(
+                program, keep_outside=keep_outside, tangents=_each(v.tangents for v in views),
+                size=_each(v.size for v in views), near=_each(v.near for v in views),
+                **limits(settings),
+            )  # fmt: skip
+            if len(views) > 1:
+                set_uniforms(program, count=arena.count)
         for i, (first, last) in enumerate(pairwise(arena.starts)):
             if last > first:
+                program = programs[arena.antialiased[i]]
                 set_uniforms(program, first=first, last=last)
                 program["frames"].write(rows[i])
                 program.run(groups_for(last - first, layout.WORKGROUP))

@@ -27,7 +27,7 @@ from renderer.splat import Splatter
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
 from runtime_models.evaluate import Control, follows_eye
-from runtime_models.model import Model
+from runtime_models.model import Model, is_antialiased
 from scene.pose import View
 
 SAMPLE = 4096  # splats, for a median
@@ -62,7 +62,8 @@ class QuadsDrawing:
         """Room for these objects; what was decoded before is gone."""
         self._release_arena()
         self._changed = True
-        self._arena = Arena(self._gpu, [model.splat_count for model in models])
+        counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
+        self._arena = Arena(self._gpu, counts, antialiased)
         self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
         on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
         self.backends["mlps"] = f"{self._mlps}, Scaffold-GS onnxruntime" if on_cpu else self._mlps

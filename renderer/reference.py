@@ -8,6 +8,7 @@ from renderer import layout
 from renderer.false_colors import false_colors, tinted
 from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.evaluate import evaluate
+from runtime_models.model import is_antialiased
 from runtime_models.rotation import normalize, rotation_matrices
 from scene.control import control_of
 from scene.pose import View
@@ -129,14 +130,22 @@ def gate_object(
             axis=1,
         )  # (N, 2, 3) pixels per metre
         half = jacobian @ camera_from_object[:3, :3] @ axes
-        covariance = half @ half.transpose(0, 2, 1) + settings.low_pass * np.eye(2)
+        bare = half @ half.transpose(0, 2, 1)
+        covariance = bare + settings.low_pass * np.eye(2)
+        seen = opacity * kept_light(bare, covariance) if is_antialiased(thing.model) else opacity
         # The arena keeps covariances as float32: what is infinite there is so here.
         overflow = np.square(axes).sum(axis=2).max(axis=1) > np.finfo(np.float32).max
         covariance[overflow] = np.inf
         mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
-        reason, faded = gate(mean, mean_px, covariance, opacity, color, view, settings)
+        reason, faded = gate(mean, mean_px, covariance, opacity, seen, color, view, settings)
         place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
     return Projected(reason, depth, place, mean_px, covariance, faded, color)
+
+
+def kept_light(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(N,) sqrt(det / det with the low pass): how much fainter an antialiased splat becomes."""
+    kept = np.sqrt(np.maximum(np.linalg.det(bare), 0) / np.linalg.det(covariance))
+    return np.fmin(kept, 1)  # 1 where the quotient is no number
 
 
 def gate(
@@ -144,11 +153,15 @@ def gate(
     mean_px: np.ndarray,
     covariance: np.ndarray,
     opacity: np.ndarray,
+    seen: np.ndarray,
     color: np.ndarray,
     view: View,
     settings: RenderSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) reasons and faded opacities; mean (N, 3) metres in the camera, the rest as Projected."""
+    """(N,) reasons and faded opacities; mean (N, 3) metres in the camera, the rest as Projected.
+
+    seen: (N,) opacity on the screen, of antialiased splats less than the model's.
+    """
     # The kernels get limits as float32: a splat that meets one exactly must meet it here.
     least, largest, farthest, smallest, near = (
         float(np.float32(min(limit, layout.HUGE)))
@@ -158,7 +171,7 @@ def gate(
         )
     )  # fmt: skip
     distance = np.linalg.norm(mean, axis=1)
-    cut = np.sqrt(np.maximum(2 * np.log(opacity / least), 0))  # sigmas to where alpha is `least`
+    cut = np.sqrt(np.maximum(2 * np.log(seen / least), 0))  # sigmas to where alpha is `least`
     extent = cut[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     inside = np.all((mean_px - extent < view.size) & (mean_px + extent > 0), axis=1)
     shaped = np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(mean_px).all(axis=1)
@@ -167,7 +180,7 @@ def gate(
     flat = np.linalg.det(np.where(shaped[:, None, None], covariance, 0)) <= 0
     colored = (np.abs(color) <= layout.HALF_MAX).all(axis=1)
     reach = cut * sigma  # pixels
-    faded = opacity * ramp(largest - sigma, settings.fade, settings.max_pixels)
+    faded = seen * ramp(largest - sigma, settings.fade, settings.max_pixels)
     faded = faded * ramp(farthest - distance, settings.fade, settings.max_distance)
     faded = faded * ramp(reach - smallest, settings.fade, settings.min_pixels)
     passes = {

@@ -26,7 +26,7 @@ from renderer.limits import check_tiles
 from renderer.settings import RenderSettings
 from renderer.timing import PassTimer
 from runtime_models.evaluate import Control, Evaluator
-from runtime_models.model import Model, SplatLayers
+from runtime_models.model import Model, SplatLayers, is_antialiased
 from scene.pose import OPENCV_FROM_EYE, View
 
 SAMPLE = 4096  # splats, for a median
@@ -80,6 +80,7 @@ class TilesDrawing:
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
         self._color = device.zeros((self.splats, 4))
+        self._antialiased = tuple(map(is_antialiased, models))
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
         )
@@ -191,6 +192,7 @@ class TilesDrawing:
             limits_of(settings),
             sort,
             into,
+            self._antialiased,
         )
 
     def _bin(self, views: list[View], key_bits: int) -> list[Tiles]:

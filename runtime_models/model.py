@@ -205,3 +205,8 @@ class Splats:
 
 
 Model = AnchorModel | SplatLayers | ScaffoldModel
+
+
+def is_antialiased(model: Model) -> bool:
+    """Whether it was trained with the screen filter that makes small splats fainter."""
+    return isinstance(model, SplatLayers) and model.antialiased

@@ -3,6 +3,10 @@
 // a splat is read once for all views, the tiles are found while the ellipses are at hand (bin.cl's
 // find_places reads them again), and what no view can see is dropped before its covariance is read.
 // Needs: VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
+// ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
+#ifndef ANTIALIASED
+#define ANTIALIASED 0
+#endif
 #include "common/camera.cl"
 #include "common/limits.cl"
 #include "common/eight_rows.cl"
@@ -16,9 +20,10 @@ typedef struct {
 } Eight;
 
 // Blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
-// order, as rows.  Eight splats are nearly always of one object, and of the one before.
+// order, as rows; then, where some object is antialiased, 1 for those that are.  Eight splats are
+// nearly always of one object, and of the one before.
 #define BLOCKS_OF_POSE (VIEWS + ORDERS)
-#define POSE (12 * BLOCKS_OF_POSE)
+#define POSE (12 * BLOCKS_OF_POSE + ANTIALIASED)
 
 inline void load_poses(float8* m, int8 object, int* current, __global const float* poses) {
   if (all(object == object.s0)) {
@@ -84,10 +89,11 @@ inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fad
   STORE_COLUMNS(rows, RECORD, 4, a * per, opacity, s->red, s->green)                 \
   STORE_COLUMNS(rows, RECORD, 8, s->blue, half_x, half_y, cut)
 
-// Screen ellipses of those `alive` in one view.  passed: per lane how many got past each gate.
-// record: of all splats, these are i to i + n; culled ones get extents of -1.
+// Screen ellipses of those `alive` in one view.  antialiased: above 0 where a splat is.
+// passed: per lane how many got past each gate.  record: of all splats, these are i to i + n; culled ones get extents of -1.
 IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
-                                float8 square, int8 alive, __global const float* view,
+                                float8 square, float8 antialiased, int8 alive,
+                                __global const float* view,
                                 __global const float* limits, int i, int n,
                                 __global float* record, int8* passed) {
   const float low_pass = limits[LOW_PASS];
@@ -112,6 +118,12 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   const float8 determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
   const float8 per = 1.0f / determinant;
   float8 cut = s->cut, opacity = s->opacity;
+#if ANTIALIASED
+  // Mip-Splatting's 2D filter: what the low pass makes wider becomes fainter, the same light in all.
+  const float8 kept = fmin(sqrt(bare / determinant), 1.0f);  // 1 where the quotient is no number
+  opacity *= select((float8)(1), kept, antialiased > 0);
+  cut = fmax(2.0f * log(opacity * limits[PER_LEAST_ALPHA]), 0.0f);
+#endif
   float8 half_x = sqrt(cut * a), half_y = sqrt(cut * c);
   const float8 px = jx * x + view[CAMERA_CX], py = jy * y + view[CAMERA_CY];
   const float8 mid = 0.5f * (a + c), off = 0.5f * (a - c);
@@ -128,6 +140,9 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
            (fabs(s->green) <= MOST_COLOR) & (fabs(s->blue) <= MOST_COLOR);
   const int8 large = small & (cut * major >= limits[LEAST_PIXELS_2]);
   int8 drawn = large;
+#if ANTIALIASED
+  drawn &= opacity >= limits[LEAST_ALPHA];
+#endif
   if (limits[FADES] > 0) {
     opacity *= ramp(limits[MOST_PIXELS] - sqrt(major), limits[PER_PIXELS]) *
                ramp(limits[MOST_DISTANCE] - sqrt(square), limits[PER_DISTANCE]) *
@@ -254,8 +269,9 @@ __kernel void project_arena(
         continue;
       }
       __global const float* view = views + VIEW_SIZE * v;
-      const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], alive[v], view,
-                                       limits, i, n, record[v], passed[v]);
+      const float8 antialiased = ANTIALIASED ? m[POSE - 1] : (float8)(0);
+      const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], antialiased,
+                                       alive[v], view, limits, i, n, record[v], passed[v]);
       const Places p = places_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
       instances[v] += p.count;
       seen[v] = p.count > 0;

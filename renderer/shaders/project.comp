@@ -8,6 +8,7 @@
 #define SORT_FRAME 0      // 1: the order is made along another frame than the first view's
 #define BY_DISTANCE 0     // 1: and by the distance in it
 #define FADE 0            // 1: some limit has a ramp
+#define ANTIALIASED 0     // 1: what the low pass makes wider becomes fainter, see renderer/project.py
 #define KEY_RANGE 0       // 1: the least and largest key are wanted
 #endif
 #include "common/finite.glsl"
@@ -83,8 +84,16 @@ Projected project(Splat splat, const uint view) {
     vec3 sigma_u = splat.sigma * u, sigma_v = splat.sigma * v;
     float bare_a = dot(u, sigma_u), b = dot(v, sigma_u), bare_c = dot(v, sigma_v);
     float a = bare_a + low_pass, c = bare_c + low_pass;
+    float opacity = splat.opacity, cut = splat.cut;
+    float bare = max(bare_a * bare_c - b * b, 0.0);
+    float determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;  // px^4
+#if ANTIALIASED
+    float kept = sqrt(bare / determinant);  // Mip-Splatting's 2D filter: the same light in all
+    opacity *= kept < 1.0 ? kept : 1.0;     // not a number where the splat is too large to draw
+    cut = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
+#endif
     vec2 center = (tangent - t.xz) * focal;  // pixels
-    vec2 extent = splat.cut * sqrt(vec2(a, c));
+    vec2 extent = cut * sqrt(vec2(a, c));
     // One by one: with any(greaterThanEqual()) llvmpipe needs 9 % more for the whole pass.
     vec2 low = center - extent, high = center + extent;
     bool outside = low.x >= size[view].x || low.y >= size[view].y || high.x <= 0.0 || high.y <= 0.0;
@@ -93,15 +102,12 @@ Projected project(Splat splat, const uint view) {
     float mid = 0.5 * (a + c), off = 0.5 * (a - c);
     float root = sqrt(off * off + b * b);
     float major = mid + root;  // px^2
-    float minor =
-        (max(bare_a * bare_c - b * b, 0.0) + low_pass * (bare_a + bare_c) + low_pass * low_pass) /
-        major;
-    float sigma = sqrt(major), reach = splat.cut * sigma;  // pixels
+    float minor = determinant / major;
+    float sigma = sqrt(major), reach = cut * sigma;  // pixels
     // One test for all of them: whatever is not finite makes the sum so.
-    bool shaped = finite(center.x + center.y + major + minor + splat.cut) && minor > 0.0;
+    bool shaped = finite(center.x + center.y + major + minor + cut) && minor > 0.0;
     float brightest = max(max(abs(splat.rgb.r), abs(splat.rgb.g)), abs(splat.rgb.b));
     bool colored = finite(splat.rgb.r + splat.rgb.g + splat.rgb.b) && brightest <= HALF_MAX;
-    float opacity = splat.opacity, cut = splat.cut;
 #if FADE
     vec3 ramps = (fade_ends - vec3(sigma, sqrt(distance2), reach)) * fade_slopes;
     ramps = clamp(vec3(ramps.xy, -ramps.z), 0.0, 1.0);
