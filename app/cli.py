@@ -105,6 +105,9 @@ def run_command(command: str, arguments: list[str]) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
+    from app.paths import plain_path
+
+    arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
         print(usage())
         return 0

@@ -167,6 +167,23 @@ class Camera:
         """Looks at the centre (3,) from that many metres, in the same direction as before."""
         self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance)
 
+    def stand(self, pose: Pose, fov_y: float) -> None:
+        """Stands at a pose at once, level and with that field of view; the orbit's reach stays."""
+        eye, forward = np.asarray(pose.position, np.float64), -pose.matrix()[:3, 2]
+        yaw = np.arctan2(-forward[0], -forward[2])
+        pitch = np.clip(np.arcsin(np.clip(forward[1], -1, 1)), -POLE, POLE)
+        distance = float((self._home[1] - eye) @ forward)
+        if not distance > MIN_RADII * self.radius:  # the scene lies behind or around the eye
+            distance = self.radius
+        self.fov_y = fov_y
+        level = axes_of(yaw, pitch)[2]
+        # The reach is bounded, so the eye is set last: it must not move.
+        log_distance = self._bounded(np.log(distance))
+        anchor = eye if self.flying else eye + np.exp(log_distance) * level
+        self._goal = np.r_[anchor, yaw, pitch, log_distance]
+        self._lag[:] = 0
+        self._velocity[:] = 0
+
     def reset(self) -> None:
         """Back to the first view of the scene."""
         view, centre, radius = self._home

@@ -8,15 +8,18 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
-from app.controls import SMOOTH_S, Camera
+from app.camera_panel import KeptViews, attach_cameras
+from app.controls import SMOOTH_S
 from app.dial import FLOOR_DB, TARGET_MS, Dial
 from app.drawing import parse_size
 from app.errors import UsageError
+from app.files import Files, first_camera, home_of, named_cameras, read_wanted
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
 from app.opening import ReadingOptions
 from app.outlines import draw_brush, draw_outlines
 from app.panel import draw_note, draw_panel, draw_problem, free_area
+from app.paths import plain
 from app.pictures import write_numbered_png, write_png
 from app.readings import Readings
 from app.refine import Refiner, attach_refiner
@@ -24,13 +27,14 @@ from app.scale_bar import draw_scale_bar
 from app.sections import Hooks
 from app.shown import Shown, Wish
 from app.slider import draw_slider_bar
-from app.stage import Stage
+from app.stage import Stage, scene_of
+from app.status_line import draw_status
+from app.stepping import Steps
 from app.window import Event, Window
 from app.wipe import comparing
 from renderer.context import describe
 from renderer.debug import debug_legend
 from renderer.renderer import Renderer
-from runtime_models.model import BadFile
 from scene.pose import View
 from scene.read_selector import read_selector
 from scene.selector import Selector
@@ -46,7 +50,12 @@ LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took lo
 @dataclass(frozen=True)
 class Options(ReadingOptions):
     scenes: tyro.conf.Positional[tuple[Path, ...]] = ()
-    """Packages, .shift, .ply or .splat files, or folders of PLY layers; none: the bundled demo."""
+    """Packages, splats of any known format, folders of layers, and files of cameras to step
+    through; none: the bundled demo."""
+    camera: Path | None = None
+    """File or folder of cameras: starts at its first, N and P step; see docs/cameras.md."""
+    fov_y: float = 0.0
+    """Degrees from top to bottom, for a camera file that says nothing about the lens."""
     x: float | None = None
     """Control value to start at, 0..1; without it the first stop."""
     size: str = "1280x720"
@@ -63,7 +72,7 @@ class Options(ReadingOptions):
     """Regions with an x of their own, one after the other: sphere:x,y,z:radius:X[:border],
     box:x,y,z:hx,hy,hz:X[:border], half:x,y,z:nx,ny,nz:X[:border], lens:degrees:X[:border]."""
     pictures: Path = Path("pictures")
-    """Folder for the pictures that P saves."""
+    """Folder for the pictures that F12 saves and the views that K keeps."""
     screenshot: Path | None = None
     """Write a picture of the whole window here after --frames frames, and end."""
     frames: int = 3
@@ -85,13 +94,18 @@ def run(options: Options) -> int:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
     refiner = Refiner(options)
     stage = Stage(refiner.open)
-    stage.open(options.scenes or (DEMO,), options.x)
+    paths = tuple(map(plain, options.scenes)) or (DEMO,)
+    found = named_cameras(options, read_wanted(paths, refiner.open, options, lambda *_: None))
+    if not found.sources:
+        raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
+    stage.take(found.sources, scene_of(found.sources, options.x), home_of(found))
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
     with refiner, Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             viewer = Viewer(window, renderer, stage, options)
             attach_refiner(viewer, refiner)
+            viewer.files.started(found, options)
             with comparing(viewer, options):
                 viewer.loop()
     return 0
@@ -120,7 +134,11 @@ class Viewer:
             drawing=renderer.backends["drawing"],
         )
         self._free = self._free_wanted()  # where the picture's middle is; follows the overlay
-        self.camera = self._first_camera()
+        self.camera = first_camera(self)
+        self.steps = Steps()
+        self.kept = KeptViews(options.pictures)
+        self.files = Files(self)
+        attach_cameras(self)
         self.shown = Shown(renderer, self.readings)
         self.dial = Dial(
             options.target_ms or TARGET_MS,
@@ -128,8 +146,7 @@ class Viewer:
             wanted=(options.target_ms or options.floor_db) is not None,
         )
         self._note_until = 0.0
-        self._wanted: tuple[Path, ...] = ()  # files to be opened once the note about them is seen
-        self._frames = 0
+        self.frames = 0  # drawn since the window opened
         self._overlay_ms = 0.0
         self.save_picture = False
 
@@ -157,7 +174,11 @@ class Viewer:
         for event in self.window.begin_frame():
             self.take(event)
         self.stage.advance(seconds)
-        self.camera.step(seconds, push(self.window))
+        pushed = push(self.window)
+        if pushed.any:
+            self.leave_camera()
+        self.camera.step(seconds, pushed)
+        self.steps.advance(seconds)
         self._polling = any([work() for work in self.hooks.each_frame])
         self._follow_overlay(seconds)
         self._turn_dial()
@@ -166,7 +187,7 @@ class Viewer:
         self._draw_overlay()
         self.window.end_frame()
         self._overlay_ms = (time.perf_counter() - drawn) * 1e3
-        self._frames += 1
+        self.frames += 1
         self._save_pictures()
         self.window.swap()
         now = self.readings.now = time.perf_counter()
@@ -174,29 +195,26 @@ class Viewer:
             self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
             self.dial.seen((now - start) * 1e3, self._moving)
         self.readings.idle = not fresh
-        if self._wanted and self._frames > 1:
-            self._open_wanted()
 
     def take(self, event: Event) -> None:
         """Lets one input event act."""
         take(self, event)
 
     def open_soon(self, paths: tuple[Path, ...]) -> None:
-        """Opens files in the next frame, so that the note about them is seen first."""
-        self._wanted = paths
-        self.say(f"Opening {', '.join(path.name for path in paths)} \u2026")
+        """Opens files and folders, scenes or cameras, while the window goes on."""
+        self.files.open_soon(paths)
 
     def say(self, text: str) -> None:
-        """Shows a note for a few seconds."""
+        """Shows a note for a few seconds, longer for more lines; "" takes it away."""
         self.readings.note = text
-        self._note_until = time.perf_counter() + NOTE_S
+        self._note_until = time.perf_counter() + NOTE_S * (1 + text.count("\n"))
 
     def _busy(self) -> bool:
         """Whether the next frame is due without waiting for input."""
-        waiting = bool(self._wanted) or self.options.screenshot is not None
+        waiting = self.options.screenshot is not None
         sliding = not np.array_equal(self._free, self._free_wanted())
         measuring = self.dial.wanted or self.dial.measuring
-        first = self._frames < WARM_UP
+        first = self.frames < WARM_UP
         return self._moving or waiting or sliding or measuring or first
 
     def _free_wanted(self) -> np.ndarray:
@@ -211,11 +229,29 @@ class Viewer:
         """The picture moves over when the overlay comes or goes, in the same soft way."""
         wanted = self._free_wanted()
         self._free = wanted + (self._free - wanted) * np.exp(-seconds / SMOOTH_S)
-        if np.abs(self._free - wanted).max() < 0.5 or self._frames == 0:
+        if np.abs(self._free - wanted).max() < 0.5 or self.frames == 0:
             self._free = wanted
 
     def view(self) -> View:
-        return self.camera.view(self.window.size, tuple(self._free))
+        """What the window shows: a camera that was stepped to, or what the hand has turned to."""
+        view = self.camera.view(self.window.size, tuple(self._free))
+        if self.steps.standing:
+            return self.steps.view(view.size, tuple(self._free), view.near, view.far)
+        return view
+
+    def plain_view(self) -> View:
+        """The same without what the overlay covers: a camera as filed, or centred."""
+        if self.steps.standing and not self.steps.moving:
+            return self.steps.cameras.views[self.steps.index]
+        return self.camera.view(self.free_size())
+
+    def leave_camera(self) -> None:
+        """From the camera that was stepped to, where it stands, to moving freely."""
+        if self.steps.standing:
+            view, (_, top, _, bottom) = self.view(), self._free
+            height = (view.tangents[3] - view.tangents[2]) * (bottom - top) / view.size[1]
+            self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
+            self.steps.leave()
 
     def free_size(self) -> tuple[int, int]:
         left, top, right, bottom = self._free_wanted()
@@ -228,10 +264,6 @@ class Viewer:
             self.readings.note = ""
         return over
 
-    def _first_camera(self) -> Camera:
-        view = self.stage.first_view(self.free_size())
-        return Camera(view, self.stage.centre, self.stage.radius)
-
     def _wish(self) -> Wish:
         """What the screen should show now."""
         stage, view, moving = self.stage, self.view(), self._moving
@@ -240,7 +272,8 @@ class Viewer:
 
     @property
     def _moving(self) -> bool:
-        return self.camera.moving or push(self.window).any or self.stage.playing
+        by_hand = self.camera.moving or push(self.window).any
+        return by_hand or self.steps.moving or self.stage.playing
 
     def _idle_work_due(self, now: float) -> bool:
         """Whether the picture has rested so long that its error is to be measured."""
@@ -264,7 +297,7 @@ class Viewer:
         if self.stage.measure_now or self.shown.due(wish, now):
             self.stage.measure_now = False
             self.shown.measure(wish)
-        force = self.options.screenshot is not None or self._frames < WARM_UP
+        force = self.options.screenshot is not None or self.frames < WARM_UP
         fresh = self.shown.draw(wish, self.window.screen(), force)
         for draw in self.hooks.over:
             draw(wish)
@@ -285,8 +318,9 @@ class Viewer:
             debug, stats = self.stage.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), left, scale)
             covered = [
-                draw_panel(self.stage, self.dial, self.readings, scale, self.hooks.sections),
+                draw_panel(self.stage, self.dial, self.readings, scale, self.hooks),
                 draw_slider_bar(self.stage, left, scale),
+                draw_status(self.stage, [words() for words in self.hooks.status], scale),
             ]
         if not self.save_picture:  # a note is no part of a picture
             draw_note(self.readings.note, scale)
@@ -303,29 +337,24 @@ class Viewer:
         if is_painting(self) and window.on_scene:
             draw_brush(window.cursor, stage.regions.brush * scale, is_erasing(self), scale)
 
-    def _open_wanted(self) -> None:
-        """Opens the dropped files; after a bad one the old scene is still there."""
-        wanted, self._wanted = self._wanted, ()
-        before = self.stage.scene
-        if self.stage.drop(wanted):
-            try:
-                self.renderer.update(self.stage.scene)
-            except BadFile as error:
-                self.stage.problem = str(error)
-                self.stage.show(before)
-        self.readings.note = ""
-        if self.stage.scene is not before:
-            self.camera = self._first_camera()
-            self.dial.forget()
-            for changed in self.hooks.opened:
-                changed()
-            self.window.set_title(f"Shapeshift \u2013 {wanted[0].name}")
+    def show_scene(self) -> None:
+        """The stage has another scene: a new camera, and whoever depends on it is told."""
+        self.camera = first_camera(self)
+        self.steps.leave()
+        self.dial.forget()
+        for changed in self.hooks.opened:
+            changed()
+        self.set_title()
+
+    def set_title(self) -> None:
+        names = ", ".join(thing.name for thing in self.stage.scene.objects)
+        self.window.set_title(f"{names} \u2013 Shapeshift" if names else "Shapeshift")
 
     @property
     def _last_frame(self) -> bool:
         """Whether a --screenshot is due: enough frames, the budget has chosen, all is read."""
         measuring = self.dial.wanted or self.dial.measuring
-        return self._frames >= self.options.frames and not measuring and not self._polling
+        return self.frames >= self.options.frames and not measuring and not self._polling
 
     def _save_pictures(self) -> None:
         """Writes the picture that a key or --screenshot asked for, of what is on the screen."""

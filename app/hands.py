@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import glfw
 import numpy as np
 
+from app.camera_panel import keep_view
 from app.controls import FAST, SLOW, Push
 from app.window import DoubleClick, Drag, Drop, Event, KeyDown, Press, Release, Wheel, Window
 from scene.pick import Hit
@@ -20,6 +21,8 @@ def take(viewer: "Viewer", event: Event) -> None:
     """Lets one input event act."""
     if any(takes(event) for takes in viewer.hooks.takes):
         return
+    if isinstance(event, Wheel | DoubleClick):
+        viewer.leave_camera()
     camera = viewer.camera
     height = viewer.window.logical_size[1]
     match event:
@@ -27,6 +30,9 @@ def take(viewer: "Viewer", event: Event) -> None:
             press_key(viewer, event)
         case Press() | Drag() | Release() if works_on_regions(viewer, event):
             pass
+        case Drag() if viewer.steps.standing:
+            viewer.leave_camera()
+            take(viewer, event)
         case Drag(button="middle") | Drag(button="right") if pans(viewer, event):
             camera.pan(-event.dx / height, event.dy / height)
         case Drag():
@@ -46,6 +52,15 @@ def press_key(viewer: "Viewer", event: KeyDown) -> None:
     """Keys that act once; the held ones are asked for in `push`."""
     stage, camera = viewer.stage, viewer.camera
     match event.key:
+        case glfw.KEY_N | glfw.KEY_P:
+            by = 1 if event.key == glfw.KEY_N else -1
+            if not viewer.steps.step(by, viewer.view()):
+                viewer.say("There are no cameras to step through; drop a file of them here.")
+        case glfw.KEY_K:
+            keep_view(viewer)
+        case glfw.KEY_V | glfw.KEY_F if viewer.steps.standing:
+            viewer.leave_camera()
+            press_key(viewer, event)
         case glfw.KEY_V:
             camera.toggle_flying()
         case glfw.KEY_F if event.shift:
@@ -57,7 +72,7 @@ def press_key(viewer: "Viewer", event: KeyDown) -> None:
             stage.toggle_play()
         case glfw.KEY_H | glfw.KEY_TAB:
             viewer.overlay = not viewer.overlay
-        case glfw.KEY_P | glfw.KEY_F12:
+        case glfw.KEY_F12:
             viewer.save_picture = True
         case glfw.KEY_G:
             stage.next_debug_view(-1 if event.shift else 1)

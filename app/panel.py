@@ -1,6 +1,6 @@
 """The panel at the left: its frame, times and counts, keys, messages; sections from beside it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 from imgui_bundle import imgui
@@ -13,8 +13,9 @@ from app.play_panel import draw_play
 from app.quality_panel import draw_quality
 from app.readings import Readings
 from app.regions_panel import draw_regions
-from app.sections import Section
+from app.sections import Hooks
 from app.stage import AS_FILED, Stage
+from app.status_line import HEIGHT as STATUS_HEIGHT
 from app.theme import Box
 from renderer.palette import PALETTES
 from renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats
@@ -48,23 +49,23 @@ KEYS = (
     ("L", "lens on, off"),
     ("B + drag", "paint a region; Shift erases"),
     ("Esc", "leave the region"),
-    ("P, F12", "save a picture"),
+    ("N, P", "next, previous camera"),
+    ("K", "keep this view in a list"),
+    ("F12", "save a picture"),
     ("H, Tab", "hide all this"),
 )
 
 
-def draw_panel(
-    stage: Stage, dial: Dial, readings: Readings, ui_scale: float, more: Sequence[Section] = ()
-) -> Box:
+def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float, hooks: Hooks) -> Box:
     """The whole left panel; changes the stage's settings and palette.  Returns where it is.
 
-    `more` are the sections that other parts of the program add, after those of the scene.
+    `hooks` hold what other parts of the program add: under the title, and after Regions.
     """
     imgui.set_next_window_pos(Vec(MARGIN * ui_scale, MARGIN * ui_scale))
     screen = imgui.get_io().display_size
     beside = free_area((screen.x, screen.y), len(stage.sliders), ui_scale)[0] > 0
     bar = 0.0 if beside else bar_height(len(stage.sliders))  # else the panel ends above it
-    limit = screen.y - (2 * MARGIN + bar) * ui_scale
+    limit = screen.y - (2 * MARGIN + bar + STATUS_HEIGHT) * ui_scale
     imgui.set_next_window_size_constraints(
         Vec(WIDTH * ui_scale, 0), Vec(WIDTH * ui_scale, max(limit, 1.0))
     )
@@ -76,6 +77,8 @@ def draw_panel(
         | flags.no_saved_settings,
     )  # fmt: skip
     _title(stage)
+    for draw in hooks.top:
+        draw(ui_scale)
     _frame(readings)
     if section("Budget", open_first=True):
         draw_budget(stage, dial, ui_scale)
@@ -83,7 +86,7 @@ def draw_panel(
         draw_quality(stage, readings, ui_scale)
     if section("Regions", open_first=bool(stage.regions.items)):
         draw_regions(stage, ui_scale)
-    for other in more:
+    for other in hooks.sections:
         if section(other.name, other.open_first):
             imgui.push_id(other.name)
             other.draw(ui_scale)
@@ -119,7 +122,7 @@ def free_area(size: tuple[float, float], rows: int, pixels: float) -> Box:
     """
     width, height = size
     left = (WIDTH + 1.5 * MARGIN) * pixels
-    bottom = height - bar_height(rows) * pixels
+    bottom = height - (bar_height(rows) + STATUS_HEIGHT) * pixels
     enough = width - left > MIN_FREE * width and bottom > MIN_FREE * height
     return (left, 0.0, float(width), bottom) if enough else (0.0, 0.0, float(width), float(height))
 

@@ -23,6 +23,7 @@ class Hooks:
     """Lists that whoever adds to the viewer appends to, before or while it runs."""
 
     sections: list[Section] = field(default_factory=list)  # after Regions, in this order
+    top: list[Callable[[float], None]] = field(default_factory=list)  # under the title, ui_scale
     each_frame: list[Callable[[], bool]] = field(default_factory=list)
     # each_frame: called in every frame, in the window's thread, before the splats are drawn;
     # True = something is under way, call again in 30 ms even if nobody touches anything

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from app import theme
 from app.stage import Stage
+from app.status_line import HEIGHT as STATUS_HEIGHT
 from app.theme import Box
 from runtime_models.model import Stop
 from scene.control import SNAP, snap
@@ -26,7 +27,8 @@ def draw_slider_bar(stage: Stage, left: float, ui_scale: float) -> Box:
     screen = imgui.get_io().display_size
     width = min(MAX_WIDTH * ui_scale, (screen.x - left) * 0.94)
     middle = (left + screen.x) / 2
-    imgui.set_next_window_pos(Vec(middle, screen.y - 18 * ui_scale), 0, Vec(0.5, 1.0))
+    low = screen.y - (18 + STATUS_HEIGHT) * ui_scale
+    imgui.set_next_window_pos(Vec(middle, low), 0, Vec(0.5, 1.0))
     imgui.set_next_window_size(Vec(width, 0))
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move
     imgui.begin("##modality", None, flags | imgui.WindowFlags_.no_saved_settings)

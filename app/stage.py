@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from app.opened import Source
 from app.regions import Regions
 from renderer.settings import DEBUG_VIEWS, RenderSettings
-from runtime_models.model import AnchorModel, BadFile, SplatLayers, Stop
+from runtime_models.model import Finding, Model, Stop
 from scene.control import Sweep
 from scene.framing import (
     default_background,
@@ -19,10 +20,9 @@ from scene.framing import (
     scene_points,
 )
 from scene.pick import Hit, Picker
-from scene.pose import View, perspective
-from scene.scene import Scene, SceneObject
+from scene.pose import Pose, View, perspective
+from scene.scene import IDENTITY, Scene, SceneObject
 
-Model = AnchorModel | SplatLayers
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
 AS_FILED = ""  # the palette that the scene's own stops name
 
@@ -31,9 +31,11 @@ class Stage:
     """The scene with what a person may change about it while it is shown."""
 
     def __init__(self, read_model: Callable[[Path], Model]) -> None:
-        self._read_model = read_model
+        self.read_model = read_model
         self._filed: tuple[Model, ...] = ()  # as read, before a palette was chosen
         self.scene = Scene(())
+        self.sources: tuple[Source, ...] = ()  # where the scene's objects come from
+        self.home: View | None = None  # the first look at the scene where a file gives one
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
         self.palette = AS_FILED
@@ -47,12 +49,13 @@ class Stage:
 
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
         """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
-        models = [self._read_model(path) for path in paths]
-        objects = []
-        for path, model in zip(paths, models, strict=True):
-            start = first_stop(model).x if x is None else x
-            objects.append(SceneObject(path.stem, model, x=start))
-        self.show(Scene(tuple(objects)))
+        sources = [Source(path, self.read_model(path)) for path in paths]
+        self.take(sources, scene_of(sources, x))
+
+    def take(self, sources: Sequence[Source], scene: Scene, home: View | None = None) -> None:
+        """Shows what has been opened; `scene` is `scene_of(sources)`."""
+        self.sources, self.home = tuple(sources), home
+        self.show(scene)
 
     def show(self, scene: Scene) -> None:
         """Takes a scene over and frames it."""
@@ -84,20 +87,28 @@ class Stage:
         self._points = scene_points(self.scene)
         self.regions.fit_painted(index, self.scene.objects[index])
 
-    def drop(self, paths: Sequence[Path]) -> bool:
-        """Opens what was dropped on the window; False, and a sentence in `problem`, when bad."""
-        try:
-            self.open(paths)
-        except (BadFile, OSError) as error:
-            self.problem = str(error)
-            return False
-        return True
-
     def first_view(self, size: tuple[int, int]) -> View:
         """The view of a single package if it gives one, else everything framed."""
+        if self.home is not None:
+            return replace(self.home, tangents=perspective(self.home_fov_y, size), size=size)
         if len(self.scene.objects) == 1:
             return default_view(self.scene.objects[0].model, size)
         return framing_view(*self._points, size)
+
+    @property
+    def home_fov_y(self) -> float:
+        """Radians from top to bottom of the home view."""
+        return float(np.arctan(self.home.tangents[3]) - np.arctan(self.home.tangents[2]))
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) metres of the file where the scene has its zero: not 0 for one re-centred."""
+        return origin_of(self.scene.objects[0].model) if self.scene.objects else np.zeros(3)
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What was wrong in the files that are shown."""
+        return [finding for thing in self.scene.objects for finding in thing.model.findings]
 
     def fit(self, view: View, fov_y: float, size: tuple[int, int]) -> float:
         """Metres from the centre at which all fits size (W, H), looking as the view does."""
@@ -215,6 +226,24 @@ class Stage:
     def has_palettes(self) -> bool:
         """Whether any thermal stop is drawn through a palette at all."""
         return any(stop.palette for thing in self.scene.objects for stop in thing.model.stops)
+
+
+def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
+    """The scene of what has been opened: each at x or its first stop, in the first one's place."""
+    objects = []
+    for source in sources:
+        path, model = source.path, source.model
+        moved = origin_of(model) - origin_of(sources[0].model)
+        pose = Pose(moved, IDENTITY.wxyz) if moved.any() else IDENTITY
+        start = first_stop(model).x if x is None else x
+        name = path.name if path.is_dir() else path.stem
+        objects.append(SceneObject(name, model, pose, x=start))
+    return Scene(tuple(objects))
+
+
+def origin_of(model: Model) -> np.ndarray:
+    """(3,) metres that were taken off a model's places."""
+    return np.array(getattr(model, "origin", (0.0, 0.0, 0.0)), np.float64)
 
 
 def first_stop(model: Model) -> Stop:

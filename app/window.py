@@ -12,6 +12,7 @@ from moderngl_window.context.glfw import Window as GlfwWindow
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from app import theme
+from app.paths import plain
 from renderer.context import NoContext
 
 BUTTONS = {0: "left", 1: "right", 2: "middle"}
@@ -282,7 +283,7 @@ class Window:
         self._note(None if self._over_overlay(*self._cursor) else Wheel(dy))
 
     def _on_drop(self, handle, paths: list[str]) -> None:
-        self._note(Drop(tuple(Path(path) for path in paths)))
+        self._note(Drop(tuple(map(plain, paths))))
 
     def _over_overlay(self, x: float, y: float) -> bool:
         """Whether the overlay takes input at that place.

@@ -73,6 +73,19 @@ def read_folder(folder: Path, reading: CameraReading) -> CameraList:
     return read_colmap_cameras(*found, reading)
 
 
+def is_cameras(path: Path) -> bool:
+    """Whether a JSON file is one of cameras, by its keys; whether it is whole is for the reader."""
+    try:
+        data = read_json(path)
+    except (BadFile, OSError):
+        return False
+    if isinstance(data, list):
+        row = data[0] if data and isinstance(data[0], dict) else {}
+        return INRIA_MARKS <= row.keys() or "matrix" in row
+    marks = {FLOOR_MARK, *PATH_MARKS, TRANSFORMS_MARK, POSE_MARK}
+    return isinstance(data, dict) and bool(marks & data.keys())
+
+
 def find_cameras(scene: Path) -> Path | None:
     """The file or folder of cameras that lies with a scene: in it, beside it, up to two above."""
     if scene.is_dir() and has_cameras(scene):

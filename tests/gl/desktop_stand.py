@@ -1,5 +1,6 @@
 """What the tests of the window share: a ball to look at and a renderer that counts."""
 
+import time
 from pathlib import Path
 
 import moderngl
@@ -70,6 +71,15 @@ def read_stub(path: Path):
     if path.name == "bad.shift":
         raise BadFile("bad.shift is truncated: 300 bytes found, 500 wanted; copy it again.")
     return ball()
+
+
+def until_opened(viewer) -> None:
+    """Frames until the thread that opens files has done so, and what it found is shown."""
+    end = time.monotonic() + 20
+    while viewer.files.busy and time.monotonic() < end:
+        run_frames(viewer, 1)
+        time.sleep(0.005)
+    run_frames(viewer, 2)
 
 
 def run_frames(viewer, count: int, seconds: float = 0.02) -> None:

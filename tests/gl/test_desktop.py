@@ -6,7 +6,7 @@ from pathlib import Path
 import glfw
 import numpy as np
 import pytest
-from desktop_stand import read_stub, run_frames
+from desktop_stand import read_stub, run_frames, until_opened
 from PIL import Image
 
 from app import hands
@@ -238,7 +238,7 @@ def test_a_dropped_bad_file_is_told_and_the_old_scene_stays(viewer):
     before, camera = viewer.stage.scene, viewer.camera
     viewer.take(Drop((Path("bad.shift"),)))
     assert "bad.shift" in viewer.readings.note  # seen while it loads
-    run_frames(viewer, 3)
+    until_opened(viewer)
     assert viewer.stage.scene is before and viewer.camera is camera
     assert "300 bytes found" in viewer.stage.problem
     boxed = screenshot(viewer)
@@ -248,9 +248,12 @@ def test_a_dropped_bad_file_is_told_and_the_old_scene_stays(viewer):
     assert boxed[270:370, 230:670].max() > 200  # readable, not dimmed
 
 
-def test_a_dropped_good_file_is_shown(viewer):
-    viewer.take(Drop((Path("one.shift"), Path("two.shift"))))
-    run_frames(viewer, 3)
+def test_a_dropped_good_file_is_shown(viewer, tmp_path):
+    paths = (tmp_path / "one.shift", tmp_path / "two.shift")
+    for path in paths:
+        path.write_bytes(b"scene")
+    viewer.take(Drop(paths))
+    until_opened(viewer)
     assert [thing.name for thing in viewer.stage.scene.objects] == ["one", "two"]
     assert not viewer.stage.problem and not viewer.readings.note
 
@@ -260,7 +263,7 @@ def test_pictures_are_numbered_and_never_overwritten(viewer):
     folder.mkdir()
     (folder / "shapeshift-0001.png").write_bytes(b"mine")
     for _ in range(2):
-        press(viewer, glfw.KEY_P)
+        press(viewer, glfw.KEY_F12)
         run_frames(viewer, 1)
     assert (folder / "shapeshift-0001.png").read_bytes() == b"mine"
     assert sorted(p.name for p in folder.iterdir()) == [f"shapeshift-000{n}.png" for n in (1, 2, 3)]

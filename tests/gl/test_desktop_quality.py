@@ -5,7 +5,7 @@ import time
 import glfw
 import numpy as np
 import pytest
-from desktop_stand import run_frames
+from desktop_stand import run_frames, until_opened
 
 from app.comparison import REST_S
 from app.window import Drag, KeyDown, Press, Release
@@ -83,15 +83,16 @@ def test_the_dial_measures_between_frames_and_chooses(viewer):
     assert viewer.renderer.settings.min_pixels == viewer.stage.settings.min_pixels
 
 
-def test_opening_another_scene_forgets_what_was_measured(viewer):
-    from pathlib import Path
-
+def test_opening_another_scene_forgets_what_was_measured(viewer, tmp_path):
     from app.window import Drop
+
+    scene = tmp_path / "one.shift"
+    scene.write_bytes(b"scene")
 
     viewer.dial.wanted = True
     run_frames(viewer, 1)
-    viewer.take(Drop((Path("one.shift"),)))
-    run_frames(viewer, 2)
+    viewer.take(Drop((scene,)))
+    until_opened(viewer)
     assert not viewer.dial.rows and not viewer.dial.measuring
 
 

@@ -1,0 +1,165 @@
+"""The viewer's files: those it opens while the window goes on, and those it opened before."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.camera_files import camera_reading, in_scene
+from app.controls import Camera
+from app.opened import Found, Opener, Told, read_files
+from app.opening import sentence
+from app.paths import config_folder
+from app.recent import RecentFiles
+from app.recent_panel import RecentMenu
+from app.stage import scene_of
+from runtime_models.model import BadFile, Model
+from scene.pose import View
+from scene.read_cameras import read_camera_list
+
+if TYPE_CHECKING:
+    from app.desktop import Options, Viewer
+
+MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
+
+
+def read_wanted(paths: tuple[Path, ...], read_model, options: "Options", told: Told) -> Found:
+    """What the files hold, with --camera's cameras.  Raises BadFile, UsageError, OSError."""
+
+    def read(path: Path, told: Told) -> Model:
+        return read_model(path)
+
+    return read_files(paths, read, camera_reading(options), told)
+
+
+class Files:
+    """Opens what is dropped or chosen; the scene changes when all of it has been read."""
+
+    def __init__(self, viewer: "Viewer", recent: RecentFiles | None = None) -> None:
+        self._viewer = viewer
+        self._opener = Opener()
+        self.recent = recent  # None: nothing is kept
+        self._menu = RecentMenu()
+        viewer.hooks.each_frame.append(self.poll)
+        viewer.hooks.top.append(self.draw_recent)
+
+    @property
+    def busy(self) -> bool:
+        return self._opener.busy
+
+    def open_soon(self, paths: tuple[Path, ...]) -> None:
+        """Begins to read files; the window stays alive meanwhile."""
+        viewer = self._viewer
+        read_model, options = viewer.stage.read_model, viewer.options
+        self._opener.start(paths, lambda paths, told: read_wanted(paths, read_model, options, told))
+        viewer.say(self._opener.note)
+
+    def started(self, found: Found, options: "Options") -> None:
+        """The scene and cameras with which the window opens."""
+        viewer = self._viewer
+        viewer.set_title()
+        if options.screenshot is None:
+            self.recent = RecentFiles.read(config_folder())
+            for source in found.sources:
+                if options.scenes:
+                    self.remember(source.path)
+        self.take_cameras(found, stand=options.camera is not None)
+        if found.notes:
+            viewer.say("\n".join(found.notes))
+
+    def poll(self) -> bool:
+        """Takes over what has been read; True while something is being read."""
+        if not self._opener.busy:
+            return False
+        viewer, paths = self._viewer, self._opener.paths
+        try:
+            found = self._opener.poll()
+        except (BadFile, OSError) as error:
+            viewer.stage.problem = str(error)
+            viewer.say("")
+        except MemoryError:
+            viewer.stage.problem = f"{paths[0].name} needs more memory than there is."
+            viewer.say("")
+        else:
+            if found is not None:
+                viewer.say("")
+                self.take(found)
+        if self._opener.busy:
+            viewer.say(self._opener.note)
+        return self._opener.busy
+
+    def take(self, found: Found) -> None:
+        """Shows what has been read; a scene that the device cannot hold leaves the old one."""
+        viewer = self._viewer
+        stage = viewer.stage
+        if found.sources:
+            scene = scene_of(found.sources)
+            try:
+                viewer.renderer.update(scene)
+            except BadFile as error:
+                stage.problem = str(error)
+                viewer.shown.forget()
+                return
+            stage.take(found.sources, scene, home_of(found))
+            viewer.show_scene()
+        self.take_cameras(found, stand=not found.sources)
+        for source in found.sources:
+            self.remember(source.path)
+        told = [sentence(f) for f in stage.findings] if found.sources else []
+        told = told[:MOST_TOLD] + [f"and {len(told) - MOST_TOLD} more"] * (len(told) > MOST_TOLD)
+        if told or found.notes:
+            viewer.say("\n".join([*told, *found.notes]))
+
+    def take_cameras(self, found: Found, stand: bool) -> None:
+        """The cameras of a file for n and p; of a scene without any there are none."""
+        viewer = self._viewer
+        cameras = found.cameras
+        if cameras is None and found.floor is not None and not found.sources:
+            cameras = found.floor
+        if cameras is None and not found.sources:
+            return
+        if cameras is not None and viewer.stage.scene.objects:
+            cameras = in_scene(cameras, viewer.stage.scene.objects[0].model)
+        now = viewer.view()
+        viewer.steps.take(cameras)
+        if stand and cameras is not None:
+            viewer.steps.go_to(0, now if viewer.frames else None)
+
+    def draw_recent(self, ui_scale: float) -> None:
+        """The button under the panel's title."""
+        chosen = self._menu.draw(self.recent, ui_scale)
+        if chosen is not None:
+            self.open_soon((chosen,))
+
+    def remember(self, path: Path) -> None:
+        """Puts a file first in the list of recent ones."""
+        if self.recent is None:
+            return
+        try:
+            self.recent.add(path)
+        except OSError as error:
+            self._viewer.say(f"The list of recent files cannot be kept: {error.strerror}.")
+            self.recent = None
+
+
+def home_of(found: Found) -> View | None:
+    """The view that stands on the floor which lies with the first scene."""
+    if found.floor is None or not found.sources:
+        return None
+    return in_scene(found.floor, found.sources[0].model).views[0]
+
+
+def first_camera(viewer: "Viewer") -> Camera:
+    """The camera of a new scene: on its floor where one is given, else the whole in view."""
+    stage = viewer.stage
+    camera = Camera(stage.first_view(viewer.free_size()), stage.centre, stage.radius)
+    if stage.home is not None:
+        camera.toggle_flying()
+        camera.stand(stage.home.world_from_eye, stage.home_fov_y)
+    return camera
+
+
+def named_cameras(options: "Options", found: Found) -> Found:
+    """With the cameras of --camera instead of those beside the scene.  Raises BadFile."""
+    if options.camera is None:
+        return found
+    cameras = read_camera_list(options.camera, camera_reading(options))
+    return Found(found.sources, cameras, found.floor, cameras.notes)

@@ -1,0 +1,147 @@
+"""Opening files while the window goes on: a thread reads, the window asks whether it is done."""
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from runtime_models.model import BadFile, Model
+from runtime_models.package_files import MANIFEST
+from runtime_models.read_scene import describe
+from scene.camera_list import CameraList, CameraReading
+from scene.colmap_tables import TABLES, find_model
+from scene.read_cameras import SPLITS, find_cameras, find_floor, is_cameras, read_camera_list
+
+Told = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A scene as it was opened: where from, and what `launch.py info` says about it."""
+
+    path: Path
+    model: Model
+    facts: dict = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the files hold that were dropped or named together."""
+
+    sources: tuple[Source, ...] = ()
+    cameras: CameraList | None = None
+    floor: CameraList | None = None  # where to stand, of splatapult's NAME_vr.json
+    notes: tuple[str, ...] = ()
+
+
+def read_files(
+    paths: Sequence[Path], read_model: Callable[[Path, Told], Model], reading: CameraReading,
+    told: Told,
+) -> Found:  # fmt: skip
+    """Reads scenes and files of cameras, told apart by what is in them.  Raises BadFile, OSError.
+
+    Cameras that lie with the first scene are read too unless others were named; what is wrong
+    with those is a note.
+    """
+    camera_paths = [path for path in paths if means_cameras(path)]
+    sources = []
+    for path in paths:
+        if path not in camera_paths:
+            model = read_model(path, told)
+            sources.append(Source(path, model, describe(model, path)))
+    cameras = [read_camera_list(path, reading) for path in camera_paths]
+    floors = [c for c in cameras if c.format == "splatapult floor"]
+    lists = [c for c in cameras if c not in floors]
+    notes = [note for found in cameras for note in found.notes]
+    if sources:
+        first = sources[0].path
+        for found, find in ((lists, find_cameras), (floors, find_floor)):
+            path = None if found else find(first)
+            if path is not None:
+                beside, note = read_beside(path, reading)
+                found += beside
+                notes += note
+    return Found(tuple(sources), last(lists), last(floors), tuple(notes))
+
+
+def read_beside(path: Path, reading: CameraReading) -> tuple[list[CameraList], list[str]]:
+    """Cameras nobody asked for: at most one list, and a note where they cannot be read."""
+    try:
+        cameras = read_camera_list(path, reading)
+    except BadFile as error:
+        return [], [f"The cameras beside it cannot be read: {error}"]
+    return [cameras], list(cameras.notes)
+
+
+def means_cameras(path: Path) -> bool:
+    """Whether a file or folder is for its cameras rather than a scene."""
+    if path.is_dir():
+        if (path / MANIFEST).exists():
+            return False
+        capture = [path / "transforms.json", path / f"transforms_{SPLITS[0]}.json"]
+        return find_model(path) is not None or any(file.is_file() for file in capture)
+    if path.suffix in (".bin", ".txt"):
+        return path.stem in TABLES
+    return path.suffix.lower() == ".json" and path.is_file() and is_cameras(path)
+
+
+def last(found: list[CameraList]) -> CameraList | None:
+    return found[-1] if found else None
+
+
+class Opener:
+    """One reading at a time, in a thread that the program's end does not wait for."""
+
+    def __init__(self) -> None:
+        self._future: Future | None = None
+        self._paths: tuple[Path, ...] = ()
+        self._next: tuple | None = None
+        self._told = ("", 0.0)
+
+    @property
+    def busy(self) -> bool:
+        return self._future is not None
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        return self._paths
+
+    @property
+    def note(self) -> str:
+        """What is being opened, and how far it is."""
+        names = ", ".join(path.name or str(path) for path in self._paths)
+        what, part = self._told
+        return f"Opening {names} \u2026" + (f" {part:.0%}" if what and part > 0 else "")
+
+    def start(
+        self, paths: tuple[Path, ...], read: Callable[[tuple[Path, ...], Told], Found]
+    ) -> None:
+        """Begins; while another reading is under way, after that one, whose result is forgotten."""
+        if self.busy:
+            self._next = (paths, read)
+            return
+        self._paths, self._told = paths, ("", 0.0)
+        future = self._future = Future()
+
+        def work() -> None:
+            try:
+                future.set_result(read(paths, self._tell))
+            except BaseException as error:  # handed to the window's thread, which raises it again
+                future.set_exception(error)
+
+        threading.Thread(target=work, name="opening", daemon=True).start()
+
+    def poll(self) -> Found | None:
+        """The result, once; raises what the reading raised."""
+        if self._future is None or not self._future.done():
+            return None
+        future, self._future = self._future, None
+        if self._next is not None:
+            wanted, self._next = self._next, None
+            self.start(*wanted)
+            return None
+        return future.result()
+
+    def _tell(self, what: str, part: float) -> None:
+        self._told = (what, part)

@@ -1,0 +1,45 @@
+"""Paths as desktops and shells hand them over: file:// addresses, a leading ~."""
+
+import os
+import sys
+from pathlib import Path
+from urllib.parse import unquote
+
+SCHEME = "file:"
+
+
+def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
+    """The path that a text means; what is neither an address nor begins with ~ stays as it is."""
+    if text.lower().startswith(SCHEME):
+        rest = text[len(SCHEME) :]
+        if rest.startswith("//"):  # file://host/path: of this machine, whatever it is called
+            host, slash, path = rest[2:].partition("/")
+            rest = slash + path if slash else host
+        rest = unquote(rest)
+        drive = rest[1:3]
+        return rest[1:] if windows and len(drive) == 2 and drive[1] == ":" else rest
+    if text == "~" or text.startswith(("~/", "~" + os.sep)):
+        return os.path.expanduser(text)
+    return text
+
+
+def plain(path: Path | str) -> Path:
+    """The same as a Path; a Path of an address has lost one of its slashes."""
+    return Path(plain_path(str(path)))
+
+
+def config_folder(environment: dict[str, str] | None = None, platform: str = sys.platform) -> Path:
+    """Where this platform keeps settings of a program; the folder need not be there.
+
+    XDG_CONFIG_HOME or ~/.config on Linux, %APPDATA% on Windows, ~/Library on macOS.
+    """
+    environment = dict(os.environ) if environment is None else environment
+    if platform == "win32":
+        base = environment.get("APPDATA") or os.path.expanduser("~/AppData/Roaming")
+    elif platform == "darwin":
+        base = os.path.expanduser("~/Library/Application Support")
+    else:
+        base = environment.get("XDG_CONFIG_HOME", "")
+        if not os.path.isabs(base):  # the XDG rule: a relative one counts as unset
+            base = os.path.expanduser("~/.config")
+    return Path(base) / "shapeshift"
