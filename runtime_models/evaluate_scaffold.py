@@ -16,6 +16,7 @@ from runtime_models.write_onnx import write_onnx
 
 BANKS = (4, 2, 1)  # every 4th feature, every 2nd, all of them: mixed by the bank's three weights
 WIDTHS = {"direction": 3, "distance": 1, "level": 1}  # inputs; "feature" is as wide as the model's
+Rows = np.ndarray | slice  # all anchors as a slice: nothing is copied
 
 
 def drawn_anchors(octree: Octree, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +56,7 @@ class Look:
     """What one eye sees: the anchors that show something, and every splat's opacity."""
 
     eye: tuple
-    rows: np.ndarray  # (n,) anchors of which a splat is there
+    rows: Rows  # (n,) anchors of which a splat is there
     parts: dict[str, np.ndarray]  # "direction" (n, 3), "distance" (n, 1), "feature" where mixed
     opacity: np.ndarray  # (A, k), not above 0 = absent
 
@@ -65,10 +66,12 @@ class ScaffoldEvaluator:
 
     Where features are not mixed by the view, what they give the first layers is kept: 3 * hidden
     floats an anchor.  Scale, rotation and colour run for anchors alone of which a splat is there.
+    keep: geometry() writes into the same arrays again; what it gave before is gone.
     """
 
-    def __init__(self, model: ScaffoldModel, threads: int = 1) -> None:
-        self.model = model
+    def __init__(self, model: ScaffoldModel, threads: int = 1, keep: bool = False) -> None:
+        self.model, self._keep = model, keep
+        self._kept: tuple[np.ndarray, np.ndarray] | None = None
         fixed = {} if model.octree is None else {"level": model.octree.level[:, None]}
         widths = WIDTHS | {"feature": model.features.shape[1]}
         bank = model.networks.get("bank")
@@ -97,7 +100,7 @@ class ScaffoldEvaluator:
     def _look_from(self, eye: np.ndarray) -> Look:
         model = self.model
         opacity = np.full((len(model.anchors), model.splats_per_anchor), -1, np.float32)
-        rows, shown = np.arange(len(model.anchors)), None
+        rows, shown = slice(None), None
         if model.octree is not None:
             drawn, part = drawn_anchors(model.octree, eye)
             rows = np.flatnonzero(drawn)
@@ -109,10 +112,11 @@ class ScaffoldEvaluator:
         opacity[rows] = found
         there = (found > 0).any(axis=1)
         if not there.all():
-            rows, parts = rows[there], {name: part[there] for name, part in parts.items()}
+            rows = np.flatnonzero(there) if isinstance(rows, slice) else rows[there]
+            parts = {name: part[there] for name, part in parts.items()}
         return Look(tuple(eye), rows, parts, opacity)
 
-    def _parts(self, rows: np.ndarray, eye: np.ndarray) -> dict[str, np.ndarray]:
+    def _parts(self, rows: Rows, eye: np.ndarray) -> dict[str, np.ndarray]:
         """The inputs that depend on the eye, of some anchors."""
         view = views_of(self.model.anchors[rows], eye)
         parts = {"direction": view[:, :3], "distance": view[:, 3:]}
@@ -133,16 +137,25 @@ class ScaffoldEvaluator:
         unit False: quaternions of any length.  Absent splats may have any scale and rotation.
         """
         look, model = self.look(eye), self.model
-        shape = (len(model.anchors), model.splats_per_anchor)
-        scales = np.zeros((*shape, 3), np.float32)
-        wxyz = np.zeros((*shape, 4), np.float32)
-        wxyz[..., 0] = 1
-        out = self._heads["covariance"].run(look.rows, look.parts).reshape(-1, shape[1], 7)
+        scales, wxyz = self._room()
+        out = self._heads["covariance"].run(look.rows, look.parts)
+        out = out.reshape(-1, model.splats_per_anchor, 7)
         scales[look.rows] = model.scales[look.rows, None] * sigmoid(out[..., :3])
         wxyz[look.rows] = out[..., 3:]
         wxyz = wxyz.reshape(-1, 4)
         wxyz = normalize(wxyz) if unit else wxyz
         return self._means, scales.reshape(-1, 3), wxyz, look.opacity.reshape(-1)
+
+    def _room(self) -> tuple[np.ndarray, np.ndarray]:
+        """scales (A, k, 3), wxyz (A, k, 4) to be filled; with `keep` the same again."""
+        if self._kept is not None:
+            return self._kept
+        shape = self.model.offsets.shape[:2]
+        scales, wxyz = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 4), np.float32)
+        wxyz[..., 0] = 1
+        if self._keep:
+            self._kept = scales, wxyz
+        return scales, wxyz
 
     def color(self, eye: np.ndarray) -> np.ndarray:
         """(N, 3) display sRGB seen from an eye (3,); of splats that are absent, 0."""
@@ -197,14 +210,15 @@ class Network:
             session = open_session(write_onnx(layer, part), threads)
             self._base = self._base + session.run(["output"], {"input": fixed[part]})[0]
 
-    def run(self, rows: np.ndarray, parts: dict[str, np.ndarray]) -> np.ndarray:
+    def run(self, rows: Rows, parts: dict[str, np.ndarray]) -> np.ndarray:
         """(n, outputs) of some anchors (n,); parts: the inputs that depend on the eye, of these."""
-        out = np.empty((len(rows), self._width_out), np.float32)
-        kept = len(self._base) > 1
-        for start in range(0, len(rows), BATCH):
+        count = len(parts["direction"])
+        out = np.empty((count, self._width_out), np.float32)
+        fixed = self._base if len(self._base) == 1 else self._base[rows]
+        for start in range(0, count, BATCH):
             now = slice(start, start + BATCH)
             columns = np.concatenate([parts[name][now] for name in self._inputs], axis=1)
-            base = self._base[rows[now]] if kept else np.repeat(self._base, len(columns), axis=0)
+            base = np.repeat(fixed, len(columns), axis=0) if len(fixed) == 1 else fixed[now]
             given = {"input": columns, "bias": self._bias, "rows": base}
             out[now] = self._session.run(["output"], given)[0]
         return out
