@@ -85,6 +85,11 @@ class Refiner:
             self._thread = None
         self._finer = queue.Queue(maxsize=1)
 
+    def stop_at(self, model: SplatLayers) -> None:
+        """Reads no finer levels than that of `model`."""
+        self.close()
+        self._level = level_words(model)
+
     def _read(
         self,
         shown: list[tuple[SplatLayers, Iterator[SplatLayers]]],
@@ -138,7 +143,7 @@ def attach_refiner(viewer, refiner: Refiner) -> None:
             viewer.renderer.update(stage.scene)
         except BadFile as error:  # more than the driver holds: the level before stays
             stage.replace_model(index, before)
-            refiner.close()
+            refiner.stop_at(before)
             stage.problem = f"no finer level can be shown: {error}"
         dial = viewer.dial
         dial.wanted = dial.wanted or dial.measuring or dial.choice is not None

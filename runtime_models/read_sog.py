@@ -59,7 +59,7 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
         wxyz=wxyz,
         opacity=opacity,
         sh=sh,
-        file=path.name,
+        file=sog.files.name,
         format=f"SOG v{sog.version}",
         logits=sog.version == 1,
         antialiased=sog.meta.get("model") == "antialiased" or sog.meta.get("antialias") is True,
@@ -134,17 +134,17 @@ def open_sog(path: Path) -> Sog:
     meta = files.meta()
     version = meta.get("version", 1)
     if type(version) is not int or version not in (1, 2):
-        raise BadFile(f"{path.name} is a SOG of version {str(version)[:20]}, known are 1 and 2.")
+        raise BadFile(f"{files.name} is a SOG of version {str(version)[:20]}, known are 1 and 2.")
     means = meta.get("means")
     shape = means.get("shape") if isinstance(means, dict) else None
     count = meta.get("count") if version == 2 else shape[0] if isinstance(shape, list) else None
     if type(count) is not int or count < 1:
-        raise BadFile(f"{path.name} does not say how many splats there are; export it again.")
+        raise BadFile(f"{files.name} does not say how many splats there are; export it again.")
     sog = Sog(files, meta, version, count)
     size = files.bytes_of(sog.file_names())
     if count > size + FREE_SPLATS:
         raise BadFile(
-            f"{path.name} states {count:,} splats, its {size:,} bytes cannot hold them; it is cut "
+            f"{files.name} states {count:,} splats, its {size:,} bytes cannot hold them; it is cut "
             "off or its header is wrong."
         )
     return sog

@@ -26,8 +26,10 @@ class SogFiles:
     """A SOG's folder (or its meta.json) or zip; names that would leave it are refused."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.name = path, path.name
+        self.path, self.name = path, path.name  # the name is for messages
         self.folder = path if path.is_dir() else path.parent if path.name == META else None
+        if path.name == META:
+            self.name = f"{path.parent.name}/{META}"
 
     def meta(self) -> dict:
         """What meta.json says.  Raises BadFile."""
