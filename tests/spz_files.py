@@ -1,0 +1,94 @@
+"""Files of .spz made by hand for the tests, and a reader that takes one splat at a time."""
+
+import gzip
+import math
+import struct
+
+import numpy as np
+
+REST = (0, 3, 8, 15, 24)
+
+
+def random_streams(count: int, version: int, degree: int, seed: int = 0) -> list[bytes]:
+    """Places, alphas, colours, scales, rotations, harmonics with every code in them."""
+    rng = np.random.default_rng(seed)
+    sizes = (9, 1, 3, 3, 4 if version >= 3 else 3, 3 * REST[degree])
+    streams = [rng.integers(0, 256, count * size, np.uint8).tobytes() for size in sizes]
+    if version == 1:
+        streams[0] = rng.normal(size=3 * count).astype("<f2").tobytes()
+    if version >= 3:  # what a writer makes: the largest really is
+        q = rng.normal(size=(count, 4))
+        words = [pack_quaternion(row / np.linalg.norm(row)) for row in q]
+        streams[4] = struct.pack(f"<{count}I", *words)
+    return streams
+
+
+def pack_quaternion(xyzw: np.ndarray) -> int:
+    """The smallest three of one quaternion."""
+    largest = max(range(4), key=lambda i: abs(xyzw[i]))
+    word = largest
+    for i in range(4):
+        if i != largest:
+            negative = (xyzw[i] < 0) != (xyzw[largest] < 0)
+            word = word << 10 | negative << 9 | round(511 * abs(xyzw[i]) * math.sqrt(2))
+    return word
+
+
+def legacy(
+    count: int, version: int, degree: int, streams: list[bytes], bits: int = 12, flags: int = 0,
+    extensions: bytes = b"", raw: bool = False,
+) -> bytes:  # fmt: skip
+    """A file of version 1 to 3."""
+    head = struct.pack("<4sIIBBBB", b"NGSP", version, count, degree, bits, flags, 0)
+    data = head + b"".join(streams) + extensions
+    return data if raw else gzip.compress(data)
+
+
+def modern(
+    count: int, degree: int, streams: list[bytes], bits: int = 12, flags: int = 0,
+    extensions: bytes = b"", version: int = 4,
+) -> bytes:  # fmt: skip
+    """A file of version 4."""
+    import zstandard
+
+    streams = [s for s in streams if s]
+    packed = [zstandard.ZstdCompressor().compress(s) for s in streams]
+    table = 32 + len(extensions)
+    head = struct.pack(
+        "<4sIIBBBBI12x", b"NGSP", version, count, degree, bits, flags, len(streams), table
+    )
+    rows = b"".join(
+        struct.pack("<QQ", len(p), len(s)) for p, s in zip(packed, streams, strict=True)
+    )
+    return head + extensions + rows + b"".join(packed)
+
+
+def splat_by_hand(streams: list[bytes], i: int, version: int, degree: int, bits: int) -> dict:
+    """Splat i in plain Python numbers."""
+    places, alphas, colors, scales, rotations, rest = streams
+    if version == 1:
+        mean = struct.unpack_from("<3e", places, 6 * i)
+    else:
+        at = [9 * i + 3 * k for k in range(3)]
+        codes = [int.from_bytes(places[a : a + 3], "little", signed=True) for a in at]
+        mean = [code / 2**bits for code in codes]
+    if version >= 3:
+        (word,) = struct.unpack_from("<I", rotations, 4 * i)
+        largest, xyzw = word >> 30, [0.0] * 4
+        for k in (3, 2, 1, 0):
+            if k != largest:
+                xyzw[k] = (word & 511) / 511 / math.sqrt(2) * (-1 if word & 512 else 1)
+                word >>= 10
+        xyzw[largest] = math.sqrt(max(0, 1 - sum(v * v for v in xyzw)))
+    else:
+        xyz = [code / 127.5 - 1 for code in rotations[3 * i : 3 * i + 3]]
+        xyzw = [*xyz, math.sqrt(max(0, 1 - sum(v * v for v in xyz)))]
+    size = 3 * REST[degree]
+    return {
+        "means": mean,
+        "scales": [code / 16 - 10 for code in scales[3 * i : 3 * i + 3]],
+        "wxyz": [xyzw[3], *xyzw[:3]],
+        "opacity": alphas[i] / 255,
+        "sh": [(code / 255 - 0.5) / 0.15 for code in colors[3 * i : 3 * i + 3]]
+        + [(code - 128) / 128 for code in rest[size * i : size * (i + 1)]][:45],
+    }
