@@ -20,13 +20,7 @@ from scene.metrics import psnr
 from scene.scene import Scene, SceneObject
 
 ALIKE = 50.0  # dB between our picture and theirs of one file
-COST = {".compressed.ply": 50, ".ply": 140, ".spz": 50, ".glb": 140, ".splat": 44}  # dB to the scene
-    ".compressed.ply": 38,
-    ".ply": 100,
-    ".spz": 38,
-    ".glb": 100,
-    ".splat": 34,
-}  # dB to the scene
+COST = {".compressed.ply": 50, ".ply": 140, ".spz": 50, ".glb": 140, ".splat": 44}  # dB at least
 THEIRS = {".compressed.ply": "compressed.ply", ".ply": "ply", ".spz": "spz", ".splat": "splat"}
 SIZE = (240, 160)
 
