@@ -1,11 +1,13 @@
 """Scaffold-GS folders made by our own code, and their decode by hand, anchor by anchor."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import Mlp
+from runtime_models.evaluate import evaluate
+from runtime_models.model import AnchorModel, Mlp
+from runtime_models.turn import HALF_TURN, turn_quaternions
 from runtime_models.write_onnx import write_onnx
 from tests.torch_files import write_tensors
 
@@ -196,5 +198,47 @@ def forward(layers: Layers, row: list) -> np.ndarray:
     return value
 
 
-def with_rows(raw: Raw, **columns: np.ndarray) -> Raw:
-    return replace(raw, **columns)
+def from_anchors(model: AnchorModel, x: float) -> Raw:
+    """A package's scene at one x as a Scaffold-GS run that shows the same but for 1 % of a scale.
+
+    Psi(x) goes into the biases; the scale network's exp becomes a sigmoid far below its middle,
+    where both are the same.  Its axes are COLMAP's, as a run's are.
+    """
+    heads, k = model.networks, model.splats_per_anchor
+    psi = model.encoding.encode(x).astype(np.float64)
+    opacity, color, scale, rotation = (
+        folded(heads[name], psi) for name in ("opacity", "color", "scale", "rotation")
+    )
+    (w0, b0), (w1, b1) = scale
+    largest = heads["scale"].gain * np.exp(heads["scale"].clip[1])
+    limit = 100 * largest  # metres
+    b1 = b1 + np.log(heads["scale"].gain / limit)
+    (v0, c0), (v1, c1) = rotation
+    v1, c1 = (turn_quaternions(a.reshape(k, 4, -1).transpose(0, 2, 1).reshape(-1, 4), HALF_TURN)
+              .reshape(k, -1, 4).transpose(0, 2, 1) for a in (v1, c1))  # fmt: skip
+    hidden = np.concatenate([w0, v0]), np.concatenate([b0, c0])
+    last = np.zeros((k, 7, len(b0) + len(c0)))
+    last[:, :3, : len(b0)] = w1.reshape(k, 3, -1)
+    last[:, 3:, len(b0) :] = v1
+    bias = np.concatenate([b1.reshape(k, 3), c1[..., 0]], axis=1)
+    means = evaluate(model, x, np.zeros(3)).means.reshape(len(model.anchors), k, 3)
+    features = model.features.shape[1]
+    color[0][0][:, features : features + 3] @= HALF_TURN
+    for one in (opacity, [hidden]):  # they do not look at the direction
+        one[0] = (np.pad(one[0][0], ((0, 0), (0, 3))), one[0][1])
+        hidden = one[0]
+    sizes = np.zeros((len(means), 6))
+    sizes[:, 3:] = np.log(limit)
+    offsets = (means - model.anchors[:, None]) @ HALF_TURN
+    networks = {"opacity_mlp": opacity, "color_mlp": color}
+    networks["cov_mlp"] = [hidden, (last.reshape(7 * k, -1), bias.reshape(-1))]
+    return Raw(model.anchors @ HALF_TURN, offsets, model.features, sizes, networks)
+
+
+def folded(mlp: Mlp, psi: np.ndarray) -> Layers:
+    """The layers of a network for one control value: its columns come last."""
+    first = mlp.weights[0].astype(np.float64)
+    bias = mlp.biases[0] + first[:, -len(psi) :] @ psi
+    rest = [(w.astype(np.float64), b.astype(np.float64))
+            for w, b in zip(mlp.weights[1:], mlp.biases[1:], strict=True)]  # fmt: skip
+    return [(first[:, : -len(psi)].copy(), bias), *rest]

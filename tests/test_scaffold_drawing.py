@@ -1,0 +1,156 @@
+"""A Scaffold-GS scene on its way to the picture: what is decoded when, and equal to the oracle."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rasterizer.device import NoDevice
+from renderer.reference import reference_image
+from renderer.renderer import Renderer
+from renderer.settings import RenderSettings
+from runtime_models.evaluate import evaluate
+from runtime_models.read_scene import read_model
+from scene.control import control_of
+from scene.framing import default_view, model_points
+from scene.pick import Picker, anchor_places
+from scene.pose import Pose, View, look_at, perspective
+from scene.scene import IDENTITY, Scene, SceneObject
+from scene.selector import Painted
+from scene.stereo import stereo_pair
+from tests.scaffold_scenes import from_anchors, random_raw, write_run
+from tests.splat_scenes import psnr_db, random_layers
+
+SIZE = (160, 100)
+TURNED = Pose(np.array([0.3, -0.2, 0.4]), np.array([0.8, 0.0, 0.6, 0.0]))
+CASES = {
+    "plain": {"anchors": 60},
+    "all inputs": {"anchors": 60, "bank": True, "distance": True, "appearance": 4},
+    "octree": {"anchors": 120, "levels": 4},
+}
+
+
+def made(folder: Path, **how):
+    """A scene a metre across."""
+    raw = random_raw(**how)
+    raw = replace(raw, anchors=raw.anchors / 3, log_scales=raw.log_scales - 0.7)
+    return read_model(write_run(raw, folder))
+
+
+def seen_from(*eye: float) -> View:
+    return View(look_at(eye, (0, 0, 0)), perspective(0.8, SIZE), 0.05, 50.0, SIZE)
+
+
+def in_scene(model, pose: Pose = IDENTITY, **how) -> Scene:
+    return Scene((SceneObject("scaffold", model, pose, **how),))
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    try:
+        with Renderer(None) as opened:
+            yield opened
+    except NoDevice as reason:
+        pytest.skip(str(reason))
+
+
+def draw(renderer: Renderer, scene: Scene, views: list[View], **settings):
+    renderer.settings = RenderSettings(**settings)
+    renderer.update(scene)
+    stats = renderer.draw(views)
+    return [renderer.image(i).copy() for i in range(len(views))], stats
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_tiles_are_the_oracle_from_every_eye(renderer, tmp_path, case):
+    scene = in_scene(made(tmp_path, **CASES[case]), TURNED)
+    pictures = []
+    for eye in ((0, 0.3, 3), (2.5, 0, -1), (0.2, 0.1, 0.9)):
+        (image,), stats = draw(renderer, scene, [seen_from(*eye)])
+        assert psnr_db(image, reference_image(scene, seen_from(*eye))) > 80
+        assert stats.drawn > 20
+        pictures.append(image)
+    assert psnr_db(pictures[0], pictures[1]) < 40
+
+
+def test_beside_other_objects_in_one_order(renderer, tmp_path):
+    one = made(tmp_path / "a", anchors=40)
+    both = Scene((
+        SceneObject("scaffold", one, TURNED), SceneObject("layers", random_layers(200, seed=1)),
+        SceneObject("again", one, Pose(np.array([-0.4, 0, 0]), np.array([1.0, 0, 0, 0]))),
+    ))  # fmt: skip
+    view = seen_from(0, 0.3, 3)
+    (image,), stats = draw(renderer, both, [view])
+    assert psnr_db(image, reference_image(both, view)) > 80
+    assert stats.geometry_runs == 3
+
+
+def test_both_eyes_are_decoded_once_for_their_middle(renderer, tmp_path):
+    scene, view = in_scene(made(tmp_path, anchors=60)), seen_from(0.3, 0.3, 2)
+    pair = stereo_pair(view, 0.064)
+    images, stats = draw(renderer, scene, pair)
+    assert (stats.geometry_runs, stats.color_runs) == (1, 1)
+    for image, eye in zip(images, pair, strict=True):
+        middle = reference_image(scene, eye, eye=view.world_from_eye.position)
+        assert psnr_db(image, middle) > 80
+
+
+def test_decoded_again_only_when_the_eye_moves_far_enough(renderer, tmp_path):
+    scene = in_scene(made(tmp_path, anchors=60))
+    far = [seen_from(3 * np.sin(a), 0.2, 3 * np.cos(a)) for a in np.radians([0, 1, 3.5, 3.5])]
+    runs = [draw(renderer, scene, [view])[1].geometry_runs for view in far]
+    assert runs == [1, 1, 1, 0]
+    runs, images = [], []
+    draw(renderer, Scene(()), [far[0]])
+    for view in far:
+        (image,), stats = draw(renderer, scene, [view], recolor_degrees=2.0)
+        runs.append((stats.geometry_runs, stats.color_runs))
+        images.append(image)
+    assert runs == [(1, 1), (0, 0), (1, 1), (0, 0)]
+    # Kept: the splats are those of the first eye, not of its own.
+    kept = reference_image(scene, far[1], eye=far[0].world_from_eye.position)
+    assert psnr_db(images[1], kept) > 80 > psnr_db(images[1], reference_image(scene, far[1]))
+    assert psnr_db(images[2], reference_image(scene, far[2])) > 80
+
+
+def test_the_slider_decodes_nothing(renderer, tmp_path):
+    model, view = made(tmp_path, anchors=60), seen_from(0, 0.2, 3)
+    draw(renderer, in_scene(model), [view])
+    (image,), stats = draw(renderer, in_scene(model, x=0.7), [view])
+    assert stats.geometry_runs == 0
+    part = Painted.of(range(10), 60, 1.0)
+    assert control_of(SceneObject("s", model, selectors=(part,))).shape == (60,)
+    selected = in_scene(model, selectors=(part,))
+    (same,), stats = draw(renderer, selected, [view], skip_unseen=True)
+    assert stats.geometry_runs == 0
+    assert np.array_equal(image, same)
+
+
+def test_a_packages_scene_as_a_run_shows_the_same(renderer, tmp_path):
+    """The bundled demo, converted to a Scaffold-GS run at x = 0: at least 60 dB."""
+    demo = read_model(Path(__file__).resolve().parents[1] / "assets" / "workshop.shift")
+    run = read_model(write_run(from_anchors(demo, 0.0), tmp_path / "run", "split"))
+    view = default_view(demo, (320, 180))
+    (image,), _ = draw(renderer, in_scene(demo), [view])
+    (same,), _ = draw(renderer, in_scene(run), [view])
+    assert psnr_db(same, image) > 60
+
+
+def test_framing_and_picking(tmp_path):
+    model = made(tmp_path, anchors=60)
+    assert np.array_equal(anchor_places(model), model.anchors)
+    assert len(model_points(model)[0]) == 60
+    scene, picker = in_scene(model, TURNED), Picker()
+    eye = np.array([0.0, 0.2, 3.0])
+    hit = picker.under(scene, eye, TURNED.position - eye)
+    assert hit is not None
+    assert 1 < hit.depth < 4
+    object_from_world = np.linalg.inv(TURNED.matrix())
+    there = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
+    assert np.array_equal(picker._decoded[0].opacity, evaluate(model, 0.0, there).opacity)
+    first = picker._decoded[0]
+    picker.under(scene, eye, np.array([0.1, 0, -1.0]))
+    assert picker._decoded[0] is first
+    picker.under(scene, -eye, np.array([0.1, 0, 1.0]))
+    assert picker._decoded[0] is not first
