@@ -13,8 +13,20 @@ OCTREE_RULES = ("round", "floor", "ceil", "progressive")
 STOP_KINDS = ("rgb", "thermal", "layer", "style")
 
 
+def one_line(text: str) -> str:
+    """The text with whatever is no letter or sign written out, as \\n: for words out of files."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
 class BadFile(ValueError):
-    """A file cannot be used.  The message says what was found, what was wanted and what to do."""
+    """A file cannot be used.  The message says what was found, what was wanted and what to do.
+
+    It is one line and ends as a sentence does, whatever a file's own words in it are.
+    """
+
+    def __init__(self, sentence: str) -> None:
+        line = one_line(sentence)
+        super().__init__(line if line.endswith((".", "!", "?")) else line + ".")
 
 
 @dataclass(frozen=True)

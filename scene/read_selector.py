@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from runtime_models.model import Stop
+from runtime_models.model import Stop, one_line
 from scene.pose import Pose
 from scene.selector import Box, HalfSpace, Lens, Selector, Sphere
 
@@ -23,6 +23,7 @@ def read_selector(text: str, stops: Sequence[Stop] = (), eye: Pose | None = None
     X is a control value from 0 to 1 or the name of a stop; places are metres in the object's
     frame.  A lens is the cone about what `eye` looks at, half its opening in degrees.
     """
+    text = one_line(text)
     kind, *parts = text.split(":")
     if kind not in FORMS:
         raise ValueError(f"'{text}' begins with '{kind}'; {', '.join(FORMS)} are known.")
