@@ -5,8 +5,11 @@ import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from app.opened import Source
 from app.opening import ReadingOptions, open_model
+from app.stage import Stage
 from runtime_models.model import BadFile, Model, SplatLayers
+from runtime_models.read_scene import describe
 from runtime_models.read_streamed import is_streamed, levels
 
 POLL_S = 0.05  # how often a waiting reader looks whether it is still wanted
@@ -138,11 +141,11 @@ def attach_refiner(viewer, refiner: Refiner) -> None:
         return refiner.running
 
     def show(index: int, before: Model, after: Model) -> None:
-        stage.replace_model(index, after)
+        place(stage, index, after)
         try:
             viewer.renderer.update(stage.scene)
         except BadFile as error:  # more than the driver holds: the level before stays
-            stage.replace_model(index, before)
+            place(stage, index, before)
             refiner.stop_at(before)
             stage.problem = f"no finer level can be shown: {error}"
         dial = viewer.dial
@@ -156,3 +159,11 @@ def attach_refiner(viewer, refiner: Refiner) -> None:
     viewer.hooks.opened.append(follow)
     viewer.hooks.status.append(lambda: refiner.status)
     follow()
+
+
+def place(stage: Stage, index: int, model: SplatLayers) -> None:
+    """Another level for one of the stage's objects, with the facts that the status line tells."""
+    stage.replace_model(index, model)
+    path = stage.sources[index].path
+    source = Source(path, model, describe(model, path))
+    stage.sources = (*stage.sources[:index], source, *stage.sources[index + 1 :])

@@ -90,6 +90,9 @@ def test_the_coarsest_level_is_there_at_once_and_finer_ones_follow(scene):
         assert stage.scene.objects[0].x == 0.25 and stage.scene.objects[0].name == "scene"
         after = (stage.centre, stage.radius, stage.settings, stage.sweeps, stage.palette)
         assert np.array_equal(before[0], after[0]) and before[1:] == after[1:]
+        [source] = stage.sources
+        assert source.path == scene and source.facts["splats"] == 400
+        assert source.model is stage.scene.objects[0].model and stage.findings == []
         assert viewer.renderer.drawn == [20, 150, 400] and viewer.dial.forgotten == 2
 
 
