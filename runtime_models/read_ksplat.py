@@ -178,7 +178,7 @@ def centers_of(data: bytes, header: Header, section: Section) -> np.ndarray:
     splat = np.arange(section.count)
     bucket = np.searchsorted(last, splat, side="right") + section.full
     if section.full:
-        bucket = np.where(splat < whole, splat // section.bucket_size, bucket)
+        bucket = np.where(splat < whole, splat // max(section.bucket_size, 1), bucket)
     return centers[bucket]
 
 
