@@ -13,6 +13,7 @@ from app.controls import SMOOTH_S
 from app.dial import FLOOR_DB, TARGET_MS, Dial
 from app.drawing import parse_size
 from app.errors import UsageError
+from app.export_panel import attach_export
 from app.files import Files, first_camera, home_of, named_cameras, read_wanted
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
@@ -139,6 +140,7 @@ class Viewer:
         self.kept = KeptViews(options.pictures)
         self.files = Files(self)
         attach_cameras(self)
+        attach_export(self)
         self.shown = Shown(renderer, self.readings)
         self.dial = Dial(
             options.target_ms or TARGET_MS,

@@ -48,6 +48,7 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from app.errors import UsageError
     from app.exported import Look, check_output, export, is_folder
+    from app.stage import origin_of
     from runtime_models.write_plain import writer_of
 
     scenes = choose_scenes(options)
@@ -61,8 +62,12 @@ def run(options: Options) -> int:
     models = [open_model(path, options) for path in scenes]
     if package:
         return export_package(options, models)
-    parts = [make_part(path, model, options) for path, model in zip(scenes, models, strict=True)]
-    look = Look(options.sh_degree, options.palette, eye)
+    origin = origin_of(models[0])
+    parts = [
+        make_part(path, model, origin_of(model) - origin, options)
+        for path, model in zip(scenes, models, strict=True)
+    ]
+    look = Look(options.sh_degree, options.palette, eye, tuple(origin))
     with progress_after(PATIENCE_S) as told:
         splats = export(parts, look, options.out, told)
     for finding in splats.findings:
@@ -107,25 +112,29 @@ def parse_eye(text: str) -> tuple[float, float, float] | None:
     return numbers
 
 
-def make_part(path: Path, model, options: Options):
-    """What the options say about one scene: its x, its regions, what of it is written."""
+def make_part(path: Path, model, position, options: Options):
+    """What the options say about one scene, which stands at position (3,) in metres: its x, its
+    regions, what of it is written.
+    """
     from app.errors import UsageError
     from app.exported import Part
     from scene.framing import default_view
+    from scene.pose import Pose
     from scene.read_selector import read_selector
-    from scene.scene import SceneObject
+    from scene.scene import IDENTITY, SceneObject
 
     x = choose_x(options.x, model)
-    pose = default_view(model, (640, 360)).world_from_eye
+    eye = default_view(model, (640, 360)).world_from_eye
     try:
-        selectors = tuple(read_selector(text, model.stops, pose) for text in options.select)
+        selectors = tuple(read_selector(text, model.stops, eye) for text in options.select)
     except ValueError as error:
         raise UsageError(f"--select {error}") from None
     try:
-        inside = tuple(read_selector(with_x(text), (), pose) for text in options.only)
+        inside = tuple(read_selector(with_x(text), (), eye) for text in options.only)
     except ValueError as error:
         raise UsageError(f"--only {error}") from None
-    thing = SceneObject(path.stem or path.name, model, x=x, selectors=selectors)
+    pose = Pose(position, IDENTITY.wxyz)
+    thing = SceneObject(path.stem or path.name, model, pose, x, selectors=selectors)
     return Part(thing, inside or None, options.label)
 
 

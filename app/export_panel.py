@@ -123,7 +123,7 @@ class ExportPanel:
         parts, viewer = self.parts(), self._viewer
         seen = any(follows_eye(part.thing.model) for part in parts)
         eye = tuple(map(float, viewer.view().world_from_eye.position)) if seen else None
-        look = Look(self.sh_degree, self.palette, eye)
+        look = Look(self.sh_degree, self.palette, eye, tuple(viewer.stage.origin))
         try:
             self._path = claim_name(viewer.options.pictures.parent / FOLDER, parts, self.ending)
         except (OSError, UsageError) as error:

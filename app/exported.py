@@ -39,6 +39,8 @@ class Look:
     sh_degree: int = 3  # at most
     palette: bool = True  # thermal stops in their false colours, as they are shown
     eye: tuple[float, float, float] | None = None  # world metres, None: the first view's
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # float64 metres: where the files have
+    #                                       the world's zero; far ones are shown nearer to it
 
 
 def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
@@ -54,6 +56,7 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
         baked.append(bake_part(part, look))
     told(f"writing {path.name}", len(parts) / (len(parts) + 1))
     splats = cut(merged(baked), look.sh_degree)
+    splats = replace(splats, origin=tuple(map(float, np.add(splats.origin, look.origin))))
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         writer.write(splats, path)
@@ -71,7 +74,8 @@ def bake_part(part: Part, look: Look) -> PlainSplats:
     splats = bake(thing.model, x, eye, look.sh_degree, recolor, chosen_rows(part))
     named = [replace(finding, file=thing.name) for finding in (*splats.findings, *said)]
     pose = thing.world_from_object
-    splats = replace(splats, findings=tuple(named))
+    # Where a model's own zero lies in its file is in the pose already.
+    splats = replace(splats, findings=tuple(named), origin=(0.0, 0.0, 0.0))
     return placed(splats, pose.matrix()[:3, :3], pose.position)
 
 

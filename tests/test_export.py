@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from app import cli
 from runtime_models.formats import read_plain
+from runtime_models.plain_splats import Reading
+from runtime_models.read_gltf import read_raw_gltf
 from runtime_models.read_scene import read_model
 from runtime_models.write_package import write_package
 from runtime_models.write_plain import WRITERS
@@ -98,9 +101,25 @@ def test_several_scenes_and_one_of_them(scenes, tmp_path):
     assert merged.sh.shape[1] == 16 and not merged.sh[40:, 4:].any()
 
 
-def test_a_label(scenes, tmp_path, capsys, monkeypatch):
-    from dataclasses import replace
+def test_far_places_come_back(scenes, tmp_path, monkeypatch):
+    """Two files millions of metres from zero, three metres apart, stand so in one file."""
+    near = read_model(scenes / "plain.ply")
+    places = {"one.ply": (4e6, 1e6, -3e6), "two.ply": (4e6 + 3, 1e6, -3e6)}
+    monkeypatch.setattr(
+        "app.export.open_model", lambda path, options: replace(near, origin=places[path.name])
+    )
+    both = (tmp_path / "one.ply", tmp_path / "two.ply")
+    for path in both:
+        path.touch()
+    assert export(*both, "--out", tmp_path / "both.glb") == 0
+    assert export(*both, "--object", 2, "--out", tmp_path / "two.glb") == 0
+    found = [read_raw_gltf(tmp_path / name, Reading()).means for name in ("both.glb", "two.glb")]
+    wanted = [near.means + np.array(place) for place in places.values()]
+    np.testing.assert_allclose(found[0], np.concatenate(wanted), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(found[1], wanted[1], rtol=0, atol=1e-6)
 
+
+def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     model = read_model(scenes / "plain.ply")
     labelled = replace(model, labels=np.arange(40, dtype=np.int32) % 3)
     monkeypatch.setattr("app.export.open_model", lambda path, options: labelled)
