@@ -63,7 +63,7 @@ def join_layers(
     origin, antialiased = parts[0].origin, any(part.antialiased for part in parts)
     findings = tuple(finding for part in parts for finding in part.findings)
     width = max(part.sh.shape[1] for part in parts)  # files of a lower degree get zeros
-    pieces = [vars(part).copy() for part in parts]
+    pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
     parts.clear()
     shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
     means = [moved(piece.pop("means"), shift) for piece, shift in zip(pieces, shifts, strict=True)]

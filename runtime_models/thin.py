@@ -8,7 +8,8 @@ from runtime_models.model import Finding, SplatLayers
 from runtime_models.morton import morton_order
 
 ROWS = ("means", "scales", "wxyz", "opacity", "sh", "layer", "labels")  # of SplatLayers
-LEAST = 1e-6  # of the largest weight: what shows nothing is not nothing, or sums would be zero
+LEAST = 1e-9  # of the least weight: what shows nothing goes first, but sums are never zero
+PHASE = 0.618  # of 0..1: equal weights do not add up to just this
 NEARLY_SURE = 0.999  # chance from which a splat stays for certain
 
 
@@ -49,8 +50,8 @@ def evenly(weights: np.ndarray, order: np.ndarray, count: int) -> np.ndarray:
     No dice: the chances are added up on the way, and who makes the sum pass another whole number
     stays (systematic sampling).  The same input gives the same rows; count <= N.
     """
-    weights = np.maximum(weights, LEAST * weights.max())
-    weights = weights if weights.any() else np.ones_like(weights)
+    shows = weights > 0
+    weights = np.where(shows, weights, LEAST * weights[shows].min() if shows.any() else 1.0)
     by_weight = np.argsort(-weights, kind="stable")
     certain = certain_ones(weights[by_weight], count)
     kept = np.zeros(len(weights), bool)
@@ -60,7 +61,7 @@ def evenly(weights: np.ndarray, order: np.ndarray, count: int) -> np.ndarray:
         sums = np.cumsum(weights[others])
         sums *= (count - certain) / sums[-1]
         sums[-1] = count - certain
-        kept[others[np.diff(np.floor(sums + 0.5), prepend=0) > 0]] = True
+        kept[others[np.diff(np.floor(sums + PHASE), prepend=0) > 0]] = True
     return np.flatnonzero(kept)
 
 
