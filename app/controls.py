@@ -19,15 +19,20 @@ STILL = 2e-4  # radians, or scene radii: less is not seen, the camera counts as 
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 
-# A camera is six numbers, so that its goal, and how far the picture lags behind, can be subtracted.
-ANCHOR, YAW, PITCH, LOG_DISTANCE = slice(0, 3), 3, 4, 5
+# A camera is seven numbers, so that its goal, and how far the picture lags behind, can be
+# subtracted.  Roll comes to rest level: at 0, or upside down where a camera of a file stood so.
+ANCHOR, YAW, PITCH, LOG_DISTANCE, ROLL = slice(0, 3), 3, 4, 5, 6
 
 
-def axes_of(yaw: float, pitch: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def axes_of(
+    yaw: float, pitch: float, roll: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Right, up and forward (3,) of an eye; yaw 0 looks along -Z, positive turns to the left."""
     right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
     forward = np.array([-np.sin(yaw) * np.cos(pitch), np.sin(pitch), -np.cos(yaw) * np.cos(pitch)])
-    return right, np.cross(right, forward), forward
+    up = np.cross(right, forward)
+    cosine, sine = np.cos(roll), np.sin(roll)
+    return cosine * right + sine * up, cosine * up - sine * right, forward
 
 
 @dataclass(frozen=True)
@@ -54,8 +59,8 @@ class Camera:
     def __init__(self, view: View, centre: np.ndarray, radius: float) -> None:
         self.flying = False
         self._home = (view, np.asarray(centre, np.float64), radius)
-        self._goal = np.zeros(6)
-        self._lag = np.zeros(6)  # goal - shown
+        self._goal = np.zeros(7)
+        self._lag = np.zeros(7)  # goal - shown
         self._velocity = np.zeros(3)  # metres a second
         self.radius = radius
         self.fov_y = FOV_Y
@@ -77,6 +82,11 @@ class Camera:
         return float(np.exp(self._goal[LOG_DISTANCE]))
 
     @property
+    def _upright(self) -> float:
+        """1, or -1 where the eye rests upside down and hands mean the other way round."""
+        return 1.0 if np.cos(self._goal[ROLL]) >= 0 else -1.0
+
+    @property
     def moving(self) -> bool:
         """False when another `step` without input would change nothing that can be seen."""
         metres = np.abs(np.r_[self._lag[ANCHOR], self._velocity * BRAKE_S]).max()
@@ -89,7 +99,7 @@ class Camera:
         that nothing covers, with the line of sight in its middle; around it more can be seen.
         """
         shown = self._goal - self._lag
-        right, up, forward = axes_of(shown[YAW], shown[PITCH])
+        right, up, forward = axes_of(shown[YAW], shown[PITCH], shown[ROLL])
         world_from_eye = np.eye(4)
         world_from_eye[:3, :3] = np.stack([right, up, -forward], axis=1)
         world_from_eye[:3, 3] = self._eye(shown)
@@ -101,14 +111,14 @@ class Camera:
     def turn(self, yaw: float, pitch: float) -> None:
         """Orbits around the anchor, or looks about when flying, by radians."""
         goal = self._goal.copy()
-        goal[YAW] += yaw
-        goal[PITCH] = np.clip(goal[PITCH] + pitch, -POLE, POLE)
+        goal[YAW] += self._upright * yaw
+        goal[PITCH] = np.clip(goal[PITCH] + self._upright * pitch, -POLE, POLE)
         self._move_to(goal)
 
     def pan(self, right: float, up: float) -> None:
         """Shifts eye and anchor by parts of the picture's height, measured at the anchor."""
         metres = 2 * np.tan(self.fov_y / 2) * self.distance
-        axis_right, axis_up, _ = axes_of(*self._goal[3:5])
+        axis_right, axis_up, _ = axes_of(*self._goal[3:5], self._goal[ROLL])
         goal = self._goal.copy()
         goal[ANCHOR] += metres * (right * axis_right + up * axis_up)
         self._move_to(goal)
@@ -124,8 +134,9 @@ class Camera:
 
     def step(self, seconds: float, push: Push = Push()) -> None:
         """Lets time pass: the keys move the camera, the picture catches up with its goal."""
-        right, _, forward = axes_of(*self._goal[3:5])
-        wanted = push.right * right + push.up * np.array([0, 1.0, 0]) + push.forward * forward
+        right, _, forward = axes_of(*self._goal[3:5], self._goal[ROLL])
+        up = np.array([0, self._upright, 0])
+        wanted = push.right * right + push.up * up + push.forward * forward
         length = np.linalg.norm(wanted)
         if length > 0:
             wanted *= SPEED_RADII * self.radius * push.pace / length
@@ -165,23 +176,27 @@ class Camera:
 
     def frame(self, centre: np.ndarray, distance: float) -> None:
         """Looks at the centre (3,) from that many metres, in the same direction as before."""
-        self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance)
+        self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance, self._goal[ROLL])
 
     def stand(self, pose: Pose, fov_y: float) -> None:
-        """Stands at a pose at once, level and with that field of view; the orbit's reach stays."""
-        eye, forward = np.asarray(pose.position, np.float64), -pose.matrix()[:3, 2]
+        """Stands at a pose at once, then turns level; the orbit goes around what it sees there."""
+        axes = pose.matrix()[:3, :3]
+        eye, forward = np.asarray(pose.position, np.float64), -axes[:, 2]
         yaw = np.arctan2(-forward[0], -forward[2])
         pitch = np.clip(np.arcsin(np.clip(forward[1], -1, 1)), -POLE, POLE)
         distance = float((self._home[1] - eye) @ forward)
         if not distance > MIN_RADII * self.radius:  # the scene lies behind or around the eye
             distance = self.radius
+        right, up, ahead = axes_of(yaw, pitch)
+        roll = float(np.arctan2(-axes[:, 1] @ right, axes[:, 1] @ up))
+        level = 0.0 if abs(roll) <= np.pi / 2 else float(np.copysign(np.pi, roll))
         self.fov_y = fov_y
-        level = axes_of(yaw, pitch)[2]
-        # The reach is bounded, so the eye is set last: it must not move.
         log_distance = self._bounded(np.log(distance))
-        anchor = eye if self.flying else eye + np.exp(log_distance) * level
-        self._goal = np.r_[anchor, yaw, pitch, log_distance]
+        # The reach is bounded, so the anchor follows from it: the eye must not move.
+        anchor = eye if self.flying else eye + np.exp(log_distance) * ahead
+        self._goal = np.r_[anchor, yaw, pitch, log_distance, level]
         self._lag[:] = 0
+        self._lag[ROLL] = level - roll
         self._velocity[:] = 0
 
     def reset(self) -> None:
@@ -198,10 +213,12 @@ class Camera:
             distance = radius
         self._stand(eye + distance * forward, yaw, pitch, distance)
 
-    def _stand(self, target: np.ndarray, yaw: float, pitch: float, distance: float) -> None:
+    def _stand(
+        self, target: np.ndarray, yaw: float, pitch: float, distance: float, roll: float = 0.0
+    ) -> None:
         """Sets the goal from orbit's terms, whichever mode is on."""
         anchor = target - self.flying * distance * axes_of(yaw, pitch)[2]
-        self._move_to(np.r_[anchor, yaw, pitch, self._bounded(np.log(distance))])
+        self._move_to(np.r_[anchor, yaw, pitch, self._bounded(np.log(distance)), roll])
 
     def _reanchor(self, distance: float) -> None:
         """Slides the orbit's anchor along the line of sight; eye and picture stay."""
