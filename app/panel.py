@@ -149,13 +149,13 @@ def draw_problem(stage: Stage, ui_scale: float) -> None:
     """The message box of a file that could not be opened; the scene stays as it was."""
     if not stage.problem:
         return
-    if not imgui.is_popup_open("Not opened"):
-        imgui.open_popup("Not opened")
+    if not imgui.is_popup_open("A problem"):
+        imgui.open_popup("A problem")
     screen = imgui.get_io().display_size
     imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
     imgui.set_next_window_size(Vec(min(460 * ui_scale, screen.x * 0.9), 0))
     flags = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_saved_settings
-    if imgui.begin_popup_modal("Not opened", None, flags)[0]:
+    if imgui.begin_popup_modal("A problem", None, flags)[0]:
         imgui.push_text_wrap_pos(0)
         imgui.text_unformatted(stage.problem)
         imgui.pop_text_wrap_pos()

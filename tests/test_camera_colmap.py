@@ -149,7 +149,7 @@ def test_a_model_is_named_by_folder_or_by_any_of_its_files(tmp_path):
     for path in (tmp_path, *tmp_path.glob("*.txt")):
         assert read_camera_list(path).names == ("a b.png",)
     (tmp_path / "cameras.txt").unlink()
-    with pytest.raises(BadFile, match="cameras.txt is missing"):
+    with pytest.raises(BadFile, match=r"cameras\.txt is missing"):
         read_camera_list(tmp_path / "images.txt")
     (tmp_path / "cameras.txt").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(BadFile, match="not text"):
