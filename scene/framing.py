@@ -17,6 +17,7 @@ FAR_RADII = 200.0
 NEAR_RADII = 0.01
 RAY_POINTS = 24
 RAY_REACH = 0.05  # tangent of the angle up to which a point can be meant by a ray
+SMALLEST_RADIUS, SMALLEST_PART = 1e-30, 1e-9  # metres; of how far from zero the centre is
 FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
 
 
@@ -32,7 +33,9 @@ def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, fl
     low, high = np.percentile(points, PERCENTILES, axis=0)
     centre = (low + high) / 2
     radius = float(np.percentile(np.linalg.norm(points - centre, axis=1), PERCENTILES[1]))
-    return centre, radius if radius > 0 else FALLBACK_RADIUS
+    # beside its place a smaller one is lost in rounding: the eye would lie in what it looks at
+    least = max(SMALLEST_PART * float(np.abs(centre).max()), SMALLEST_RADIUS)
+    return centre, radius if radius > least else FALLBACK_RADIUS
 
 
 def _seen(means: np.ndarray, opacity: np.ndarray) -> np.ndarray:
@@ -152,6 +155,8 @@ def framing_view(means: np.ndarray, opacity: np.ndarray, size: tuple[int, int]) 
     view = orbit_path(1, centre, radius, size, start=start)[0]
     axes = view.world_from_eye.matrix()
     distance = fit_points(means, opacity, centre, axes, view.tangents)
+    if not distance > NEAR_RADII * radius:  # all in one place
+        distance = fit_distance(radius, size)
     return orbit_path(1, centre, radius, size, distance=distance, start=start)[0]
 
 

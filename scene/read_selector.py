@@ -9,6 +9,7 @@ from runtime_models.model import Stop, one_line
 from scene.pose import Pose
 from scene.selector import Box, HalfSpace, Lens, Selector, Sphere
 
+LONGEST = 120  # letters of a selector that are quoted
 FORMS = {
     "sphere": "sphere:x,y,z:radius:X[:border]",
     "box": "box:x,y,z:hx,hy,hz:X[:border]",
@@ -23,24 +24,24 @@ def read_selector(text: str, stops: Sequence[Stop] = (), eye: Pose | None = None
     X is a control value from 0 to 1 or the name of a stop; places are metres in the object's
     frame.  A lens is the cone about what `eye` looks at, half its opening in degrees.
     """
-    text = one_line(text)
+    said = _quoted(text)
     kind, *parts = text.split(":")
     if kind not in FORMS:
-        raise ValueError(f"'{text}' begins with '{kind}'; {', '.join(FORMS)} are known.")
+        raise ValueError(f"{said} begins with {_quoted(kind)}; {', '.join(FORMS)} are known.")
     form = FORMS[kind]
     least = form.split("[")[0].count(":")
     if not least <= len(parts) <= least + 1:
-        raise ValueError(f"'{text}' has {len(parts)} parts after '{kind}'; write {form}.")
+        raise ValueError(f"{said} has {len(parts)} parts after '{kind}'; write {form}.")
     try:
         border = float(parts[least]) if len(parts) > least else 0.0
         shape = [tuple(float(n) for n in part.split(",")) for part in parts[: least - 1]]
     except ValueError as error:
-        raise ValueError(f"'{text}': {error}; write {form}.") from None
-    common = {"x": _control(parts[least - 1], stops, text), "border": border}
+        raise ValueError(f"{said}: {one_line(str(error))[:80]}; write {form}.") from None
+    common = {"x": _control(parts[least - 1], stops, said), "border": border}
     try:
         return _made(kind, shape, common, eye)
     except ValueError as error:
-        raise ValueError(f"'{text}': {error}") from None
+        raise ValueError(f"{said}: {error}") from None
 
 
 def _made(kind: str, shape: list[tuple], common: dict, eye: Pose | None) -> Selector:
@@ -61,7 +62,13 @@ def _single(numbers: tuple[float, ...], what: str) -> float:
     return numbers[0]
 
 
-def _control(text: str, stops: Sequence[Stop], whole: str) -> float:
+def _quoted(text: str) -> str:
+    """One line of what was typed, cut where it is longer than any selector."""
+    line = one_line(text)
+    return f"'{line}'" if len(line) <= LONGEST else f"'{line[:LONGEST]}\u2026'"
+
+
+def _control(text: str, stops: Sequence[Stop], said: str) -> float:
     """x of a number or of a stop's name."""
     for stop in stops:
         if stop.name.lower() == text.lower():
@@ -71,5 +78,5 @@ def _control(text: str, stops: Sequence[Stop], whole: str) -> float:
     except ValueError:
         names = ", ".join(stop.name for stop in stops) or "none"
         raise ValueError(
-            f"'{whole}': X is '{text}'; a number from 0 to 1 or a stop ({names}) is wanted."
+            f"{said}: X is {_quoted(text)}; a number from 0 to 1 or a stop ({names}) is wanted."
         ) from None

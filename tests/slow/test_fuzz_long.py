@@ -1,0 +1,19 @@
+"""The same as tests/test_fuzz.py, 20,000 times and more."""
+
+import os
+
+import pytest
+
+pytest.importorskip("hypothesis")
+pytest.importorskip("pyopencl")
+
+from test_fuzz import fuzz_all
+
+EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "22000"))
+
+
+@pytest.mark.slow
+def test_twenty_thousand_wrong_files_become_a_model_or_one_sentence(tmp_path):
+    count, then = fuzz_all(tmp_path, EXAMPLES, os.environ.get("FUZZ_ONLY", ""))
+    assert count >= EXAMPLES
+    assert then.opened > 0 and then.drawn > 0
