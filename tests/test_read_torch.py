@@ -14,24 +14,31 @@ from runtime_models.scaffold_networks import ACTIVATIONS, STEMS, mlp_of
 from tests import torch_files as made
 from tests.models import run_in_numpy
 
-FIXTURES = Path(__file__).resolve().parent / "fixtures"
+FIXTURES = Path(__file__).resolve().parent / "fixtures" / "torch_2_15"
+OLDER = FIXTURES.with_name("torch_1_12")  # what Scaffold-GS asks for
+
+
+@pytest.fixture(scope="module", params=[FIXTURES, OLDER], ids=lambda folder: folder.name)
+def folder(request) -> Path:
+    """Files by one version of torch."""
+    return request.param
 
 
 @pytest.fixture(scope="module")
-def known() -> dict[str, np.ndarray]:
-    """What torch itself makes of the fixtures."""
-    with np.load(FIXTURES / "scaffold_torch.npz") as arrays:
+def known(folder) -> dict[str, np.ndarray]:
+    """What torch itself makes of them."""
+    with np.load(folder / "scaffold_torch.npz") as arrays:
         return dict(arrays)
 
 
 @pytest.mark.parametrize("role", STEMS)
 @pytest.mark.parametrize("how", ["script", "state dict"])
-def test_networks_give_what_torch_gives(known, role, how):
+def test_networks_give_what_torch_gives(folder, known, role, how):
     stem = STEMS[role]
     if how == "script":
-        tensors = read_tensors(FIXTURES / f"scaffold_{stem}.pt")
+        tensors = read_tensors(folder / f"scaffold_{stem}.pt")
     else:
-        every = read_tensors(FIXTURES / "scaffold_checkpoints.pth")
+        every = read_tensors(folder / "scaffold_checkpoints.pth")
         tensors = {name: t for name, t in every.items() if name.startswith(f"{stem}.")}
         assert len(tensors) == 4
     found = run_in_numpy(mlp_of(tensors, stem, ACTIVATIONS[role]), known[f"{stem}.input"])
@@ -40,25 +47,25 @@ def test_networks_give_what_torch_gives(known, role, how):
     np.testing.assert_allclose(found, known[f"{stem}.output"], rtol=0, atol=1e-6)
 
 
-def test_names_and_shapes_of_a_script():
-    found = read_tensors(FIXTURES / "scaffold_opacity_mlp.pt")
+def test_names_and_shapes_of_a_script(folder):
+    found = read_tensors(folder / "scaffold_opacity_mlp.pt")
     shapes = {"0.weight": (8, 12), "0.bias": (8,), "2.weight": (2, 8), "2.bias": (2,)}
     assert {name: t.shape for name, t in found.items()} == shapes
     assert all(t.dtype == np.float32 and not t.flags.writeable for t in found.values())
 
 
-def test_the_table_of_appearances(known):
+def test_the_table_of_appearances(folder, known):
     for file, name in (
         ("scaffold_embedding_appearance.pt", "embedding.weight"),
         ("scaffold_checkpoints.pth", "appearance.embedding.weight"),
     ):
-        table = read_tensors(FIXTURES / file)[name]
+        table = read_tensors(folder / file)[name]
         assert np.array_equal(table, known["embedding_appearance.output"])
 
 
-def test_every_kind_of_tensor_is_torchs_own(known):
+def test_every_kind_of_tensor_is_torchs_own(folder, known):
     """Types, transposed and cut views, a scalar, an empty one, a parameter; the rest is left."""
-    found = read_tensors(FIXTURES / "torch_kinds.pth")
+    found = read_tensors(folder / "torch_kinds.pth")
     wanted = {name.removeprefix("kinds."): a for name, a in known.items() if "kinds." in name}
     assert found.keys() == wanted.keys()
     for name, array in wanted.items():

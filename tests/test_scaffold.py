@@ -21,6 +21,7 @@ from tests.scaffold_scenes import decode_by_hand, random_raw, write_cloud, write
 from tests.torch_files import write_tensors
 
 FIXTURES = Path(__file__).resolve().parent / "fixtures"
+VERSIONS = ("torch_1_12", "torch_2_15")
 EYE = np.array([0.4, -0.3, -5.0])  # in the file's axes
 CASES = {
     "plain": {},
@@ -117,11 +118,11 @@ def test_any_axis_up_and_upside_down(tmp_path, up):
         compare(model, raw, EYE, ours_from_file(up, flip))
 
 
-def test_a_folder_by_torch_itself(tmp_path):
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_folder_by_torch_itself(tmp_path, version):
     """The fixtures that torch traced and saved: the networks of a small scene."""
-    for fixture in FIXTURES.glob("scaffold_*_mlp.pt"):
+    for fixture in (FIXTURES / version).glob("scaffold_*.pt"):
         shutil.copy(fixture, tmp_path / fixture.name.removeprefix("scaffold_"))
-    shutil.copy(FIXTURES / "scaffold_embedding_appearance.pt", tmp_path / "embedding_appearance.pt")
     raw = random_raw(k=2, features=8)
     write_cloud(raw, tmp_path / "point_cloud.ply")
     model = read_model(tmp_path)
