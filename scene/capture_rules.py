@@ -83,7 +83,8 @@ def rigid(matrix: object, where: str) -> np.ndarray:
     if not np.isfinite(m).all():
         raise BadFile(f"{where}: the pose holds NaN or Inf; pose this photo again or drop it")
     rotation = m[:3, :3]
-    error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if not error <= ORTHONORMAL:
         raise BadFile(
             f"{where}: the pose is no rotation (R^T R differs from 1 by {error:.3g}); "

@@ -5,6 +5,7 @@ import re
 import shutil
 import signal
 import sys
+import warnings
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -95,7 +96,8 @@ def check_sentence(text: str, folder: Path) -> None:
 def outcome(sown: Seed, folder: Path) -> object | None:
     """The model that the files in the folder make, or None after a refusal in one sentence."""
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-    with watched(size):
+    with watched(size), warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)  # numpy's would be lines beside the sentence
         try:
             return sown.open(sown.path_in(folder))
         except sown.sentence as refusal:
