@@ -13,13 +13,14 @@ AUTO = "auto"
 
 
 def camera_reading(options, size: tuple[int, int] | None = None) -> "CameraReading":
-    """The same of options with fov_y (degrees), up and flip.  Raises UsageError."""
+    """The same of options with up and flip, and fov_y (degrees) if they have that; UsageError."""
     from app.errors import UsageError
     from scene.camera_list import CameraReading
 
-    if not (options.fov_y == 0 or 0 < options.fov_y < 180):
-        raise UsageError(f"--fov-y is {options.fov_y}, expected degrees between 0 and 180.")
-    return CameraReading(size, math.radians(options.fov_y), options.up, options.flip)
+    fov_y = getattr(options, "fov_y", 0.0)
+    if not (fov_y == 0 or 0 < fov_y < 180):
+        raise UsageError(f"--fov-y is {fov_y}, expected degrees between 0 and 180.")
+    return CameraReading(size, math.radians(fov_y), options.up, options.flip)
 
 
 def scene_cameras(

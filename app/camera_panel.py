@@ -3,10 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from imgui_bundle import imgui
 
+from app import theme
 from app.panel_rows import button_row, choice, tip
 from app.sections import Section
+from app.stepping import picture_box
 from runtime_models.model import BadFile
 from scene.camera_list import CameraList, moved
 from scene.pose import View
@@ -15,6 +18,7 @@ from scene.write_cameras import COLMAP_FORMS, FORMS, write_cameras
 if TYPE_CHECKING:
     from app.desktop import Viewer
 
+Vec = imgui.ImVec2
 FORM_NAMES = {
     "ours": "our own list",
     "inria": "3DGS cameras.json",
@@ -56,6 +60,19 @@ def attach_cameras(viewer: "Viewer") -> None:
     """Adds the section, and what the status line says of cameras."""
     viewer.hooks.sections.append(Section("Cameras", lambda scale: draw_cameras(viewer, scale)))
     viewer.hooks.status.append(lambda: viewer.steps.text)
+    viewer.hooks.marks.append(lambda scale: draw_edges(viewer, scale))
+
+
+def draw_edges(viewer: "Viewer", ui_scale: float) -> None:
+    """Where the picture of the camera that is looked through ends."""
+    steps, window = viewer.steps, viewer.window
+    if not (viewer.overlay and steps.standing) or steps.moving:
+        return
+    box = picture_box(steps.cameras.views[steps.index], viewer.view())
+    left, top, right, low = np.array(box) * window.logical_size[0] / window.size[0]
+    imgui.get_background_draw_list().add_rect(
+        Vec(left, top), Vec(right, low), theme.color(theme.MUTED, 0.6), 0, 0, max(1.0, ui_scale)
+    )
 
 
 def draw_cameras(viewer: "Viewer", ui_scale: float) -> None:
@@ -71,7 +88,7 @@ def draw_cameras(viewer: "Viewer", ui_scale: float) -> None:
     imgui.push_item_width(-1)
     kept.form = choice("form", kept.form, FORMS, [f"as {FORM_NAMES[form]}" for form in FORMS])
     imgui.pop_item_width()
-    if imgui.button("Keep this view", imgui.ImVec2(-1, 0)):
+    if imgui.button("Keep this view", Vec(-1, 0)):
         keep_view(viewer)
     tip("Key K. All views of this start go into one file beside the pictures.", ui_scale)
 

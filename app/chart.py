@@ -62,7 +62,7 @@ def run(options: Options) -> int:
     if options.x is not None and not 0 <= options.x <= 1:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
     models = read_models(options)
-    cameras = read_views(options, size)
+    cameras = read_views(options, models[0], size)
     make_folder(options.out)
     return measure_and_draw(options, models, cameras, size)
 
@@ -74,15 +74,16 @@ def read_models(options: Options) -> list:
     return [known[path] for path in options.scenes]
 
 
-def read_views(options: Options, size: tuple[int, int]) -> list:
+def read_views(options: Options, model, size: tuple[int, int]) -> list:
+    from app.camera_files import scene_cameras
     from app.errors import UsageError
-    from scene.read_cameras import read_cameras
 
     if options.cameras is None:
         return []
     if options.frames:
         raise UsageError("--cameras gives the number of frames; leave --frames out.")
-    return read_cameras(options.cameras, size)[:MOST_FRAMES]
+    cameras = scene_cameras(str(options.cameras), options.scenes[0], model, options, size)
+    return list(cameras.views[:MOST_FRAMES])
 
 
 def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[int, int]) -> int:

@@ -125,14 +125,16 @@ def picture_pairs(a, b) -> Iterator[Compared]:
 
 def choose_views(options: Options, a) -> list:
     """Views in A's own coordinates."""
+    from app.camera_files import camera_reading
     from app.drawing import parse_size
     from scene.camera_list import moved
     from scene.framing import frame_points, model_points, orbit_path
-    from scene.read_cameras import read_cameras
+    from scene.read_cameras import read_camera_list
 
     size = parse_size(options.size) if options.size else None
     if options.cameras is not None:
-        return moved(read_cameras(options.cameras, size), -a.origin)
+        cameras = read_camera_list(options.cameras, camera_reading(options, size))
+        return moved(cameras.views, -a.origin)
     centre, radius = frame_points(*model_points(a.model))
     return orbit_path(VIEWS, centre, radius, size or SIZE)
 

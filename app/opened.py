@@ -8,6 +8,7 @@ from pathlib import Path
 
 from runtime_models.model import BadFile, Model
 from runtime_models.package_files import MANIFEST
+from runtime_models.read_output_folder import newest_cloud
 from runtime_models.read_scene import describe
 from scene.camera_list import CameraList, CameraReading
 from scene.colmap_tables import TABLES, find_model
@@ -77,7 +78,7 @@ def read_beside(path: Path, reading: CameraReading) -> tuple[list[CameraList], l
 def means_cameras(path: Path) -> bool:
     """Whether a file or folder is for its cameras rather than a scene."""
     if path.is_dir():
-        if (path / MANIFEST).exists():
+        if (path / MANIFEST).exists() or newest_cloud(path) is not None:
             return False
         capture = [path / "transforms.json", path / f"transforms_{SPLITS[0]}.json"]
         return find_model(path) is not None or any(file.is_file() for file in capture)
