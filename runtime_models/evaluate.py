@@ -76,7 +76,7 @@ class Evaluator:
         self._centres: np.ndarray | None = None  # (A, k * 3) the anchor of every splat
         self._scaffold: ScaffoldEvaluator | None = None
         if isinstance(model, ScaffoldModel):
-            self._scaffold = ScaffoldEvaluator(model, threads, keep)
+            self._scaffold = ScaffoldEvaluator(model, keep)
         elif isinstance(model, AnchorModel):
             kind = FoldedNetwork if fold else WholeNetwork
             for name, mlp in model.networks.items():

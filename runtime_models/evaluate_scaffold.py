@@ -5,15 +5,17 @@ networks take an anchor's features and the direction from the eye to it, some th
 octree level, too.  A splat whose opacity is not above 0 is absent.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from runtime_models.model import SCAFFOLD_HEADS, Mlp, Octree, ScaffoldModel
 from runtime_models.rotation import normalize
-from runtime_models.session import BATCH, open_session
+from runtime_models.session import open_session
 from runtime_models.write_onnx import write_onnx
 
+BLOCK = 4096  # anchors at a time: stays in the cache; threads gained nothing on two cores
 BANKS = (4, 2, 1)  # every 4th feature, every 2nd, all of them: mixed by the bank's three weights
 WIDTHS = {"direction": 3, "distance": 1, "level": 1}  # inputs; "feature" is as wide as the model's
 Rows = np.ndarray | slice  # all anchors as a slice: nothing is copied
@@ -53,12 +55,19 @@ def views_of(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Look:
-    """What one eye sees: the anchors that show something, and every splat's opacity."""
+    """What one eye sees: every anchor's inputs to the networks, every splat's opacity."""
 
     eye: tuple
-    rows: Rows  # (n,) anchors of which a splat is there
-    parts: dict[str, np.ndarray]  # "direction" (n, 3), "distance" (n, 1), "feature" where mixed
+    view: np.ndarray  # (A, 4) views_of
+    features: np.ndarray | None  # (A, F) as mixed for the view; None: as they are
     opacity: np.ndarray  # (A, k), not above 0 = absent
+    there: np.ndarray  # (A,) bool: a splat of it is
+
+    def inputs(self, rows: Rows) -> dict[str, np.ndarray]:
+        """What networks take, of some anchors."""
+        view = self.view[rows]
+        parts = {"direction": view[:, :3], "distance": view[:, 3:]}
+        return parts if self.features is None else parts | {"feature": self.features[rows]}
 
 
 class ScaffoldEvaluator:
@@ -66,21 +75,20 @@ class ScaffoldEvaluator:
 
     Where features are not mixed by the view, what they give the first layers is kept: 3 * hidden
     floats an anchor.  Scale, rotation and colour run for anchors alone of which a splat is there.
-    keep: geometry() writes into the same arrays again; what it gave before is gone.
+    keep: geometry() and color() write into the same arrays again; what they gave before is gone.
     """
 
-    def __init__(self, model: ScaffoldModel, threads: int = 1, keep: bool = False) -> None:
+    def __init__(self, model: ScaffoldModel, keep: bool = False) -> None:
         self.model, self._keep = model, keep
-        self._kept: tuple[np.ndarray, np.ndarray] | None = None
+        self._kept: dict[str, np.ndarray] = {}
         fixed = {} if model.octree is None else {"level": model.octree.level[:, None]}
         widths = WIDTHS | {"feature": model.features.shape[1]}
         bank = model.networks.get("bank")
-        self._bank = Network("bank", bank, fixed, widths, threads) if bank else None
+        self._bank = Network("bank", bank, fixed, widths) if bank else None
         if bank is None:
             fixed = fixed | {"feature": model.features}
         self._heads = {
-            name: Network(name, model.networks[name], fixed, widths, threads)
-            for name in SCAFFOLD_HEADS
+            name: Network(name, model.networks[name], fixed, widths) for name in SCAFFOLD_HEADS
         }
         self._means = (model.anchors[:, None] + model.offsets).reshape(-1, 3)
         self._look: Look | None = None
@@ -99,35 +107,25 @@ class ScaffoldEvaluator:
 
     def _look_from(self, eye: np.ndarray) -> Look:
         model = self.model
-        opacity = np.full((len(model.anchors), model.splats_per_anchor), -1, np.float32)
-        rows, shown = slice(None), None
+        count, k = model.offsets.shape[:2]
+        drawn, part = np.ones(count, bool), None
         if model.octree is not None:
             drawn, part = drawn_anchors(model.octree, eye)
-            rows = np.flatnonzero(drawn)
-            shown = part[rows, None]
-        parts = self._parts(rows, eye)
-        found = self._heads["opacity"].run(rows, parts)
-        if shown is not None:
-            found *= shown
-        opacity[rows] = found
-        there = (found > 0).any(axis=1)
-        if not there.all():
-            rows = np.flatnonzero(there) if isinstance(rows, slice) else rows[there]
-            parts = {name: part[there] for name, part in parts.items()}
-        return Look(tuple(eye), rows, parts, opacity)
+        features = None if self._bank is None else np.zeros_like(model.features)
+        opacity = np.full((count, k), -1, np.float32)
+        look = Look(tuple(eye), np.empty((count, 4), np.float32), features, opacity, drawn.copy())
 
-    def _parts(self, rows: Rows, eye: np.ndarray) -> dict[str, np.ndarray]:
-        """The inputs that depend on the eye, of some anchors."""
-        view = views_of(self.model.anchors[rows], eye)
-        parts = {"direction": view[:, :3], "distance": view[:, 3:]}
-        if self._bank is None:
-            return parts
-        weights = softmax(self._bank.run(rows, parts))  # (n, 3)
-        features = self.model.features[rows]
-        mixed = np.zeros_like(features)
-        for step, weight in zip(BANKS, weights.T, strict=True):
-            mixed += np.tile(features[:, ::step], (1, step)) * weight[:, None]
-        return parts | {"feature": mixed}
+        def decode(rows: Rows) -> None:
+            look.view[rows] = views_of(model.anchors[rows], eye)
+            if look.features is not None:
+                weights = softmax(self._bank.run(rows, look.inputs(rows)))  # (n, 3)
+                look.features[rows] = mixed(model.features[rows], weights)
+            found = self._heads["opacity"].run(rows, look.inputs(rows))
+            opacity[rows] = found if part is None else found * part[rows, None]
+            look.there[rows] = (opacity[rows] > 0).any(axis=1)
+
+        each_row_of(drawn, decode)
+        return look
 
     def geometry(
         self, eye: np.ndarray | None, unit: bool = True
@@ -137,41 +135,64 @@ class ScaffoldEvaluator:
         unit False: quaternions of any length.  Absent splats may have any scale and rotation.
         """
         look, model = self.look(eye), self.model
-        scales, wxyz = self._room()
-        out = self._heads["covariance"].run(look.rows, look.parts)
-        out = out.reshape(-1, model.splats_per_anchor, 7)
-        scales[look.rows] = model.scales[look.rows, None] * sigmoid(out[..., :3])
-        wxyz[look.rows] = out[..., 3:]
+        scales, wxyz = self._room("scales", 3), self._room("wxyz", 4)
+
+        def decode(rows: Rows) -> None:
+            out = self._heads["covariance"].run(rows, look.inputs(rows))
+            out = out.reshape(-1, model.splats_per_anchor, 7)
+            scales[rows] = model.scales[rows, None] * sigmoid(out[..., :3])
+            wxyz[rows] = out[..., 3:]
+
+        each_row_of(look.there, decode)
         wxyz = wxyz.reshape(-1, 4)
         wxyz = normalize(wxyz) if unit else wxyz
         return self._means, scales.reshape(-1, 3), wxyz, look.opacity.reshape(-1)
 
-    def _room(self) -> tuple[np.ndarray, np.ndarray]:
-        """scales (A, k, 3), wxyz (A, k, 4) to be filled; with `keep` the same again."""
-        if self._kept is not None:
-            return self._kept
-        shape = self.model.offsets.shape[:2]
-        scales, wxyz = np.zeros((*shape, 3), np.float32), np.zeros((*shape, 4), np.float32)
-        wxyz[..., 0] = 1
-        if self._keep:
-            self._kept = scales, wxyz
-        return scales, wxyz
+    def _room(self, name: str, size: int) -> np.ndarray:
+        """(A, k, size) to be filled, zeros at first (quaternions: none); with `keep` the same."""
+        if name not in self._kept or not self._keep:
+            self._kept[name] = np.zeros((*self.model.offsets.shape[:2], size), np.float32)
+            if name == "wxyz":
+                self._kept[name][..., 0] = 1
+        return self._kept[name]
 
-    def color(self, eye: np.ndarray) -> np.ndarray:
-        """(N, 3) display sRGB seen from an eye (3,); of splats that are absent, 0."""
+    def color(self, eye: np.ndarray | None) -> np.ndarray:
+        """(N, 3) display sRGB seen from an eye (3,); absent splats have any."""
         return self._color_of(self.look(eye))
 
     def _color_of(self, look: Look) -> np.ndarray:
-        model = self.model
-        color = np.zeros((len(model.anchors), 3 * model.splats_per_anchor), np.float32)
-        color[look.rows] = self._heads["color"].run(look.rows, look.parts)
+        color = self._room("color", 3)
+
+        def decode(rows: Rows) -> None:
+            out = self._heads["color"].run(rows, look.inputs(rows))
+            color[rows] = out.reshape(-1, *color.shape[1:])
+
+        each_row_of(look.there, decode)
         return color.reshape(-1, 3)
 
     def color_along(self, eye: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """The same with each anchor looked at along its direction (A, 3), else as from the eye."""
         look = self.look(eye)
-        turned = replace(look, parts=look.parts | {"direction": direction[look.rows]})
-        return self._color_of(turned)
+        return self._color_of(replace(look, view=np.hstack([direction, look.view[:, 3:]])))
+
+
+def each_row_of(wanted: np.ndarray, decode: Callable[[Rows], None]) -> None:
+    """decode(rows) for the rows where wanted (A,) is true, block by block."""
+    for start in range(0, len(wanted), BLOCK):
+        block = slice(start, min(start + BLOCK, len(wanted)))
+        mine = wanted[block]
+        if mine.all():
+            decode(block)  # nothing is copied
+        elif mine.any():
+            decode(start + np.flatnonzero(mine))
+
+
+def mixed(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(n, F) features of three resolutions, mixed by weights (n, 3)."""
+    out = np.zeros_like(features)
+    for step, weight in zip(BANKS, weights.T, strict=True):
+        out += np.tile(features[:, ::step], (1, step)) * weight[:, None]
+    return out
 
 
 def sigmoid(z: np.ndarray) -> np.ndarray:
@@ -189,36 +210,28 @@ class Network:
     """One network; the part of its first layer that meets what no eye changes is kept."""
 
     def __init__(
-        self,
-        name: str,
-        mlp: Mlp,
-        fixed: dict[str, np.ndarray],
-        widths: dict[str, int],
-        threads: int,
+        self, name: str, mlp: Mlp, fixed: dict[str, np.ndarray], widths: dict[str, int]
     ) -> None:
         part_of = np.repeat(mlp.inputs, [widths[part] for part in mlp.inputs])
         first = mlp.weights[0]
         self._inputs = [part for part in mlp.inputs if part not in fixed]
-        self._width_out = mlp.width_out
         rest = replace(mlp, weights=(first[:, ~np.isin(part_of, list(fixed))], *mlp.weights[1:]))
-        self._session = open_session(write_onnx(rest, name, "input and rows"), threads)
+        self._session = open_session(write_onnx(rest, name, "input and rows"), threads=1)
         self._bias = mlp.biases[0][None]  # (1, hidden)
-        self._base = np.zeros((1, len(first)), np.float32)  # (A, hidden), (1, hidden) of none
+        self._base: np.ndarray | None = None  # (A, hidden)
         for part in set(mlp.inputs) & fixed.keys():
             # By a session as well: numpy's matrix product leaves threads spinning for milliseconds.
             layer = Mlp((first[:, part_of == part],), (np.zeros(len(first), np.float32),))
-            session = open_session(write_onnx(layer, part), threads)
-            self._base = self._base + session.run(["output"], {"input": fixed[part]})[0]
+            session = open_session(write_onnx(layer, part), threads=1)
+            given = session.run(["output"], {"input": fixed[part]})[0]
+            self._base = given if self._base is None else self._base + given
 
     def run(self, rows: Rows, parts: dict[str, np.ndarray]) -> np.ndarray:
         """(n, outputs) of some anchors (n,); parts: the inputs that depend on the eye, of these."""
-        count = len(parts["direction"])
-        out = np.empty((count, self._width_out), np.float32)
-        fixed = self._base if len(self._base) == 1 else self._base[rows]
-        for start in range(0, count, BATCH):
-            now = slice(start, start + BATCH)
-            columns = np.concatenate([parts[name][now] for name in self._inputs], axis=1)
-            base = np.repeat(fixed, len(columns), axis=0) if len(fixed) == 1 else fixed[now]
-            given = {"input": columns, "bias": self._bias, "rows": base}
-            out[now] = self._session.run(["output"], given)[0]
-        return out
+        columns = np.concatenate([parts[name] for name in self._inputs], axis=1)
+        if self._base is None:
+            base = np.zeros((len(columns), self._bias.shape[1]), np.float32)
+        else:
+            base = self._base[rows]
+        given = {"input": columns, "bias": self._bias, "rows": base}
+        return self._session.run(["output"], given)[0]
