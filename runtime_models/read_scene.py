@@ -25,8 +25,8 @@ from runtime_models.sog_files import META
 from runtime_models.thin import thin
 
 KNOWN = (
-    "a package (folder or .shift), a 3DGS .ply, a .splat, a folder of such .ply files, or the "
-    "folder of a Scaffold-GS run"
+    "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
+    ".gltf), a folder of .ply layers, or the folder of a 3DGS or Scaffold-GS run"
 )
 
 

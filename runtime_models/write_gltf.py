@@ -2,11 +2,13 @@
 
 import json
 import struct
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.gltf_files import BINARY_CHUNK, JSON_CHUNK, MAGIC
+from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_gltf import PREFIX, SPLATS
 from runtime_models.spherical_harmonics import C0
@@ -15,17 +17,20 @@ from runtime_models.whole_file import write_whole
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 FLOAT, BYTE = 5126, 5121
 POINTS = 0
+MOST_BYTES = (1 << 32) - (1 << 20)  # lengths are 32 bits, and the JSON wants a place
 
 
 def write_gltf(splats: PlainSplats, path: str | Path) -> None:
     """Atomic.  Far places stay exact: the origin stands in the node, in float64.
 
-    COLOR_0 is for programs that know no splats and show points.
+    COLOR_0 is for programs that know no splats and show points.  Raises BadFile over 4 GB, which
+    the format's lengths cannot say.
     """
     arrays = attributes_of(splats)
     views, accessors, place = [], [], 0
     for name, array in arrays.items():
-        views.append({"buffer": 0, "byteOffset": place, "byteLength": array.nbytes})
+        size = array.size * (1 if array.dtype == np.uint8 else 4)
+        views.append({"buffer": 0, "byteOffset": place, "byteLength": size})
         accessor = {
             "bufferView": len(accessors),
             "componentType": BYTE if array.dtype == np.uint8 else FLOAT,
@@ -35,10 +40,11 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
         if array.dtype == np.uint8:
             accessor["normalized"] = True
         if name == "POSITION":  # glTF demands its bounds
-            accessor["min"] = array.min(axis=0).tolist()
-            accessor["max"] = array.max(axis=0).tolist()
+            accessor |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
         accessors.append(accessor)
-        place += array.nbytes
+        place += size
+    if place > MOST_BYTES:
+        raise BadFile(f"{place:,} bytes do not fit a .glb (4 GB); write .ply or .spz.")
     primitive = {
         "attributes": {name: number for number, name in enumerate(arrays)},
         "mode": POINTS,
@@ -65,11 +71,11 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
         "bufferViews": views,
         "buffers": [{"byteLength": place}],
     }
-    write_whole(Path(path), pack(asset, [array.tobytes() for array in arrays.values()]))
+    write_whole(Path(path), pack(asset, arrays.values(), place))
 
 
 def attributes_of(splats: PlainSplats) -> dict[str, np.ndarray]:
-    """Attribute name -> (N, width), little endian, in the order in which they are written."""
+    """Attribute name -> (N, width), uint8 or floats, in the order in which they are written."""
     diffuse = np.clip(0.5 + C0 * splats.sh[:, 0], 0, 1)  # display
     linear = np.where(diffuse <= 0.04045, diffuse / 12.92, ((diffuse + 0.055) / 1.055) ** 2.4)
     points = np.column_stack([linear, splats.opacity.clip(0, 1)])
@@ -84,19 +90,17 @@ def attributes_of(splats: PlainSplats) -> dict[str, np.ndarray]:
         degree = int(number**0.5)
         name = f"{PREFIX}SH_DEGREE_{degree}_COEF_{number - degree**2}"
         arrays[name] = splats.sh[:, number]
-    return {
-        name: np.ascontiguousarray(array, None if array.dtype == np.uint8 else "<f4")
-        for name, array in arrays.items()
-    }
+    return arrays
 
 
-def pack(asset: dict, blocks: list[bytes]) -> bytes:
-    """The two chunks of a binary glTF, each filled up to four bytes."""
+def pack(asset: dict, arrays: Iterable[np.ndarray], size: int) -> Iterator[bytes]:
+    """The two chunks of a binary glTF, each filled up to four bytes; one array at a time."""
     text = json.dumps(asset, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    size = sum(map(len, blocks))
     fill = -size % 4
     total = 12 + 8 + len(text) + 8 + size + fill
-    head = struct.pack("<4sII", MAGIC, 2, total) + struct.pack("<II", len(text), JSON_CHUNK)
-    binary = struct.pack("<II", size + fill, BINARY_CHUNK)
-    return b"".join([head, text, binary, *blocks, bytes(fill)])
+    yield struct.pack("<4sII", MAGIC, 2, total) + struct.pack("<II", len(text), JSON_CHUNK) + text
+    yield struct.pack("<II", size + fill, BINARY_CHUNK)
+    for array in arrays:
+        yield array.astype(array.dtype if array.dtype == np.uint8 else "<f4").tobytes()
+    yield bytes(fill)

@@ -9,8 +9,9 @@ from app.exported import Look, Part, bake_part
 from renderer.false_colors import tinted
 from renderer.renderer import Renderer
 from runtime_models.bake import LEAST_ALPHA, bake, fit_rows, spread_directions
-from runtime_models.evaluate import evaluate
+from runtime_models.evaluate import directions, evaluate
 from runtime_models.model import BadFile, SplatLayers, Stop
+from runtime_models.read_scene import read_model
 from runtime_models.spherical_harmonics import COEFFICIENTS, basis, shade
 from runtime_models.write_plain import merged, placed
 from scene.framing import default_view
@@ -19,6 +20,7 @@ from scene.pose import Pose
 from scene.scene import Scene, SceneObject
 from scene.selector import Painted, Sphere
 from tests.models import make_random_model
+from tests.scaffold_scenes import random_raw, write_run
 from tests.splat_scenes import random_layers
 
 FAR = 1e7  # metres: seen from there all directions are the same
@@ -50,16 +52,16 @@ def test_places_and_opacities_are_the_evaluators(model, x):
 
 def test_colors_are_the_least_squares_fit_over_the_sphere(model):
     """Beside numpy's own solver on the same directions, and better with every degree."""
-    directions = spread_directions(64)
-    assert np.abs(directions.mean(0)).max() < 2e-3
-    seen = [evaluate(model, 0.3, -FAR * d) for d in directions]  # the network's own answers
+    spread = spread_directions(64)
+    assert np.abs(spread.mean(0)).max() < 2e-3
+    seen = [evaluate(model, 0.3, -FAR * d) for d in spread]  # the network's own answers
     there = seen[0].opacity >= LEAST_ALPHA
     colors = np.stack([s.color[there] for s in seen])  # (64, n, 3)
     worst = []
     for degree, count in enumerate(COEFFICIENTS):
         sh = bake(model, 0.3, sh_degree=degree).sh
         assert sh.shape == (there.sum(), count, 3)
-        rows = basis(directions.astype(np.float64), count)
+        rows = basis(spread.astype(np.float64), count)
         flat = colors.reshape(64, -1) - 0.5
         wanted = np.linalg.lstsq(rows, flat, rcond=None)[0].reshape(count, -1, 3)
         np.testing.assert_allclose(sh, wanted.transpose(1, 0, 2), atol=2e-5)
@@ -71,9 +73,9 @@ def test_colors_are_the_least_squares_fit_over_the_sphere(model):
 
 def test_directions_solve_every_degree():
     for count in COEFFICIENTS:
-        directions, parts = fit_rows(count)
-        np.testing.assert_allclose(parts.T @ basis(directions, count), np.eye(count), atol=1e-5)
-        assert np.linalg.cond(basis(directions.astype(float), count)) < 1.1
+        spread, parts = fit_rows(count)
+        np.testing.assert_allclose(parts.T @ basis(spread, count), np.eye(count), atol=1e-5)
+        assert np.linalg.cond(basis(spread.astype(float), count)) < 1.1
 
 
 def test_a_control_value_an_anchor(model):
@@ -117,6 +119,29 @@ def test_broken_and_faint_splats_are_left_out():
         bake(layers, 0.0)
     with pytest.raises(BadFile, match="degree 4"):
         bake(layers, 0.0, sh_degree=4)
+
+
+def test_scaffold_models_are_baked_from_one_eye(tmp_path):
+    """What is there and its shape as from the eye, colours along every direction."""
+    folder = write_run(random_raw(60, k=3, distance=True), tmp_path / "run")
+    model, eye = read_model(folder), np.array([0.3, 0.8, 2.5])
+    with pytest.raises(BadFile, match="say from where it is seen"):
+        bake(model, 0.0)
+    plain, whole = bake(model, 0.0, eye), evaluate(model, 0.0, eye)
+    there = whole.opacity >= LEAST_ALPHA
+    assert 0 < there.sum() < len(there)
+    for name in ("means", "scales", "wxyz", "opacity"):
+        np.testing.assert_array_equal(getattr(plain, name), getattr(whole, name)[there])
+    # Degree 3 has what the network gives along each anchor's own direction, nearly.
+    toward = np.repeat(directions(model.anchors, eye), model.splats_per_anchor, axis=0)[there]
+    error = np.abs(shade(plain.sh, toward) - whole.color[there])
+    assert error.mean() < 0.02
+    flat = bake(model, 0.0, eye, sh_degree=0)
+    assert np.abs(shade(flat.sh, toward) - whole.color[there]).mean() > 3 * error.mean()
+    splats = bake_part(Part(SceneObject("run", model)), Look())
+    assert any("--eye" in finding.done for finding in splats.findings)
+    other = bake_part(Part(SceneObject("run", model)), Look(eye=tuple(eye)))
+    np.testing.assert_array_equal(other.opacity, plain.opacity)
 
 
 # As the program shows it: false colours, regions, poses

@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -315,6 +316,17 @@ def test_a_third_party_finds_our_numbers(tmp_path):
     assert np.abs(arrays["COLOR_0"][:, :3] / 255 - linear).max() < 0.0021
     places = raw(tmp_path / "a.glb").means  # float64: a far place keeps its micrometres
     np.testing.assert_allclose(places - splats.origin, splats.means, rtol=0, atol=1e-6)
+
+
+def test_what_a_third_party_writes_is_read():
+    """The file is splat-transform 2.7.1's, of our PLY: turned half a turn about z, not about x."""
+    theirs = read_plain(Path(__file__).parent / "fixtures" / "splat_transform.glb")
+    ours, back = plain_splats(12, 1), turn(theirs, np.diag([-1.0, 1, -1]))
+    np.testing.assert_allclose(back.means, ours.means, atol=1e-6)
+    np.testing.assert_allclose(back.scales, ours.scales, rtol=1e-5)
+    np.testing.assert_allclose(back.opacity, ours.opacity, atol=1e-6)
+    np.testing.assert_allclose(back.sh, ours.sh, atol=1e-6)
+    np.testing.assert_allclose(np.abs((back.wxyz * ours.wxyz).sum(1)), 1, atol=1e-6)
 
 
 def test_whole_or_not_at_all(tmp_path):
