@@ -115,7 +115,7 @@ class Columns:
     def keep(self, name: str, rows: slice, column: np.ndarray) -> None:
         """A column that is not of the splats; normals only when one of them is not zero."""
         extra = self.raw.extra
-        if name in NORMAL and name not in extra and not column.any():
+        if name in NORMAL and name not in extra and not np.asarray(column != 0).any():
             return
         if name not in extra:
             extra.setdefault(name, np.zeros(self.count, column.dtype.newbyteorder("=")))
