@@ -1,5 +1,6 @@
 """What every reader of captures holds to: rigid poses, up, stops, splits, sizes, background."""
 
+import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -76,14 +77,14 @@ def rigid(matrix: object, where: str) -> np.ndarray:
     """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile."""
     try:
         m = np.asarray(matrix, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadFile(f"{where}: the pose is no matrix of numbers; give 4 rows of 4") from None
     if m.shape not in ((3, 4), (4, 4)):
         raise BadFile(f"{where}: the pose has shape {m.shape}; give 4 rows of 4 numbers")
     if not np.isfinite(m).all():
         raise BadFile(f"{where}: the pose holds NaN or Inf; pose this photo again or drop it")
     rotation = m[:3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # 1e300 is no rotation either
         error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if not error <= ORTHONORMAL:
         raise BadFile(
@@ -114,8 +115,8 @@ def turn_upright(up: object, where: str) -> np.ndarray:
     """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
     try:
         up = np.asarray(up, np.float64)
-        length = float(np.linalg.norm(up))
-    except (TypeError, ValueError):
+        length = math.hypot(*up.ravel())
+    except (TypeError, ValueError, OverflowError):
         up, length = np.zeros(0), 0.0
     if up.shape != (3,) or not 0 < length < np.inf:
         raise BadFile(f"{where}: 'up' must be three numbers that are not all zero")

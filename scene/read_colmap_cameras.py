@@ -1,5 +1,6 @@
 """A COLMAP model for its cameras alone, text or binary; neither photos nor points are needed."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ def read_colmap_cameras(folder: Path, ending: str, reading: CameraReading) -> Ca
 
 
 def view_of(image: Posed, lens: Lens, turn: np.ndarray, where: str) -> View:
-    length = float(np.linalg.norm(image.wxyz))
+    length = math.hypot(*image.wxyz)
     if not (abs(length - 1) <= UNIT and np.isfinite(image.place).all()):
         raise BadFile(f"{where}: its pose is no rotation and place; run the mapper again.")
     camera_from_world = Pose(np.array(image.place), np.array(image.wxyz) / length).matrix()

@@ -26,7 +26,8 @@ def read_floor(data: dict, reading: CameraReading, where: str) -> CameraList:
     where the world was scaled, so that a metre for the viewer is `scale` of the world's units.
     """
     matrix = numbers(data[MARK], (4, 4), f"{where}: '{MARK}'")
-    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3]))) if np.isfinite(matrix).all() else 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        scale = float(np.cbrt(np.linalg.det(matrix[:3, :3]))) if np.isfinite(matrix).all() else 0.0
     if not (np.array_equal(matrix[3], (0, 0, 0, 1)) and 1e-6 < scale < 1e6):
         raise BadFile(f"{where}: '{MARK}' is no rotation, scale and position; save it again.")
     matrix[:3, :3] /= scale
