@@ -50,12 +50,14 @@ def bake(
     if not there.any():
         raise BadFile("nothing of what was chosen is there at this x; choose another one.")
     if isinstance(model, SplatLayers):
-        sh = model.sh[there, :count]
+        sh = of_rows(model.sh[:, :count], there)
         if recolor:
             sh = recolored(sh, lambda color, rows: recolor(color, np.flatnonzero(there)[rows]))
     else:
         sh = fit_colors(lambda d: evaluator.color_along(x, d, eye), model, count, there, recolor)
-    return as_plain(model, [a[there] for a in (means, scales, wxyz, opacity)], sh, there, absent)
+    return as_plain(
+        model, [of_rows(a, there) for a in (means, scales, wxyz, opacity)], sh, there, absent
+    )
 
 
 def find_present(
@@ -66,6 +68,11 @@ def find_present(
     for array in (means, scales, wxyz):
         there &= np.isfinite(array).all(axis=1)
     return there
+
+
+def of_rows(array: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """The rows of an array that are there; the array itself, not a copy, where all are."""
+    return array if there.all() else array[there]
 
 
 def as_plain(
@@ -90,8 +97,8 @@ def as_plain(
         plain,
         origin=model.origin,
         antialiased=model.antialiased,
-        labels=None if model.labels is None else model.labels[there],
-        extra={name: column[there] for name, column in model.extra.items()},
+        labels=None if model.labels is None else of_rows(model.labels, there),
+        extra={name: of_rows(column, there) for name, column in model.extra.items()},
     )
 
 
