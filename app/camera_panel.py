@@ -81,7 +81,7 @@ def draw_cameras(viewer: "Viewer", ui_scale: float) -> None:
         imgui.text_disabled(steps.text)
         clicked = button_row(("Previous", "Next"), ui_scale, 2)
         if clicked:
-            steps.step(1 if clicked == "Next" else -1, viewer.view())
+            step_to_camera(viewer, 1 if clicked == "Next" else -1)
         tip("Keys P and N; moving leaves the camera.", ui_scale)
     else:
         imgui.text_wrapped("Drop a file of cameras on the window to step through them.")
@@ -91,6 +91,16 @@ def draw_cameras(viewer: "Viewer", ui_scale: float) -> None:
     if imgui.button("Keep this view", Vec(-1, 0)):
         keep_view(viewer)
     tip("Key K. All views of this start go into one file beside the pictures.", ui_scale)
+
+
+def step_to_camera(viewer: "Viewer", by: int) -> None:
+    """To the next (1) or the previous (-1) camera, with a word on what its file leaves out."""
+    steps = viewer.steps
+    if not steps.step(by, viewer.view()):
+        viewer.say("There are no cameras to step through; drop a file of them here.")
+    elif steps.untold:
+        viewer.say("\n".join(steps.untold))
+        steps.untold = ()
 
 
 def keep_view(viewer: "Viewer") -> None:

@@ -122,6 +122,7 @@ class Files:
         viewer.steps.take(cameras)
         if stand and cameras is not None:
             viewer.steps.go_to(0, now if viewer.frames else None)
+            viewer.steps.untold = ()  # said with the file's other notes
 
     def draw_recent(self, ui_scale: float) -> None:
         """The button under the panel's title."""

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import glfw
 import numpy as np
 
-from app.camera_panel import keep_view
+from app.camera_panel import keep_view, step_to_camera
 from app.controls import FAST, SLOW, Push
 from app.window import DoubleClick, Drag, Drop, Event, KeyDown, Press, Release, Wheel, Window
 from scene.pick import Hit
@@ -53,9 +53,7 @@ def press_key(viewer: "Viewer", event: KeyDown) -> None:
     stage, camera = viewer.stage, viewer.camera
     match event.key:
         case glfw.KEY_N | glfw.KEY_P:
-            by = 1 if event.key == glfw.KEY_N else -1
-            if not viewer.steps.step(by, viewer.view()):
-                viewer.say("There are no cameras to step through; drop a file of them here.")
+            step_to_camera(viewer, 1 if event.key == glfw.KEY_N else -1)
         case glfw.KEY_K:
             keep_view(viewer)
         case glfw.KEY_V | glfw.KEY_F if viewer.steps.standing:

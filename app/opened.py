@@ -67,12 +67,15 @@ def read_files(
 
 
 def read_beside(path: Path, reading: CameraReading) -> tuple[list[CameraList], list[str]]:
-    """Cameras nobody asked for: at most one list, and a note where they cannot be read."""
+    """Cameras nobody asked for: at most one list, and a note where they cannot be read.
+
+    Their own notes are told once somebody steps to them.
+    """
     try:
         cameras = read_camera_list(path, reading)
     except BadFile as error:
         return [], [f"The cameras beside it cannot be read: {error}"]
-    return [cameras], list(cameras.notes)
+    return [cameras], []
 
 
 def means_cameras(path: Path) -> bool:

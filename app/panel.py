@@ -25,6 +25,7 @@ WIDTH = 268.0  # logical pixels
 MARGIN = 16.0
 BAR_HEIGHT = 92.0  # of the slider bar with one row, with what lies below it
 BAR_FIRST, BAR_ROW = 46.0, 71.0  # a row without and with the name of its object
+NOTE_WIDTH = 620.0  # logical pixels; longer notes wrap
 MIN_FREE = 0.5  # of the window's width and height
 DEBUG_NAMES = {
     "": "picture",
@@ -131,9 +132,8 @@ def draw_note(text: str, ui_scale: float) -> None:
     """A short message at the upper edge that needs no answer."""
     if not text:
         return
-    imgui.set_next_window_pos(
-        Vec(imgui.get_io().display_size.x / 2, MARGIN * ui_scale), 0, Vec(0.5, 0)
-    )
+    screen = imgui.get_io().display_size
+    imgui.set_next_window_pos(Vec(screen.x / 2, MARGIN * ui_scale), 0, Vec(0.5, 0))
     flags = imgui.WindowFlags_
     imgui.begin(
         "##note",
@@ -141,7 +141,10 @@ def draw_note(text: str, ui_scale: float) -> None:
         flags.no_decoration | flags.always_auto_resize | flags.no_inputs | flags.no_saved_settings
         | flags.no_focus_on_appearing,
     )  # fmt: skip
-    imgui.text(text)
+    room = min(NOTE_WIDTH * ui_scale, screen.x * 0.9) - 2 * imgui.get_style().window_padding.x
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + room)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
     imgui.end()
 
 

@@ -19,6 +19,7 @@ class Steps:
 
     def __init__(self) -> None:
         self.cameras: CameraList | None = None
+        self.untold: tuple[str, ...] = ()  # what the file's reader assumed, until it is shown
         self.index = -1  # the last one that was stood at
         self.standing = False  # whether the picture is that camera's; moving freely leaves it
         self._from: View | None = None  # where the flight began
@@ -27,6 +28,7 @@ class Steps:
     def take(self, cameras: CameraList | None) -> None:
         """Cameras instead of those that there were; nobody stands at one yet."""
         self.cameras, self.index, self.standing, self._from = cameras, -1, False, None
+        self.untold = cameras.notes if cameras else ()
 
     @property
     def count(self) -> int:

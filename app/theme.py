@@ -9,7 +9,8 @@ Box = tuple[float, float, float, float]  # left, top, right, bottom in logical p
 
 FONT_SIZE = 15.0  # logical pixels
 FONT = Path(imgui_bundle.__file__).parent / "assets/fonts/Roboto/Roboto-Regular.ttf"
-GLYPHS = [0x20, 0xFF, 0x370, 0x3FF, 0x2000, 0x2027, 0x2190, 0x21FF, 0]  # Latin, Greek, dashes
+# Latin, Greek, Cyrillic, dashes, arrows: what the font has
+GLYPHS = [0x20, 0x17F, 0x370, 0x3FF, 0x400, 0x4FF, 0x2000, 0x2027, 0x2190, 0x21FF, 0]
 
 ACCENT = (0.95, 0.63, 0.27)
 TEXT = (0.90, 0.90, 0.91)
