@@ -23,8 +23,8 @@ Rows = np.ndarray | slice  # all anchors as a slice: nothing is copied
 
 def drawn_anchors(octree: Octree, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(A,) bool: drawn from an eye (3,); (A,) float32: the part of their opacity that is shown."""
-    away = np.linalg.norm(octree.places - np.asarray(eye, np.float32), axis=1)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
+        away = np.linalg.norm(octree.places - np.asarray(eye, np.float32), axis=1)
         asked = np.log2(octree.standard_m / away) / np.log2(octree.fork) + octree.extra
     last = float(np.ptp(octree.level)) if len(octree.level) else 0.0
     part = np.ones(len(away), np.float32)
@@ -177,14 +177,18 @@ class ScaffoldEvaluator:
 
 
 def each_row_of(wanted: np.ndarray, decode: Callable[[Rows], None]) -> None:
-    """decode(rows) for the rows where wanted (A,) is true, block by block."""
+    """decode(rows) for the rows where wanted (A,) is true, block by block.
+
+    Numbers beyond float32 become Inf or NaN without a word: such splats pass no gate.
+    """
     for start in range(0, len(wanted), BLOCK):
         block = slice(start, min(start + BLOCK, len(wanted)))
         mine = wanted[block]
-        if mine.all():
-            decode(block)  # nothing is copied
-        elif mine.any():
-            decode(start + np.flatnonzero(mine))
+        with np.errstate(over="ignore", invalid="ignore"):
+            if mine.all():
+                decode(block)  # nothing is copied
+            elif mine.any():
+                decode(start + np.flatnonzero(mine))
 
 
 def mixed(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -196,8 +200,7 @@ def mixed(features: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def sigmoid(z: np.ndarray) -> np.ndarray:
-    with np.errstate(over="ignore"):
-        return 1 / (1 + np.exp(-z))
+    return 1 / (1 + np.exp(-z))
 
 
 def softmax(z: np.ndarray) -> np.ndarray:

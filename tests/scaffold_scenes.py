@@ -103,8 +103,8 @@ def as_mlp(raw: Raw, stem: str) -> Mlp:
     return Mlp(tuple(map(np.float32, weights)), tuple(map(np.float32, biases)), ONNX_HEADS[stem])
 
 
-def write_cloud(raw: Raw, path: Path) -> None:
-    """The cloud as save_ply of Scaffold-GS or Octree-GS writes it."""
+def write_cloud(raw: Raw, path: Path, kind: str = "float") -> None:
+    """The cloud as save_ply of Scaffold-GS or Octree-GS writes it; kind: of x, float or double."""
     count = len(raw.anchors)
     columns = {axis: raw.anchors[:, i] for i, axis in enumerate("xyz")}
     comments = []
@@ -125,8 +125,13 @@ def write_cloud(raw: Raw, path: Path) -> None:
     columns |= {"opacity": np.zeros(count), "rot_0": np.ones(count)}
     columns |= {f"rot_{i}": np.zeros(count) for i in (1, 2, 3)}
     header = ["ply", "format binary_little_endian 1.0", *comments, f"element vertex {count}"]
-    header += [f"property float {name}" for name in columns] + ["end_header\n"]
-    rows = np.stack(list(columns.values()), 1).astype("<f4")
+    kinds = {name: kind if name == "x" else "float" for name in columns}
+    header += [f"property {kinds[name]} {name}" for name in columns] + ["end_header\n"]
+    rows = np.empty(
+        count, [(name, {"float": "<f4", "double": "<f8"}[kinds[name]]) for name in columns]
+    )
+    for name, column in columns.items():
+        rows[name] = column
     path.write_bytes("\n".join(header).encode() + rows.tobytes())
 
 

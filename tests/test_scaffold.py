@@ -276,6 +276,72 @@ def test_a_budget_keeps_coarse_levels_first(tmp_path, most):
     assert bool(model.findings) == (most < 240)
 
 
+@pytest.mark.parametrize("levels", [0, 3])
+def test_far_from_zero_it_has_a_zero_of_its_own(tmp_path, levels):
+    """At 4,000 km a float32 has steps of a quarter metre: eyes and anchors are told apart here."""
+    raw, place = random_raw(levels=levels, distance=not levels), np.array([4e6, -2e6, 8e5])
+    raw = replace(raw, anchors=np.round(raw.anchors * 8) / 2)  # what float32 can hold there
+    near = read_model(write_run(raw, tmp_path / "near"))
+    far = read_model(write_run(replace(raw, anchors=raw.anchors + place), tmp_path / "far"))
+    assert near.origin == (0, 0, 0)
+    moved = np.array(far.origin) - ours_from_file("-Y") @ place
+    assert np.abs(moved).max() < 100
+    np.testing.assert_allclose(far.anchors + moved, near.anchors, atol=1e-4)
+    eye = np.array([0.5, 0.2, 3.0])
+    one, other = evaluate(near, 0.0, eye), evaluate(far, 0.0, eye - moved)
+    np.testing.assert_allclose(other.opacity, one.opacity, atol=1e-4)
+    assert far.findings[0].what.startswith("the scene lies far from zero")
+
+
+def test_columns_of_other_types_and_text(tmp_path):
+    raw = random_raw(levels=3)
+    folder = write_run(raw, tmp_path / "run")
+    plain = read_model(folder)
+    write_cloud(raw, folder / "point_cloud.ply", "double")
+    same = read_model(folder)
+    for name in ("anchors", "features", "offsets", "scales"):
+        assert np.array_equal(getattr(same, name), getattr(plain, name))
+    cloud = (folder / "point_cloud.ply").read_bytes()
+    (folder / "point_cloud.ply").write_bytes(cloud.replace(b"binary_little_endian", b"ascii"))
+    with pytest.raises(BadFile, match=r"ASCII|promises"):
+        read_model(folder)
+    for change, match in (
+        ((b"float f_offset_1\n", b"float f_offset_x\n"), "not numbered"),
+        ((b"float f_anchor_feat_3\n", b"float f_anchor_feat_03\n"), "not numbered"),
+        ((b"float scale_5\n", b"float other\n"), "has no scale_5"),
+    ):
+        (folder / "point_cloud.ply").write_bytes(cloud.replace(*change))
+        with pytest.raises(BadFile, match=match):
+            read_model(folder)
+    (folder / "point_cloud.ply").write_bytes(cloud[:-100])
+    with pytest.raises(BadFile, match="cut off"):
+        read_model(folder)
+
+
+def test_any_flipped_byte_is_a_model_or_a_sentence(tmp_path):
+    """A small fuzz over cloud and settings; the networks' own is in test_read_torch."""
+    rng = np.random.default_rng(1)
+    folder = write_run(random_raw(levels=3, bank=True, anchors=5), tmp_path / "run", "split")
+    names = ["point_cloud.ply", "cfg_args", "cov_mlp.pt"]
+    (folder / "cfg_args").write_text("Namespace(fork=2, dist2level='progressive', add_level=False)")
+    whole = {name: (folder / name).read_bytes() for name in names}
+    outcomes = []
+    for round_ in range(300):
+        name = names[round_ % 3]
+        data = bytearray(whole[name])
+        for at in rng.integers(len(data), size=rng.integers(1, 6)):
+            data[at] = rng.integers(256)
+        (folder / name).write_bytes(data[: rng.integers(len(data))] if round_ % 5 == 0 else data)
+        try:
+            model = read_model(folder)
+            outcomes.append(np.isfinite(model.anchors).all())
+        except BadFile as error:
+            assert "\n" not in str(error)
+            outcomes.append(False)
+        (folder / name).write_bytes(whole[name])
+    assert 30 < sum(outcomes) < 270
+
+
 def test_a_budget_keeps_the_anchors_that_show(tmp_path):
     raw = random_raw(anchors=100)
     raw.log_scales[::2, 3:] = -9.0  # every second anchor's splats are tiny
