@@ -73,7 +73,9 @@ def known_failures() -> tuple[type[Exception], ...]:
 
 
 def refuse(sentence: str) -> int:
-    print(f"shapeshift {sentence}", file=sys.stderr)
+    """One line on stderr, whatever a path or a file put into it."""
+    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in sentence)
+    print(f"shapeshift {line}", file=sys.stderr)
     return BAD_INPUT
 
 

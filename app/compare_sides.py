@@ -12,7 +12,6 @@ from runtime_models.model import BadFile, Model, Stop
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 SCENE_MARKS = ("scene.json", "meta.json", "lod-meta.json")  # folders of these hold no photographs
-LARGEST_PICTURE = 1 << 27  # pixels
 
 
 @dataclass(frozen=True)
@@ -108,12 +107,6 @@ def match_pictures(a: PictureSide, b: PictureSide) -> tuple[list[tuple[str, Path
 
 def read_picture(path: Path) -> np.ndarray:
     """(H, W, 3) float32 display sRGB 0..1; what is see-through lies over black.  Raises BadFile."""
-    from scene.photo import open_image, read_pixels
+    from scene.photo import read_pixels
 
-    with open_image(path) as image:
-        width, height = image.size
-    if width * height > LARGEST_PICTURE:
-        raise BadFile(
-            f"{path} has {width}x{height} pixels, at most {LARGEST_PICTURE:,} are compared."
-        )
     return read_pixels(path)[0]

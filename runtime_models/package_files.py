@@ -16,6 +16,8 @@ WHOLE = f"a package is {MANIFEST}, {ANCHORS} and five ONNX files"
 
 LARGEST = {MANIFEST: 16 << 20, ANCHORS: 4 << 30}  # bytes, unpacked
 LARGEST_NETWORK = 256 << 20  # bytes; five of 64 MB would draw one frame a minute
+ALWAYS_FREE = 32 << 20  # bytes that anything may unpack to
+MOST_RATIO = 20  # unpacked over packed beyond that; trained numbers pack 1.2 times
 
 # What the standard library raises on a damaged zip, by itself or through its decompressors.
 DAMAGED = (
@@ -39,6 +41,15 @@ def refuse_large(path: Path, name: str, size: int) -> None:
         raise BadFile(f"{path}: {name} has {size:,} bytes, at most {limit:,} are read.")
 
 
+def refuse_bomb(what: str, size: int, packed: int) -> None:
+    """BadFile where `packed` bytes are to become more than numbers of a scene ever do."""
+    if size > max(ALWAYS_FREE, MOST_RATIO * packed):
+        raise BadFile(
+            f"{what} would unpack from {packed:,} to {size:,} bytes, over {MOST_RATIO} times as "
+            "many; it is not taken for numbers of a scene."
+        )
+
+
 def read_from_folder(path: Path, name: str) -> bytes:
     file = path / name
     if not file.is_file():
@@ -53,7 +64,10 @@ def read_from_zip(path: Path, name: str) -> bytes:
         with zipfile.ZipFile(path) as archive:
             entry = find_entry(archive, path, name)
             refuse_large(path, name, entry.file_size)
-            return archive.read(entry)
+            packed = min(entry.compress_size, path.stat().st_size)
+            refuse_bomb(f"{path}: {name}", entry.file_size, packed)
+            with archive.open(entry) as stream:  # archive.read would unpack 2 GB, then cut
+                return stream.read(entry.file_size + 1)
     except BadFile:
         raise
     except DAMAGED:

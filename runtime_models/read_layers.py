@@ -13,9 +13,11 @@ MODES = ("cumulative", "exclusive")
 
 
 def layer_files(folder: Path) -> list[Path]:
-    """layer*.ply of a folder, else every .ply, else every .splat; layer2 before layer10."""
-    for pattern in ("layer*.ply", "*.ply", "*.splat"):
-        if found := sorted(folder.glob(pattern), key=number_aware):
+    """layer*.ply of a folder, else every .ply, else every .splat, else every .spz and so on;
+    layer2 before layer10.
+    """
+    for pattern in ("layer*.ply", "*.ply", "*.splat", "*.spz", "*.sog", "*.ksplat", "*.glb"):
+        if found := sorted(filter(Path.is_file, folder.glob(pattern)), key=number_aware):
             return found
     return []
 

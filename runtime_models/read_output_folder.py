@@ -39,7 +39,7 @@ def newest_of(clouds: Iterable[Path]) -> Path | None:
     by_number = {}
     for cloud in clouds:
         name = cloud.parent.name if cloud.name == CLOUD else cloud.stem
-        if found := NUMBER.fullmatch(name):
+        if (found := NUMBER.fullmatch(name)) and cloud.is_file():
             by_number[int(found[1])] = cloud
     return by_number[max(by_number)] if by_number else None
 

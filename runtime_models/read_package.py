@@ -9,7 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, BadFile, Mlp
-from runtime_models.package_files import ANCHORS, DAMAGED, LARGEST, MANIFEST, open_package
+from runtime_models.package_files import (
+    ANCHORS,
+    DAMAGED,
+    LARGEST,
+    MANIFEST,
+    open_package,
+    refuse_bomb,
+)
 from runtime_models.read_manifest import Manifest, read_manifest
 from runtime_models.read_onnx import read_onnx
 
@@ -67,9 +74,12 @@ def read_arrays(data: bytes, where: str) -> dict[str, np.ndarray]:
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             size = sum(entry.file_size for entry in archive.zip.infolist())
+            refuse_bomb(where, size, len(data))
             lacking = [name for name in TYPES if name not in archive]
             small = size <= LARGEST[ANCHORS]
             arrays = {name: archive[name] for name in TYPES} if small and not lacking else {}
+    except BadFile:
+        raise
     except (*DAMAGED, *BAD_HEADER, MemoryError):
         raise BadFile(f"{where} is damaged or holds other than plain numbers.") from None
     if not small:

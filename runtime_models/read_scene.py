@@ -41,6 +41,8 @@ def read_whole(path: Path, reading: Reading) -> Model:
     """The model with all its splats."""
     if not path.exists():
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
+    if not (path.is_file() or path.is_dir()):  # reading a pipe would wait for ever
+        raise BadFile(f"{path} is neither a file nor a folder; wanted is {KNOWN}.")
     if path.name == MANIFEST:
         path = path.parent
     if is_streamed(path):

@@ -1,5 +1,6 @@
 """The pixels of a photo and of its mask, in the size that is asked for."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -8,18 +9,22 @@ from PIL import Image, UnidentifiedImageError
 from runtime_models.model import BadFile
 from scene.capture import Photo
 
+MOST_PIXELS = 1 << 27
+BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
 GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
 
 
 def open_image(path: Path) -> Image.Image:
     """The image file, its header read; BadFile when it is missing or no image."""
     try:
-        return Image.open(path)
+        with warnings.catch_warnings():  # read_pixels says what is too large, in a sentence
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            return Image.open(path)
     except FileNotFoundError:
         raise BadFile(
             f"{path}: the image file is missing; put it there or drop the frame"
         ) from None
-    except (UnidentifiedImageError, OSError) as error:
+    except (UnidentifiedImageError, Image.DecompressionBombError, *BROKEN) as error:
         raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
 
 
@@ -46,9 +51,14 @@ def load_photo(
 
 def read_pixels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     with open_image(path) as image:
+        if image.width * image.height > MOST_PIXELS:
+            raise BadFile(
+                f"{path}: {image.width}x{image.height} pixels, at most {MOST_PIXELS:,} are read; "
+                "scale it down"
+            )
         try:
             image.load()
-        except OSError as error:
+        except BROKEN as error:
             raise BadFile(f"{path}: the image is cut off ({error}); copy it again") from None
         if image.mode in GREY_16:
             grey = np.asarray(image, np.float32) / 65535

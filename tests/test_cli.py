@@ -83,7 +83,7 @@ def fail_with(monkeypatch, error):
 def test_bad_file_is_exit_2_and_its_sentence(monkeypatch, capsys):
     fail_with(monkeypatch, BadFile("found this, wanted that"))
     assert cli.main(["info", "x"]) == 2
-    assert capsys.readouterr().err == "shapeshift info: found this, wanted that\n"
+    assert capsys.readouterr().err == "shapeshift info: found this, wanted that.\n"
 
 
 def test_interrupt_is_exit_130(monkeypatch, capsys):
