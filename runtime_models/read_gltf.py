@@ -198,8 +198,8 @@ def display_from_linear(sh: np.ndarray) -> np.ndarray:
 
     Exact for the mean colour; what varies with direction is scaled by the curve's slope there.
     """
-    mean = np.clip(0.5 + C0 * sh[:, :1], 0, None)  # (N, 1, 3)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = np.clip(0.5 + C0 * sh[:, :1], 0, None)  # (N, 1, 3)
         low = mean <= 0.0031308
         power = np.maximum(mean, 0.0031308)
         shown = np.where(low, 12.92 * mean, 1.055 * power ** (1 / 2.4) - 0.055)
