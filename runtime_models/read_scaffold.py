@@ -10,7 +10,7 @@ from runtime_models.blocks import BLOCK
 from runtime_models.model import OCTREE_RULES, BadFile, Finding, Octree, ScaffoldModel, Stop
 from runtime_models.plain_splats import COLMAP_UP, RawSplats, Reading
 from runtime_models.recentre import recentre
-from runtime_models.scaffold_budget import within_budget
+from runtime_models.scaffold_budget import refuse_filling, within_budget
 from runtime_models.scaffold_cloud import Cloud, read_cloud
 from runtime_models.scaffold_networks import Networks, Shape, read_networks, turn_networks
 from runtime_models.turn import ours_from_file
@@ -65,6 +65,8 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
         tuple(map(float, rotation @ origin)),
         (*networks.findings, *findings, *far),
     )
+    if not reading.allow_huge:
+        refuse_filling(model, file.name)
     return within_budget(model, reading.most_splats)
 
 

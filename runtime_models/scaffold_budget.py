@@ -1,11 +1,15 @@
-"""--max-splats for a Scaffold-GS or Octree-GS model: whole anchors go, the least shown first."""
+"""How much a Scaffold-GS or Octree-GS model draws: --max-splats, and the gate before any drawing.
+
+What a splat shows depends on the eye; eyes outside the scene stand for all.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
 from runtime_models.evaluate_scaffold import ScaffoldEvaluator
-from runtime_models.model import Finding, ScaffoldModel
+from runtime_models.lint_whole import MIN_ALPHA, MOST_LAYERS, SAMPLE, layers
+from runtime_models.model import BadFile, Finding, ScaffoldModel
 from runtime_models.thin import largest
 
 EYES = np.concatenate([np.eye(3), -np.eye(3)])  # directions from the middle
@@ -33,6 +37,7 @@ def within_budget(model: ScaffoldModel, most_splats: int) -> ScaffoldModel:
         0,
         f"{kept.splat_count:,} that show most are kept",
         file=", ".join(model.provenance.get("files", ())[:1]),
+        repaired=False,
     )
     return replace(kept, findings=(*model.findings, found))
 
@@ -52,14 +57,38 @@ def pick(model: ScaffoldModel, rows: np.ndarray) -> ScaffoldModel:
 
 def shown_of(model: ScaffoldModel) -> np.ndarray:
     """(A,) m^2: what the splats of each anchor show on average."""
-    low, high = np.percentile(model.anchors, (2, 98), axis=0)
-    centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
-    if model.octree is not None:
-        model = replace(model, octree=replace(model.octree, standard_m=np.inf))  # every level
-    evaluator = ScaffoldEvaluator(model)
+    evaluator = ScaffoldEvaluator(with_every_level(model))
     shown = np.zeros(model.offsets.shape[:2])
-    for direction in EYES:
-        _, scales, _, opacity = evaluator.geometry(centre + AWAY * radius * direction)
+    for eye in eyes_around(model):
+        _, scales, _, opacity = evaluator.geometry(eye)
         area = np.sort(scales, axis=1)[:, 1:].prod(axis=1)
         shown += (np.maximum(opacity, 0) * area).reshape(shown.shape)
     return shown.sum(axis=1)
+
+
+def refuse_filling(model: ScaffoldModel, file: str) -> None:
+    """BadFile where so many splats would lie over every pixel that drawing could halt a machine."""
+    step = max(model.splat_count // SAMPLE, 1)
+    few = pick(model, np.arange(0, len(model.anchors), step))
+    evaluator = ScaffoldEvaluator(with_every_level(few))
+    means, scales, _, opacity = evaluator.geometry(eyes_around(few)[0])
+    ratio = layers(means, scales, opacity >= MIN_ALPHA) * len(model.anchors) / len(few.anchors)
+    if not ratio <= MOST_LAYERS:
+        raise BadFile(
+            f"{file}: {ratio:,.0f} splats would lie over every pixel, at most {MOST_LAYERS:,.0f} "
+            "are drawn: its scales are no logarithms of metres, or its networks are another "
+            "cloud's; export it again, or add --allow-huge if this is meant."
+        )
+
+
+def eyes_around(model: ScaffoldModel) -> np.ndarray:
+    """(6, 3) metres: outside the scene, one on each side."""
+    low, high = np.percentile(model.anchors, (2, 98), axis=0)
+    return (low + high) / 2 + AWAY * np.linalg.norm(high - low) / 2 * EYES
+
+
+def with_every_level(model: ScaffoldModel) -> ScaffoldModel:
+    """The model as seen from very near: no level of an octree is too fine."""
+    if model.octree is None:
+        return model
+    return replace(model, octree=replace(model.octree, standard_m=np.inf))

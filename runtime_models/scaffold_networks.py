@@ -191,7 +191,7 @@ def takes_level(
     if set(extra.values()) != {1}:
         return 2 in extra.values(), ()
     what = "every network takes one number beside features and direction, and no cfg_args says what"
-    return False, (Finding(what, 0, "read as the distance", file="opacity_mlp.pt"),)
+    return False, (Finding(what, 0, "read as the distance", (), "opacity_mlp.pt", repaired=False),)
 
 
 def bank_with_inputs(bank: Mlp, shape: Shape, folder: Path) -> Mlp:

@@ -342,6 +342,18 @@ def test_any_flipped_byte_is_a_model_or_a_sentence(tmp_path):
     assert 30 < sum(outcomes) < 270
 
 
+def test_what_would_halt_a_machine_is_refused(tmp_path):
+    """Scales of metres where centimetres are meant: every splat would cover the scene."""
+    raw = random_raw(anchors=4000, k=5)
+    folder = write_run(raw, tmp_path / "run")
+    read_model(folder)
+    raw.log_scales[:, 3:] = 2.0
+    write_cloud(raw, folder / "point_cloud.ply")
+    with pytest.raises(BadFile, match=r"splats would lie over every pixel.*--allow-huge"):
+        read_model(folder)
+    assert read_model(folder, Reading(allow_huge=True)).splat_count == 20_000
+
+
 def test_a_budget_keeps_the_anchors_that_show(tmp_path):
     raw = random_raw(anchors=100)
     raw.log_scales[::2, 3:] = -9.0  # every second anchor's splats are tiny
