@@ -29,12 +29,14 @@ def formats() -> tuple[Format, ...]:
     from runtime_models.read_gltf import is_gltf, read_raw_gltf
     from runtime_models.read_ksplat import read_raw_ksplat
     from runtime_models.read_ply import read_raw_ply
+    from runtime_models.read_points_ply import is_points, read_raw_points_ply
     from runtime_models.read_sog import is_sog, read_raw_sog
     from runtime_models.read_splat import read_raw_splat
     from runtime_models.read_spz import has_spz_mark, read_raw_spz
 
     return (
         Format("compressed PLY", (".ply",), has_chunks, read_raw_compressed_ply),
+        Format("PLY of points", (".ply",), is_points, read_raw_points_ply),
         Format("3DGS PLY", (".ply",), lambda head, path: head[:3] == b"ply", read_raw_ply),
         Format("glTF", (".glb", ".gltf"), is_gltf, read_raw_gltf),
         Format("SOG", (".sog", "meta.json"), is_sog, read_raw_sog),

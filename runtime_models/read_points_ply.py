@@ -1,0 +1,109 @@
+"""A PLY of points, with or without colours: shown as round splats that reach their neighbours."""
+
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.model import BadFile, Finding
+from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.ply_file import Element, PlyHeader, read_header
+from runtime_models.read_ply import DIRECT, GEOMETRY, NORMAL, PLACE, QUATERNION, SCALES, numbers
+from runtime_models.spacing import spacing
+from runtime_models.spherical_harmonics import C0
+
+COLORS = (  # names that programs give to red, green and blue
+    ("red", "green", "blue"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+    ("r", "g", "b"),
+)
+GRAY = 0.7  # of points without a colour
+SIGMA = 0.25  # of the distance to the neighbours: they touch, strays do not hide the rest
+
+
+def is_points(head: bytes, path: Path) -> bool:
+    """Whether a PLY has points of no size and no rotation; a broken header is for others to say."""
+    if head[:3] != b"ply":
+        return False
+    try:
+        vertex = [e for e in read_header(path).elements if e.name == "vertex" and e.row]
+    except BadFile:
+        return False
+    names = set(vertex[0].row.names or ()) if vertex else set()
+    return set(PLACE) <= names and not names & {*SCALES, *QUATERNION}
+
+
+def read_raw_points_ply(path: Path, reading: Reading) -> RawSplats:
+    """A round opaque splat for each point, binary or ASCII.  Raises BadFile, always if strict."""
+    header = read_header(path)
+    vertex, begins = header.find("vertex")
+    lacking = [name for name in GEOMETRY if name not in vertex.row.names]
+    what = f"a point cloud, no splats: it has no {', '.join(lacking)}"
+    if reading.strict:
+        raise BadFile(f"{path.name}: {what}; --strict shows splats only, open it without.")
+    table = read_records(path, header, vertex, begins)
+    places = np.stack([table[axis] for axis in PLACE], 1)  # (N, 3)
+    if places.dtype not in (np.float32, np.float64):
+        places = places.astype(np.float64)
+    reading.tell(f"measuring {path.name}", 0.5)
+    size = (SIGMA * spacing(places)).astype(np.float32)
+    count = len(table)
+    done = f"shown as {count:,} points, each as wide as the way to its neighbours"
+    return RawSplats(
+        means=places,
+        scales=np.repeat(size[:, None], 3, axis=1),
+        wxyz=np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
+        opacity=np.ones(count, np.float32),
+        sh=colors_of(table),
+        file=path.name,
+        format="PLY of points",
+        log_scales=False,
+        logits=False,
+        extra=others_of(table),
+        findings=(Finding(what, 0, done, file=path.name),),
+    )
+
+
+def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) -> np.ndarray:
+    """(N,) records of the points.  Raises BadFile."""
+    if header.encoding != "ascii":
+        return np.memmap(path, vertex.row, "r", begins, (vertex.count,))
+    width, table, done = len(vertex.row), np.empty(vertex.count, vertex.row), 0
+    pending = np.empty(0)
+    with path.open("rb") as file:
+        file.seek(begins)
+        for values in numbers(file, path.name):
+            pending = np.concatenate([pending, values])
+            rows = min(len(pending) // width, vertex.count - done)
+            part = pending[: rows * width].reshape(rows, width)
+            with np.errstate(over="ignore", invalid="ignore"):
+                for i, name in enumerate(vertex.row.names):
+                    table[name][done : done + rows] = part[:, i]
+            pending, done = pending[rows * width :], done + rows
+            if done == vertex.count:
+                return table
+    raise BadFile(
+        f"{path.name}: the header promises {vertex.count} points, the file holds {done}; it is cut "
+        "off or its header is wrong."
+    )
+
+
+def colors_of(table: np.ndarray) -> np.ndarray:
+    """(N, 1, 3) float32 harmonics of degree 0: the points' colours, or gray."""
+    names = next((three for three in (*COLORS, DIRECT) if set(three) <= set(table.dtype.names)), ())
+    if names == DIRECT:
+        return np.stack([table[name] for name in names], 1, dtype=np.float32)[:, None]
+    if not names:
+        return np.full((len(table), 1, 3), (GRAY - 0.5) / C0, np.float32)
+    shades = []
+    for name in names:
+        kind = table.dtype[name]
+        most = np.iinfo(kind).max if kind.kind in "iu" else 1.0
+        shades.append(table[name].astype(np.float32) / np.float32(most))
+    return ((np.stack(shades, 1) - 0.5) / np.float32(C0))[:, None]
+
+
+def others_of(table: np.ndarray) -> dict[str, np.ndarray]:
+    """The columns that say neither where a point is nor how it looks."""
+    shown = {*PLACE, *NORMAL, *DIRECT, "alpha", "opacity", *(n for three in COLORS for n in three)}
+    names = [name for name in table.dtype.names if name not in shown]
+    return {name: table[name].astype(table.dtype[name].newbyteorder("=")) for name in names}
