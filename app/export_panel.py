@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 FOLDER = "exports"  # beside the folder of the pictures
 EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
-DEGREES = (
-    "one colour from all sides",
-    "colours of SH degree 1",
-    "of SH degree 2",
-    "of SH degree 3",
-)
+DEGREES = ("colours: one from all sides", *(f"colours: SH degree {n}" for n in (1, 2, 3)))
 FORMAT_TIPS = {
     ".ply": "What 3DGS writes; every viewer opens it. The largest.",
     ".compressed.ply": "A quarter of the size or less; SuperSplat and PlayCanvas.",
@@ -74,7 +69,7 @@ class ExportPanel:
             return
         imgui.push_item_width(-1)
         endings = [writer.ending for writer in WRITERS]
-        names = [f"{w.ending.removeprefix('.')}  ({w.name})" for w in WRITERS]
+        names = [f"{w.ending}  {w.name if w.name not in w.ending else ''}" for w in WRITERS]
         self.ending = choice("format", self.ending, endings, names)
         tip(FORMAT_TIPS[self.ending], ui_scale)
         values, labels = self._choices()

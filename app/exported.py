@@ -13,7 +13,10 @@ from renderer.palette import palette_colors, thermal_weights
 from runtime_models.bake import Recolor, bake
 from runtime_models.evaluate import follows_eye
 from runtime_models.model import Finding, SplatLayers
+from runtime_models.package_files import MANIFEST
 from runtime_models.plain_splats import PlainSplats
+from runtime_models.read_streamed import TREE
+from runtime_models.sog_files import META
 from runtime_models.write_plain import cut, merged, placed, writer_of
 from scene.control import control_of
 from scene.framing import default_view
@@ -137,7 +140,8 @@ def chosen_rows(part: Part) -> np.ndarray | None:
 
 def check_output(path: Path, inputs: Sequence[Path], overwrite: bool) -> None:
     """Refuses a path that is an input under any name, and what exists unless it may be replaced."""
-    for given in inputs:
+    folders = [given.parent for given in inputs if given.name in (MANIFEST, META, TREE)]
+    for given in (*inputs, *folders):
         if given.is_dir() and path.resolve().is_relative_to(given.resolve()):
             raise UsageError(f"--out {path} lies in {given}, which is read; choose another folder.")
         if path.exists() and os.path.samefile(path, given):

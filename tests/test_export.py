@@ -259,6 +259,13 @@ def test_nor_into_a_folder_that_is_read(scenes, tmp_path, capsys):
     )
 
 
+def test_nor_over_a_package_that_is_named_by_its_manifest(scenes, tmp_path, capsys):
+    assert export(scenes / "random.shift", "--out", tmp_path / "package") == 0
+    manifest = tmp_path / "package" / "scene.json"
+    refused(capsys, "which is read", manifest, "--out", manifest.parent, "--overwrite")
+    assert export(manifest, "--out", tmp_path / "beside.ply") == 0
+
+
 def test_a_failure_leaves_no_part(scenes, tmp_path, capsys, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device", "a.ply")
