@@ -23,7 +23,7 @@ Rows = np.ndarray | slice  # all anchors as a slice: nothing is copied
 
 def drawn_anchors(octree: Octree, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(A,) bool: drawn from an eye (3,); (A,) float32: the part of their opacity that is shown."""
-    with np.errstate(divide="ignore", over="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         away = np.linalg.norm(octree.places - np.asarray(eye, np.float32), axis=1)
         asked = np.log2(octree.standard_m / away) / np.log2(octree.fork) + octree.extra
     last = float(np.ptp(octree.level)) if len(octree.level) else 0.0
