@@ -23,9 +23,8 @@ LENSES = {
 }  # fmt: skip
 LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
 CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")
-POINT = struct.Struct("<Q3d3BdQ")
 COUNT = struct.Struct("<Q")
-POINT_IN_IMAGE, STEP_OF_TRACK = 24, 8  # bytes
+POINT_IN_IMAGE = 24  # bytes
 AGAIN = "copy or export it again"
 
 
@@ -96,14 +95,14 @@ def cameras_of_bytes(path: Path) -> dict[int, Lens]:
     lenses = {}
     for _ in range(count):
         if at + CAMERA.size > len(data):
-            raise _short(path, count, "cameras")
+            raise short_of(path, count, "cameras")
         number, model, width, height = CAMERA.unpack_from(data, at)
         at += CAMERA.size
         if model not in LENSES:
             raise BadFile(f"{path}: camera {number} is of model {model}, which is not known here.")
         params = LENSES[model][2]
         if at + 8 * params > len(data):
-            raise _short(path, count, "cameras")
+            raise short_of(path, count, "cameras")
         values = struct.unpack_from(f"<{params}d", data, at)
         at += 8 * params
         lenses[number] = Lens(LENSES[model][0], (width, height), values)
@@ -116,12 +115,12 @@ def images_of_bytes(path: Path) -> list[Posed]:
     posed = []
     for _ in range(count):
         if at + IMAGE.size > len(data):
-            raise _short(path, count, "images")
+            raise short_of(path, count, "images")
         number, *values, lens = IMAGE.unpack_from(data, at)
         at += IMAGE.size
         end = data.find(b"\0", at, at + LONGEST_NAME)
         if end < 0 or end + 1 + COUNT.size > len(data):
-            raise _short(path, count, "images")
+            raise short_of(path, count, "images")
         name = data[at:end].decode("utf-8", "replace")
         points = COUNT.unpack_from(data, end + 1)[0]
         at = end + 1 + COUNT.size
@@ -130,20 +129,6 @@ def images_of_bytes(path: Path) -> list[Posed]:
         at += points * POINT_IN_IMAGE
         posed.append(Posed(number, name, tuple(values[:4]), tuple(values[4:]), lens))
     return posed
-
-
-def check_points(path: Path) -> None:
-    """Raises BadFile where points3D.bin ends before the counts in it are met."""
-    data = path.read_bytes()
-    count, at = count_of(data, POINT.size, path), COUNT.size
-    for _ in range(count):
-        if at + POINT.size > len(data):
-            raise _short(path, count, "points")
-        track = COUNT.unpack_from(data, at + POINT.size - COUNT.size)[0]
-        at += POINT.size
-        if track > (len(data) - at) // STEP_OF_TRACK:
-            raise _short(path, count, "points")
-        at += track * STEP_OF_TRACK
 
 
 def count_of(data: bytes, least: int, path: Path) -> int:
@@ -210,5 +195,5 @@ def _focals(model: str) -> int:
     return LENSES[LENS_NUMBERS[model]][1]
 
 
-def _short(path: Path, count: int, what: str) -> BadFile:
+def short_of(path: Path, count: int, what: str) -> BadFile:
     return BadFile(f"{path} claims {count:,} {what} and ends before the last; {AGAIN}.")

@@ -11,62 +11,44 @@ from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     image_size,
-    rigid,
     split_every_8th,
     spread_stops,
     stop_from,
 )
-from scene.colmap_tables import TABLES, check_points, find_model, read_tables
+from scene.colmap_points import read_colmap_points
+from scene.colmap_tables import Lens, find_model, read_tables
 from scene.pose import View
+from scene.read_colmap_cameras import camera_pose
 from scene.read_transforms import STRAIGHT, read_json
 
 
 def read_colmap(folder: Path) -> Capture:
     """Sub-folders of images/ are modalities; capture.json may say more (docs/capture.md)."""
-    model = load_model(*find_model(folder))
-    posed = sorted((i for i in model.images.values() if i.has_pose), key=lambda i: i.name)
-    if not posed:
-        raise BadFile(f"{folder}: the COLMAP model holds no posed image; run the mapper again")
+    model, ending = find_model(folder)
+    lenses, images = read_tables(model, ending)
+    posed = sorted(images, key=lambda image: image.name)
     root = folder / "images" if (folder / "images").is_dir() else folder
     said = read_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
     stops, modality_of = modalities(said, [i.name for i in posed], folder)
-    cameras = [rigid(i.cam_from_world().inverse().matrix(), f"{folder}: {i.name}") for i in posed]
+    cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
     photos = []
     for image, world_from_camera in zip(posed, cameras, strict=True):
-        camera, path = model.cameras[image.camera_id], root / image.name
+        lens, path = lenses[image.lens], root / image.name
         if not path.is_file():
             raise BadFile(f"{path}: the image file is missing; put it there or drop it from COLMAP")
-        size = image_size(path, (camera.width, camera.height))
-        focal, centre = pinhole(camera, f"{folder}: camera {image.camera_id}")
+        size = image_size(path, lens.size)
+        focal, centre = pinhole(lens, f"{folder}: camera {image.lens}")
         mask = find_mask(folder, image.name)
         if mask is not None:
             image_size(mask, size)
         view = View.from_pinhole(world.turned(world_from_camera), focal, centre, size)
         photos.append(Photo(view, path, modality_of[image.name], mask))
-    cloud = [model.points3D[i] for i in sorted(model.points3D)]
-    points = np.array([p.xyz for p in cloud]) if cloud else None
-    colors = np.array([p.color for p in cloud], np.float32) / 255 if cloud else None
+    xyz, rgb = read_colmap_points(model / f"points3D{ending}")
+    points, colors = (xyz, rgb.astype(np.float32) / 255) if len(xyz) else (None, None)
     photos = split_every_8th(photos)
     background, guessed = said.get("background"), not said.get("modalities")
     return world.capture(folder, stops, photos, points, colors, background, guessed)
-
-
-def load_model(folder: Path, ending: str):
-    """pycolmap's Reconstruction; the counts are checked first, which it takes memory for."""
-    import pycolmap
-
-    missing = [t + ending for t in TABLES if not (folder / (t + ending)).is_file()]
-    if missing:
-        raise BadFile(f"{folder}: {', '.join(missing)} missing; copy the whole COLMAP model")
-    read_tables(folder, ending)
-    if ending == ".bin":
-        check_points(folder / "points3D.bin")
-    try:
-        return pycolmap.Reconstruction(folder)
-    except (RuntimeError, ValueError, IndexError, MemoryError) as error:
-        text = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise BadFile(f"{folder}: not a readable COLMAP model ({text}); export it again") from None
 
 
 def modalities(
@@ -97,19 +79,23 @@ def modalities(
     return tuple(sorted(stops, key=lambda s: s.x)), of
 
 
-def pinhole(camera, where: str) -> tuple[tuple, tuple]:
+def pinhole(lens: Lens, where: str) -> tuple[tuple, tuple]:
     """(fx, fy), (cx, cy) of a camera without distortion, or with less than half a pixel."""
-    focal = (camera.focal_length_x, camera.focal_length_y)
-    centre = (camera.principal_point_x, camera.principal_point_y)
+    import pycolmap
+
+    width, height = lens.size
+    focal, centre = lens.focal, lens.centre
     if not all(0 < f < np.inf for f in focal):
         raise BadFile(f"{where} has focal lengths {focal}; both must be above 0")
-    x, y = np.meshgrid([0, camera.width / 2, camera.width], [0, camera.height / 2, camera.height])
+    camera = pycolmap.Camera(model=lens.model, width=width, height=height, params=lens.params)
+    x, y = np.meshgrid([0, width / 2, width], [0, height / 2, height])
     corners = np.stack([x.ravel(), y.ravel()], axis=1)
-    straight = np.concatenate([(corners - centre) / focal, np.ones((9, 1))], axis=1)
-    shift = np.abs(camera.img_from_cam(straight) - corners).max()
+    with np.errstate(over="ignore", invalid="ignore"):  # then the shift is NaN: refused
+        straight = np.concatenate([(corners - centre) / focal, np.ones((9, 1))], axis=1)
+        shift = np.abs(camera.img_from_cam(straight) - corners).max()
     if not shift <= STRAIGHT:
         raise BadFile(
-            f"{where} ({camera.model_name}) shifts corners by {shift:.1f} pixels; undistort first: "
+            f"{where} ({lens.model}) shifts corners by {shift:.1f} pixels; undistort first: "
             "colmap image_undistorter --image_path images --input_path sparse/0 --output_path out"
         )
     return focal, centre

@@ -33,9 +33,13 @@ def read_colmap_cameras(folder: Path, ending: str, reading: CameraReading) -> Ca
 
 
 def view_of(image: Posed, lens: Lens, turn: np.ndarray, where: str) -> View:
+    world_from_camera = turn @ camera_pose(image, where)
+    return pinhole_view(world_from_camera, lens.focal, lens.centre, lens.size, where)
+
+
+def camera_pose(image: Posed, where: str) -> np.ndarray:
+    """(4, 4) camera to world, OpenCV axes, COLMAP's world.  Raises BadFile."""
     length = math.hypot(*image.wxyz)
     if not (abs(length - 1) <= UNIT and np.isfinite(image.place).all()):
         raise BadFile(f"{where}: its pose is no rotation and place; run the mapper again.")
-    camera_from_world = Pose(np.array(image.place), np.array(image.wxyz) / length).matrix()
-    world_from_camera = turn @ np.linalg.inv(camera_from_world)
-    return pinhole_view(world_from_camera, lens.focal, lens.centre, lens.size, where)
+    return np.linalg.inv(Pose(np.array(image.place), np.array(image.wxyz) / length).matrix())

@@ -1,5 +1,6 @@
 """COLMAP models: against pycolmap both ways, cut and lying tables, broken lines of text."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from camera_files import HALF, NAMES, cameras, views
 
 from runtime_models.model import BadFile
 from scene.camera_list import CameraList, data_from_ours
+from scene.colmap_points import read_colmap_points
 from scene.read_cameras import read_camera_list
 from scene.write_cameras import COLMAP_FORMS, write_cameras
 
@@ -90,23 +92,36 @@ def test_a_lying_count_takes_no_memory(tmp_path, table, count):
     path.write_bytes(count.to_bytes(8, "little") + path.read_bytes()[8:])
     with pytest.raises(BadFile, match="claims"):
         read_camera_list(folder)
-    from scene.read_colmap import load_model
-
-    with pytest.raises(BadFile, match="claims"):  # and pycolmap never sees it
-        load_model(folder, ".bin")
 
 
-def test_lying_points_never_reach_pycolmap(tmp_path):
-    from scene.read_colmap import load_model
-
-    pytest.importorskip("pycolmap", reason="pycolmap is not installed")
-    folder = colmap(tmp_path)
-    assert len(load_model(folder, ".bin").images) == 3
-    one = (1).to_bytes(8, "little") + bytes(35) + (1 << 50).to_bytes(8, "little")
-    for data in (b"", (1 << 40).to_bytes(8, "little"), one, one[:-9]):
-        (folder / "points3D.bin").write_bytes(data)
+def test_points_that_lie_or_are_cut(tmp_path):
+    path = tmp_path / "points3D.bin"
+    point = struct.pack("<Q3d3BdQ", 7, 1.0, 2.0, 3.0, 10, 20, 30, 0.5, 2) + bytes(16)
+    earlier = struct.pack("<Q3d3BdQ", 3, 4.0, 5.0, 6.0, 40, 50, 60, 0.5, 0)
+    whole = struct.pack("<Q", 2) + point + earlier
+    path.write_bytes(whole)
+    xyz, rgb = read_colmap_points(path)  # in the order of their numbers
+    np.testing.assert_array_equal(xyz, [[4, 5, 6], [1, 2, 3]])
+    np.testing.assert_array_equal(rgb, [[40, 50, 60], [10, 20, 30]])
+    lies = [whole[:length] for length in range(len(whole))]
+    lies += [struct.pack("<Q", 1 << 40) + whole[8:]]
+    lies += [
+        whole.replace(struct.pack("<Q", 2) + bytes(16), struct.pack("<Q", 1 << 50) + bytes(16))
+    ]
+    for data in lies:
+        path.write_bytes(data)
         with pytest.raises(BadFile):
-            load_model(folder, ".bin")
+            read_colmap_points(path)
+    path.write_bytes(struct.pack("<Q", 0))
+    assert [len(a) for a in read_colmap_points(path)] == [0, 0]
+    text = tmp_path / "points3D.txt"
+    text.write_text("# a\n7 1 2 3 10 20 30 0.5 1 2 3 4\n\n3 4 5 6 40 50 60 0.5\n")
+    for got, wanted in zip(read_colmap_points(text), (xyz, rgb), strict=True):
+        np.testing.assert_array_equal(got, wanted)
+    for line in ("7 1 2 3 10 20 30", "7 1 x 3 10 20 30 0.5", "7 1 nan 3 10 20 30 0.5"):
+        text.write_text(line)
+        with pytest.raises(BadFile, match="line 1"):
+            read_colmap_points(text)
 
 
 TEXTS = {

@@ -134,5 +134,5 @@ def test_colmap_lacks_a_table_or_an_image(tmp_path):
     with pytest.raises(BadFile, match=r"rgb/2.png: the image file is missing"):
         read_capture(tmp_path)
     (tmp_path / "sparse/0/cameras.bin").unlink()
-    with pytest.raises(BadFile, match=r"cameras.bin missing"):
+    with pytest.raises(BadFile, match=r"cameras\.bin is missing"):
         read_capture(tmp_path)
