@@ -10,6 +10,7 @@ from scene.colmap_tables import AGAIN, COUNT, count_of, numbers_of, short_of, te
 
 POINT = struct.Struct("<Q3d3BdQ")  # number, place, colour, error, steps of its track
 STEP_OF_TRACK = 8  # bytes
+FARTHEST = 1e30  # beyond this float32 ends soon
 WORDS = 8  # of a line of text before its track
 
 
@@ -21,8 +22,8 @@ def read_colmap_points(path: Path) -> tuple[np.ndarray, np.ndarray]:
     rows.sort(key=lambda row: row[0])
     xyz = np.array([row[1:4] for row in rows], np.float64).reshape(-1, 3)
     rgb = np.array([row[4:7] for row in rows], np.float64).reshape(-1, 3)
-    if not np.isfinite(xyz).all():
-        raise BadFile(f"{path}: some points have no place (NaN or Inf); {AGAIN}.")
+    if not (np.abs(xyz) < FARTHEST).all():
+        raise BadFile(f"{path}: some points are nowhere (NaN, Inf or beyond measure); {AGAIN}.")
     return xyz, rgb.clip(0, 255).astype(np.uint8)
 
 
