@@ -27,6 +27,8 @@ class ReadingOptions:
     """Turn the scene upside down."""
     strict: bool = False
     """Refuse a file that needs repair instead of repairing it."""
+    allow_huge: bool = False
+    """Open a file even where thousands of its splats would lie over every pixel."""
     max_splats: int = 0
     """Show no more splats than this, those that show most; 0: all."""
 
@@ -36,7 +38,14 @@ class ReadingOptions:
 
         if self.max_splats < 0:
             raise UsageError(f"--max-splats is {self.max_splats}, expected 0 (all) or more.")
-        return Reading(self.mode, self.up, self.flip, self.strict, self.max_splats)
+        return Reading(
+            self.mode,
+            self.up,
+            self.flip,
+            self.strict,
+            allow_huge=self.allow_huge,
+            most_splats=self.max_splats,
+        )
 
 
 def open_model(path: Path, options: ReadingOptions) -> AnchorModel | SplatLayers:
@@ -64,6 +73,7 @@ def sentence(finding: Finding) -> str:
 def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress
 
     began, bar, task = time.monotonic(), None, None
@@ -75,8 +85,8 @@ def progress_after(seconds: float) -> Iterator:
                 return
             bar = Progress(console=Console(stderr=True), transient=True)
             bar.start()
-            task = bar.add_task(what, total=1.0)
-        bar.update(task, description=what, completed=part)
+            task = bar.add_task(escape(what), total=1.0)
+        bar.update(task, description=escape(what), completed=part)
 
     try:
         yield told

@@ -38,6 +38,7 @@ class Finding:
     done: str  # "dropped", "kept, invisible", "read as metres", ...
     rows: tuple[int, ...] = ()  # the first few, counted from 0 in the file
     file: str = ""
+    repaired: bool = True  # False: only worth knowing, so that --strict lets it pass
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,10 @@ def is_odd(raw: RawSplats, rows: slice) -> bool:
 def odd_in(raw: RawSplats, rows: slice) -> np.ndarray:
     """(n,) bool: the rows themselves."""
     scales, opacities = ranges(raw)
-    usual = np.isfinite(raw.means[rows]).all(1) & np.isfinite(raw.sh[rows]).all((1, 2))
+    largest = np.finfo(np.float32).max  # float64 positions may lie beyond
+    usual = within(raw.means[rows], (-largest, largest)).all(1) & np.isfinite(raw.sh[rows]).all(
+        (1, 2)
+    )
     usual &= within(raw.scales[rows], scales).all(1) & within(raw.opacity[rows], opacities)
     with np.errstate(over="ignore", invalid="ignore"):
         usual &= within(np.einsum("nc,nc->n", raw.wxyz[rows], raw.wxyz[rows]), SQUARES)

@@ -19,6 +19,7 @@ class Reading:
     up: str = ""  # the file's axis that points up, one of AXES; "" = what its format says
     flip: bool = False  # half a turn about z after that: upside down
     strict: bool = False  # refuse what would be repaired
+    allow_huge: bool = False  # open files that would lay thousands of splats over every pixel
     most_splats: int = 0  # no more than these, the ones that show most; 0 = all
     told: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
 

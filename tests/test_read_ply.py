@@ -1,6 +1,7 @@
 """The PLY reader against reading value by value: block edges, types, orders, comments, memory."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -164,7 +165,8 @@ def test_a_file_that_shrinks_while_it_is_read_is_one_sentence(tmp_path, monkeypa
 
 def test_memory_of_opening_is_that_of_the_arrays(tmp_path):
     """The whole way, at most 1.3 times what the model holds (numpy tells tracemalloc)."""
-    write_ply(some_splats(100_000, 16), tmp_path / "a.ply")
+    splats = some_splats(100_000, 16)
+    write_ply(replace(splats, scales=splats.scales / 20), tmp_path / "a.ply")  # no wall of fog
     read_model(tmp_path / "a.ply")  # imports
     tracemalloc.start()
     model = read_model(tmp_path / "a.ply")
