@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.blocks import each_block
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.ply_file import PlyHeader, read_header
@@ -32,25 +33,38 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3.  Raises BadFile."""
     header = read_header(path)
     ranges, packed = chunks_and_splats(path, header)
-    position, rotation, scale, color = (np.ascontiguousarray(packed[name]) for name in PACKED)
-    sh = read_harmonics(path, header, len(packed))
-    shares = unpack(color, BITS_8888)  # (N, 4) 0..1
-    opacity, shown = shares[:, 3].copy(), shares[:, :3]
-    if set(COLORS) <= set(ranges.dtype.names):
-        shown = within(shown, ranges, COLORS)
-    with np.errstate(over="ignore", invalid="ignore"):  # what is beyond float32 is for the judge
-        sh[:, 0] = (shown - 0.5) / C0
-    return RawSplats(
-        means=within(unpack(position, BITS_11_10_11), ranges, POSITIONS),
-        scales=within(unpack(scale, BITS_11_10_11), ranges, SCALES),
-        wxyz=unpack_smallest_three(rotation),
-        opacity=opacity,
-        sh=sh,
+    rest = harmonics_of(path, header, len(packed))  # (N, 3, M - 1) bytes
+    count = len(packed)
+    raw = RawSplats(
+        means=np.empty((count, 3), np.float32),
+        scales=np.empty((count, 3), np.float32),
+        wxyz=np.empty((count, 4), np.float32),
+        opacity=np.empty(count, np.float32),
+        sh=np.empty((count, 1 + rest.shape[2], 3), np.float32),
         file=path.name,
         format="compressed PLY",
         logits=False,
         antialiased="splatrendermode: mip" in [comment.lower() for comment in header.comments],
     )
+    coefficient = harmonic_of_code()
+
+    def decode(rows: slice, _: object) -> None:
+        words = packed[rows]
+        near = ranges[rows.start // CHUNK : -(-rows.stop // CHUNK)]  # blocks begin with a chunk
+        raw.means[rows] = within(unpack(words["packed_position"], BITS_11_10_11), near, POSITIONS)
+        raw.scales[rows] = within(unpack(words["packed_scale"], BITS_11_10_11), near, SCALES)
+        raw.wxyz[rows] = unpack_smallest_three(words["packed_rotation"])
+        shown = unpack(words["packed_color"], BITS_8888)  # (n, 4) 0..1
+        raw.opacity[rows] = shown[:, 3]
+        colored = set(COLORS) <= set(ranges.dtype.names)
+        color = within(shown[:, :3], near, COLORS) if colored else shown[:, :3]
+        raw.sh[rows, 0] = (color - 0.5) / C0
+        raw.sh[rows, 1:] = coefficient[rest[rows]].transpose(0, 2, 1)
+
+    each_block(
+        count, decode, lambda part: reading.tell(f"reading {path.name}", part), block=8 * CHUNK
+    )
+    return raw
 
 
 def chunks_and_splats(path: Path, header: PlyHeader) -> tuple[np.ndarray, np.ndarray]:
@@ -82,21 +96,18 @@ def records(
     return np.memmap(path, element.row, "r", begins, (element.count,))
 
 
-def read_harmonics(path: Path, header: PlyHeader, count: int) -> np.ndarray:
-    """(N, M, 3) coefficients, those of degree 0 not filled in; bytes, all of red first."""
+def harmonics_of(path: Path, header: PlyHeader, count: int) -> np.ndarray:
+    """(N, 3, M - 1) bytes of the harmonics beyond degree 0, mapped: red, then green, then blue."""
     rows = [element.row for element in header.elements if element.name == "sh"]
     if not rows:
-        return np.empty((count, 1, 3), np.float32)
+        return np.empty((count, 3, 0), np.uint8)
     names = tuple(f"f_rest_{i}" for i in range(len(rows[0] or ())))
     if len(names) not in REST or rows[0].names != names:
         raise BadFile(f"{path.name}: its element sh has not 9, 24 or 45 columns f_rest_0, ...")
     codes = records(path, header, "sh", names, np.uint8)
     if len(codes) != count:
         raise BadFile(f"{path.name} has {count} splats, but harmonics of {len(codes)}.")
-    sh = np.empty((count, len(names) // 3 + 1, 3), np.float32)
-    by_channel = codes.view(np.uint8).reshape(count, 3, -1)
-    sh[:, 1:] = harmonic_of_code()[by_channel.transpose(0, 2, 1)]
-    return sh
+    return codes.view(np.uint8).reshape(count, 3, -1)
 
 
 def harmonic_of_code() -> np.ndarray:

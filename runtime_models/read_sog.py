@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.blocks import each_block
 from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.read_compressed_ply import from_smallest_three
@@ -166,20 +167,32 @@ def decode(sog: Sog, part: str, codes: np.ndarray) -> np.ndarray:
 def read_means(sog: Sog) -> np.ndarray:
     """(N, 3) float32: 16 bits between two ends of sign(x) log(1 + |x|), in two pictures."""
     low, high = (sog.numbers("means", end, 3, 3).astype(float) for end in ("mins", "maxs"))
-    codes = sog.pixels("means", 0)[:, :3] | sog.pixels("means", 1)[:, :3].astype(np.uint16) << 8
-    share = codes / 65535
-    bent = low * (1 - share) + high * share
+    codes = sog.pixels("means", 0)[:, :3].astype(np.uint16)
+    codes |= sog.pixels("means", 1)[:, :3].astype(np.uint16) << 8
+    means = np.empty((sog.count, 3), np.float32)
+
+    def fill(rows: slice, _: object) -> None:
+        share = codes[rows] / 65535
+        bent = low * (1 - share) + high * share
+        means[rows] = np.sign(bent) * np.expm1(np.abs(bent))
+
     with np.errstate(over="ignore"):  # what is beyond float32 is for the judge
-        return (np.sign(bent) * np.expm1(np.abs(bent))).astype(np.float32)
+        each_block(sog.count, fill)
+    return means
 
 
 def read_quaternions(sog: Sog) -> np.ndarray:
     """(N, 4) wxyz: three entries of 8 bits, and in alpha which one is left out."""
     pixels = sog.pixels("quats")
-    small = (pixels[:, :3].astype(np.float32) / 255 - 0.5) * np.float32(2**0.5)
+    wxyz = np.empty((sog.count, 4), np.float32)
     unknown = pixels[:, 3] < FIRST_MODE
-    mode = np.where(unknown, FIRST_MODE, pixels[:, 3]) - np.uint8(FIRST_MODE)
-    wxyz = from_smallest_three(small, mode)
+
+    def fill(rows: slice, _: object) -> None:
+        small = (pixels[rows, :3].astype(np.float32) / 255 - 0.5) * np.float32(2**0.5)
+        mode = np.maximum(pixels[rows, 3], FIRST_MODE) - np.uint8(FIRST_MODE)
+        wxyz[rows] = from_smallest_three(small, mode)
+
+    each_block(sog.count, fill)
     if unknown.any():
         wxyz[unknown] = 1, 0, 0, 0
         sog.findings.append(odd("quaternions are of no known code", unknown, "not turned", sog))
@@ -201,12 +214,17 @@ def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
         labels = sog.pixels("shN", 1)
         labels = labels[:, 0] | labels[:, 1].astype(np.uint16) << 8
         beyond = labels >= len(palette)
-        np.take(palette, labels, axis=0, mode="clip", out=sh[:, 1:])
+        each_block(sog.count, lambda rows, _: look_up(palette, labels[rows], sh[rows, 1:]))
         if beyond.any():
             sh[beyond, 1:] = 0
             found = odd("splats name harmonics that are not there", beyond, "one colour", sog)
             sog.findings.append(found)
     return sh, opacity
+
+
+def look_up(palette: np.ndarray, labels: np.ndarray, into: np.ndarray) -> None:
+    """Puts the sets of harmonics that labels (n,) name into (n, M - 1, 3)."""
+    into[:] = palette[np.minimum(labels, len(palette) - 1)]
 
 
 def read_palette(sog: Sog) -> np.ndarray:
