@@ -8,11 +8,11 @@ import numpy as np
 from runtime_models.evaluate import Control, Evaluator, follows_eye
 from runtime_models.model import AnchorModel, BadFile, Finding, Model, ScaffoldModel, SplatLayers
 from runtime_models.plain_splats import PlainSplats
-from runtime_models.spherical_harmonics import COEFFICIENTS, basis, shade
+from runtime_models.spherical_harmonics import COEFFICIENTS, basis
 
 LEAST_ALPHA = 1 / 255  # no renderer draws a fainter splat
 DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3
-BLOCK = 1 << 16  # splats at a time of what is colored anew: bounds the memory
+BLOCK = 1 << 13  # splats at a time of what is colored anew: bounds the memory
 
 # (colours (n, 3) as the model has them, their rows in the model) -> colours (n, 3) as shown
 Recolor = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -111,9 +111,9 @@ def spread_directions(count: int) -> np.ndarray:
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], 1).astype(np.float32)
 
 
-def fit_rows(count: int) -> tuple[np.ndarray, np.ndarray]:
+def fit_rows(count: int, number: int = DIRECTIONS) -> tuple[np.ndarray, np.ndarray]:
     """Directions (D, 3), and (D, count) what a colour along each adds to every coefficient."""
-    directions = spread_directions(DIRECTIONS)
+    directions = spread_directions(number)
     solve = np.linalg.pinv(basis(directions.astype(np.float64), count))  # (count, D)
     return directions, solve.T.astype(np.float32)
 
@@ -142,12 +142,13 @@ def fit_colors(
 
 def recolored(sh: np.ndarray, recolor: Recolor) -> np.ndarray:
     """(N, M, 3) harmonics of what `recolor` makes of the colours of harmonics (N, M, 3)."""
-    out = np.zeros_like(sh)
-    directions, parts = fit_rows(sh.shape[1])
+    out = np.empty_like(sh)
+    directions, parts = fit_rows(sh.shape[1], 4 * sh.shape[1])
+    values = basis(directions, sh.shape[1])  # (D, M)
     for start in range(0, len(sh), BLOCK):
         rows = np.arange(start, min(start + BLOCK, len(sh)))
-        for direction, part in zip(directions, parts, strict=True):
-            color = shade(sh[rows], np.tile(direction, (len(rows), 1)))
-            color = recolor(color, rows).astype(np.float32) - np.float32(0.5)
-            out[rows] += part[:, None] * color[:, None]
+        color = np.maximum(values @ sh[rows] + np.float32(0.5), 0)  # (n, D, 3), as shade does
+        every = np.repeat(rows, len(directions))
+        shown = recolor(color.reshape(-1, 3), every).reshape(color.shape)
+        out[rows] = parts.T @ (shown - np.float32(0.5))
     return out

@@ -8,7 +8,7 @@ import pytest
 from app.exported import Look, Part, bake_part
 from renderer.false_colors import tinted
 from renderer.renderer import Renderer
-from runtime_models.bake import LEAST_ALPHA, bake, fit_rows, spread_directions
+from runtime_models.bake import BLOCK, LEAST_ALPHA, bake, fit_rows, recolored, spread_directions
 from runtime_models.evaluate import directions, evaluate
 from runtime_models.model import BadFile, SplatLayers, Stop
 from runtime_models.read_scene import read_model
@@ -183,6 +183,24 @@ def test_palette_of_layers_is_laid_over_each_color():
         Part(SceneObject("hot", replace(layers, stops=stops))), Look(palette=False)
     )
     np.testing.assert_array_equal(as_filed.sh, layers.sh[there])
+
+
+@pytest.mark.parametrize("count", [1, BLOCK - 1, BLOCK, BLOCK + 1])
+@pytest.mark.parametrize("coefficients", COEFFICIENTS)
+def test_coloring_anew_is_the_fit_of_the_new_colors(count, coefficients):
+    """Beside one splat at a time; and nothing changes where the colours do not."""
+    rng = np.random.default_rng(count)
+    sh = (rng.normal(size=(count, coefficients, 3)) * 0.05).astype(np.float32)
+    np.testing.assert_allclose(recolored(sh, lambda color, rows: color), sh, atol=2e-6)
+    gain = rng.uniform(0.5, 2, count).astype(np.float32)
+    found = recolored(sh, lambda color, rows: gain[rows, None] * color**2)
+    spread, _ = fit_rows(coefficients, 4 * coefficients)
+    for i in {0, count // 2, count - 1}:
+        seen = shade(np.repeat(sh[i : i + 1], len(spread), 0), spread)
+        wanted = np.linalg.lstsq(basis(spread, coefficients), gain[i] * seen**2 - 0.5, rcond=None)[
+            0
+        ]
+        np.testing.assert_allclose(found[i], wanted, atol=1e-5)
 
 
 def test_inside_is_by_anchor_and_by_paint(model):
