@@ -5,7 +5,7 @@ import numpy as np
 from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import RawSplats
 
-SAMPLE = 1 << 16  # rows that are looked at: percentiles of more are the same
+SAMPLE = 1 << 14  # rows that are looked at: percentiles of more are the same
 TELLING = 100  # splats; fewer tell nothing about the file
 BOX = (1, 99)  # percentiles of the positions between which the scene lies
 MOST_LAYERS = 2000.0  # splats over every pixel; real files have 3 to 20 (docs/formats.md)
@@ -14,7 +14,7 @@ MIN_ALPHA = 1 / 255  # fainter splats are not drawn
 
 def sample_of(raw: RawSplats) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """means (S, 3), scales (S, 3), opacity (S,) as filed, float64, of evenly spaced finite rows."""
-    rows = slice(None, None, max(len(raw.means) // SAMPLE, 1))
+    rows = slice(None, None, max(-(-len(raw.means) // SAMPLE), 1))
     with np.errstate(invalid="ignore"):  # NaN that signals
         means, scales = raw.means[rows].astype(np.float64), raw.scales[rows].astype(np.float64)
         opacity = raw.opacity[rows].astype(np.float64)
