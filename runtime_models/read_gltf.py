@@ -107,7 +107,7 @@ def read_primitive(asset: Asset, primitive: dict, reading: Reading) -> RawSplats
         raw.sh = display_from_linear(raw.sh)
         what = f"colours of {len(raw.means):,} splats are linear"
         done = "turned into display colours one by one; where they overlap they blend otherwise"
-        findings.append(Finding(what, len(raw.means), done, file=asset.path.name))
+        findings.append(Finding(what, len(raw.means), done, file=asset.path.name, repaired=False))
     raw.findings = (*raw.findings, *findings)
     return raw
 
