@@ -45,12 +45,14 @@ class CameraList:
 
 def read_json(path: Path) -> object:
     """What a JSON file holds.  Raises BadFile."""
+    if not path.is_file():  # reading a pipe would wait for ever
+        raise BadFile(f"{path} is no file; --camera wants a file of cameras.")
     if path.stat().st_size > MOST_BYTES:
         raise BadFile(f"{path} has {path.stat().st_size:,} bytes; no file of cameras is so large.")
     try:
         return json.loads(path.read_bytes())
     except (ValueError, RecursionError):
-        raise BadFile(f"{path} is not JSON; --camera wants a file of cameras.") from None
+        raise BadFile(f"{path} is not JSON, and no other form of cameras either.") from None
 
 
 def read_rows(data: object, name: str, where: str) -> list[dict]:
