@@ -9,6 +9,7 @@ from runtime_models.blocks import each_block
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.ply_file import PlyHeader, read_header
+from runtime_models.read_ply import teller
 from runtime_models.spherical_harmonics import C0
 
 CHUNK = 256  # splats that share one row of ranges
@@ -61,9 +62,8 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
         raw.sh[rows, 0] = (color - 0.5) / C0
         raw.sh[rows, 1:] = coefficient[rest[rows]].transpose(0, 2, 1)
 
-    each_block(
-        count, decode, lambda part: reading.tell(f"reading {path.name}", part), block=8 * CHUNK
-    )
+    with np.errstate(invalid="ignore", over="ignore"):  # ranges of NaN or Inf are for the judge
+        each_block(count, decode, teller(path, reading), block=8 * CHUNK)
     return raw
 
 
@@ -127,8 +127,7 @@ def within(shares: np.ndarray, ranges: np.ndarray, names: tuple[str, ...]) -> np
     """(N, 3) values at shares 0..1 of the way from the least to the most of their chunk."""
     table = np.stack([ranges[name] for name in names], 1)  # (chunks, 6)
     ends = np.repeat(table, CHUNK, axis=0)[: len(shares)]
-    with np.errstate(invalid="ignore", over="ignore"):  # ranges of NaN or Inf are for the judge
-        return ends[:, :3] * (1 - shares) + ends[:, 3:] * shares
+    return ends[:, :3] * (1 - shares) + ends[:, 3:] * shares
 
 
 def unpack_smallest_three(packed: np.ndarray) -> np.ndarray:
