@@ -15,6 +15,7 @@ COMMANDS = {
     "bench": ("bench", "frame times and image error, no window needed"),
     "chart": ("chart", "what each shortcut saves in time and costs in the picture"),
     "stability": ("stability", "the cases where splat renderers fail, each held to a bound"),
+    "lint": ("lint", "what is wrong with a file, and what opening it repairs"),
     "info": ("info", "what is in a scene"),
     "compare": ("compare", "two scenes, stops or folders of pictures: PSNR, SSIM, differences"),
     "export": ("export", "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat"),

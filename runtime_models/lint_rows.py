@@ -41,8 +41,8 @@ def mend_rows(raw: RawSplats, rows: np.ndarray, filed: RawSplats) -> list[Findin
     else:
         found += unsign_scales(raw, odd, kept)
     if filed.logits:
-        found += told("opacities are +Inf", rows[kept & (odd.opacity == np.inf)], OPAQUE, raw)
-        found += told("opacities are -Inf", rows[kept & (odd.opacity == -np.inf)], UNSEEN, raw)
+        found += told("an opacity of +Inf", rows[kept & (odd.opacity == np.inf)], OPAQUE, raw)
+        found += told("an opacity of -Inf", rows[kept & (odd.opacity == -np.inf)], UNSEEN, raw)
     else:
         found += bound_opacity(raw, odd, kept)
     if broken.any():
@@ -61,12 +61,12 @@ def look_at(rows: np.ndarray, filed: RawSplats) -> Odd:
 
 
 DROPS = {
-    "positions are NaN or Inf": lambda odd: ~finite_as_float32(odd.means).all(1),
-    "scales are NaN or infinite": lambda odd: ~np.isfinite(odd.sigma).all(1),
-    "rotations are NaN or Inf": lambda odd: ~np.isfinite(odd.wxyz).all(1),
-    "rotations are zero": lambda odd: (odd.wxyz == 0).all(1),
-    "opacities are NaN": lambda odd: np.isnan(odd.opacity),
-    "colours are NaN or Inf": lambda odd: ~np.isfinite(odd.sh).all((1, 2)),
+    "a NaN or Inf position": lambda odd: ~finite_as_float32(odd.means).all(1),
+    "a NaN or infinite scale": lambda odd: ~np.isfinite(odd.sigma).all(1),
+    "a NaN or Inf rotation": lambda odd: ~np.isfinite(odd.wxyz).all(1),
+    "a zero rotation": lambda odd: (odd.wxyz == 0).all(1),
+    "a NaN opacity": lambda odd: np.isnan(odd.opacity),
+    "a NaN or Inf colour": lambda odd: ~np.isfinite(odd.sh).all((1, 2)),
 }  # what: which (K,) bool of the odd rows
 
 
@@ -78,7 +78,7 @@ def unsign_scales(raw: RawSplats, odd: Odd, kept: np.ndarray) -> list[Finding]:
     """A splat mirrored along its own axis is the same splat: the sign of a sigma means nothing."""
     hit = odd.rows[kept & (odd.sigma < 0).any(1)]
     raw.scales[hit] = np.abs(raw.scales[hit])
-    return told("scales are negative", hit, "read without their sign", raw)
+    return told("a negative scale", hit, "read without their sign", raw)
 
 
 def keep_sizeless(raw: RawSplats, odd: Odd, kept: np.ndarray) -> list[Finding]:
@@ -87,15 +87,15 @@ def keep_sizeless(raw: RawSplats, odd: Odd, kept: np.ndarray) -> list[Finding]:
     gone = odd.rows[kept & endless.all(1)]
     flat = odd.rows[kept & endless.any(1) & ~endless.all(1)]
     raw.opacity[gone] = 0  # the screen filter would make dots of them
-    return told("scales are -Inf, of no size", gone, UNSEEN, raw) + told(
-        "scales are -Inf along an axis", flat, "kept, flat", raw
+    return told("no size: scales of -Inf", gone, UNSEEN, raw) + told(
+        "no size along an axis: a scale of -Inf", flat, "kept, flat", raw
     )
 
 
 def bound_opacity(raw: RawSplats, odd: Odd, kept: np.ndarray) -> list[Finding]:
     hit = odd.rows[kept & ~((odd.opacity >= 0) & (odd.opacity <= 1))]
     raw.opacity[hit] = np.clip(raw.opacity[hit], 0, 1)
-    return told("opacities lie outside 0..1", hit, "cut there", raw)
+    return told("an opacity outside 0..1", hit, "cut there", raw)
 
 
 def told(what: str, rows: np.ndarray, done: str, raw: RawSplats) -> list[Finding]:
@@ -109,7 +109,8 @@ def told(what: str, rows: np.ndarray, done: str, raw: RawSplats) -> list[Finding
 def finding_of(what: str, rows: np.ndarray, done: str, file: str) -> Finding:
     """A finding that counts its rows and names the first few."""
     few = tuple(int(row) for row in rows[:FEW])
-    return Finding(f"{len(rows):,} {what}", len(rows), done, few, file)
+    splats = "splat" if len(rows) == 1 else "splats"
+    return Finding(f"{len(rows):,} {splats} with {what}", len(rows), done, few, file)
 
 
 def drop(raw: RawSplats, rows: np.ndarray) -> None:

@@ -59,6 +59,14 @@ def fill_ratio(raw: RawSplats) -> float:
     return layers(means, sigma, fainter_out(opacity, raw.logits)) / part if part else 0.0
 
 
+def fill_of(means: np.ndarray, sigma: np.ndarray, opacity: np.ndarray) -> float:
+    """The same of splats in our units: means (N, 3), sigma (N, 3) metres, opacity (N,) 0..1."""
+    rows = slice(None, None, max(-(-len(means) // SAMPLE), 1))
+    looked_at = means[rows].astype(np.float64)
+    part = len(looked_at) / len(means)
+    return layers(looked_at, sigma[rows].astype(np.float64), opacity[rows] >= MIN_ALPHA) / part
+
+
 def fainter_out(opacity: np.ndarray, logits: bool) -> np.ndarray:
     """(S,) bool: splats that can be seen at all."""
     return opacity >= (np.log(MIN_ALPHA / (1 - MIN_ALPHA)) if logits else MIN_ALPHA)
