@@ -40,14 +40,21 @@ class Decoder:
             if isinstance(on_gpu, Layers):
                 on_gpu.place(arena, i)
 
-    def geometry(self, i: int, x: Control, eye: np.ndarray | None = None) -> None:
+    def geometry(
+        self,
+        i: int,
+        x: Control,
+        eye: np.ndarray | None = None,
+        seen: np.ndarray | None = None,
+    ) -> None:
         """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
 
-        eye: (3,) in the object's frame, for a model that follows it.
+        eye: (3,) in the object's frame, and seen (A,), which anchors are there, for a model that
+        follows it.
         """
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
-            arena.write_geometry(i, *model.geometry(x, unit=False, eye=eye))
+            arena.write_geometry(i, *model.geometry(x, unit=False, eye=eye, seen=seen))
         else:
             model.geometry(arena, arena.starts[i], x)
 

@@ -68,13 +68,20 @@ class QuadsDrawing:
         on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
         self.backends["mlps"] = f"{self._mlps}, Scaffold-GS onnxruntime" if on_cpu else self._mlps
 
-    def decode_geometry(self, i: int, x: Control, eye_object: np.ndarray | None = None) -> None:
+    def decode_geometry(
+        self,
+        i: int,
+        x: Control,
+        eye_object: np.ndarray | None = None,
+        seen: np.ndarray | None = None,
+    ) -> None:
         """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
 
-        eye_object: (3,) in the object's frame, for a model that follows it.
+        eye_object: (3,) in the object's frame, for a model that follows it; seen: (A,) bool, the
+        anchors of such a model that are there, None: all.
         """
         self._changed = True
-        self._decoder.geometry(i, x, eye_object)
+        self._decoder.geometry(i, x, eye_object, seen)
 
     def decode_color(
         self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None

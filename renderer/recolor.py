@@ -8,7 +8,7 @@ import numpy as np
 from renderer.layout import JACOBIAN_MARGIN
 from renderer.settings import RenderSettings
 from runtime_models.evaluate import follows_eye
-from runtime_models.model import Model, SplatLayers
+from runtime_models.model import Model, ScaffoldModel, SplatLayers
 from scene.pose import View
 
 
@@ -33,7 +33,7 @@ class Colored:
     key: tuple | None = None  # color_key; None: never, or spoilt
     anchors: np.ndarray | None = None  # (A,) bool: those that have it; None: all
     reach: np.ndarray | None = None  # (A,) metres around each anchor with all of its splats
-    reach_key: tuple | None = None  # control value and least alpha of that
+    reach_key: tuple | float | None = None  # control value and least alpha of that
 
     def is_stale(self, key: tuple, degrees: float) -> bool:
         """Whether x changed, or the eye moved by more than so many degrees around the centre."""
@@ -42,6 +42,16 @@ class Colored:
         if key[1] == self.key[1]:
             return False
         return not degrees > 0 or _angle(self.key[1], key[1], self.centre) > math.radians(degrees)
+
+    def take(self, key: tuple, wanted: np.ndarray | None, stale: bool) -> bool:
+        """Notes that the wanted anchors get their colours; False: none of them needs any."""
+        if stale:
+            self.key, self.anchors = key, wanted
+        elif wanted is None or not wanted.any():
+            return False
+        else:
+            self.anchors |= wanted
+        return True
 
 
 def centre_of(model: Model) -> np.ndarray:
@@ -72,6 +82,16 @@ def reach_of(
     sigma = np.sqrt(covariance[:, [0, 3, 5]].sum(axis=1)).reshape(away.shape)
     whole = np.where(per_anchor[..., 3] > 0, away + k * sigma, 0)
     return np.nan_to_num(whole.max(axis=1, initial=0), nan=np.inf)
+
+
+def reach_of_scaffold(model: ScaffoldModel, min_alpha: float) -> np.ndarray:
+    """(A,) metres: the same for every eye.  Offsets are stored; scales are a part of the anchor's.
+
+    Opacity is at most 1, so that k sigmas are where the most opaque splat fades below min_alpha.
+    """
+    away = np.linalg.norm(model.offsets, axis=2).max(axis=1, initial=0)
+    k = math.sqrt(2 * math.log(1 / min_alpha))
+    return away + np.float32(k) * np.linalg.norm(model.scales, axis=1)
 
 
 def seen_anchors(

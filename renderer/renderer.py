@@ -13,7 +13,14 @@ from renderer.debug import debug_image, opaque, prepare_debug
 from renderer.false_colors import FalseColors, Tint, false_colors, same_tint
 from renderer.gpu import Gpu
 from renderer.palette import apply_palette, palette_colors
-from renderer.recolor import Colored, centre_of, color_key, reach_of, seen_anchors
+from renderer.recolor import (
+    Colored,
+    centre_of,
+    color_key,
+    reach_of,
+    reach_of_scaffold,
+    seen_anchors,
+)
 from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
@@ -204,17 +211,17 @@ class Renderer:
                 eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
                 key = color_key(thing.model, decoded.version, eye)
                 stale = colored.is_stale(key, degrees)
-                wanted = self._wanted_anchors(i, thing, decoded, stale, views)
-                if stale:
-                    colored.key = key
-                    colored.anchors = wanted
-                elif wanted is None or not wanted.any():
-                    continue  # all that is seen has its colours
-                else:
-                    colored.anchors |= wanted
                 if follows_eye(thing.model):
-                    self._drawing.decode_geometry(i, decoded.x, eye)
+                    due, wanted = self._wanted_of_follower(thing, colored, stale, views)
+                    if not due:
+                        continue
+                    colored.key, colored.anchors = key, wanted
+                    self._drawing.decode_geometry(i, decoded.x, eye, wanted)
                     self._geometry_runs += 1
+                else:
+                    wanted = self._wanted_anchors(i, thing, decoded, stale, views)
+                    if not colored.take(key, wanted, stale):
+                        continue  # all that is seen has its colours
                 self._drawing.decode_color(i, decoded.x, eye, wanted)
                 if decoded.tint is not None:
                     palette = palette_colors(decoded.tint.name)
@@ -229,8 +236,7 @@ class Renderer:
         Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
         """
         colored = decoded.colored
-        whole = isinstance(thing.model, SplatLayers) or follows_eye(thing.model)
-        if not self.settings.skip_unseen or whole:
+        if not self.settings.skip_unseen or isinstance(thing.model, SplatLayers):
             if stale or colored.anchors is None:
                 return None
             return ~colored.anchors  # left out before: now all are wanted
@@ -250,6 +256,24 @@ class Renderer:
         pose = thing.world_from_object.matrix()
         seen = seen_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
         return seen if stale else seen & ~colored.anchors
+
+    def _wanted_of_follower(
+        self, thing: SceneObject, colored: Colored, stale: bool, views: list[View]
+    ) -> tuple[bool, np.ndarray | None]:
+        """Whether a model that follows the eye is to be decoded, and (A,) which anchors; None: all.
+
+        Where its splats can be is known beforehand, so only what views see needs to be decoded;
+        for one eye as a whole, so what comes into view has the rest decoded, too.
+        """
+        if not self.settings.skip_unseen:
+            return stale or colored.anchors is not None, None
+        if colored.reach_key != self.settings.min_alpha:
+            colored.reach = reach_of_scaffold(thing.model, self.settings.min_alpha)
+            colored.reach_key = self.settings.min_alpha
+        pose = thing.world_from_object.matrix()
+        seen = seen_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
+        new = colored.anchors is not None and (seen & ~colored.anchors).any()
+        return stale or bool(new), None if seen.all() else seen
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,

@@ -42,7 +42,7 @@ class RenderSettings:
 
     # Colour
     recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
-    skip_unseen: bool = False  # no colours for anchors that no view can see
+    skip_unseen: bool = False  # no colours (Scaffold-GS: nothing) for anchors that no view can see
 
     debug: str = ""  # one of DEBUG_VIEWS instead of the picture
 

@@ -91,14 +91,21 @@ class TilesDrawing:
             for start, count, model in zip(starts, counts, models, strict=False)
         ]
 
-    def decode_geometry(self, i: int, x: Control, eye_object: np.ndarray | None = None) -> None:
+    def decode_geometry(
+        self,
+        i: int,
+        x: Control,
+        eye_object: np.ndarray | None = None,
+        seen: np.ndarray | None = None,
+    ) -> None:
         """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
 
-        eye_object: (3,) in the object's frame, for a model that follows it.
+        eye_object: (3,) in the object's frame, for a model that follows it; seen: (A,) bool, the
+        anchors of such a model that are there, None: all.
         """
         slot = self._slots[i]
         self._changed = True
-        splats = slot.evaluator.geometry(x, unit=False, eye=eye_object)
+        splats = slot.evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
         if slot.placed:
             pack_opacity(self.device, splats[3], slot.start, self._mean_opacity)
             return

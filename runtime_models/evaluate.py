@@ -83,16 +83,21 @@ class Evaluator:
                 self._networks[name] = kind(name, mlp, model, threads)
 
     def geometry(
-        self, x: Control, unit: bool = True, eye: np.ndarray | None = None
+        self,
+        x: Control,
+        unit: bool = True,
+        eye: np.ndarray | None = None,
+        seen: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,) negative = absent.
 
         unit False: quaternions of any length, for one who divides by it anyway.
         eye: (3,) metres in the object's frame; a model that follows_eye needs it (ValueError).
+        seen: (A,) bool; of such a model, the splats of other anchors are absent.
         """
         model = self.model
         if self._scaffold is not None:
-            return self._scaffold.geometry(eye, unit)
+            return self._scaffold.geometry(eye, unit, seen)
         if isinstance(model, SplatLayers):
             weights = model.weights(x)  # (stops,) or (stops, N)
             there = weights[model.layer] if np.ndim(x) == 0 else _own(weights, model.layer)

@@ -62,6 +62,7 @@ class Look:
     features: np.ndarray | None  # (A, F) as mixed for the view; None: as they are
     opacity: np.ndarray  # (A, k), not above 0 = absent
     there: np.ndarray  # (A,) bool: a splat of it is
+    seen: np.ndarray | None  # (A,) bool: anchors that were asked for; None: all
 
     def inputs(self, rows: Rows) -> dict[str, np.ndarray]:
         """What networks take, of some anchors."""
@@ -93,27 +94,31 @@ class ScaffoldEvaluator:
         self._means = (model.anchors[:, None] + model.offsets).reshape(-1, 3)
         self._look: Look | None = None
 
-    def look(self, eye: np.ndarray | None) -> Look:
+    def look(self, eye: np.ndarray | None, seen: np.ndarray | None = None) -> Look:
         """The opacities seen from an eye (3,), metres in the object's frame; kept until it moves.
 
+        seen: (A,) bool, the rest is absent; None: all, or as looked before from there.
         Raises ValueError for an eye that is not three finite numbers.
         """
         place = np.asarray(eye, np.float64) if eye is not None else np.zeros(0)
         if place.shape != (3,) or not np.isfinite(place).all():
             raise ValueError(f"the eye is {eye}; a Scaffold-GS model is decoded for one place.")
-        if self._look is None or self._look.eye != tuple(place):
-            self._look = self._look_from(place)
-        return self._look
+        kept = self._look
+        if kept is None or kept.eye != tuple(place) or (seen is not None and seen is not kept.seen):
+            kept = self._look = self._look_from(place, seen)
+        return kept
 
-    def _look_from(self, eye: np.ndarray) -> Look:
+    def _look_from(self, eye: np.ndarray, seen: np.ndarray | None) -> Look:
         model = self.model
         count, k = model.offsets.shape[:2]
         drawn, part = np.ones(count, bool), None
         if model.octree is not None:
             drawn, part = drawn_anchors(model.octree, eye)
+        drawn = drawn if seen is None else drawn & seen
         features = None if self._bank is None else np.zeros_like(model.features)
         opacity = np.full((count, k), -1, np.float32)
-        look = Look(tuple(eye), np.empty((count, 4), np.float32), features, opacity, drawn.copy())
+        view = np.empty((count, 4), np.float32)
+        look = Look(tuple(eye), view, features, opacity, drawn.copy(), seen)
 
         def decode(rows: Rows) -> None:
             look.view[rows] = views_of(model.anchors[rows], eye)
@@ -128,13 +133,16 @@ class ScaffoldEvaluator:
         return look
 
     def geometry(
-        self, eye: np.ndarray | None, unit: bool = True
+        self, eye: np.ndarray | None, unit: bool = True, seen: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """means (N, 3) m, scales (N, 3) m, wxyz (N, 4) unit, opacity (N,), not above 0 = absent.
 
         unit False: quaternions of any length.  Absent splats may have any scale and rotation.
+        seen: (A,) bool; the splats of other anchors are absent, for the colours after it as well.
         """
-        look, model = self.look(eye), self.model
+        if seen is None and self._look is not None and self._look.seen is not None:
+            self._look = None  # what was asked for before is not enough
+        look, model = self.look(eye, seen), self.model
         scales, wxyz = self._room("scales", 3), self._room("wxyz", 4)
 
         def decode(rows: Rows) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rasterizer.device import NoDevice
+from renderer.recolor import reach_of_scaffold
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
@@ -112,6 +113,47 @@ def test_decoded_again_only_when_the_eye_moves_far_enough(renderer, tmp_path):
     kept = reference_image(scene, far[1], eye=far[0].world_from_eye.position)
     assert psnr_db(images[1], kept) > 80 > psnr_db(images[1], reference_image(scene, far[1]))
     assert psnr_db(images[2], reference_image(scene, far[2])) > 80
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_only_what_is_in_view_is_decoded_and_the_picture_is_the_same(renderer, tmp_path, case):
+    """From inside, turning: bit for bit the same, and decoded again when something comes in."""
+    how = CASES[case] | {"anchors": 600}
+    model = made(tmp_path, **how)
+    model = replace(model, scales=model.scales * 0.2, offsets=model.offsets * 0.2)
+    scene, eye = in_scene(model, TURNED), np.array([0.1, 0.0, 0.2])
+    turns = [0.0, 0.05, 1.5, 1.5, 0.0]
+    views = [
+        View(look_at(eye, eye + ahead), perspective(0.6, SIZE), 0.01, 50, SIZE)
+        for ahead in np.stack([np.sin(turns), np.full(5, 0.1), np.cos(turns)], 1)
+    ]
+    draw(renderer, Scene(()), views[:1])
+    whole = [draw(renderer, scene, [view])[0][0] for view in views]
+    draw(renderer, Scene(()), views[:1])
+    runs = []
+    for view, image in zip(views, whole, strict=True):
+        (same,), stats = draw(renderer, scene, [view], skip_unseen=True)
+        assert np.array_equal(same, image)
+        runs.append(stats.geometry_runs)
+    assert runs[0] == runs[2] == runs[4] == 1
+    assert runs[3] == 0
+    seen = renderer._decoded[0].colored.anchors
+    assert 0 < seen.sum() < len(seen) / 2
+    _, stats = draw(renderer, scene, [views[0]])
+    assert stats.geometry_runs == 1  # all are wanted now
+    assert draw(renderer, scene, [views[2]])[1].geometry_runs == 0
+
+
+def test_no_splat_reaches_beyond_what_is_known_beforehand(tmp_path):
+    model = made(tmp_path, anchors=300)
+    reach = reach_of_scaffold(model, 1 / 255)
+    for eye in np.random.default_rng(0).normal(size=(8, 3)) * 3:
+        splats = evaluate(model, 0.0, eye)
+        away = np.linalg.norm(splats.means - np.repeat(model.anchors, 3, axis=0), axis=1)
+        sigma = splats.scales.max(axis=1)
+        cut = np.sqrt(2 * np.log(np.maximum(splats.opacity * 255, 1)))
+        there = splats.opacity > 0
+        assert (away + cut * sigma <= np.repeat(reach, 3))[there].all()
 
 
 def test_the_slider_decodes_nothing(renderer, tmp_path):
