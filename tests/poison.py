@@ -123,8 +123,10 @@ def cloud(rng: np.random.Generator) -> SplatLayers:
         rng.uniform(0.2, 1, count),
         rng.normal(size=(count, coefficients, 3)) * 0.4,
     )
-    index = np.zeros(count, np.int32)
-    return SplatLayers(*(a.astype(np.float32) for a in arrays), index, (Stop("only", 0.0),))
+    layers = SplatLayers(
+        *(a.astype(np.float32) for a in arrays), np.zeros(count, np.int32), (Stop("only", 0.0),)
+    )
+    return replace(layers, antialiased=bool(rng.random() < 0.25))
 
 
 def settings_of(rng: np.random.Generator) -> RenderSettings:

@@ -1,5 +1,7 @@
 """Scenes that tests of the drawing back ends share."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from runtime_models.model import AnchorModel, ControlEncoding, Mlp, SplatLayers, Stop
@@ -146,4 +148,5 @@ def poisoned(layers: SplatLayers, seed: int = 5) -> tuple[SplatLayers, np.ndarra
 
 def only(layers: SplatLayers, rows: np.ndarray) -> SplatLayers:
     arrays = [getattr(layers, name)[rows] for name in FIELDS]
-    return SplatLayers(*arrays, layers.layer[rows], layers.stops)
+    made = SplatLayers(*arrays, layers.layer[rows], layers.stops)
+    return replace(made, antialiased=layers.antialiased)
