@@ -36,6 +36,7 @@ def attach_export(viewer: "Viewer") -> "ExportPanel":
     viewer.hooks.sections.append(Section("Export", panel.draw))
     viewer.hooks.each_frame.append(panel.poll)
     viewer.hooks.opened.append(panel.forget)
+    viewer.hooks.status.append(panel.status)
     return panel
 
 
@@ -60,6 +61,10 @@ class ExportPanel:
     def forget(self) -> None:
         """Another scene: its objects are others."""
         self.what = EVERYTHING
+
+    def status(self) -> str:
+        """Words for the status line; "" when nothing is under way."""
+        return f"exporting {self._path.name}" if self.running else ""
 
     def draw(self, ui_scale: float) -> None:
         """Format, what, SH degree, the button, or how far it is."""

@@ -17,7 +17,7 @@ from runtime_models.package_files import MANIFEST
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_streamed import TREE
 from runtime_models.sog_files import META
-from runtime_models.write_plain import cut, merged, placed, writer_of
+from runtime_models.write_plain import cut, merged, placed, told_lost, writer_of
 from scene.control import control_of
 from scene.framing import default_view
 from scene.scene import SceneObject
@@ -65,7 +65,8 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
         writer.write(splats, path)
     except ValueError as error:  # the format cannot hold them
         raise UsageError(f"{writer.name}: {error}") from None
-    return splats
+    lost = [replace(finding, file=path.name) for finding in told_lost(splats, writer)]
+    return replace(splats, findings=(*splats.findings, *lost))
 
 
 def bake_part(part: Part, look: Look) -> PlainSplats:

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import BadFile
+from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_layers import joined, moved, widened
 from runtime_models.spherical_harmonics import COEFFICIENTS
 from runtime_models.turn import turn
+
+FEW = 4  # columns that are named
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,8 @@ class Writer:
     ending: str
     sh_degree: int  # the highest that it holds
     function: str  # of the module of the same name
+    antialiased: bool = True  # has a place for the flag
+    columns: bool = False  # has a place for labels and other columns
 
     def write(self, splats: PlainSplats, path: Path) -> None:
         """Atomic; what the format cannot hold is lost."""
@@ -28,10 +32,10 @@ class Writer:
 
 WRITERS = (  # of two endings that fit a name, the longer one stands first
     Writer("compressed PLY", ".compressed.ply", 3, "write_compressed_ply"),
-    Writer("3DGS PLY", ".ply", 3, "write_ply"),
+    Writer("3DGS PLY", ".ply", 3, "write_ply", columns=True),
     Writer("spz", ".spz", 3, "write_spz"),
-    Writer("glTF", ".glb", 3, "write_gltf"),
-    Writer(".splat", ".splat", 0, "write_splat"),
+    Writer("glTF", ".glb", 3, "write_gltf", antialiased=False),
+    Writer(".splat", ".splat", 0, "write_splat", antialiased=False),
 )
 
 
@@ -42,6 +46,21 @@ def writer_of(path: Path) -> Writer:
             return writer
     endings = ", ".join(writer.ending for writer in WRITERS)
     raise BadFile(f"{path} has no ending that can be written; known are {endings}.")
+
+
+def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
+    """What the splats have and the format has no place for, beside what its codes round."""
+    findings = []
+    if splats.antialiased and not writer.antialiased:
+        what = "the splats were trained antialiased"
+        done = f"{writer.name} cannot say so; other viewers draw thin ones thicker"
+        findings.append(Finding(what, 0, done, repaired=False))
+    names = [*(["labels"] if splats.labels is not None else []), *splats.extra]
+    if names and not writer.columns:
+        said = ", ".join(names[:FEW]) + (", ..." if len(names) > FEW else "")
+        done = f"left out, {writer.name} has no place for them; .ply has"
+        findings.append(Finding(f"other columns ({said})", 0, done, repaired=False))
+    return tuple(findings)
 
 
 def cut(splats: PlainSplats, sh_degree: int) -> PlainSplats:

@@ -130,6 +130,19 @@ def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     )
 
 
+@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.ending)
+def test_what_a_format_has_no_place_for_is_said(scenes, tmp_path, capsys, monkeypatch, writer):
+    model = read_model(scenes / "plain.ply")
+    more = {"labels": np.arange(40, dtype=np.int32) % 3, "extra": {"error": np.ones(40, "f4")}}
+    rich = replace(model, antialiased=True, **more)
+    monkeypatch.setattr("app.export.open_model", lambda path, options: rich)
+    out = tmp_path / f"a{writer.ending}"
+    assert export(scenes / "plain.ply", "--out", out) == 0
+    said, back = capsys.readouterr().err, read_plain(out)
+    assert ("cannot say so" in said) == (not back.antialiased) == (not writer.antialiased)
+    assert ("(labels, error)" in said) == (back.labels is None) == (not writer.columns)
+
+
 # Packages
 
 
