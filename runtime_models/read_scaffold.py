@@ -20,13 +20,21 @@ MARK = b"f_anchor_feat_0"
 HEAD = 1 << 16  # bytes
 SETTINGS = ("cfg_args", "config.yaml")  # of Scaffold-GS and Octree-GS, of Octree-AnyGS
 SETTING = re.compile(r"(\w+)\s*[:=]\s*'?([\w.+-]+)")
+NETWORK_ENDINGS = (".pt", ".pth", ".onnx")
 FEW = 10  # rows that a finding names
 MOST_LEVELS = 64
 
 
+def cloud_of(path: Path) -> Path:
+    """Where the cloud should be, whatever of a model is named."""
+    if path.is_dir():
+        return path / CLOUD
+    return path.with_name(CLOUD) if path.suffix in NETWORK_ENDINGS else path
+
+
 def is_scaffold(path: Path) -> bool:
-    """A cloud with anchors' features, or a folder that holds one as point_cloud.ply."""
-    cloud = path / CLOUD if path.is_dir() else path
+    """A cloud with anchors' features, the folder that holds one, or a network beside one."""
+    cloud = cloud_of(path)
     if not cloud.is_file():
         return False
     with cloud.open("rb") as file:
@@ -35,8 +43,11 @@ def is_scaffold(path: Path) -> bool:
 
 
 def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
-    """The model of a cloud or of the folder that holds it, in our axes.  Raises BadFile."""
-    file = path / CLOUD if path.is_dir() else path
+    """The model of a cloud, of its folder or of a network beside it, in our axes.
+
+    Raises BadFile.
+    """
+    file = cloud_of(path)
     settings = read_settings(file.parent)
     cloud = read_cloud(file, reading)
     findings = judge_rows(cloud.good, reading, file.name)

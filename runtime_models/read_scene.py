@@ -64,10 +64,10 @@ def read_whole(path: Path, reading: Reading) -> Model:
         if not layers:
             raise BadFile(f"{path} holds nothing to show; wanted is {KNOWN}.")
         return read_layers(layers, reading) if len(layers) > 1 else read_file(layers[0], reading)
-    if is_package(path):
-        return read_package(path)
     if is_scaffold(path):
         return read_scaffold(path, reading)
+    if is_package(path):
+        return read_package(path)
     if format_of(path):
         return read_file(path, reading)
     raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
@@ -138,6 +138,8 @@ def describe_head(mlp: Mlp) -> dict:
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
     if path.name in (MANIFEST, META, TREE):
+        path = path.parent
+    if isinstance(model, ScaffoldModel) and not path.is_dir():
         path = path.parent
     if not path.is_dir():
         return [path]

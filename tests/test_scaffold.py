@@ -145,12 +145,13 @@ def test_found_from_the_run_its_cloud_and_the_folder_between(tmp_path):
     raw = random_raw(seed=2)
     write_run(raw, new, "split")
     (run / "cfg_args").write_text("Namespace(white_background=True)")
-    for path in (run, new, new / "point_cloud.ply"):
+    sizes = sum(p.stat().st_size for p in new.iterdir())
+    for path in (run, new, new / "point_cloud.ply", new / "cov_mlp.pt"):
         model = read_model(path)
+        assert describe(model, path)["bytes"] == sizes
         compare(model, raw, EYE)
         assert model.provenance["background"] == (1.0, 1.0, 1.0)
     facts = describe(read_model(run), run)
-    sizes = sum(p.stat().st_size for p in new.iterdir())
     assert facts["bytes"] == sizes == sum(f.stat().st_size for f in files_of(model, new))
     assert facts["format"] == "Scaffold-GS"
     assert facts["anchors"] == 40
