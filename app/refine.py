@@ -2,7 +2,7 @@
 
 import queue
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from app.opened import Source
@@ -37,10 +37,10 @@ class Refiner:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def open(self, path: Path) -> Model:
+    def open(self, path: Path, told: Callable[[str, float], None] | None = None) -> Model:
         """The model at `path`; of a streamed scene its coarsest level.  Raises BadFile."""
         if not path.exists() or not is_streamed(path):
-            return open_model(path, self._options)
+            return open_model(path, self._options, told)
         finer = levels(path, self._options.reading())
         first = next(finer)
         self._opened.append((first, finer))
@@ -48,14 +48,14 @@ class Refiner:
 
     def follow(self, models: Sequence[Model]) -> None:
         """Refines those of the shown models that were opened coarse, and no others any more."""
-        self.close()
+        self._unwanted.set()  # the thread before ends by itself after the level that it reads
         shown = [(first, finer) for first, finer in self._opened if any(first is m for m in models)]
-        self._opened = []
+        self._opened, self._finer, self._thread = [], queue.Queue(maxsize=1), None
         self._level = ", ".join(level_words(first) for first, _ in shown)
         self.problem = ""
         if not shown:
             return
-        self._unwanted, self._finer = threading.Event(), queue.Queue(maxsize=1)
+        self._unwanted = threading.Event()
         given = (shown, self._finer, self._unwanted)
         self._thread = threading.Thread(target=self._read, args=given, daemon=True)
         self._thread.start()
@@ -106,7 +106,8 @@ class Refiner:
                         return
                     before = after
         except (BadFile, OSError, MemoryError) as error:
-            self.problem = f"no finer level can be shown: {error}"
+            if not unwanted.is_set():
+                self.problem = f"no finer level can be shown: {error}"
 
 
 def put(out: queue.Queue, item: tuple, unwanted: threading.Event) -> bool:

@@ -183,7 +183,7 @@ def told_of(streamed: Streamed, number: int) -> tuple[Finding, ...]:
         return ()
     what = f"the finest of {len(streamed.levels)} levels has {streamed.counts[finest]:,} splats"
     done = f"level {number} with {streamed.counts[number]:,} is read"
-    return (Finding(what, 0, done, file=streamed.folder.resolve().name),)
+    return (Finding(what, 0, done, file=streamed.folder.resolve().name, repaired=False),)
 
 
 def files_of_sog(path: Path) -> list[Path]:

@@ -124,6 +124,7 @@ def test_another_scene_ends_the_reading_of_the_one_before(tmp_path, scene):
         viewer = FakeViewer(refiner, [scene])
         first = refiner._thread
         viewer.open(other, other)
+        first.join(LONGEST_S)
         assert not first.is_alive()
         seen = viewer.run()
         assert seen[0] == [9, 9] and seen[-1] == [90, 90]
@@ -182,6 +183,26 @@ def test_the_window_never_waits_for_a_level(scene, monkeypatch):
         assert time.perf_counter() - start < 1.0 and viewer.counts() == [20]
         gate.set()
         assert viewer.run()[-1] == [400]
+
+
+def test_another_scene_does_not_wait_for_the_level_that_is_being_read(scene, monkeypatch):
+    gate, real = threading.Event(), refine.levels
+
+    def stuck(path, reading):
+        yield from [next(real(path, reading))]
+        assert gate.wait(LONGEST_S)
+        raise BadFile("read too late.")
+
+    monkeypatch.setattr(refine, "levels", stuck)
+    with Refiner(ReadingOptions()) as refiner:
+        viewer = FakeViewer(refiner, [scene])
+        first = refiner._thread
+        start = time.perf_counter()
+        viewer.open(scene / "1_0")
+        assert time.perf_counter() - start < 1.0 and not refiner.running and viewer.status == []
+        gate.set()
+        first.join(LONGEST_S)
+        assert refiner.problem == "" and viewer.counts() == [COUNTS[1]]
 
 
 def test_closing_ends_the_thread(scene):
