@@ -8,15 +8,17 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
+from app.camera_files import camera_reading
 from app.camera_panel import KeptViews, attach_cameras
 from app.controls import SMOOTH_S
 from app.dial import FLOOR_DB, TARGET_MS, Dial
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.export_panel import attach_export
-from app.files import Files, first_camera, home_of, named_cameras, read_wanted
+from app.files import Files, first_camera, home_of, named_cameras
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
+from app.opened import read_files
 from app.opening import ReadingOptions
 from app.outlines import draw_brush, draw_outlines
 from app.panel import draw_note, draw_panel, draw_problem, free_area
@@ -96,7 +98,7 @@ def run(options: Options) -> int:
     refiner = Refiner(options)
     stage = Stage(refiner.open)
     paths = tuple(map(plain, options.scenes)) or (DEMO,)
-    found = named_cameras(options, read_wanted(paths, refiner.open, options, lambda *_: None))
+    found = named_cameras(options, read_files(paths, refiner.open, camera_reading(options), None))
     if not found.sources:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
     stage.take(found.sources, scene_of(found.sources, options.x), home_of(found))
@@ -106,6 +108,7 @@ def run(options: Options) -> int:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             viewer = Viewer(window, renderer, stage, options)
             attach_refiner(viewer, refiner)
+            viewer.files.read = refiner.open
             viewer.files.started(found, options)
             with comparing(viewer, options):
                 viewer.loop()

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 from app.camera_files import camera_reading, in_scene
 from app.controls import Camera
-from app.opened import Found, Opener, Told, read_files
+from app.opened import Found, Opener, ReadModel, read_files
 from app.opening import sentence
 from app.paths import config_folder
 from app.recent import RecentFiles
 from app.recent_panel import RecentMenu
 from app.stage import scene_of
-from runtime_models.model import BadFile, Model
+from runtime_models.model import BadFile
 from scene.pose import View
 from scene.read_cameras import read_camera_list
 
@@ -21,15 +21,6 @@ if TYPE_CHECKING:
 MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
 
 
-def read_wanted(paths: tuple[Path, ...], read_model, options: "Options", told: Told) -> Found:
-    """What the files hold, with --camera's cameras.  Raises BadFile, UsageError, OSError."""
-
-    def read(path: Path, told: Told) -> Model:
-        return read_model(path)
-
-    return read_files(paths, read, camera_reading(options), told)
-
-
 class Files:
     """Opens what is dropped or chosen; the scene changes when all of it has been read."""
 
@@ -37,6 +28,8 @@ class Files:
         self._viewer = viewer
         self._opener = Opener()
         self.recent = recent  # None: nothing is kept
+        # Reads one scene, in the thread that opens; replaced where progress can be told.
+        self.read: ReadModel = lambda path, told: viewer.stage.read_model(path)
         self._menu = RecentMenu()
         viewer.hooks.each_frame.append(self.poll)
         viewer.hooks.top.append(self.draw_recent)
@@ -48,8 +41,8 @@ class Files:
     def open_soon(self, paths: tuple[Path, ...]) -> None:
         """Begins to read files; the window stays alive meanwhile."""
         viewer = self._viewer
-        read_model, options = viewer.stage.read_model, viewer.options
-        self._opener.start(paths, lambda paths, told: read_wanted(paths, read_model, options, told))
+        reading = camera_reading(viewer.options)
+        self._opener.start(paths, lambda paths, told: read_files(paths, self.read, reading, told))
         viewer.say(self._opener.note)
 
     def started(self, found: Found, options: "Options") -> None:

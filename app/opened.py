@@ -14,7 +14,8 @@ from scene.camera_list import CameraList, CameraReading
 from scene.colmap_tables import TABLES, find_model
 from scene.read_cameras import SPLITS, find_cameras, find_floor, is_cameras, read_camera_list
 
-Told = Callable[[str, float], None]
+Told = Callable[[str, float], None]  # what is being done, part done 0..1
+ReadModel = Callable[[Path, Told | None], Model]
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,8 @@ class Found:
 
 
 def read_files(
-    paths: Sequence[Path], read_model: Callable[[Path, Told], Model], reading: CameraReading,
-    told: Told,
-) -> Found:  # fmt: skip
+    paths: Sequence[Path], read_model: ReadModel, reading: CameraReading, told: Told | None
+) -> Found:
     """Reads scenes and files of cameras, told apart by what is in them.  Raises BadFile, OSError.
 
     Cameras that lie with the first scene are read too unless others were named; what is wrong

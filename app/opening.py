@@ -2,8 +2,8 @@
 
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -48,14 +48,19 @@ class ReadingOptions:
         )
 
 
-def open_model(path: Path, options: ReadingOptions) -> AnchorModel | SplatLayers:
-    """The model in a file or folder; progress and findings go to stderr.  Raises BadFile."""
+def open_model(
+    path: Path, options: ReadingOptions, told: Callable[[str, float], None] | None = None
+) -> AnchorModel | SplatLayers:
+    """The model in a file or folder; progress and findings go to stderr.  Raises BadFile.
+
+    `told` takes the progress instead: (what, part 0..1), from the thread that reads.
+    """
     from dataclasses import replace
 
     from runtime_models.read_scene import read_model
 
-    with progress_after(PATIENCE_S) as told:
-        model = read_model(path, replace(options.reading(), told=told))
+    with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
+        model = read_model(path, replace(options.reading(), told=tell))
     for finding in model.findings:
         print(sentence(finding), file=sys.stderr)
     return model

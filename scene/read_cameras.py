@@ -38,7 +38,7 @@ def read_camera_list(path: str | Path, reading: CameraReading | None = None) -> 
     """The same with names, notes and the form's name; docs/cameras.md says what each form is."""
     path, reading = Path(path), reading or CameraReading()
     if not path.exists():
-        raise BadFile(f"{path} does not exist; --camera wants a file of cameras, or orbit.")
+        raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if path.is_dir():
         return read_folder(path, reading)
     if path.stem in COLMAP_TABLES and path.suffix in (".bin", ".txt"):

@@ -1,11 +1,15 @@
 """cameras.json as 3DGS writes it beside its splats: positions, rotations, focal lengths."""
 
+import math
+
 import numpy as np
 
 from runtime_models.model import BadFile
 from scene.camera_list import (
+    SIZE,
     CameraList,
     CameraReading,
+    assumed_fov,
     is_number,
     numbers,
     ours_from_world,
@@ -17,19 +21,27 @@ from scene.camera_list import (
 from scene.pose import View
 
 MARKS = {"position", "rotation"}  # keys of a row that tell this form
+LENS = {"width", "height", "fx", "fy"}
 
 
 def read_inria_cameras(rows: object, reading: CameraReading, where: str) -> CameraList:
     """`rows` as JSON gives them, turned as 3DGS's splats are.  Raises BadFile.
 
     A row is {"id", "img_name", "width", "height", "position" (3,), "rotation" 3x3 camera to world
-    with OpenCV axes, "fx", "fy"}; "cx" and "cy" are ours, the middle where they are absent.
+    with OpenCV axes, "fx", "fy"}; "cx" and "cy" are ours, the middle where they are absent.  Where
+    no row has any of the lens, all get the field of view of `reading`, or ours with a note.
     """
     rows = read_rows(rows, "the file", where)
-    turn = ours_from_world(reading)
+    turn, notes = ours_from_world(reading), ()
+    if not any(LENS & row.keys() for row in rows):
+        fov_y, notes = assumed_fov(reading, where)
+        width, height = reading.size or SIZE
+        focal = height / 2 / math.tan(fov_y / 2)
+        lens = {"width": width, "height": height, "fx": focal, "fy": focal}
+        rows = [row | lens for row in rows]
     views = [read_row(r, turn, reading, f"{where}, camera {i}") for i, r in enumerate(rows)]
     names = tuple(read_name(row.get("img_name")) for row in rows)
-    return CameraList(tuple(views), names, "3DGS cameras.json")
+    return CameraList(tuple(views), names, "3DGS cameras.json", notes)
 
 
 def read_row(row: dict, turn: np.ndarray, reading: CameraReading, where: str) -> View:

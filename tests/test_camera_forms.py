@@ -133,6 +133,15 @@ def test_poses_alone_get_a_field_of_view(data):
     assert_same([told.views[first]], known[:1])
 
 
+def test_positions_and_rotations_alone_get_one_too(tmp_path):
+    row = {"position": [0, 0, 0], "rotation": np.eye(3).tolist()}
+    path = tmp_path / "cameras.json"
+    path.write_text(json.dumps([row, row]))
+    guessed, told = (read_camera_list(path, CameraReading(fov_y=f)) for f in (0.0, 1.0))
+    assert "--fov-y" in guessed.notes[0] and not told.notes
+    np.testing.assert_allclose(told.views[1].tangents, perspective(1.0, (640, 360)))
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_a_size_replaces_the_files(tmp_path, form):
     path = target(tmp_path, form)

@@ -115,7 +115,7 @@ BROKEN = {
     '[{"matrix": {"a": 1}, "fov_y": 1}]': "not 4 x 4 numbers",
     '[{"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,1,1], "fov_y": 1}]': "no rotation and position",
     '[{"matrix": [1,0,0,0, 0,1,0,0, 0,0.5,1,0, 0,0,0,1], "fov_y": 1}]': "no rotation",
-    f"[{{{GS}}}]": "'width', 'height', 'fx' and 'fy'",
+    f'[{{{GS}, "fx": 3}}]': "'width', 'height', 'fx' and 'fy'",
     f'[{{{GS}, "width": 4, "height": 4, "fx": 0, "fy": 1}}]': "above 0",
     f'[{{{GS.replace("1]", "2]")}, "width": 4, "height": 4, "fx": 1, "fy": 1}}]': "no rotation",
     f'[{{{GS.replace("1]", "-1]")}, "width": 4, "height": 4, "fx": 1, "fy": 1}}]': "mirrors",

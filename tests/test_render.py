@@ -196,7 +196,7 @@ REFUSED = {
     ("--stereo", "-0.1"): "--stereo is -0.1",
     ("--background", "nan", "0", "0"): "--background",
     ("--size", "16384x16384"): "134,217,728 pixels",
-    ("--camera", "sideways"): "sideways does not exist; --camera wants a file",
+    ("--camera", "sideways"): "sideways does not exist; wanted is a list of cameras",
 }
 
 
