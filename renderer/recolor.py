@@ -35,13 +35,19 @@ class Colored:
     reach: np.ndarray | None = None  # (A,) metres around each anchor with all of its splats
     reach_key: tuple | float | None = None  # control value and least alpha of that
 
-    def is_stale(self, key: tuple, degrees: float) -> bool:
-        """Whether x changed, or the eye moved by more than so many degrees around the centre."""
+    def is_stale(self, key: tuple, degrees: float, nearer: bool = False) -> bool:
+        """Whether x changed, or the eye moved by more than so many degrees around the centre.
+
+        nearer: or by as much of its distance towards the centre or away.
+        """
         if self.key is None or key[0] != self.key[0]:
             return True
         if key[1] == self.key[1]:
             return False
-        return not degrees > 0 or _angle(self.key[1], key[1], self.centre) > math.radians(degrees)
+        if not degrees > 0 or _angle(self.key[1], key[1], self.centre) > math.radians(degrees):
+            return True
+        before, now = (np.linalg.norm(np.array(eye) - self.centre) for eye in (self.key[1], key[1]))
+        return nearer and not abs(math.log(now / before)) <= math.radians(degrees)
 
     def take(self, key: tuple, wanted: np.ndarray | None, stale: bool) -> bool:
         """Notes that the wanted anchors get their colours; False: none of them needs any."""

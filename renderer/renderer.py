@@ -210,7 +210,7 @@ class Renderer:
                 object_from_world = np.linalg.inv(thing.world_from_object.matrix())
                 eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
                 key = color_key(thing.model, decoded.version, eye)
-                stale = colored.is_stale(key, degrees)
+                stale = colored.is_stale(key, degrees, nearer=follows_eye(thing.model))
                 if follows_eye(thing.model):
                     due, wanted = self._wanted_of_follower(thing, colored, stale, views)
                     if not due:

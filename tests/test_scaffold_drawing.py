@@ -144,6 +144,19 @@ def test_only_what_is_in_view_is_decoded_and_the_picture_is_the_same(renderer, t
     assert draw(renderer, scene, [views[2]])[1].geometry_runs == 0
 
 
+def test_coming_nearer_counts_as_turning_does(renderer, tmp_path):
+    """Levels and networks go by the distance, too: 2 degrees are 3.5 % of it."""
+    scene = in_scene(made(tmp_path, anchors=120, levels=4))
+    centre = scene.objects[0].model.anchors.mean(axis=0)
+    draw(renderer, Scene(()), [seen_from(0, 0, 3)])
+    runs = []
+    for away in (3.0, 2.95, 2.85, 2.85 * 1.03, 2.85 * 1.04):
+        eye = centre + away * np.array([0, 0, 1])
+        view = View(look_at(eye, centre), perspective(0.8, SIZE), 0.05, 50.0, SIZE)
+        runs.append(draw(renderer, scene, [view], recolor_degrees=2.0)[1].geometry_runs)
+    assert runs == [1, 0, 1, 0, 1]
+
+
 def test_no_splat_reaches_beyond_what_is_known_beforehand(tmp_path):
     model = made(tmp_path, anchors=300)
     reach = reach_of_scaffold(model, 1 / 255)
