@@ -19,6 +19,8 @@ HALF_TURN_Y = np.diag([-1.0, 1, -1])
 SPLATS = "KHR_gaussian_splatting"
 SPZ = "KHR_gaussian_splatting_compression_spz_2"
 PREFIX = f"{SPLATS}:"
+ROTATION, SCALE, OPACITY = f"{PREFIX}ROTATION", f"{PREFIX}SCALE", f"{PREFIX}OPACITY"
+FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
 NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
 HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
@@ -77,7 +79,7 @@ def refuse_repeats(asset: Asset, primitives: list[dict]) -> None:
     for primitive in primitives:
         attributes = asset.item(primitive, "attributes", dict, {})
         if "POSITION" in attributes and compressed_view(asset, primitive) is None:
-            floats = ROW + 3 * sum(name.startswith(f"{PREFIX}SH_") for name in attributes)
+            floats = ROW + 3 * sum("SH_DEGREE_" in name for name in attributes)
             wanted += 4 * floats * asset.count(attributes["POSITION"])
     size = asset.path.stat().st_size + asset.size_beside()
     if wanted > MOST_REPEATED * size + ALWAYS_ALLOWED:
@@ -129,7 +131,8 @@ def unusual(asset: Asset, splats: dict) -> list[Finding]:
 
 
 def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
-    """Splats of a primitive's accessors."""
+    """Splats of a primitive's accessors, also by the names of the extension's drafts."""
+    attributes = {present_name(name): index for name, index in attributes.items()}
 
     def read(name: str, width: int) -> np.ndarray:
         if name not in attributes:
@@ -141,13 +144,13 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
 
     if "POSITION" not in attributes:
         raise asset.refuse("a splat primitive has no POSITION; export it again.")
-    count = asset.count(attributes["POSITION"])
-    means, xyzw = read("POSITION", 3), read(f"{PREFIX}ROTATION", 4)
-    scales, opacity = read(f"{PREFIX}SCALE", 3), read(f"{PREFIX}OPACITY", 1)
-    names = harmonic_names(asset, attributes)
+    count, draft = asset.count(attributes["POSITION"]), is_draft(attributes)
+    means, xyzw, scales = read("POSITION", 3), read(ROTATION, 4), read(SCALE, 3)
+    opacity = read(COLOR, 4)[:, 3:] if draft else read(OPACITY, 1)
+    names = harmonic_names(asset, attributes, draft)
     sh = np.empty((count, len(names), 3), np.float32)
     for coefficient, name in enumerate(names):
-        sh[:, coefficient] = read(name, 3)
+        sh[:, coefficient] = (read(name, 4)[:, :3] - 0.5) / C0 if name == COLOR else read(name, 3)
     return RawSplats(
         means=np.array(means),  # out of the file: who judges them may write into them
         scales=np.array(scales),
@@ -155,24 +158,34 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
         opacity=np.array(opacity[:, 0]),
         sh=sh,
         file=asset.path.name,
-        format=NAME,
+        format=f"{NAME} (draft)" if draft else NAME,
         log_scales=False,
         logits=False,
         up="+Y",
     )
 
 
-def harmonic_names(asset: Asset, attributes: dict) -> list[str]:
+def present_name(name: str) -> str:
+    """An attribute's name as the release candidate has it: drafts wrote _SCALE."""
+    return PREFIX + name[1:] if name.startswith(("_ROTATION", "_SCALE", "_SH_DEGREE_")) else name
+
+
+def is_draft(attributes: dict) -> bool:
+    """Whether colour and opacity are in COLOR_0 alone, as the drafts of 2025 have it."""
+    return COLOR in attributes and not {FIRST, OPACITY} & attributes.keys()
+
+
+def harmonic_names(asset: Asset, attributes: dict, draft: bool) -> list[str]:
     """The attributes of the spherical harmonics, by degree and order; whole degrees alone."""
-    names: list[str] = []
-    for degree in range(4):
+    names: list[str] = [COLOR] if draft else []
+    for degree in range(len(names), 4):
         row = [f"{PREFIX}SH_DEGREE_{degree}_COEF_{n}" for n in range(2 * degree + 1)]
         there = sum(name in attributes for name in row)
         if there not in (0, len(row)) or (there and len(names) < degree**2):
             raise asset.refuse(f"of its harmonics of degree {degree} or below some are missing.")
         names += row if there else []
     if not names:
-        raise asset.refuse(f"a splat primitive has no {PREFIX}SH_DEGREE_0_COEF_0: no colours.")
+        raise asset.refuse(f"a splat primitive has no {FIRST}: no colours.")
     return names
 
 

@@ -281,6 +281,20 @@ def test_what_is_not_known_is_drawn_as_usual_and_told(tmp_path, name, value):
     assert value in finding.what and finding.done.startswith("drawn as")
 
 
+@pytest.mark.parametrize("prefix", ["_", P])
+def test_drafts_have_colour_and_opacity_in_color_0(tmp_path, prefix):
+    arrays = splat_arrays(9, 1)
+    now = raw(write_glb(tmp_path / "a.glb", *make_asset(arrays)))
+    color = 0.5 + C0 * arrays.pop(P + "SH_DEGREE_0_COEF_0")
+    color = np.concatenate([color, arrays.pop(P + "OPACITY")], axis=1).astype("<f4")
+    names = {name: name.replace(P, prefix) for name in arrays}
+    draft = {names[name]: array for name, array in arrays.items()} | {"COLOR_0": color}
+    then = raw(write_glb(tmp_path / "b.glb", *make_asset(draft)))
+    for name in ("means", "scales", "wxyz", "opacity", "sh"):
+        np.testing.assert_allclose(getattr(then, name), getattr(now, name), atol=1e-6)
+    assert then.format == "glTF (draft)" and now.format == "glTF"
+
+
 # Third parties
 
 
