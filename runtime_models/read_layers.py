@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.formats import read_plain
-from runtime_models.model import BadFile, SplatLayers, Stop
+from runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from runtime_models.plain_splats import PlainSplats, Reading
 
 MODES = ("cumulative", "exclusive")
@@ -64,6 +64,9 @@ def join_layers(
         provenance["dropped_rows"] = dropped
     origin, antialiased = parts[0].origin, any(part.antialiased for part in parts)
     findings = tuple(finding for part in parts for finding in part.findings)
+    if antialiased and not all(part.antialiased for part in parts):
+        what = "only some of the layers were trained antialiased"
+        findings += (Finding(what, 0, "all are drawn so"),)
     width = max(part.sh.shape[1] for part in parts)  # files of a lower degree get zeros
     pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
     parts.clear()

@@ -93,7 +93,8 @@ def describe(model: Model, path: str | Path) -> dict:
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
     if plain:
-        return facts | {"mode": model.mode} | describe_labels(model)
+        drawn = {"antialiased": True} if model.antialiased else {}
+        return facts | {"mode": model.mode} | drawn | describe_labels(model)
     networks = {
         "splats_per_anchor": model.splats_per_anchor,
         "feature_width": model.features.shape[1],

@@ -28,7 +28,7 @@ from renderer.settings import RenderSettings
 from runtime_models.formats import read_plain
 from runtime_models.model import SplatLayers
 from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_scene import read_model
+from runtime_models.read_scene import describe, read_model
 from runtime_models.write_ply import write_ply
 from runtime_models.write_spz import write_spz
 from scene.pose import Pose, View
@@ -217,7 +217,19 @@ def test_files_say_it_and_the_scene_keeps_it(tmp_path):
     (tmp_path / "no.ply").write_bytes(text.replace(b"antialiased 1", b"SplatRenderMode: default"))
     for name, want in {"a.ply": True, "mip.ply": True, "no.ply": False, "a.spz": True}.items():
         assert read_plain(tmp_path / name).antialiased is want, name
-        assert read_model(tmp_path / name, Reading()).antialiased is want, name
+        model = read_model(tmp_path / name, Reading())
+        assert model.antialiased is want, name
+        assert describe(model, tmp_path / name).get("antialiased", False) is want, name
+
+
+def test_layers_that_differ_in_it_are_told_of(tmp_path):
+    layers = thin(20)
+    arrays = [getattr(layers, name) for name in ("means", "scales", "wxyz", "opacity", "sh")]
+    for i, antialiased in enumerate((False, True)):
+        write_ply(PlainSplats(*arrays, antialiased=antialiased), tmp_path / f"layer{i}.ply")
+    model = read_model(tmp_path, Reading())
+    assert model.antialiased
+    assert model.findings[-1].done == "all are drawn so"
 
 
 def test_the_oracle_does_not_stumble_over_what_is_flat():
