@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
+from rasterizer.device import NoDevice, open_device
 from renderer.recolor import reach_of_scaffold
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
@@ -22,6 +22,7 @@ from scene.selector import Painted
 from scene.stereo import stereo_pair
 from tests.scaffold_scenes import from_anchors, random_raw, write_run
 from tests.splat_scenes import psnr_db, random_layers
+from training.evaluate import Painter
 
 SIZE = (160, 100)
 TURNED = Pose(np.array([0.3, -0.2, 0.4]), np.array([0.8, 0.0, 0.6, 0.0]))
@@ -190,6 +191,19 @@ def test_a_packages_scene_as_a_run_shows_the_same(renderer, tmp_path):
     (image,), _ = draw(renderer, in_scene(demo), [view])
     (same,), _ = draw(renderer, in_scene(run), [view])
     assert psnr_db(same, image) > 60
+
+
+def test_held_out_photos_are_compared_from_their_own_eyes(tmp_path):
+    """launch.py eval draws with the rasterizer alone."""
+    try:
+        painter = Painter(open_device(), model := made(tmp_path, anchors=60))
+    except NoDevice as reason:
+        pytest.skip(str(reason))
+    assert painter.set_control(0.0) == 180
+    for eye in ((0, 0.3, 3), (2.5, 0, -1)):
+        picture = painter.picture(seen_from(*eye), (0.0, 0.0, 0.0))
+        wanted = reference_image(in_scene(model), seen_from(*eye))[..., :3]
+        assert psnr_db(picture, wanted) > 60
 
 
 def test_framing_and_picking(tmp_path):
