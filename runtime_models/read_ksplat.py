@@ -15,6 +15,7 @@ from runtime_models.model import BadFile
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.spherical_harmonics import C0
 
+VERSION = b"\0\1"  # the first bytes: 0.1
 HEADER_SIZE, SECTION_SIZE = 4096, 1024
 HEADER = struct.Struct("<BB2xIIIIH14xff")  # version, sections' room, sections, splats' room,
 #                                            splats, level, least and largest 8-bit harmonic
@@ -55,7 +56,9 @@ class Section:
 
 def read_raw_ksplat(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3; as in COLMAP, y down.  Raises BadFile."""
-    data = path.read_bytes()
+    with path.open("rb") as file:  # what is none is not read as a whole to say so
+        head = file.read(HEADER_SIZE)
+    data = path.read_bytes() if head[:2] == VERSION else head
     header = read_header(data, path.name)
     sections = read_sections(data, header)
     degree = max((section.degree for section in sections), default=0)
@@ -90,7 +93,7 @@ def read_header(data: bytes, file: str) -> Header:
     if len(data) < HEADER_SIZE:
         raise BadFile(f"{file} has {len(data)} bytes, a .ksplat begins with {HEADER_SIZE}.")
     major, minor, sections, _, _, count, level, least, most = HEADER.unpack_from(data)
-    if (major, minor) != (0, 1):
+    if bytes((major, minor)) != VERSION:
         raise BadFile(f"{file} is .ksplat version {major}.{minor}; 0.1 is known.")
     if level > 2:
         raise BadFile(f"{file} has compression level {level}; a .ksplat has 0, 1 or 2.")

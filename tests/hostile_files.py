@@ -65,16 +65,6 @@ def zip_with_a_huge_stated_size(folder: Path) -> Path:
     return put(folder / "a.shift", bytes(data))
 
 
-@case
-def zip_with_a_lying_packed_size(folder: Path) -> Path:
-    data = bytearray(zip_files(good_package()))
-    place = data.find(b"PK\1\2")
-    while place >= 0:
-        data[place + 20 : place + 24] = struct.pack("<I", 0x7FFFFFFF)
-        place = data.find(b"PK\1\2", place + 4)
-    return put(folder / "a.shift", bytes(data))
-
-
 def renamed(folder: Path, name: str, ending: str = "shift") -> Path:
     files = {f"{name}{key}": value for key, value in good_package().items()}
     return put(folder / f"a.{ending}", zip_files(files))
