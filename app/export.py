@@ -123,7 +123,7 @@ def make_part(path: Path, model, position, options: Options):
     from scene.read_selector import read_selector
     from scene.scene import IDENTITY, SceneObject
 
-    x = choose_x(options.x, model)
+    x = choose_x(options.x, model, path.name)
     eye = default_view(model, (640, 360)).world_from_eye
     try:
         selectors = tuple(read_selector(text, model.stops, eye) for text in options.select)
@@ -138,7 +138,7 @@ def make_part(path: Path, model, position, options: Options):
     return Part(thing, inside or None, options.label)
 
 
-def choose_x(text: str, model) -> float:
+def choose_x(text: str, model, name: str) -> float:
     """The control value of a number or a stop's name.  Raises UsageError."""
     from app.errors import UsageError
 
@@ -153,7 +153,9 @@ def choose_x(text: str, model) -> float:
         x = float("nan")
     if not 0 <= x <= 1:
         names = ", ".join(f"{stop.name} ({stop.x:g})" for stop in model.stops) or "none"
-        raise UsageError(f"--x is '{text}', expected 0 to 1 or one of the stops: {names}.")
+        raise UsageError(
+            f"--x is '{text}', expected 0 to 1 or one of the stops of {name}: {names}."
+        )
     return x
 
 

@@ -183,7 +183,7 @@ def test_plain_splats_become_no_package(scenes, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--x", "1.5"), "0 to 1 or one of the stops: RGB (0), Thermal (1)"),
+        (("--x", "1.5"), "0 to 1 or one of the stops of random.shift: RGB (0), Thermal (1)"),
         (("--x", "nan"), "0 to 1 or one of the stops"),
         (("--x", "layer9"), "0 to 1 or one of the stops"),
         (("--sh-degree", "4"), "--sh-degree is 4"),
