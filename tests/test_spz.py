@@ -7,13 +7,20 @@ import zlib
 
 import numpy as np
 import pytest
+from splat_scenes import alone, psnr_db
 from spz_files import legacy, modern, random_streams, splat_by_hand
 
+from rasterizer.device import NoDevice
+from renderer.renderer import Renderer
 from runtime_models.formats import format_of, read_plain, read_raw
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.read_scene import read_model
 from runtime_models.read_spz import read_spz_bytes
 from runtime_models.spz_file import is_spz
+from scene.pose import View, look_at
+
+BIKER = View(look_at((0.5, 1.2, -3), (0, 1.0, 0)), (-0.25, 0.25, -0.4, 0.4), 0.05, 50, (160, 256))
 
 
 def read(data: bytes) -> RawSplats:
@@ -200,3 +207,17 @@ def test_the_biker_is_the_same_splats_as_its_compressed_ply(data):
     head, feet = spz.means[:, 1] > 1.6, spz.means[:, 1] < 0.2
     skin = 0.5 + 0.28209 * np.median(spz.sh[head, 0], axis=0)
     assert head.sum() > 1000 and feet.sum() > 1000 and skin[0] > skin[2]
+
+
+def test_the_biker_s_picture_is_that_of_its_compressed_ply(data):
+    try:
+        with Renderer(None) as renderer:
+            pictures = []
+            for name in ("biker.spz", "biker.compressed.ply"):
+                renderer.update(alone(read_model(data / "splats_playcanvas" / name)))
+                renderer.draw([BIKER])
+                pictures.append(renderer.image().copy())
+    except NoDevice as reason:
+        pytest.skip(str(reason))
+    assert pictures[0][..., 3].mean() > 0.1  # he is in the picture
+    assert psnr_db(*pictures) > 50

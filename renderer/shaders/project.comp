@@ -8,7 +8,7 @@
 #define SORT_FRAME 0      // 1: the order is made along another frame than the first view's
 #define BY_DISTANCE 0     // 1: and by the distance in it
 #define FADE 0            // 1: some limit has a ramp
-#define ANTIALIASED 0     // 1: what the low pass makes wider becomes fainter, see renderer/project.py
+#define ANTIALIASED 0     // 1: what the low pass makes wider becomes fainter
 #define KEY_RANGE 0       // 1: the least and largest key are wanted
 #endif
 #include "common/finite.glsl"
