@@ -1,7 +1,5 @@
 """How many splats a device can hold, and one sentence for a scene that has more."""
 
-from math import inf
-
 from rasterizer.device import Device
 from rasterizer.project import RECORD
 from runtime_models.model import AnchorModel, BadFile, SplatLayers
@@ -31,10 +29,8 @@ def check_tiles(device: Device, models: list[AnchorModel | SplatLayers]) -> None
     if not count <= most:
         raise too_many(count, most, "the kernels count with 32 bits", "quads")
     sh = [model.sh for model in models if isinstance(model, SplatLayers)]
-    largest = 4 * max(
-        [RECORD, *(3 * array.shape[1] for array in sh)]
-    )  # bytes a splat
-    most = int(min((device.most_bytes or inf) // largest, most))
-    if not count <= most:
+    largest = 4 * max([RECORD, *(3 * array.shape[1] for array in sh)])  # bytes a splat
+    most = device.most_bytes // largest
+    if device.most_bytes and not count <= most:
         limit = f"CL_DEVICE_MAX_MEM_ALLOC_SIZE is {device.most_bytes:,} bytes"
         raise too_many(count, most, f"{limit}, a splat takes {largest} of one array", "quads")

@@ -33,7 +33,13 @@ KNOWN = (
 def read_model(path: str | Path, reading: Reading | None = None) -> Model:
     """The model in a file or folder, read as `reading` says.  Raises BadFile."""
     reading = reading or Reading()
-    model = read_whole(Path(path), reading)
+    try:
+        model = read_whole(Path(path), reading)
+    except MemoryError as error:
+        raise BadFile(
+            f"{Path(path).name} does not fit this machine's memory ({error}); close other "
+            "programs, or open fewer layers."
+        ) from error
     return thin(model, reading.most_splats) if isinstance(model, SplatLayers) else model
 
 
@@ -94,6 +100,9 @@ def describe(model: Model, path: str | Path) -> dict:
     }
     if plain:
         drawn = {"antialiased": True} if model.antialiased else {}
+        if "level" in model.provenance:  # of a streamed scene; 0 is the finest
+            drawn["level"] = model.provenance["level"]
+            drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))
         return facts | {"mode": model.mode} | drawn | describe_labels(model)
     networks = {
         "splats_per_anchor": model.splats_per_anchor,
