@@ -21,6 +21,15 @@ def press(viewer, key: int, shift: bool = False) -> None:
     viewer.take(KeyDown(key, shift))
 
 
+def click(viewer, x: float, y: float) -> None:
+    window = viewer.window
+    window._on_cursor(None, x, y)
+    run_frames(viewer, 2)
+    for action in (glfw.PRESS, glfw.RELEASE):
+        window._on_button(None, glfw.MOUSE_BUTTON_LEFT, action, 0)
+        run_frames(viewer, 2)
+
+
 @pytest.fixture
 def dropped(viewer, tmp_path):
     """A viewer that stands at the first of three cameras."""
@@ -150,15 +159,18 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path):
         viewer.take(Drop((path,)))
         until_opened(viewer)
     assert viewer.files.recent.paths == (scene, gone)
+    before = viewer.stage.scene
     gone.unlink()
     left, top, *_ = viewer.window.covered[0]
-    window = viewer.window
-    window._on_cursor(None, left + 100, top + 44)  # on the button
-    run_frames(viewer, 2)
-    for action in (glfw.PRESS, glfw.RELEASE):
-        window._on_button(None, glfw.MOUSE_BUTTON_LEFT, action, 0)
-        run_frames(viewer, 2)
-    assert window._popup  # the list is open
+    click(viewer, left + 100, top + 44)  # on the button
+    assert viewer.window._popup  # the list is open
+    click(viewer, left + 60, top + 90)  # the second, which is not there any more
+    assert not viewer.files.busy and viewer.window._popup
+    click(viewer, left + 60, top + 72)  # the first
+    until_opened(viewer)
+    assert viewer.stage.scene.objects[0].name == "one" and not viewer.stage.problem
+    assert viewer.stage.scene is not before
+    assert not viewer.window._popup
     told = json.loads((tmp_path / "settings/recent.json").read_text())
     assert told["recent"] == [str(scene), str(gone)]
 

@@ -1,5 +1,6 @@
 """The viewer as a person starts it, under Xvfb or without a display: pictures and sentences."""
 
+import json
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from PIL import Image
 
 from app.window import Window
 from renderer.context import NoContext
+from scene.pose import look_at
 
 pytest_plugins = ["desktop_fixtures"]  # its fixture display
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,6 +67,25 @@ def test_screenshot_of_the_whole_window(display, scene_file, tmp_path):
     panel = np.abs(picture[:500, :290] - ACCENT).max(axis=2) < 12
     assert panel.sum() > 40  # the title and the bars of the passes
     assert out.parent.exists() and [p.name for p in out.parent.iterdir()] == ["window.png"]
+
+
+def test_any_name_and_a_file_of_cameras(display, scene_file, tmp_path):
+    """Opened by its address, as desktops hand it over; the camera looks past the ball."""
+    path = tmp_path / "Möbel 3 ツ" / "stuhl äöü.ply"
+    path.parent.mkdir()
+    path.write_bytes(scene_file.read_bytes())
+    row = {"matrix": look_at((0.0, 0.0, 6.0), (0.0, 3.0, 0.0)).matrix().tolist(), "fov_y": 0.9}
+    (path.parent / "blick ß.json").write_text(json.dumps([row]))
+    out = path.parent / "bild ä.png"
+    done = start(
+        display, "view", path.as_uri(), "--camera", path.parent / "blick ß.json",
+        "--screenshot", out, "--size", "900x600",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    picture = np.asarray(Image.open(out)).astype(int)
+    green = (picture[..., 1] > 120) & (picture[..., 0] < 90) & (picture[..., 2] < 90)
+    rows, _ = np.nonzero(green)
+    assert green.any() and rows.mean() > 330  # below the middle: the eye looks up past it
 
 
 def test_no_display_is_one_sentence(scene_file):
