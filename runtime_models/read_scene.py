@@ -57,7 +57,7 @@ def read_whole(path: Path, reading: Reading) -> Model:
         path = path.parent
     if path.is_dir():
         if (path / MANIFEST).exists():
-            return read_package(path)
+            return read_upright(path, reading)
         if is_sog(b"", path):
             return read_sog_folder(path, reading)
         if is_scaffold(path):
@@ -73,10 +73,19 @@ def read_whole(path: Path, reading: Reading) -> Model:
     if is_scaffold(path):
         return read_scaffold(path, reading)
     if is_package(path):
-        return read_package(path)
+        return read_upright(path, reading)
     if format_of(path):
         return read_file(path, reading)
     raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
+
+
+def read_upright(path: Path, reading: Reading) -> AnchorModel:
+    """A package, whose up is +Y and nothing else.  Raises BadFile."""
+    if reading.flip or reading.up not in ("", "+Y"):
+        raise BadFile(
+            f"{path.name} is a package, and +Y is up in all of them; leave out --up and --flip."
+        )
+    return read_package(path)
 
 
 def is_package(path: Path) -> bool:

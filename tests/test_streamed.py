@@ -59,6 +59,8 @@ def test_the_finest_level_is_read_and_has_its_files_splats(scene):
     assert np.array_equal(layers.sh[:, 0], raw.sh[order, 0])
     assert layers.provenance["level"] == 0 and layers.provenance["level_splats"] == list(COUNTS)
     assert layers.findings == ()
+    facts = describe(layers, scene)
+    assert facts["level"] == 0 and facts["levels"] == dict(enumerate(COUNTS))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from desktop_stand import run_frames
+from desktop_stand import run_frames, until_opened
 from PIL import Image
 from sog_scenes import write_folder
 from test_desktop_program import start
@@ -78,3 +78,26 @@ def test_the_first_frame_is_coarse_and_the_camera_stays(window, scene, tmp_path)
         after = viewer.camera.view((900, 640))
         assert np.array_equal(before.world_from_eye.matrix(), after.world_from_eye.matrix())
         assert "detail 3 of 3" in [said() for said in viewer.hooks.status]
+
+
+def test_a_streamed_scene_that_is_dropped_on_the_window_is_refined(window, scene, tmp_path):
+    options = Options(pictures=tmp_path / "pictures")
+    with Refiner(options) as refiner, Renderer(window.ctx) as renderer:
+        stage = Stage(refiner.open)
+        sources = [Source(scene / "1_0", refiner.open(scene / "1_0"))]  # one level alone: blue
+        stage.take(sources, scene_of(sources))
+        viewer = Viewer(window, renderer, stage, options)
+        attach_refiner(viewer, refiner)
+        run_frames(viewer, 2)
+        assert not refiner.running
+        viewer.files.open_soon((scene,))
+        until_opened(viewer)
+        for _ in range(200):
+            run_frames(viewer, 1)
+            if not refiner.running:
+                break
+        run_frames(viewer, 1)
+        red, green, blue = shares(window.picture())
+        assert green > 0.03 and red + blue < green / 20
+        assert stage.scene.objects[0].model.splat_count == LEVELS[0]
+        assert stage.sources[0].facts["splats"] == LEVELS[0] and stage.problem == ""
