@@ -16,6 +16,7 @@ from app.stability_cases.finding import (
     not_here,
 )
 from app.stability_cases.stage import Stage, difference, turned, turned_about
+from runtime_models.evaluate import follows_eye
 from runtime_models.model import AnchorModel
 
 LONGEST_STEP = 0.02  # of x, half a Gaussian of the paper's encoding
@@ -145,7 +146,9 @@ def stale(stage: Stage, move, bounds: dict[float, float]) -> Result:
         if worst is None or db < worst[0]:
             worst = (db, angle, old, exact)
     _, angle, old, exact = worst
-    told = at_least("frames drawn in an old order", kept, len(bounds), WAS_OLD)
+    # A model whose opacities follow the eye is put in order wherever that moves.
+    moved = follows_eye(stage.model) and move is not turned
+    told = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
     panels = [
         stage.panel(f"order {angle:g} degrees old", old),
         stage.panel("its own order", exact),
