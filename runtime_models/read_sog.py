@@ -8,6 +8,7 @@ import numpy as np
 
 from runtime_models.blocks import each_block
 from runtime_models.model import BadFile, Finding
+from runtime_models.package_files import MANIFEST
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.read_compressed_ply import from_smallest_three
 from runtime_models.sog_files import META, SogFiles, is_meta
@@ -36,9 +37,11 @@ def is_sog(head: bytes, path: Path) -> bool:
         return False
     try:
         with zipfile.ZipFile(path) as archive:
-            return any(is_meta(entry.filename) for entry in archive.infolist())
+            names = [entry.filename for entry in archive.infolist()]
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
         return False  # whoever reads packages says what is wrong with it
+    packaged = any(name.rpartition("/")[2] == MANIFEST for name in names)
+    return any(is_meta(name) for name in names) and not packaged
 
 
 def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
@@ -79,7 +82,9 @@ class Sog:
     findings: list[Finding] = field(default_factory=list)
 
     def names(self, part: str) -> list[str]:
-        """The files of a part; [] where there is none."""
+        """The files of a part; [] where there is none, which only harmonics may be."""
+        if part not in self.meta and part != "shN":
+            raise self.bad(f"{part} is missing")
         names = self.section(part).get("files") if part in self.meta else []
         wanted = PICTURES[part] if part in self.meta else 0
         if not isinstance(names, list) or len(names) != wanted:

@@ -153,12 +153,14 @@ def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[Run
 def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers:
     """One level as a scene of one stop.  Raises BadFile."""
     check_mode(reading.mode)
-    numbers = sorted({run.file for run in streamed.levels[number] if run.count})
+    runs_of_file: dict[int, list[Run]] = {}
+    for run in streamed.levels[number]:
+        if run.count:
+            runs_of_file.setdefault(run.file, []).append(run)
     parts, used = [], [streamed.folder / TREE]
-    for i, file in enumerate(numbers):
-        within = replace(reading, told=None)
-        reading.tell(f"reading level {number} of {streamed.folder.name}", i / len(numbers))
-        runs = [run for run in streamed.levels[number] if run.file == file]
+    within = replace(reading, told=None)
+    for i, (file, runs) in enumerate(sorted(runs_of_file.items())):
+        reading.tell(f"reading level {number} of {streamed.folder.name}", i / len(runs_of_file))
         parts.append(picked(read_raw_sog(streamed.files[file], within), runs))
         used += files_of_sog(streamed.files[file])
     if streamed.environment is not None:
@@ -210,7 +212,10 @@ def picked(raw: RawSplats, runs: list[Run]) -> RawSplats:
 
 
 def joined(parts: list[RawSplats], name: str) -> RawSplats:
-    """All splats of several SOG files as of one.  Raises BadFile where their versions differ."""
+    """All splats of several SOG files as of one; takes the parts over.
+
+    Raises BadFile where their versions differ.
+    """
     if len(parts) == 1:
         return replace(parts[0], file=name)
     if len({part.format for part in parts}) > 1:
@@ -218,7 +223,11 @@ def joined(parts: list[RawSplats], name: str) -> RawSplats:
     most = max(part.sh.shape[1] for part in parts)
     for part in parts:
         part.sh = np.pad(part.sh, ((0, 0), (0, most - part.sh.shape[1]), (0, 0)))
-    arrays = {key: np.concatenate([getattr(part, key) for part in parts]) for key in ARRAYS}
+    arrays = {}
+    for key in ARRAYS:
+        arrays[key] = np.concatenate([getattr(part, key) for part in parts])
+        for part in parts:
+            setattr(part, key, None)  # each goes once it is copied
     findings = tuple(found for part in parts for found in part.findings)
     mip = any(part.antialiased for part in parts)
     return replace(parts[0], **arrays, file=name, findings=findings, antialiased=mip)

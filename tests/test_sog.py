@@ -59,6 +59,13 @@ def test_zip_folder_and_its_meta_json_are_the_same_scene(tmp_path, version):
     assert describe(models[0], stored)["bytes"] == stored.stat().st_size
 
 
+def test_a_package_with_a_meta_json_beside_stays_a_package(tmp_path):
+    path = write_zip(tmp_path / "a.shift", *random_sog(4))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("scene.json", "{}")
+    assert is_package(path) and format_of(path) is None
+
+
 def test_a_codebook_that_begins_with_null_is_continued_as_its_writer_meant(tmp_path):
     meta, pictures = random_sog(40, bands=1)
     meta["scales"]["codebook"][0] = None
