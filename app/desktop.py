@@ -315,11 +315,12 @@ class Viewer:
         scale = self.window.ui_scale
         self.readings.flying = self.camera.flying
         covered = []
+        free = free_area(self.window.logical_size, len(self.stage.sliders), scale)
+        left = free[0] if self.overlay else 0.0
         if not self.save_picture:
             self._draw_marks(scale)
         if self.overlay:
             draw_scale_bar(self.stage.scene, scale)
-            left = free_area(self.window.logical_size, len(self.stage.sliders), scale)[0]
             debug, stats = self.stage.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), left, scale)
             covered = [
@@ -328,7 +329,7 @@ class Viewer:
                 draw_status(self.stage, [words() for words in self.hooks.status], scale),
             ]
         if not self.save_picture:  # a note is no part of a picture
-            draw_note(self.readings.note, scale)
+            draw_note(self.readings.note, left, scale)
         draw_problem(self.stage, scale)
         self.window.covered = tuple(covered)
 

@@ -55,8 +55,7 @@ class Files:
                 if options.scenes:
                     self.remember(source.path)
         self.take_cameras(found, stand=options.camera is not None)
-        if found.notes:
-            viewer.say("\n".join(found.notes))
+        viewer.say(told_of(found))
 
     def poll(self) -> bool:
         """Takes over what has been read; True while something is being read."""
@@ -96,10 +95,7 @@ class Files:
         self.take_cameras(found, stand=not found.sources)
         for source in found.sources:
             self.remember(source.path)
-        told = [sentence(f) for f in stage.findings] if found.sources else []
-        told = told[:MOST_TOLD] + [f"and {len(told) - MOST_TOLD} more"] * (len(told) > MOST_TOLD)
-        if told or found.notes:
-            viewer.say("\n".join([*told, *found.notes]))
+        viewer.say(told_of(found))
 
     def take_cameras(self, found: Found, stand: bool) -> None:
         """The cameras of a file for n and p; of a scene without any there are none."""
@@ -132,6 +128,14 @@ class Files:
         except OSError as error:
             self._viewer.say(f"The list of recent files cannot be kept: {error.strerror}.")
             self.recent = None
+
+
+def told_of(found: Found) -> str:
+    """What was repaired in the files and assumed about the cameras, a line each; "" = nothing."""
+    findings = [finding for source in found.sources for finding in source.model.findings]
+    lines = [sentence(finding) for finding in findings if finding.repaired]
+    more = [f"and {len(lines) - MOST_TOLD} more."] if len(lines) > MOST_TOLD else []
+    return "\n".join([*lines[:MOST_TOLD], *more, *found.notes])
 
 
 def home_of(found: Found) -> View | None:

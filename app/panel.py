@@ -128,12 +128,13 @@ def free_area(size: tuple[float, float], rows: int, pixels: float) -> Box:
     return (left, 0.0, float(width), bottom) if enough else (0.0, 0.0, float(width), float(height))
 
 
-def draw_note(text: str, ui_scale: float) -> None:
-    """A short message at the upper edge that needs no answer."""
+def draw_note(text: str, left: float, ui_scale: float) -> None:
+    """A message that needs no answer, at the upper edge and central in what is right of `left`."""
     if not text:
         return
     screen = imgui.get_io().display_size
-    imgui.set_next_window_pos(Vec(screen.x / 2, MARGIN * ui_scale), 0, Vec(0.5, 0))
+    middle = (left + screen.x) / 2
+    imgui.set_next_window_pos(Vec(middle, MARGIN * ui_scale), 0, Vec(0.5, 0))
     flags = imgui.WindowFlags_
     imgui.begin(
         "##note",
@@ -141,7 +142,8 @@ def draw_note(text: str, ui_scale: float) -> None:
         flags.no_decoration | flags.always_auto_resize | flags.no_inputs | flags.no_saved_settings
         | flags.no_focus_on_appearing,
     )  # fmt: skip
-    room = min(NOTE_WIDTH * ui_scale, screen.x * 0.9) - 2 * imgui.get_style().window_padding.x
+    width = min(NOTE_WIDTH * ui_scale, (screen.x - left) * 0.9)
+    room = width - 2 * imgui.get_style().window_padding.x
     imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + room)
     imgui.text_unformatted(text)
     imgui.pop_text_wrap_pos()

@@ -4,6 +4,7 @@ import json
 import os
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from camera_files import cameras
 from PIL import Image
 
 from app import cli
+from app.files import told_of
 from app.opened import Opener, means_cameras, read_files
 from app.paths import config_folder, plain, plain_path
 from app.recent import FILE, MOST, RecentFiles
@@ -92,6 +94,7 @@ def test_every_command_takes_any_name(tmp_path, capsys, monkeypatch):
     assert cli.main(["render", str(path), "--out", str(out), *tiny]) == 0
     with Image.open(next(out.glob("*.png"))) as picture:
         assert picture.size == (16, 12)
+    assert cli.main(["lint", str(path)]) == 0
     assert cli.main(["export", str(path), "--out", str(path.parent / "neu ツ.ply")]) == 0
     assert read_model(path.parent / "neu ツ.ply").splat_count == 40
     write_cameras(cameras(), path.parent / "kameras ツ.json", "ours")
@@ -255,6 +258,21 @@ def test_the_status_line_says_what_is_open(tmp_path):
     assert words[-1] == bytes_text(path.stat().st_size)
     stage.take(sources * 2, scene_of(sources * 2))
     assert scene_words(stage)[:2] == ["2 scenes", "2\u2009468 splats"]
+
+
+def test_what_was_repaired_is_told_at_opening(tmp_path):
+    path = splats(tmp_path / "a.ply")
+    whole = bytearray(path.read_bytes())
+    start = whole.index(b"end_header\n") + len(b"end_header\n")
+    whole[start : start + 4] = np.float32(np.nan).tobytes()
+    path.write_bytes(whole)
+    found = read_files([path], read, CameraReading(), silent)
+    assert "a.ply" in told_of(found) and "NaN" in told_of(found) and "dropped" in told_of(found)
+    good = read_files([splats(tmp_path / "b.ply")], read, CameraReading(), silent)
+    assert told_of(good) == ""
+    assert told_of(replace(found, notes=("A note.",))).endswith("\nA note.")
+    many = replace(found, sources=found.sources * 5)
+    assert told_of(many).splitlines()[-1] == "and 3 more."
 
 
 def test_bytes_have_three_digits_and_a_unit():
