@@ -1,6 +1,8 @@
 """The pixels of a photo and of its mask, in the size that is asked for."""
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,7 @@ GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
 def open_image(path: Path) -> Image.Image:
     """The image file, its header read; BadFile when it is missing or no image."""
     try:
-        with warnings.catch_warnings():  # read_pixels says what is too large, in a sentence
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with quiet():
             return Image.open(path)
     except FileNotFoundError:
         raise BadFile(
@@ -26,6 +27,14 @@ def open_image(path: Path) -> Image.Image:
         ) from None
     except (UnidentifiedImageError, Image.DecompressionBombError, *BROKEN) as error:
         raise BadFile(f"{path}: not a readable image ({error}); PNG or JPEG is wanted") from None
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Without Pillow's warnings of odd metadata and large pictures: what is wrong is a BadFile."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
 
 
 def load_photo(
@@ -57,7 +66,8 @@ def read_pixels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
                 "scale it down"
             )
         try:
-            image.load()
+            with quiet():
+                image.load()
         except BROKEN as error:
             raise BadFile(f"{path}: the image is cut off ({error}); copy it again") from None
         if image.mode in GREY_16:

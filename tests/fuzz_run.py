@@ -117,7 +117,7 @@ def fuzz(
     then(good, sown.path_in(folder), True)
     names = list(sown.files)
 
-    @seed(zlib.crc32(sown.name.encode()))
+    @seed(zlib.crc32(sown.name.encode()) + int(os.environ.get("FUZZ_SEED", "0")))
     @settings(
         max_examples=examples, database=None, deadline=None, report_multiple_bugs=False,
         suppress_health_check=list(HealthCheck), phases=(Phase.generate, Phase.shrink),

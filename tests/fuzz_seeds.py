@@ -92,8 +92,8 @@ def real_seeds() -> list[Seed]:
     return found
 
 
-def ply_text_seeds(folder: Path) -> list[Seed]:
-    """A header of points, and one in letters, which only a sentence may come of or a model."""
+def point_seeds() -> list[Seed]:
+    """Points with colours, in letters and in bytes."""
     rows = [f"{x} {x * 2} {x * 3} 200 100 {x}" for x in range(20)]
     header = ["ply", "format ascii 1.0", "element vertex 20"]
     header += [f"property float {axis}" for axis in "xyz"]
@@ -102,8 +102,8 @@ def ply_text_seeds(folder: Path) -> list[Seed]:
     packed["xyz"] = np.random.default_rng(0).normal(size=(20, 3))
     binary = "\n".join(header).replace("ascii", "binary_little_endian") + "\n"
     return [
-        Seed("points in letters", {"a.ply": "\n".join(header + rows).encode() + b"\n"}, forgiving),
-        Seed("points", {"a.ply": binary.encode() + packed.tobytes()}, forgiving),
+        Seed("points in letters", {"a.ply": "\n".join(header + rows).encode() + b"\n"}, read_model),
+        Seed("points", {"a.ply": binary.encode() + packed.tobytes()}, read_model),
     ]
 
 
@@ -185,6 +185,65 @@ def torch_seeds(folder: Path) -> list[Seed]:
     ]
 
 
+def thermal_seeds(folder: Path) -> list[Seed]:
+    """A pair, and ThermalGaussian's two sets of harmonics in one PLY."""
+    from test_output_folder import with_thermal_harmonics
+
+    from runtime_models.write_ply import write_ply
+
+    (folder / "pair").mkdir()
+    for name in ("rgb", "thermal"):
+        write_ply(some_splats(20, 1), folder / f"pair/{name}.ply")
+    with_thermal_harmonics(folder / "ommg.ply", 20)
+    return [
+        Seed("thermal pair", files_of(folder / "pair"), read_model),
+        Seed("thermal harmonics", {"a.ply": (folder / "ommg.ply").read_bytes()}, read_model),
+    ]
+
+
+def picture_seeds() -> list[Seed]:
+    """Photographs and what compare takes."""
+    import io
+
+    from PIL import Image
+
+    from scene.photo import read_pixels
+
+    rng = np.random.default_rng(0)
+    seeds = []
+    for form, mode in (
+        ("PNG", "RGB"), ("PNG", "RGBA"), ("PNG", "P"), ("PNG", "I;16"), ("JPEG", "RGB"),
+        ("WEBP", "RGBA"), ("TIFF", "RGB"), ("BMP", "RGB"),
+    ):  # fmt: skip
+        pixels = rng.integers(0, 256, (12, 16, 4), dtype=np.uint8)
+        image = Image.fromarray(pixels)
+        if mode == "I;16":
+            image = Image.fromarray(pixels[..., 0].astype(np.uint16) * 200)
+        else:
+            image = image.convert("RGB").convert(mode) if mode != "RGBA" else image
+        out = io.BytesIO()
+        image.save(out, form)
+        name = f"a.{form.lower()}"
+        seeds.append(Seed(f"picture {form} {mode}", {name: out.getvalue()}, read_pixels))
+    return seeds
+
+
+def capture_seeds(folder: Path) -> list[Seed]:
+    """A capture with its photos, as training and eval read it, and the list of recent files."""
+    from app.recent import RecentFiles
+    from scene.read_capture import read_capture
+    from tests.captures import simple, write_transforms
+
+    capture = folder / "capture"
+    frames, more = simple(capture, 3)
+    write_transforms(capture, frames, **more)
+    recent = json.dumps({"recent": ["/a/b.ply", "C:\\c d\\\u00e9.splat"]}).encode()
+    return [
+        Seed("capture", files_of(capture), read_capture),
+        Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent)),
+    ]
+
+
 def camera_seeds(folder: Path) -> list[Seed]:
     """Every form of cameras that we write."""
     from scene.camera_list import CameraList
@@ -223,7 +282,8 @@ def text_seeds() -> list[Seed]:
 
 def all_seeds(folder: Path) -> list[Seed]:
     folder.mkdir(parents=True, exist_ok=True)
-    seeds = splat_seeds(folder) + real_seeds() + ply_text_seeds(folder) + archive_seeds(folder)
+    seeds = splat_seeds(folder) + real_seeds() + point_seeds() + archive_seeds(folder)
     legacy = gzip.compress(b"NGSP" + bytes([1, 0, 0, 0, 2, 0, 0, 0, 0, 12, 0, 0]) + bytes(2 * 17))
     seeds.append(Seed("spz v1", {"v1.spz": legacy}, forgiving, {"v1.spz": "gzip"}))
+    seeds += thermal_seeds(folder) + picture_seeds() + capture_seeds(folder)
     return seeds + camera_seeds(folder) + text_seeds()

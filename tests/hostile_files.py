@@ -340,6 +340,17 @@ def sog_with_names_elsewhere(folder: Path) -> Path:
 
 
 @case
+def sog_that_lacks_a_part(folder: Path) -> Path:
+    from sog_scenes import random_sog, write_folder
+
+    path = write_folder(folder / "sog", *random_sog(4, version=1))
+    meta = json.loads((path / "meta.json").read_text())
+    del meta["scales"]
+    put(path / "meta.json", json.dumps(meta).encode())
+    return path
+
+
+@case
 def sog_with_a_picture_bomb(folder: Path) -> Path:
     from sog_scenes import random_sog, write_folder
 

@@ -168,6 +168,77 @@ def test_the_command_line_says_one_line_and_ends_with_2(tmp_path, name):
     assert listing(tmp_path) == before
 
 
+# What the fuzzer found, as small as it gets
+
+
+def some(count: int = 3, coefficients: int = 1, **kind):
+    from fuzz_seeds import some_splats
+
+    return some_splats(count, coefficients, **kind)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_signalling_nan_in_logarithms_and_normals_warns_of_nothing(tmp_path):
+    from runtime_models.write_ply import write_ply
+
+    path = tmp_path / "a.ply"
+    normals = {name: np.ones(3, np.float32) for name in ("nx", "ny", "nz")}
+    write_ply(some(extra=normals), path)
+    data = bytearray(path.read_bytes())
+    names = [line.split()[2] for line in bytes(data).split(b"end_header")[0].splitlines()
+             if line.startswith(b"property")]  # fmt: skip
+    start = data.index(b"end_header\n") + 11
+    for name in (b"scale_1", b"nx"):
+        at = start + 4 * names.index(name)
+        data[at : at + 4] = b"\x01\x00\x80\x7f"
+    path.write_bytes(data)
+    assert read_model(path).splat_count == 2
+
+
+def test_negative_metres_are_no_negative_sigmas(tmp_path):
+    from runtime_models.write_splat import write_splat
+
+    path = tmp_path / "a.splat"
+    write_splat(some(), path)
+    data = bytearray(path.read_bytes())
+    data[12:16] = np.float32(-0.25).tobytes()
+    path.write_bytes(data)
+    model = read_model(path)
+    assert (model.scales >= 0).all() and model.findings
+
+
+@pytest.mark.parametrize("place", [0.0, 1e-45, 256.0, 1e30])
+@pytest.mark.parametrize("count", [1, 2])
+def test_scenes_all_in_one_place_are_framed(place, count):
+    from scene.framing import framing_view
+
+    means = np.full((count, 3), place, np.float32)
+    means[-1] += np.float32(1e-45)
+    view = framing_view(means, np.ones(count, np.float32), (16, 16))
+    assert np.isfinite(view.world_from_eye.matrix()).all()
+
+
+@pytest.mark.parametrize("text", ["x" * 5000, "sphere:" + "\x00" * 300 + ":1:1", "a\nb", "lens:é"])
+def test_selectors_are_quoted_in_one_line_and_in_part(tmp_path, text):
+    from scene.read_selector import read_selector
+
+    with pytest.raises(ValueError, match=r"write|known") as caught:
+        read_selector(text)
+    check_sentence(str(caught.value), tmp_path)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("number", ["1e308", "-1e308", "1e999"])
+def test_poses_of_huge_numbers(tmp_path, number):
+    from scene.read_cameras import read_camera_list
+
+    row = f'{{"matrix": [{", ".join([number] * 12)}, 0, 0, 0, 1], "fov_y": 1}}'
+    path = put(tmp_path / "cameras.json", f"[{row}]".encode())
+    with pytest.raises(BadFile) as caught:
+        read_camera_list(path)
+    check_sentence(str(caught.value), tmp_path)
+
+
 def test_what_the_guard_hears():
     """The guard itself: it hears a process, a program and a file that is written."""
     global heard
