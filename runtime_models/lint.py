@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from runtime_models.lint_rows import mend_rows
-from runtime_models.lint_whole import read_coding, refuse_filling
+from runtime_models.lint_whole import read_coding, refuse_boundless, refuse_filling
 from runtime_models.model import BadFile, Finding
 from runtime_models.own_units import to_own_units
 from runtime_models.plain_splats import PlainSplats, RawSplats, Reading
@@ -26,6 +26,7 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     findings += mend_rows(raw, odd, filed)
     if not len(raw.means):
         raise BadFile(f"{raw.file}: not one of {count:,} splats can be drawn{because(findings)}.")
+    refuse_boundless(raw)
     refuse_filling(raw, reading.allow_huge)
     origin, found = recentre(raw)
     findings += found

@@ -8,7 +8,9 @@ from runtime_models.plain_splats import RawSplats
 SAMPLE = 1 << 14  # rows that are looked at: percentiles of more are the same
 TELLING = 100  # splats; fewer tell nothing about the file
 BOX = (1, 99)  # percentiles of the positions between which the scene lies
-MOST_LAYERS = 2000.0  # splats over every pixel; real files have 3 to 20 (docs/formats.md)
+MOST_LAYERS = 2000.0  # splats over every pixel; real files have 2 to 18 (docs/formats.md)
+TOO_MANY = 100.0  # splats over every pixel that make a doubtful coding the wrong one
+LARGEST_SCENE = 1e12  # metres; squares of distances in it are far from the end of float32
 MIN_ALPHA = 1 / 255  # fainter splats are not drawn
 
 
@@ -25,25 +27,37 @@ def sample_of(raw: RawSplats) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def read_coding(raw: RawSplats) -> list[Finding]:
     """Changes raw.log_scales and raw.logits where the numbers are none; what was found.
 
-    Scales that are metres: none is below 0 (the logarithm of a metre), and as logarithms they
-    would fill the scene, as metres they do not.  Opacities that are no logits: all lie within 0..1
-    and reach both ends of it, which logits (0.5 to 0.73 of the light) never have reason to.
+    Scales that are metres: none is below 0 (the logarithm of a metre), as logarithms they would
+    fill the scene, as metres they do not.  A file in millimetres has no scale below 0 either, but
+    fills nothing.  Opacities that are no logits: all lie within 0..1 and reach both ends of it,
+    which logits (0.5 to 0.73 of the light) never have reason to.
     """
     means, scales, opacity = sample_of(raw)
     found = []
     if len(means) < TELLING:
         return found
-    if raw.logits and 0 <= opacity.min() < 0.3 and 0.9 < opacity.max() <= 1:
+    part = len(means) / len(raw.means)
+    spread = 0 <= opacity.min() < 0.3 and 0.9 < opacity.max() <= 1
+    if raw.logits and spread and all_within(raw.opacity, 0, 1):
         raw.logits = False
         what = f"all {len(raw.means):,} opacities lie within 0..1: they are no logits"
         found.append(Finding(what, len(raw.means), "read as they are", file=raw.file))
-    if raw.log_scales and scales.min() >= 0:
+    if raw.log_scales and scales.min() >= 0 and all_within(raw.scales, 0, np.inf):
         seen = fainter_out(opacity, raw.logits)
-        if layers(means, np.exp(scales), seen) > 10 * layers(means, scales, seen):
+        with np.errstate(over="ignore"):
+            if_logs = layers(means, np.exp(scales), seen) / part
+        if_metres = layers(means, scales, seen) / part
+        if if_logs > TOO_MANY and if_logs > 10 * if_metres:
             raw.log_scales = False
             what = f"all {len(raw.means):,} scales are at least 0: they are no logarithms"
             found.append(Finding(what, len(raw.means), "read as metres", file=raw.file))
     return found
+
+
+def all_within(array: np.ndarray, low: float, high: float) -> bool:
+    """Whether every number that is one lies there; the sample alone might miss a few."""
+    with np.errstate(invalid="ignore"):  # NaN that signals
+        return np.fmin.reduce(array, axis=None) >= low and np.fmax.reduce(array, axis=None) <= high
 
 
 def fill_ratio(raw: RawSplats) -> float:
@@ -82,6 +96,18 @@ def layers(means: np.ndarray, sigma: np.ndarray, seen: np.ndarray) -> float:
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         share = np.pi * longer.prod(axis=1) / sides.prod()
     return float(np.where(share < 1, share, 1)[seen].sum())  # NaN, of no area at all, counts 1
+
+
+def refuse_boundless(raw: RawSplats) -> None:
+    """BadFile where most positions are no places: wild bytes are finite numbers, too."""
+    means, _, _ = sample_of(raw)
+    low, high = np.percentile(means, BOX, axis=0)
+    largest = float((high - low).max())
+    if not largest <= LARGEST_SCENE:
+        raise BadFile(
+            f"{raw.file}: its positions spread over {largest:.3g} m, at most {LARGEST_SCENE:g} m "
+            "are a scene: they are no positions in metres; export it again."
+        )
 
 
 def refuse_filling(raw: RawSplats, allow_huge: bool) -> None:

@@ -71,7 +71,7 @@ class Columns:
         findings = ()
         if self.flat:
             done = f"read as flat splats, {FLAT:g} as thick as wide"
-            findings = (Finding("2D splats, with two scales each", n, done, (), file),)
+            findings = (Finding("2D splats, with two scales each", n, done, (), file, False),)
         self.raw = RawSplats(
             means=np.empty((n, 3), np.float64 if exact else np.float32),
             scales=np.empty((n, 3), np.float32),

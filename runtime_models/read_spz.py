@@ -99,7 +99,9 @@ def unpack_harmonics(spz: Spz, findings: list[Finding]) -> np.ndarray:
     kept = min(there, REST[3])
     if kept < there:
         what = f"{there - kept} coefficients of SH degree 4 a splat"
-        findings.append(Finding(what, 0, "left out, degree 3 is drawn", file=spz.header.file))
+        findings.append(
+            Finding(what, 0, "left out, degree 3 is drawn", file=spz.header.file, repaired=False)
+        )
     sh = np.empty((spz.header.count, 1 + kept, 3), np.float32)
     if kept:
         coded = codes(spz.streams[5], 3 * there).reshape(-1, there, 3)
@@ -114,7 +116,7 @@ def axis_up(spz: Spz, findings: list[Finding]) -> str:
     others = [kind for kind in spz.extensions if kind != AXES_EXTENSION]
     if others:
         what = f"extensions {', '.join(f'{kind:#010x}' for kind in others)}"
-        findings.append(Finding(what, 0, "not looked at", file=spz.header.file))
+        findings.append(Finding(what, 0, "not looked at", file=spz.header.file, repaired=False))
     number = int.from_bytes(told, "little") if len(told) == 4 else 0
     if not 1 <= number <= len(NAMED_AXES):
         return "+Y"

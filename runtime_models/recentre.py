@@ -37,9 +37,7 @@ def recentre(raw: RawSplats) -> tuple[np.ndarray, list[Finding]]:
     done = "drawn about a zero of its own; exports put it back"
     found = [Finding(what, 0, done, file=raw.file, repaired=False)]
     if was_float32 and step > COARSE * size:
-        what = (
-            f"float32 positions have steps of {step:.3g} m there, its splats are {size:.3g} m"
-        )
+        what = f"float32 positions have steps of {step:.3g} m there, its splats are {size:.3g} m"
         done = "nothing, that was lost when the file was written; write it about a nearer zero"
         found.append(Finding(what, 0, done, file=raw.file, repaired=False))
     return origin, found

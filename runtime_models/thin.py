@@ -29,6 +29,7 @@ def thin(layers: SplatLayers, most: int) -> SplatLayers:
         0,
         f"{most:,} are kept, evenly over the scene, rather those that show more",
         file=", ".join(layers.provenance.get("files", ())[:3]),
+        repaired=False,
     )
     return replace(
         layers,
