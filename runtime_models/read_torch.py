@@ -11,7 +11,7 @@ import numpy as np
 
 from runtime_models.model import BadFile
 from runtime_models.package_files import DAMAGED
-from runtime_models.tensor_pickle import Storage, Tensor, tensors_in
+from runtime_models.tensor_pickle import Storage, Tensor, index_of
 
 INDEX = "data.pkl"
 LARGEST_INDEX = 16 << 20  # bytes
@@ -34,6 +34,14 @@ def is_torch_archive(path: Path) -> bool:
 def read_tensors(path: Path) -> dict[str, np.ndarray]:
     """Every tensor of a file by torch.jit.save or torch.save by its dotted name ("0.weight").
 
+    As read_script, without the modules.  Raises BadFile.
+    """
+    return read_script(path)[0]
+
+
+def read_script(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """Tensors and modules ("1": "ReLU"; a state dict names none) of a file, by dotted names.
+
     Read-only arrays, float32 where the file holds bfloat16, else of the file's own type.  Whatever
     else the file names is refused, and nothing in it is ever called.  Raises BadFile.
     """
@@ -43,7 +51,8 @@ def read_tensors(path: Path) -> dict[str, np.ndarray]:
         raise BadFile(_no_archive(path)) from None
     with archive:
         members = _Members(archive, path)
-        tensors = tensors_in(members.read(INDEX, LARGEST_INDEX), path.name)
+        index = index_of(members.read(INDEX, LARGEST_INDEX), path.name)
+        tensors = index.tensors
         order = members.read("byteorder", 64) if members.has("byteorder") else b"little"
         if order != b"little":
             raise BadFile(f"{path.name} has its numbers in {order!r} order; save it on a PC.")
@@ -54,7 +63,8 @@ def read_tensors(path: Path) -> dict[str, np.ndarray]:
     for name, tensor in tensors.items():
         if tensor.storage != storages[tensor.storage.key]:
             raise BadFile(f"{path.name}: {name} reads a storage as two types; save it again.")
-    return {name: _view(t, kept[t.storage.key], name, path) for name, t in tensors.items()}
+    views = {name: _view(t, kept[t.storage.key], name, path) for name, t in tensors.items()}
+    return views, index.modules
 
 
 def _no_archive(path: Path) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from runtime_models.model import SCAFFOLD_HEADS, BadFile, Finding, Mlp
 from runtime_models.package_files import LARGEST_NETWORK
 from runtime_models.read_onnx import read_onnx
-from runtime_models.read_torch import read_tensors
+from runtime_models.read_torch import read_script
 from runtime_models.turn import turn_quaternions
 
 UNITED = "checkpoints.pth"
@@ -24,8 +24,10 @@ STEMS = {
     "opacity": "opacity_mlp", "covariance": "cov_mlp", "color": "color_mlp",
     "bank": "feature_bank_mlp",
 }  # fmt: skip
+ROLES = {stem: role for role, stem in STEMS.items()}
 IN_UNITED = {**{stem: stem for stem in STEMS.values()}, APPEARANCE: "appearance"}
 ACTIVATIONS = {"opacity": "tanh", "covariance": "none", "color": "sigmoid", "bank": "none"}
+ENDS = {"tanh": "Tanh", "sigmoid": "Sigmoid", "none": "Linear"}  # TorchScript's module
 LAYER = re.compile(r"(?:.*\.)?([0-9]{1,6})\.(weight|bias)", re.ASCII)
 EVALUATED_ROW = 10  # the appearance that Octree-GS's own render.py takes for every view (--ape)
 
@@ -74,34 +76,44 @@ def gather(folder: Path) -> tuple[dict[str, Callable], tuple[str, ...]]:
     for stem in (*STEMS.values(), APPEARANCE):
         script, graph = folder / f"{stem}.pt", folder / f"{stem}.onnx"
         if script.is_file():
-            found[stem] = from_tensors(read_torch_file(script), script.name, stem)
+            found[stem] = from_tensors(*read_torch_file(script), script.name, stem)
             files.append(script.name)
         elif graph.is_file() and stem != APPEARANCE:
             found[stem] = from_graph(graph)
             files.append(graph.name)
     united = folder / UNITED
     if any(STEMS[role] not in found for role in SCAFFOLD_HEADS) and united.is_file():
-        tensors = read_torch_file(united)
+        tensors, _ = read_torch_file(united)
         files.append(UNITED)
         for stem, key in IN_UNITED.items():
             mine = {name: t for name, t in tensors.items() if name.startswith(f"{key}.")}
             if mine and stem not in found:
-                found[stem] = from_tensors(mine, f"{UNITED} ({key})", stem)
+                found[stem] = from_tensors(mine, {}, f"{UNITED} ({key})", stem)
     return found, tuple(files)
 
 
-def read_torch_file(path: Path) -> dict[str, np.ndarray]:
+def read_torch_file(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     if path.stat().st_size > LARGEST_NETWORK:
         raise BadFile(
             f"{path.name} has {path.stat().st_size:,} bytes; a network of at most "
             f"{LARGEST_NETWORK:,} is read."
         )
-    return read_tensors(path)
+    return read_script(path)
 
 
-def from_tensors(tensors: dict[str, np.ndarray], name: str, stem: str) -> Callable:
+def from_tensors(
+    tensors: dict[str, np.ndarray], modules: dict[str, str], name: str, stem: str
+) -> Callable:
     if stem == APPEARANCE:
         return lambda _: embedding_of(tensors, name)
+    names = sorted(modules, key=lambda label: (len(label), label))  # "2" before "10"
+    kinds = [modules[label] for label in names if modules[label] != "Sequential"]
+    wanted = "Softmax" if stem == STEMS["bank"] else ENDS[ACTIVATIONS[ROLES[stem]]]
+    if kinds and (kinds[-1] != wanted or not set(kinds[:-1]) <= {"Linear", "ReLU"}):
+        raise BadFile(
+            f"{name} is {', '.join(kinds[:9])}; a network of Scaffold-GS is Linear, ReLU, Linear"
+            f"{'' if wanted == 'Linear' else ', ' + wanted}."
+        )
     return lambda activation: mlp_of(tensors, name, activation)
 
 

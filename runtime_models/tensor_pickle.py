@@ -61,9 +61,18 @@ class Tensor:
 
 @dataclass
 class Record:
-    """A module of TorchScript: what it holds by name."""
+    """A module of TorchScript: what it is called ("Linear"), what it holds by name."""
 
+    kind: str = ""
     fields: dict = field(default_factory=dict)
+
+
+@dataclass
+class Index:
+    """What a pickle holds, by dotted names ("0.weight")."""
+
+    tensors: dict[str, Tensor] = field(default_factory=dict)
+    modules: dict[str, str] = field(default_factory=dict)  # of TorchScript: what each is called
 
 
 class _Mark:
@@ -73,8 +82,8 @@ class _Mark:
 MARK = _Mark()
 
 
-def tensors_in(data: bytes, file: str) -> dict[str, Tensor]:
-    """Every tensor of a pickle by its dotted name ("0.weight").  Raises BadFile."""
+def index_of(data: bytes, file: str) -> Index:
+    """Every tensor and module of a pickle.  Raises BadFile."""
     machine = _Machine(file)
     try:
         for count, (opcode, given, _) in enumerate(pickletools.genops(data)):
@@ -85,12 +94,12 @@ def tensors_in(data: bytes, file: str) -> dict[str, Tensor]:
         raise
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError):
         raise BadFile(f"{file}: its index of tensors is damaged; save it again.") from None
-    found: dict[str, Tensor] = {}
-    _name_tensors(machine.result, found, file)
+    found = Index()
+    _name_parts(machine.result, found, file)
     return found
 
 
-def _name_tensors(tree: object, found: dict[str, Tensor], file: str) -> None:
+def _name_parts(tree: object, found: Index, file: str) -> None:
     """Fills `found`; a tree whose shared parts would unfold without end is refused."""
     todo, nodes = [("", tree, 0)], 0
     while todo:
@@ -99,9 +108,10 @@ def _name_tensors(tree: object, found: dict[str, Tensor], file: str) -> None:
         if nodes > MOST_NODES or depth > MOST_DEPTH or len(name) > LONGEST_NAME:
             raise BadFile(f"{file}: its tensors are nested or named beyond reason; save it again.")
         if isinstance(node, Tensor):
-            found[name] = node
+            found.tensors[name] = node
             continue
         if isinstance(node, Record):
+            found.modules[name] = node.kind
             node = node.fields
         inside = ()
         if isinstance(node, dict):
@@ -211,7 +221,7 @@ class _Machine:
         given, kind = self.stack.pop(), self.stack.pop()
         if given != () or not isinstance(kind, Name) or not kind.module.startswith(MODULE):
             raise ValueError("only TorchScript's modules are objects")
-        self.stack.append(Record())
+        self.stack.append(Record(kind.name))
 
     def _build(self) -> None:
         """State goes into a module once; of a dictionary (a state dict's _metadata) it is left."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from runtime_models.model import BadFile
-from runtime_models.read_torch import is_torch_archive, read_tensors
+from runtime_models.read_torch import is_torch_archive, read_script, read_tensors
 from runtime_models.scaffold_networks import ACTIVATIONS, STEMS, mlp_of
 from tests import torch_files as made
 from tests.models import run_in_numpy
@@ -51,6 +51,8 @@ def test_names_and_shapes_of_a_script(folder):
     found = read_tensors(folder / "scaffold_opacity_mlp.pt")
     shapes = {"0.weight": (8, 12), "0.bias": (8,), "2.weight": (2, 8), "2.bias": (2,)}
     assert {name: t.shape for name, t in found.items()} == shapes
+    _, modules = read_script(folder / "scaffold_opacity_mlp.pt")
+    assert modules == {"": "Sequential", "0": "Linear", "1": "ReLU", "2": "Linear", "3": "Tanh"}
     assert all(t.dtype == np.float32 and not t.flags.writeable for t in found.values())
 
 

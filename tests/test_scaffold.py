@@ -138,6 +138,16 @@ def test_a_folder_by_torch_itself(tmp_path, version):
     assert ((splats.color > 0) & (splats.color < 1))[splats.opacity > 0].all()
 
 
+def test_a_network_that_ends_otherwise_is_refused(tmp_path):
+    """A fork's networks: the tensors alone would fit."""
+    for fixture in (FIXTURES / VERSIONS[0]).glob("scaffold_*.pt"):
+        shutil.copy(fixture, tmp_path / fixture.name.removeprefix("scaffold_"))
+    shutil.copy(tmp_path / "color_mlp.pt", tmp_path / "opacity_mlp.pt")
+    write_cloud(random_raw(k=2, features=8), tmp_path / "point_cloud.ply")
+    with pytest.raises(BadFile, match=r"opacity_mlp\.pt is Linear, ReLU, Linear, Sigmoid; .*Tanh"):
+        read_model(tmp_path)
+
+
 def test_found_from_the_run_its_cloud_and_the_folder_between(tmp_path):
     run = tmp_path / "ein Lauf ä"
     old, new = (run / "point_cloud" / f"iteration_{n}" for n in (7000, 30000))
