@@ -96,12 +96,12 @@ def run(options: Options) -> int:
 def run_viewer(options: Options) -> int:
     """The same two in a window."""
     from app import desktop
+    from app.compare_sides import split_stop, x_of
+    from app.opening import open_model
 
     shared = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}
-    from app.compare_sides import split_stop, x_of
-
     path, at = split_stop(options.a)
-    stops = () if not at else desktop.open_model(path, options).stops
+    stops = () if not at else open_model(path, options).stops
     x = x_of(at, stops, options.a) if at else None
     return desktop.run(desktop.Options(scenes=(path,), x=x, compare=options.b, **shared))
 

@@ -23,12 +23,14 @@ def difference_picture(a: np.ndarray, b: np.ndarray, amplify: int) -> np.ndarray
 
 def written(picture: np.ndarray, text: str) -> np.ndarray:
     """The picture with a line in its upper left corner."""
-    from PIL import Image, ImageDraw, ImageFont
+    from PIL import Image, ImageDraw
+
+    from app.letters import drawable, letters
 
     image = Image.fromarray((np.clip(np.nan_to_num(picture), 0, 1) * 255 + 0.5).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     height = max(11, image.height // 28)  # pixels of a letter
-    font = ImageFont.load_default(height)
+    font, text = letters(height), drawable(text, height)
     margin = height // 2
     width = draw.textlength(text, font) + 2 * margin
     draw.rectangle((0, 0, width, height + 2 * margin), fill=BEHIND)

@@ -11,12 +11,15 @@ def with_legend(picture: np.ndarray, rows: Rows) -> np.ndarray:
     """(H, W, 3) display sRGB with the rows (text, colour) written into its upper left corner."""
     if not rows:
         return picture
-    from PIL import Image, ImageDraw, ImageFont
+    from PIL import Image, ImageDraw
+
+    from app.letters import drawable, letters
 
     image = Image.fromarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     height = max(11, image.height // 45)  # pixels of a line's letters
-    font = ImageFont.load_default(height)
+    font = letters(height)
+    rows = [(drawable(text, height), color) for text, color in rows]
     line, margin = round(height * 1.4), round(height * 0.6)
     width = max(draw.textlength(text, font) for text, _ in rows) + height + 3 * margin
     draw.rectangle((0, 0, width, line * len(rows) + margin), fill=BEHIND)

@@ -163,3 +163,13 @@ def test_a_scene_is_no_folder_of_pictures(pair, tmp_path):
     Image.new("RGB", (8, 6)).save(pair / "thumb.png")
     assert pictures_in(pair) == ()
     assert read_model(pair).splat_count == 100
+
+
+def test_names_in_any_letters_are_drawn_or_marked():
+    from app.letters import drawable
+
+    assert drawable("M\u00f6hre a\u2192b \u03a9", 20) == "M\u00f6hre a\u2192b \u03a9"
+    assert drawable("\u30c4 \u6f22", 20) == "? ?"
+    a = np.zeros((40, 300, 3), np.float32)
+    one, other = (sheet(a, a, (name, "b"), 1) for name in ("\u00f6\u00f6", "\u00fc\u00fc"))
+    assert (one != other).any()  # as boxes they would be the same

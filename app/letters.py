@@ -1,0 +1,30 @@
+"""The letters that are written into pictures: DejaVu Sans, which lies with matplotlib.
+
+Pillow's own font has English ones only: all others would be boxes.
+"""
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from PIL import ImageFont
+
+MISSING = "\uffff"  # no letter: its shape is that of all letters which the font has not
+
+
+@cache
+def letters(height: int) -> "ImageFont.FreeTypeFont":
+    """The font, `height` pixels high."""
+    import matplotlib
+    from PIL import ImageFont
+
+    path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    return ImageFont.truetype(str(path), height)
+
+
+def drawable(text: str, height: int) -> str:
+    """The text with a question mark for every letter that the font has not."""
+    font = letters(height)
+    missing = bytes(font.getmask(MISSING))
+    return "".join(c if c == " " or bytes(font.getmask(c)) != missing else "?" for c in text)
