@@ -106,8 +106,9 @@ def from_tensors(
 ) -> Callable:
     if stem == APPEARANCE:
         return lambda _: embedding_of(tensors, name)
-    names = sorted(modules, key=lambda label: (len(label), label))  # "2" before "10"
-    kinds = [modules[label] for label in names if modules[label] != "Sequential"]
+    around = {label.rpartition(".")[0] for label in modules if label}  # hold the others
+    names = sorted(modules.keys() - around, key=lambda label: (len(label), label))  # 2 before 10
+    kinds = [modules[label] for label in names]
     wanted = "Softmax" if stem == STEMS["bank"] else ENDS[ACTIVATIONS[ROLES[stem]]]
     if kinds and (kinds[-1] != wanted or not set(kinds[:-1]) <= {"Linear", "ReLU"}):
         raise BadFile(
