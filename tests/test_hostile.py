@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import hostile_things  # noqa: F401  adds its cases
 import numpy as np
 import pytest
 from fuzz_run import check_sentence, watched
