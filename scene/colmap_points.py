@@ -1,55 +1,68 @@
 """COLMAP's points3D, text or binary: places and colours; tracks are stepped over."""
 
-import struct
+import mmap
+from array import array
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.model import BadFile
-from scene.colmap_tables import AGAIN, COUNT, count_of, numbers_of, short_of, text_lines
+from scene.colmap_tables import AGAIN, COUNT, count_of, mapped, numbers_of, short_of, text_lines
 
-POINT = struct.Struct("<Q3d3BdQ")  # number, place, colour, error, steps of its track
+POINT = np.dtype([("number", "<u8"), ("xyz", "<f8", 3), ("rgb", "u1", 3), ("error", "<f8")])
 STEP_OF_TRACK = 8  # bytes
-FARTHEST = 1e30  # beyond this float32 ends soon
 WORDS = 8  # of a line of text before its track
+FARTHEST = 1e30  # beyond this float32 ends soon
 
 
 def read_colmap_points(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """(P, 3) float64 places and (P, 3) uint8 colours, in the order of their numbers; BadFile."""
     if not path.is_file():
         raise BadFile(f"{path} is missing; copy the whole COLMAP model.")
-    rows = points_of_bytes(path) if path.suffix == ".bin" else points_of_text(path)
-    rows.sort(key=lambda row: row[0])
-    xyz = np.array([row[1:4] for row in rows], np.float64).reshape(-1, 3)
-    rgb = np.array([row[4:7] for row in rows], np.float64).reshape(-1, 3)
-    if not (np.abs(xyz) < FARTHEST).all():
+    if path.suffix == ".bin":
+        with mapped(path) as data:
+            rows = points_of_bytes(data, path)
+    else:
+        rows = points_of_text(path)
+    rows = rows[np.argsort(rows["number"], kind="stable")]
+    if not (np.abs(rows["xyz"]) < FARTHEST).all():
         raise BadFile(f"{path}: some points are nowhere (NaN, Inf or beyond measure); {AGAIN}.")
-    return xyz, rgb.clip(0, 255).astype(np.uint8)
+    return rows["xyz"].copy(), rows["rgb"].copy()
 
 
-def points_of_bytes(path: Path) -> list[tuple]:
-    data = path.read_bytes()
-    count, at = count_of(data, POINT.size, path), COUNT.size
-    rows = []
+def points_of_bytes(data: bytes | mmap.mmap, path: Path) -> np.ndarray:
+    """(P,) POINT; where each begins is found one by one, as tracks have any length."""
+    count, at = count_of(data, POINT.itemsize + COUNT.size, path), COUNT.size
+    starts = array("Q")
     for _ in range(count):
-        if at + POINT.size > len(data):
+        end = at + POINT.itemsize
+        if end + COUNT.size > len(data):
             raise short_of(path, count, "points")
-        *row, _, steps = POINT.unpack_from(data, at)
-        at += POINT.size
+        steps = COUNT.unpack_from(data, end)[0]
+        starts.append(at)
+        at = end + COUNT.size
         if steps > (len(data) - at) // STEP_OF_TRACK:
             raise short_of(path, count, "points")
         at += steps * STEP_OF_TRACK
-        rows.append(tuple(row))
-    return rows
+    rows = np.empty((count, POINT.itemsize), np.uint8)
+    whole, first = np.frombuffer(data, np.uint8), np.array(starts, np.int64)
+    for byte in range(POINT.itemsize):
+        rows[:, byte] = whole[first + byte]
+    return rows.reshape(-1).view(POINT)
 
 
-def points_of_text(path: Path) -> list[tuple]:
-    rows = []
+def points_of_text(path: Path) -> np.ndarray:
+    """(P,) POINT."""
+    values = []
     for line, text in enumerate(text_lines(path), 1):
         words = text.split(maxsplit=WORDS)
         if not words or words[0].startswith("#"):
             continue
         if len(words) < WORDS:
             raise BadFile(f"{path}, line {line}: a number, a place, a colour and an error wanted.")
-        rows.append(tuple(numbers_of(words[:WORDS], f"{path}, line {line}")))
+        values.append(numbers_of(words[:WORDS], f"{path}, line {line}"))
+    table = np.array(values, np.float64).reshape(-1, WORDS)
+    rows = np.zeros(len(table), POINT)
+    rows["number"] = table[:, 0].clip(0, 2.0**63)
+    rows["xyz"], rows["rgb"] = table[:, 1:4], table[:, 4:7].clip(0, 255)
     return rows

@@ -1,6 +1,9 @@
 """COLMAP's cameras and images, text or binary; every count is held against the bytes there are."""
 
+import mmap
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,7 +81,9 @@ def read_tables(folder: Path, ending: str) -> tuple[dict[int, Lens], list[Posed]
         if not path.is_file():
             raise BadFile(f"{path} is missing; cameras and images are needed, both as {ending}.")
     if ending == ".bin":
-        lenses, posed = cameras_of_bytes(cameras), images_of_bytes(images)
+        with mapped(cameras) as lens_bytes, mapped(images) as image_bytes:
+            lenses = cameras_of_bytes(lens_bytes, cameras)
+            posed = images_of_bytes(image_bytes, images)
     else:
         lenses, posed = cameras_of_text(cameras), images_of_text(images)
     if not posed:
@@ -89,8 +94,17 @@ def read_tables(folder: Path, ending: str) -> tuple[dict[int, Lens], list[Posed]
     return lenses, sorted(posed, key=lambda image: image.number)
 
 
-def cameras_of_bytes(path: Path) -> dict[int, Lens]:
-    data = path.read_bytes()
+@contextmanager
+def mapped(path: Path) -> Iterator[bytes | mmap.mmap]:
+    """A file's bytes, read as they are needed: the points in images.bin may be a gigabyte."""
+    if not path.stat().st_size:
+        yield b""
+        return
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        yield data
+
+
+def cameras_of_bytes(data: bytes | mmap.mmap, path: Path) -> dict[int, Lens]:
     count, at = count_of(data, CAMERA.size + 3 * 8, path), COUNT.size
     lenses = {}
     for _ in range(count):
@@ -109,8 +123,7 @@ def cameras_of_bytes(path: Path) -> dict[int, Lens]:
     return lenses
 
 
-def images_of_bytes(path: Path) -> list[Posed]:
-    data = path.read_bytes()
+def images_of_bytes(data: bytes | mmap.mmap, path: Path) -> list[Posed]:
     count, at = count_of(data, IMAGE.size + 1 + COUNT.size, path), COUNT.size
     posed = []
     for _ in range(count):
@@ -131,7 +144,7 @@ def images_of_bytes(path: Path) -> list[Posed]:
     return posed
 
 
-def count_of(data: bytes, least: int, path: Path) -> int:
+def count_of(data: bytes | mmap.mmap, least: int, path: Path) -> int:
     """The count that a table begins with, which its bytes must be able to hold."""
     if len(data) < COUNT.size:
         raise BadFile(f"{path} has {len(data)} bytes, too few for a table of COLMAP; {AGAIN}.")
