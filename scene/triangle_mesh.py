@@ -14,9 +14,11 @@ class TriangleMesh:
 
     def __post_init__(self) -> None:
         """Refuses what is no mesh: ValueError with a sentence."""
-        check(vertices=(self.vertices, "V 3"), faces=(self.faces, "F 3"))
-        if not np.isfinite(self.vertices).all():
-            raise ValueError("a mesh has vertices that are NaN or Inf; finite metres are wanted.")
+        check(vertices=(self.vertices, "V 3"))
+        if self.faces.ndim != 2 or self.faces.shape[1] != 3 or self.faces.dtype != np.int32:
+            raise ValueError(
+                f"a mesh has faces {self.faces.shape} of {self.faces.dtype}; (F, 3) int32 is wanted."
+            )
         if self.faces.size and not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
             raise ValueError(
                 f"a mesh has faces of vertices {self.faces.min()} to {self.faces.max()}; there are "
