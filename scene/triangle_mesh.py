@@ -17,7 +17,7 @@ class TriangleMesh:
         check(vertices=(self.vertices, "V 3"))
         if self.faces.ndim != 2 or self.faces.shape[1] != 3 or self.faces.dtype != np.int32:
             raise ValueError(
-                f"a mesh has faces {self.faces.shape} of {self.faces.dtype}; (F, 3) int32 is wanted."
+                f"a mesh has faces {self.faces.shape} {self.faces.dtype}; (F, 3) int32 is wanted."
             )
         if self.faces.size and not 0 <= self.faces.min() <= self.faces.max() < len(self.vertices):
             raise ValueError(
