@@ -94,7 +94,8 @@ class HalfSpace(_Placed):
         _floats(self, "normal", 3)
         length = math.hypot(*self.normal)
         _wanted(self, "normal", 0 < length < math.inf, "a direction, not zero")
-        object.__setattr__(self, "normal", tuple(n / length for n in self.normal))
+        if abs(length - 1) > 1e-12:  # a unit normal stays to the bit, so that files keep it
+            object.__setattr__(self, "normal", tuple(n / length for n in self.normal))
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         return (places - self.point) @ np.array(self.normal)
