@@ -18,12 +18,12 @@ MAY_IMPORT = {
 }
 # folder: outside packages it must never see
 NEVER = {
-    "runtime_models": {"moderngl", "torch", "pyopencl", "glfw", "imgui_bundle"},
-    "rasterizer": {"moderngl", "torch", "PIL", "onnx", "onnxruntime", "glfw"},
+    "runtime_models": {"rapier3d", "moderngl", "torch", "pyopencl", "glfw", "imgui_bundle"},
+    "rasterizer": {"rapier3d", "moderngl", "torch", "PIL", "onnx", "onnxruntime", "glfw"},
     "scene": {"moderngl", "torch", "pyopencl", "glfw"},
-    "renderer": {"torch", "glfw", "imgui_bundle", "moderngl_window"},
-    "training": {"moderngl", "glfw", "imgui_bundle", "torch"},
-    "app": {"torch"},
+    "renderer": {"rapier3d", "torch", "glfw", "imgui_bundle", "moderngl_window"},
+    "training": {"rapier3d", "moderngl", "glfw", "imgui_bundle", "torch"},
+    "app": {"rapier3d", "torch"},
 }
 
 
@@ -77,6 +77,15 @@ def test_modes_load_training_only_inside_the_subcommand():
         and "training" in imported(path, everywhere=False)
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def test_the_physics_engine_is_loaded_only_when_a_world_is_made():
+    loading = [
+        str(path.relative_to(ROOT))
+        for path in files("scene")
+        if "rapier3d" in imported(path, everywhere=False)
+    ]
+    assert not loading
 
 
 def test_launch_uses_the_standard_library_alone():
