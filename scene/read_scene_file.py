@@ -24,7 +24,7 @@ from scene.selector_rows import made, read_selector_row
 MOST_OBJECTS = 1000
 MOST_ROWS = 1000  # of selectors, states and reactions each
 LONGEST_NAME = 100  # letters
-GRAVITY, MASS, FRICTION, RESTITUTION = 1000.0, 1e6, 100.0, 1.0  # at most: m/s2, kg
+GRAVITY, MASS, FRICTION, RESTITUTION = 100.0, 1e6, 10.0, 1.0  # at most: m/s2, kg
 
 
 def read_scene_file(path: str | Path) -> SceneFile:
@@ -37,7 +37,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
     floor_y = file.take("floor_y", None)
     if floor_y is not None:
         floor_y = file.number("floor_y", None, "metres, or null for no floor,")
-    gravity = file.number("gravity_m_s2", 9.81, "0 to 1000 m/s2", 0, GRAVITY)
+    gravity = file.number("gravity_m_s2", 9.81, "0 to 100 m/s2", 0, GRAVITY)
     background = file.inner(BACKGROUND)
     rows = file.rows("objects", MOST_OBJECTS, "object")
     view = read_view(file.inner("view"))
@@ -103,7 +103,7 @@ def read_looks(row: Fields) -> dict:
         "visible": row.flag("visible", True),
         "selectors": read_selectors(row),
         "collider": collider,
-        "friction": row.number("friction", 0.6, "0 to 100", 0, FRICTION),
+        "friction": row.number("friction", 0.6, "0 to 10", 0, FRICTION),
         "restitution": row.number("restitution", 0.0, "0 to 1", 0, RESTITUTION),
     }
 

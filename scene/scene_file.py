@@ -13,7 +13,8 @@ import numpy as np
 from runtime_models.model import BadFile, Model, SplatLayers
 from runtime_models.plain_splats import Reading
 from runtime_models.read_scene import read_model
-from scene.pose import Pose
+from scene.framing import frame_points, framing_view, scene_points, view_from
+from scene.pose import Pose, View
 from scene.reactions import Machine, Reaction, State, TwoAxes
 from scene.scene import Scene, SceneObject
 from scene.selector import UPRIGHT, Painted, Selector
@@ -144,3 +145,13 @@ def machine_of(item: SceneItem, model: Model) -> Machine:
         return Machine(states, item.reactions, item.ring)
     except ValueError as error:
         raise BadFile(f"object '{item.name}': 'reactions': {error}") from None
+
+
+def first_view(file: SceneFile, scene: Scene, size: tuple[int, int]) -> View:
+    """From where the file wants to be seen, else all of it in the picture."""
+    points, opacity = scene_points(scene)
+    if file.view is None:
+        return framing_view(points, opacity, size)
+    _, radius = frame_points(points, opacity)
+    eye, target = np.array(file.view.eye), np.array(file.view.target)
+    return view_from(eye, target, radius, size, file.view.fov_y)

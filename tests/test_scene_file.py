@@ -163,7 +163,7 @@ WRONG = [
         ("ring", 0, "true or false"),
         ("x", 1.5, "0 to 1"), ("x", -0.1, "0 to 1"),
         ("mass_kg", 0, "above 0"), ("mass_kg", -3, "above 0"),
-        ("friction", -1, "0 to 100"), ("restitution", 1.01, "0 to 1"),
+        ("friction", -1, "0 to 10"), ("restitution", 1.01, "0 to 1"),
         *[(key, value, "") for value in NOT_A_NUMBER
           for key in ("x", "mass_kg", "friction", "restitution")],
         ("pose", [], "braces"), ("selectors", {}, "a list"), ("states", [1], "a list"),
