@@ -1,0 +1,27 @@
+"""A process of its own for CoACD: `python -P coacd_run.py IN.npz OUT.npz`; see collider_hulls.py.
+
+CoACD is C++ that can run for minutes, prints a lot and ends the process on input that it does not
+like: none of this may happen to the program.
+"""
+
+import sys
+
+import numpy as np
+
+
+def main(given: str, wanted: str) -> None:
+    import coacd
+
+    coacd.set_log_level("off")
+    with np.load(given) as file:
+        mesh = coacd.Mesh(file["vertices"], file["faces"])
+        settings = {name: float(file[name]) for name in ("threshold",)}
+        settings |= {name: int(file[name]) for name in WHOLE}
+    pieces = coacd.run_coacd(mesh, decimate=True, preprocess_mode="off", seed=0, **settings)
+    np.savez(wanted, *[vertices for vertices, _ in pieces])
+
+
+WHOLE = ("max_convex_hull", "max_ch_vertex", "mcts_iterations", "mcts_nodes", "resolution")
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

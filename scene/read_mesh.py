@@ -1,0 +1,161 @@
+"""A triangle mesh from a file: .glb and .gltf by our own reader, .obj, .ply and .stl by trimesh.
+
+Sizes are checked first: a header that promises more than the file holds is refused, and nothing
+but the file itself is opened (no materials, no textures).
+"""
+
+import io
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.gltf_files import Asset
+from runtime_models.gltf_nodes import placed_meshes
+from runtime_models.model import BadFile
+from scene.triangle_mesh import TriangleMesh
+
+ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
+MOST_BYTES = 256 << 20
+MOST_FACES = 2_000_000
+MOST_HEADER = 65536  # bytes of a PLY's header
+PLY_SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2,
+             "uint16": 2, "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
+             "double": 8, "float64": 8}  # fmt: skip
+TRIANGLES = 4  # glTF's mode of separate triangles
+# What the package that reads meshes raises on damaged bytes.
+DAMAGED = (
+    ValueError, KeyError, IndexError, TypeError, AttributeError, RuntimeError, OverflowError,
+    struct.error, EOFError, ZeroDivisionError, AssertionError,
+)  # fmt: skip
+
+
+def read_mesh(path: Path) -> TriangleMesh:
+    """The triangles of a file, metres, in its own axes, equal vertices joined.  Raises BadFile."""
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise BadFile(f"{path.name} is no mesh that is read here; {', '.join(ENDINGS)} are.")
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise BadFile(f"{path.name} cannot be read: {error.strerror}.") from None
+    if not 0 < size <= MOST_BYTES:
+        raise BadFile(f"{path.name} has {size:,} bytes; 1 to {MOST_BYTES:,} are read, simplify it.")
+    if ending in (".glb", ".gltf"):
+        vertices, faces = read_gltf_triangles(path)
+    else:
+        vertices, faces = read_by_trimesh(path, ending[1:])
+    return clean(vertices, faces, path.name)
+
+
+def clean(vertices: np.ndarray, faces: np.ndarray, name: str) -> TriangleMesh:
+    """The mesh with equal vertices joined and faces of no area left out.  Raises BadFile."""
+    if len(faces) > MOST_FACES:
+        raise BadFile(f"{name} has {len(faces):,} faces; {MOST_FACES:,} at most, simplify it.")
+    if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise BadFile(f"{name} has faces of vertices that it does not have; it is damaged.")
+    with np.errstate(over="ignore"):
+        vertices = np.asarray(vertices, np.float32)
+    if not np.isfinite(vertices[faces]).all():
+        raise BadFile(f"{name} has vertices that are NaN or Inf; repair it.")
+    used, rows = np.unique(faces, return_inverse=True)
+    vertices, joined = np.unique(vertices[used] + np.float32(0), axis=0, return_inverse=True)
+    faces = joined.reshape(-1)[rows.reshape(-1)].reshape(-1, 3).astype(np.int32)
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    if not len(faces):
+        raise BadFile(f"{name} has no triangles; a collider needs some.")
+    if not 0 < np.ptp(vertices, axis=0).max() < 1e6:
+        raise BadFile(
+            f"{name} is {np.ptp(vertices, axis=0).max():.3g} m long; below 1000 km, please."
+        )
+    return TriangleMesh(vertices, faces)
+
+
+def read_by_trimesh(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and faces (F, 3) of an .obj, .ply or .stl.  Raises BadFile."""
+    import trimesh
+
+    data = path.read_bytes()
+    if kind == "ply":
+        check_ply(data, path.name)
+    more = {"skip_materials": True} if kind == "obj" else {}
+    try:
+        with np.errstate(all="ignore"):
+            mesh = trimesh.load_mesh(
+                io.BytesIO(data), file_type=kind, process=False, maintain_order=True, **more
+            )
+            if isinstance(mesh, trimesh.Scene):
+                mesh = mesh.to_mesh()
+            return np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+    except DAMAGED as error:
+        reason = str(error)[:100] or type(error).__name__
+        raise BadFile(f"{path.name} cannot be read as a mesh ({reason}); it is damaged.") from None
+
+
+def check_ply(data: bytes, name: str) -> None:
+    """Refuses a PLY whose elements cannot fit into the file.  Raises BadFile."""
+    end = data.find(b"end_header", 0, MOST_HEADER)
+    if not data.startswith(b"ply") or end < 0:
+        raise BadFile(f"{name} has no PLY header; it is damaged.")
+    text = b"format ascii" in data[:end]
+    count, least, name_of = 0, 0, ""
+    for line in [*data[:end].decode("latin-1").splitlines(), "element end 0"]:
+        words = line.split()
+        if words[:1] == ["element"] and len(words) == 3:
+            refuse_ply(count, least, len(data) - end, name, name_of)
+            if not (words[2].isascii() and words[2].isdigit() and len(words[2]) < 12):
+                raise BadFile(f"{name} has {words[2][:20]!r} elements '{words[1][:20]}'.")
+            name_of, count, least = words[1], int(words[2]), 0
+        elif words[:1] == ["property"] and len(words) >= 3:
+            kind = words[2] if words[1] == "list" else words[1]  # a list has its length at least
+            least += 2 if text else PLY_SIZES.get(kind, 1)
+
+
+def refuse_ply(count: int, least: int, there: int, name: str, element: str) -> None:
+    if count * max(least, 1) > there:
+        raise BadFile(
+            f"{name} promises {count:,} elements '{element[:20]}' and has {there:,} bytes after "
+            "its header; it is cut off or the number is wrong."
+        )
+
+
+def read_gltf_triangles(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """All triangles of the shown scene where its nodes stand.  Raises BadFile."""
+    asset = Asset(path)
+    for needed in asset.item(asset.json, "extensionsRequired", list, []):
+        if not str(needed).startswith(("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_")):
+            raise asset.refuse(f"it needs {str(needed)[:60]}, which is not read here.")
+    vertices, faces, count, start = [], [], 0, 0
+    for mesh, matrix in placed_meshes(asset):
+        for primitive in asset.item(asset.entry("meshes", mesh), "primitives", list, []):
+            if not isinstance(primitive, dict) or primitive.get("mode", TRIANGLES) != TRIANGLES:
+                continue
+            places, rows = read_primitive(asset, primitive)
+            count += len(rows)
+            if count > MOST_FACES or start + len(places) > 3 * MOST_FACES:
+                raise asset.refuse(f"it has more than {MOST_FACES:,} faces; simplify it.")
+            with np.errstate(over="ignore", invalid="ignore"):
+                vertices.append(places @ matrix[:3, :3].T + matrix[:3, 3])
+            mirrored = np.linalg.det(matrix[:3, :3]) < 0
+            faces.append((rows[:, ::-1] if mirrored else rows) + start)
+            start += len(places)
+    if not faces:
+        raise asset.refuse("its scene shows no triangles; a collider needs some.")
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def read_primitive(asset: Asset, primitive: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) float64 and faces (F, 3) of one primitive.  Raises BadFile."""
+    attributes = asset.item(primitive, "attributes", dict, {})
+    places = asset.read(attributes.get("POSITION"), "POSITION", 3).astype(np.float64)
+    if "indices" in primitive:
+        rows = asset.read(primitive["indices"], "indices", 1).reshape(-1)
+        if len(rows) and not rows.max() < min(len(places), 1 << 24):  # exact in float32 below
+            raise asset.refuse("it has faces of vertices that it does not have; it is damaged.")
+        rows = rows.astype(np.int64)
+    else:
+        rows = np.arange(len(places))
+    if len(rows) % 3:
+        raise asset.refuse(f"it has {len(rows)} corners of triangles, which is no multiple of 3.")
+    return places, rows.reshape(-1, 3)
