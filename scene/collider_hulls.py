@@ -19,6 +19,7 @@ CONCAVITY = 0.05  # CoACD's threshold: how far a piece may be from convex, as a 
 LEAST_THICKNESS = 0.01  # of the object's longest side, which a hull keeps
 LEAST_VOLUME = 1e-4  # of all hulls; a smaller one is a splinter
 SLACK = 0.025  # of the object's longest side that a hull may stand out of it
+JOIN = 1.08  # times the volume of two pieces that their common hull may have
 SPIKES = 3.0  # times SLACK that it may stand out in a few places: stray splats leave spikes
 SKIN_SAMPLES, HULL_SAMPLES = 20_000, 600
 Told = Callable[[str, float], None]
@@ -68,27 +69,30 @@ class Skin:
 
 
 def joined(pieces: list[np.ndarray], skin: Skin) -> list[np.ndarray]:
-    """The pieces, two made one wherever their common hull stands out too little to matter.
+    """The pieces, two made one wherever their common hull adds too little to matter.
 
     What is noisy comes in more pieces than its shape needs.
     """
-    pieces = list(pieces)
-    reach = {
-        (i, j): skin.reach(np.concatenate([pieces[i], pieces[j]]))
-        for i in range(len(pieces))
-        for j in range(i)
-    }
-    while reach:
-        (i, j), least = min(reach.items(), key=lambda pair: (pair[1], pair[0]))
+    pieces = dict(enumerate(pieces))
+    volumes = {name: hull_volume(piece) for name, piece in pieces.items()}
+
+    def cost(i: int, j: int) -> float:
+        """Metres that the common hull stands out; Inf where it is much larger than both."""
+        both = np.concatenate([pieces[i], pieces[j]])
+        if not hull_volume(both) <= JOIN * (volumes[i] + volumes[j]):
+            return np.inf
+        return skin.reach(both)
+
+    costs = {(i, j): cost(i, j) for i in pieces for j in range(i)}
+    while costs:
+        (i, j), least = min(costs.items(), key=lambda pair: (pair[1], pair[0]))
         if not least <= skin.slack:
             break
-        pieces[j] = np.concatenate([pieces[i], pieces[j]])
-        reach = {pair: far for pair, far in reach.items() if i not in pair}
-        for k in {k for pair in reach for k in pair} - {j}:
-            together = np.concatenate([pieces[j], pieces[k]])
-            reach[max(j, k), min(j, k)] = skin.reach(together)
-        pieces[i] = np.zeros((0, 3))
-    return [piece for piece in pieces if len(piece)]
+        pieces[j] = np.concatenate([pieces.pop(i), pieces[j]])
+        volumes[j] = hull_volume(pieces[j])
+        costs = {pair: far for pair, far in costs.items() if i not in pair}
+        costs |= {(a, b): cost(a, b) for a, b in costs if j in (a, b)}
+    return list(pieces.values())
 
 
 def face_normals(mesh: TriangleMesh) -> np.ndarray:

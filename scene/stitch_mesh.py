@@ -53,9 +53,8 @@ def without_flaps(faces: np.ndarray) -> np.ndarray:
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
     order = np.sort(faces, axis=1)
-    turns = (faces[:, 0] == order[:, 0]) == (faces[:, 1] == order[:, 1])
-    turns |= (faces[:, 0] == order[:, 1]) & (faces[:, 1] == order[:, 2])
-    turns &= ~((faces[:, 0] == order[:, 2]) & (faces[:, 1] == order[:, 1]))
+    a, b, c = faces.astype(np.int64).T
+    turns = np.sign(b - a) * np.sign(c - b) * np.sign(a - c) < 0  # an even order of the vertices
     _, name, count = np.unique(order, axis=0, return_inverse=True, return_counts=True)
     name, kept = name.reshape(-1), np.ones(len(faces), bool)
     for which in np.flatnonzero(count > 1):
