@@ -1,9 +1,18 @@
-"""What touched what, how hard and where: the engine's events of a step, summed for each pair."""
+"""What touched what, how hard and where: the engine's events of a step, summed for each pair.
 
-from collections.abc import Callable
+The engine merges the touching faces of a body's hulls into clusters, which halves its cost, and
+then counts impulses of clusters up to four times.  So impulses are taken from the momentum that
+bodies gained: a body that touched one thing alone got all of it there, which leaves what its
+neighbour got elsewhere, and so on.  Only in a ring of bodies, or of held ones, the engine's count
+stays.
+"""
+
 from dataclasses import dataclass
 
 import numpy as np
+
+Triple = tuple[float, float, float]
+HARDER = 1.1  # as hard as this a substep takes over the place of a contact
 
 
 @dataclass(frozen=True)
@@ -16,17 +25,85 @@ class Contact:
     point: np.ndarray  # (3,) metres, world: the deepest point of the hardest substep
 
 
-def gather(world: object, events: object, owner: Callable[[object], int], hardest: dict) -> None:
-    """Adds one substep's impulses: pair of ids -> (their sum, the largest, where that one was)."""
-    seconds = world.integration_parameters.dt
-    for event in events.drain_contact_force_events():
-        impulse = event.total_force_magnitude * seconds
-        pair = owner(event.collider1), owner(event.collider2)
-        key = pair if pair[0] < pair[1] else pair[::-1]
-        total, largest, point = hardest.get(key, (0.0, -1.0, None))
-        if impulse > largest:
-            largest, point = impulse, touch_point(world, event, point)
-        hardest[key] = total + impulse, largest, point
+@dataclass
+class Touch:
+    """One pair in one substep, as the engine tells it."""
+
+    ids: tuple[int, int]
+    impulse: float  # N s
+    normal: Triple  # the direction of the force, of length 1
+    event: object
+
+
+class Tally:
+    """The contacts of one step, gathered substep by substep."""
+
+    def __init__(self, world: object, ids: dict[object, int], gravity_m_s2: float) -> None:
+        self._world, self._ids, self._gravity = world, ids, gravity_m_s2
+        # pair: (sum of its impulses, the largest, where that one was)
+        self._hardest: dict[tuple[int, int], tuple[float, float, np.ndarray]] = {}
+
+    def gather(self, events: list, before: dict[int, Triple], free: dict[int, tuple]) -> None:
+        """Adds one substep.
+
+        `events`: its contact forces; `before`: velocities ahead of it, by id;
+        `free`: id -> (mass, engine's body) of those that only contacts and gravity pushed.
+        """
+        seconds = self._world.integration_parameters.dt
+        touches = [self._touch(event, seconds) for event in events]
+        touched = {number for touch in touches for number in touch.ids if number in free}
+        gained = {}
+        for number in touched:
+            mass, body = free[number]
+            v, (x, y, z) = body.linvel, before[number]
+            gained[number] = (
+                mass * (v.x - x), mass * (v.y - y + self._gravity * seconds), mass * (v.z - z)
+            )  # fmt: skip
+        share_out(touches, gained)
+        for touch in touches:
+            a, b = touch.ids
+            key = (a, b) if a < b else (b, a)
+            total, largest, point = self._hardest.get(key, (0.0, -1.0, None))
+            if touch.impulse > HARDER * largest:
+                largest, point = touch.impulse, touch_point(self._world, touch.event, point)
+            self._hardest[key] = total + touch.impulse, largest, point
+
+    def contacts(self) -> list[Contact]:
+        """Every pair once, by ids."""
+        return [Contact(*pair, row[0], row[2]) for pair, row in sorted(self._hardest.items())]
+
+    def _touch(self, event: object, seconds: float) -> Touch:
+        ids = self._ids[event.collider1], self._ids[event.collider2]
+        force, size = event.total_force, max(event.total_force_magnitude, 1e-12)
+        normal = force.x / size, force.y / size, force.z / size
+        return Touch(ids, event.total_force_magnitude * seconds, normal, event)
+
+
+def share_out(touches: list[Touch], gained: dict[int, Triple]) -> None:
+    """Sets the impulses of touches from what bodies gained (N s), from the ends of chains inward.
+
+    The slow way is a system of linear equations; chains and trees of it are solved leaf by leaf.
+    """
+    of: dict[int, list[Touch]] = {}
+    for touch in touches:
+        for number in touch.ids:
+            of.setdefault(number, []).append(touch)
+    ends = [number for number in of if len(of[number]) == 1 and number in gained]
+    while ends:
+        number = ends.pop()
+        if not of[number]:
+            continue
+        touch = of[number][0]
+        x, y, z = gained[number]
+        touch.impulse = abs(x * touch.normal[0] + y * touch.normal[1] + z * touch.normal[2])
+        other = touch.ids[1] if touch.ids[0] == number else touch.ids[0]
+        for side in touch.ids:
+            of[side].remove(touch)
+        if other in gained:
+            p, q, r = gained[other]
+            gained[other] = p + x, q + y, r + z  # what it got from elsewhere
+            if len(of[other]) == 1:
+                ends.append(other)
 
 
 def touch_point(world: object, event: object, before: np.ndarray | None) -> np.ndarray:
@@ -38,3 +115,8 @@ def touch_point(world: object, event: object, before: np.ndarray | None) -> np.n
         return before
     at = position.transform_point(deepest.local_p1) if deepest else position.translation
     return np.array([at.x, at.y, at.z])
+
+
+def velocities(bodies: dict[int, object]) -> dict[int, tuple[float, float, float]]:
+    """m/s of the engine's bodies, by id."""
+    return {n: (v.x, v.y, v.z) for n, v in ((n, body.linvel) for n, body in bodies.items())}

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from runtime_models.model import Finding
-from scene.contacts import Contact, gather
+from scene.contacts import Contact, Tally, velocities
 from scene.grab import (
     WITH_HAND,
     Hold,
@@ -21,8 +21,9 @@ from scene.grab import (
     take_hold,
     throw,
 )
-from scene.physics_rules import MOST_SPEED, new_world
+from scene.physics_rules import MOST_SPEED, more_substeps, new_world
 from scene.physics_shapes import (
+    LEAST_EXTENT,
     MOST_FRICTION,
     checked_number,
     checked_point,
@@ -38,8 +39,6 @@ from scene.pose import Pose
 from scene.triangle_mesh import TriangleMesh
 
 FLOOR = 0  # the id of the floor; every other id counts from 1
-# m/s: above, a step has twice and four times its substeps, so that nothing passes a thin plate.
-BRISK, FAST = 7.0, 14.0
 MOST_REACH = 2e4  # metres along a ray
 
 
@@ -64,7 +63,7 @@ class Physics:
         self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
         self.findings: list[Finding] = []
         self._handles: dict[int, object] = {}  # id: the engine's handle of a rigid body
-        self._ids: dict[object, int] = {}  # the other way round
+        self._ids: dict[object, int] = {}  # the engine's handle of a collider: id
         self._masses: dict[int, float] = {}  # kg, of bodies alone
         self._holds: dict[int, Hold] = {}
         self._next_id, self._next_grab = FLOOR + 1, 1
@@ -154,17 +153,22 @@ class Physics:
             collider = collider.mass(mass).active_events(ActiveEvents.CONTACT_FORCE_EVENTS)
             collider = collider.contact_force_event_threshold(0.0)
         handle = self._world.add_body(body, [collider])
-        self._handles[number], self._ids[handle] = handle, number
+        self._handles[number] = handle
+        self._note_collider(number)
         self._queries_stale = True
         return number
+
+    def _note_collider(self, number: int) -> None:
+        body = self._world.rigid_bodies[self._handles[number]]
+        self._ids[body.colliders[0]] = number  # each has one
 
     def remove(self, number: int) -> None:
         """Takes a thing out; hands that held it are empty, and what lay on it falls."""
         handle = self._handle(number)
         for grab in [g for g, hold in self._holds.items() if hold.body == number]:
             self._let_go(grab)
+        del self._ids[self._world.rigid_bodies[handle].colliders[0]], self._handles[number]
         self._world.remove_body(handle)
-        del self._handles[number], self._ids[handle]
         self._masses.pop(number, None)
         self._world.wake_up_all()
         self._queries_stale = True
@@ -226,7 +230,7 @@ class Physics:
             raise ValueError(f"a ray has the direction {direction}; 3 numbers, not 0, are wanted.")
         ray = Ray(tuple(map(float, start)), tuple(map(float, along / length)))
         hit = self._queries().cast_ray(ray, MOST_REACH, True)
-        return (self._owner(hit[0]), hit[1]) if hit else None
+        return (self._ids[hit[0]], hit[1]) if hit else None
 
     def nearest(self, point: object, within: float) -> tuple[int, float] | None:
         """The body nearest to a hand and its distance, at most `within` metres; 0 inside."""
@@ -235,22 +239,19 @@ class Physics:
         at = checked_point(point, "the place of a hand")
         reach = checked_number(within, "a hand's reach in metres", 0, MOST_REACH)
         found = self._queries().project_point(
-            tuple(map(float, at)), True, QueryFilter.only_dynamic(), reach
+            tuple(map(float, at)), True, QueryFilter.only_dynamic(), reach + LEAST_EXTENT
         )
         if found is None:
             return None
         p = found[1].point
-        distance = math.dist(at, (p.x, p.y, p.z))
-        return (self._owner(found[0]), distance) if distance <= reach else None
+        distance = 0.0 if found[1].is_inside else math.dist(at, (p.x, p.y, p.z))
+        return (self._ids[found[0]], distance) if distance <= reach else None
 
     def _queries(self) -> object:
         if self._queries_stale:
             self._world.update_query_pipeline()
             self._queries_stale = False
         return self._world.query_pipeline
-
-    def _owner(self, collider: object) -> int:
-        return self._ids[self._world.colliders[collider].parent]
 
     def _handle(self, number: int) -> object:
         if number not in self._handles:
@@ -267,36 +268,35 @@ class Physics:
 
     def step(self) -> list[Contact]:
         """One step of 1 / hz seconds; every pair that touched in it, once, by ids."""
-        substeps = self._substeps_now()
+        bodies = {number: self._body(number) for number in self._masses}
+        held = {hold.body for hold in self._holds.values()}
+        free = {n: (self._masses[n], body) for n, body in bodies.items() if n not in held}
+        speeds = velocities(bodies)
+        substeps = self.substeps * more_substeps(speeds)
         self._world.integration_parameters.dt = 1 / self.hz / substeps
         starts = {grab: self._hand(hold).position for grab, hold in self._holds.items()}
-        hardest = {}
+        tally = Tally(self._world, self._ids, -self._world.gravity.y)
         for k in range(substeps):
             for grab, start in starts.items():
                 hold = self._holds[grab]
                 now = start.lerp_slerp(isometry(hold.target), (k + 1) / substeps)
                 self._hand(hold).set_next_kinematic_position(now)
             self._world.step()
-            gather(self._world, self._events, self._owner, hardest)
+            events = self._events.drain_contact_force_events()
+            if events:
+                tally.gather(events, speeds, free)
+            speeds = velocities(bodies)
         for hold in self._holds.values():
             hold.trail.append(hold.target)
         self._note_quarantine()
         self._queries_stale = True
-        return [Contact(*pair, row[0], row[2]) for pair, row in sorted(hardest.items())]
-
-    def _substeps_now(self) -> int:
-        """More while something is fast: what it moves in one must stay near PREDICTION."""
-        bodies = self._world.rigid_bodies
-        fastest = 0.0
-        for number in self._masses:
-            v = bodies[self._handles[number]].linvel
-            fastest = max(fastest, v.x * v.x + v.y * v.y + v.z * v.z)
-        return self.substeps * (1 if fastest <= BRISK**2 else 2 if fastest <= FAST**2 else 4)
+        return tally.contacts()
 
     def _note_quarantine(self) -> None:
         """The engine stops a body whose numbers are no longer finite where it last was."""
-        for handle in self._world.quarantine.bodies:
-            what = f"body {self._ids.get(handle, 'of a hand')} was thrown out of all numbers"
+        lost = self._world.quarantine.bodies
+        for number in [n for n, handle in self._handles.items() if handle in lost] if lost else []:
+            what = f"body {number} was thrown out of all numbers"
             self.findings.append(Finding(what, 1, "stopped where it last was"))
 
     # ---- hands
@@ -350,7 +350,10 @@ class Physics:
     # ---- all of it
 
     def snapshot(self) -> bytes:
-        """Everything there is, to the last bit, findings aside."""
+        """Everything there is, to the last bit, findings aside.
+
+        Of equal worlds the bytes can differ: the engine writes its pairs in no fixed order.
+        """
         books = {
             "hz": self.hz,
             "substeps": self.substeps,
@@ -373,7 +376,9 @@ class Physics:
         self.hz, self.substeps = books["hz"], books["substeps"]
         self._next_id, self._next_grab = books["next"]
         self._handles = {n: RigidBodyHandle(i, g) for n, i, g in books["things"]}
-        self._ids = {handle: n for n, handle in self._handles.items()}
+        self._ids = {}
+        for number in self._handles:
+            self._note_collider(number)
         self._masses = dict(books["masses"])
         self._holds = {grab: hold_from_json(hold) for grab, hold in books["holds"]}
         self._events.clear()

@@ -111,8 +111,8 @@ def mesh_shape(mesh: TriangleMesh) -> tuple[object, Finding | None]:
     vertices, faces = np.ascontiguousarray(mesh.vertices), mesh.faces
     if not (np.abs(vertices) <= FAR).all():
         raise ValueError(
-            f"a static mesh reaches {np.abs(vertices).max():g} m; {FAR:.0f} m is the most, "
-            "are its units metres?"
+            f"a static mesh reaches {np.abs(vertices).max():g} m; {FAR:.0f} m is the "
+            "most, see whether its units are metres."
         )
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))  # (F, 3) each
     solid = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2 >= LEAST_AREA
