@@ -107,10 +107,16 @@ def unpack(data: bytes) -> Made | None:
     if head != MARK or len(body) < 12 or hashlib.sha256(body).digest() != digest:
         return None
     count, vertices, faces = (int(n) for n in np.frombuffer(body, "<u4", 3))
-    sizes = np.frombuffer(body, "<u4", count, 12).astype(int)
+    if len(body) % 4 or not 1 <= count <= len(body) // 4 - 3:
+        return None
+    sizes = [3 * int(n) for n in np.frombuffer(body, "<u4", count, 12)]
     numbers = np.frombuffer(body, "<f4", offset=12 + 4 * count)
-    shown, rows, *hulls = np.split(
-        numbers, np.cumsum([3 * vertices, 3 * faces, *3 * sizes[:-1]]).astype(int)
-    )
-    mesh = TriangleMesh(shown.reshape(-1, 3), rows.view("<i4").reshape(-1, 3))
+    if len(numbers) != 3 * vertices + 3 * faces + sum(sizes):
+        return None
+    ends = np.cumsum([3 * vertices, 3 * faces, *sizes[:-1]])
+    shown, rows, *hulls = np.split(numbers, ends)
+    try:
+        mesh = TriangleMesh(shown.reshape(-1, 3), rows.view("<i4").reshape(-1, 3))
+    except ValueError:  # of one that was written by something else
+        return None
     return tuple(hull.reshape(-1, 3) for hull in hulls), mesh
