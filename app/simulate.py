@@ -1,0 +1,150 @@
+"""launch.py simulate: a scene file in motion, driven by a script, told as JSON lines."""
+
+import json
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+RESULT = "run.jsonl"
+HZ = 90
+AFTER_S = 2.0  # seconds that go on after the script's last line
+LONGEST_S = 24 * 3600.0
+
+
+@dataclass(frozen=True)
+class Options:
+    """Let hands and rays of a script act on a scene; poses, contacts, x and events come out."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A scene file, see docs/scene.md."""
+    out: Path
+    """Folder for run.jsonl and the pictures."""
+    script: Path | None = None
+    """JSON lines with times: hands, grabs, releases, rays; without it things only fall."""
+    seconds: float | None = None
+    """How long; default: two seconds more than the script."""
+    pictures: int = 0
+    """A picture every so many steps of 1/90 s; 0: none."""
+    size: str = "640x360"
+    """WIDTHxHEIGHT of a picture."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Drawing back end: GL quads or OpenCL tiles."""
+    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
+    """Where GL comes from."""
+    overwrite: bool = False
+    """Replace what an earlier run has left in --out."""
+
+
+def run(options: Options) -> int:
+    from app.drawing import make_folder, parse_size
+    from app.errors import UsageError
+    from scene.read_scene_file import read_scene_file
+    from scene.read_script import read_script
+
+    size = parse_size(options.size)
+    if options.pictures < 0:
+        raise UsageError(f"--pictures is {options.pictures}; steps, 0 or more, are wanted.")
+    file = read_scene_file(options.scene)
+    acts = read_script(options.script, file.all_items) if options.script else ()
+    seconds = options.seconds
+    if seconds is None:
+        seconds = (acts[-1].t if acts else 0.0) + AFTER_S
+    if not 0 < seconds <= LONGEST_S:
+        raise UsageError(f"--seconds is {seconds:g}; above 0 and at most a day is wanted.")
+    steps = math.ceil(seconds * HZ - 1e-6)
+    simulation = make_simulation(file, acts)
+    every = options.pictures
+    paths = [options.out / f"{i:05d}.png" for i in range(0, steps + 1, every)] if every else []
+    result = options.out / RESULT
+    refuse_taken([result, *paths], options)
+    make_folder(options.out)
+    told = tell(simulation, steps, result, options)
+    if every:
+        draw_run(told, simulation, file, size, options)
+    else:
+        for _ in told:
+            pass
+    pictures = f" and {len(paths)} pictures" if paths else ""
+    print(
+        f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {options.out}", file=sys.stderr
+    )
+    return 0
+
+
+def make_simulation(file, acts: tuple):
+    """The scene with its models, bodies and physics.  Raises BadFile."""
+    from app.opening import PATIENCE_S, progress_after, sentence
+    from runtime_models.model import BadFile
+    from runtime_models.plain_splats import Reading
+    from scene.collider_files import colliders_of
+    from scene.physics import Physics
+    from scene.scene_file import read_models
+    from scene.simulation import Simulation
+
+    with progress_after(PATIENCE_S) as shown:
+        models = read_models(file, Reading(told=shown))
+        colliders = colliders_of(file, models, shown)
+    try:
+        physics = Physics(file.gravity_m_s2, file.floor_y, HZ)
+        simulation = Simulation(file, models, colliders, physics, acts, HZ)
+    except ValueError as error:
+        raise error if isinstance(error, BadFile) else BadFile(str(error)) from None
+    unique = {id(model): model for model in models.values()}
+    findings = [finding for model in unique.values() for finding in model.findings]
+    for finding in (*findings, *physics.findings):
+        print(sentence(finding), file=sys.stderr)
+    return simulation
+
+
+def refuse_taken(paths: list[Path], options: Options) -> None:
+    """Nothing is replaced unasked, and an input never."""
+    from app.errors import UsageError
+
+    inputs = [path.resolve() for path in (options.scene, options.script) if path]
+    for path in paths:
+        if path.resolve() in inputs:
+            raise UsageError(f"{path} is read in this run; choose another --out.")
+        if path.exists() and not options.overwrite:
+            raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
+
+
+def tell(simulation, steps: int, path: Path, options: Options):
+    """Steps and writes what is new; gives the number of steps done, 0 at first.
+
+    Lines are whole at every moment: who stops it keeps what was told until then.
+    """
+    with path.open("w", encoding="utf-8", newline="\n") as out:
+        head = {"scene": options.scene.name, "hz": simulation.hz, "steps": steps}
+        out.write(line({**head, "objects": list(simulation.moving)}))
+        yield 0
+        for number in range(1, steps + 1):
+            record = simulation.step()
+            if record.is_news:
+                out.write(line(record.row()))
+            yield number
+        out.write(line({"end": steps, "hash": simulation.physics.hash()}))
+
+
+def line(row: dict) -> str:
+    return json.dumps(row, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
+
+
+def draw_run(told, simulation, file, size: tuple[int, int], options: Options) -> None:
+    """A picture of the scene as it stands every --pictures steps."""
+    from dataclasses import replace
+
+    from app.drawing import open_renderer, save_png
+    from scene.scene_file import first_view
+
+    view = first_view(file, simulation.scene, size)
+    with open_renderer(options.context, options.drawing) as (renderer, _):
+        renderer.settings = replace(renderer.settings, background=(0.0, 0.0, 0.0))
+        for number in told:
+            if number % options.pictures == 0:
+                renderer.update(simulation.drawn())
+                renderer.draw([view])
+                save_png(renderer.resolved(0), options.out / f"{number:05d}.png")
