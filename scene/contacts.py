@@ -7,6 +7,7 @@ neighbour got elsewhere, and so on.  Only in a ring of bodies, or of held ones, 
 stays.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,17 +22,16 @@ class Contact:
 
     a: int  # id, less than b
     b: int
-    impulse_n_s: float  # N s: along the normals, the sum over the step
+    impulse_n_s: float  # N s: pressure and friction together, summed over the substeps
     point: np.ndarray  # (3,) metres, world: the deepest point of the hardest substep
 
 
-@dataclass
+@dataclass(eq=False)
 class Touch:
     """One pair in one substep, as the engine tells it."""
 
     ids: tuple[int, int]
     impulse: float  # N s
-    normal: Triple  # the direction of the force, of length 1
     event: object
 
 
@@ -74,9 +74,7 @@ class Tally:
 
     def _touch(self, event: object, seconds: float) -> Touch:
         ids = self._ids[event.collider1], self._ids[event.collider2]
-        force, size = event.total_force, max(event.total_force_magnitude, 1e-12)
-        normal = force.x / size, force.y / size, force.z / size
-        return Touch(ids, event.total_force_magnitude * seconds, normal, event)
+        return Touch(ids, event.total_force_magnitude * seconds, event)
 
 
 def share_out(touches: list[Touch], gained: dict[int, Triple]) -> None:
@@ -95,7 +93,7 @@ def share_out(touches: list[Touch], gained: dict[int, Triple]) -> None:
             continue
         touch = of[number][0]
         x, y, z = gained[number]
-        touch.impulse = abs(x * touch.normal[0] + y * touch.normal[1] + z * touch.normal[2])
+        touch.impulse = math.sqrt(x * x + y * y + z * z)
         other = touch.ids[1] if touch.ids[0] == number else touch.ids[0]
         for side in touch.ids:
             of[side].remove(touch)

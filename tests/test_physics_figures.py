@@ -95,6 +95,22 @@ def test_a_two_millimetre_plate_never_tunnels(kind, speed):
             assert y > -0.01, f"trial {trial} went through"
 
 
+@pytest.mark.parametrize("cells", [1, 150])
+def test_a_plate_passes_neither_large_triangles_nor_small_ones_from_either_side(cells):
+    for side in (1, -1):
+        physics = Physics(gravity_m_s2=9.81 * side)
+        physics.add_static(sheet(1, cells), at(0, 0, 0))
+        plates = [
+            physics.add_body([box(*PLATE)], at(0.25 * i - 0.5, side * 0.4, 0), 0.2)
+            for i in range(5)
+        ]
+        for plate, speed in zip(plates, (3, 6, 10, 20, 40), strict=True):
+            physics.set_velocity(plate, (0, -speed * side, 0))
+        for _ in range(30):
+            physics.step()
+            assert min(physics.pose(plate).position[1] * side for plate in plates) > 0
+
+
 @pytest.mark.parametrize("mass", [0.05, 0.3, 5.0])
 @pytest.mark.parametrize("speed", [1.0, 4.0, 8.0])
 def test_a_throw_has_the_velocity_of_its_hand_within_five_percent(mass, speed):
