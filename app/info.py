@@ -15,15 +15,21 @@ class Options(ReadingOptions):
     """Say what is in a scene."""
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat or a folder of PLY layers."""
+    """A package, a .ply, a .splat, a folder of PLY layers or a scene file, see docs/scene.md."""
     json: bool = False
     """JSON on standard output instead of a table."""
 
 
 def run(options: Options) -> int:
+    from app.scene_files import describe_scene, open_scene_file
     from runtime_models.read_scene import describe
+    from scene.scene_file import is_scene_file
 
-    facts = describe(open_model(options.scene, options), options.scene)
+    if is_scene_file(options.scene):
+        file, models, _ = open_scene_file(options.scene, options)
+        facts = describe_scene(file, models, options.scene)
+    else:
+        facts = describe(open_model(options.scene, options), options.scene)
     if options.json:
         print(json.dumps(facts, indent=1, ensure_ascii=False))
     else:
@@ -45,9 +51,20 @@ def print_table(facts: dict) -> None:
                 f"{name}: {' → '.join(map(str, head['layers']))}, {head['activation']}"
                 for name, head in value.items()
             )
+        elif key == "objects":
+            value = "\n".join(map(object_line, value))
         elif key == "labels":
             value = "\n".join(f"{label}: {count:,} splats" for label, count in value.items())
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
         table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets
     Console().print(table)
+
+
+def object_line(item: dict) -> str:
+    """One object of a scene file."""
+    body = "not to be touched" if item["collider"] is None else item["collider"]
+    words = [item["model"], f"{item['splats']:,} splats", f"x {item['x']:g}", body]
+    words += ["static"] if item["static"] else []
+    words += [f"{item['reactions']} reactions"] if item["reactions"] else []
+    return f"{item['name']}: " + ", ".join(words)

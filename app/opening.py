@@ -57,8 +57,12 @@ def open_model(
     """
     from dataclasses import replace
 
+    from runtime_models.model import BadFile
     from runtime_models.read_scene import read_model
+    from scene.scene_file import is_scene_file
 
+    if is_scene_file(path):
+        raise BadFile(f"{path} is a scene file of objects; render, info and simulate open it.")
     with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
         model = read_model(path, replace(options.reading(), told=tell))
     for finding in model.findings:

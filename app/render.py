@@ -1,6 +1,7 @@
 """launch.py render: a scene into PNG files, without a window."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -18,7 +19,7 @@ class Options(ReadingOptions):
     """Draw a scene into PNG files."""
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat or a folder of PLY layers."""
+    """A package, a .ply, a .splat, a folder of PLY layers or a scene file, see docs/scene.md."""
     out: Path
     """Folder for the pictures."""
     x: tuple[str, ...] = ("0",)
@@ -75,8 +76,7 @@ def run(options: Options) -> int:
         parse_size,
     )
     from app.errors import UsageError
-    from scene.framing import default_background
-    from scene.scene import SceneObject
+    from scene.scene_file import is_scene_file
 
     controls = parse_controls(options.x)
     size = parse_size(options.size) if options.size else None
@@ -88,9 +88,9 @@ def run(options: Options) -> int:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
     settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
     check_one_of(options, budget)
-    model = open_model(options.scene, options)
-    views = choose_views(options, model, size)
-    selectors = [choose_selectors(options.select, model, view) for view in views]
+    opening = open_objects if is_scene_file(options.scene) else open_one
+    opened = opening(options, size)
+    views = opened.views
     count = len(controls) * len(views)
     if count > MOST_VALUES:
         raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
@@ -101,17 +101,56 @@ def run(options: Options) -> int:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
-        background = options.background or default_background(model, (0.0, 0.0, 0.0))
+        background = options.background or opened.background
         renderer.settings = replace(
             settings, target=renderer.settings.target, background=background
         )
         if budget:
-            drawn = Drawn(model, controls[0], views[0].size, 1 + (options.stereo > 0))
+            drawn = Drawn(opened.model, controls[0], views[0].size, 1 + (options.stereo > 0))
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
-        things = [SceneObject("scene", model, x=x, selectors=selectors[i]) for x, i in pairs]
-        draw_all(renderer, things, [views[i] for _, i in pairs], paths, options.stereo)
+        scenes = [opened.scene_at(x, i) for x, i in pairs]
+        draw_all(renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
     print(f"{count} picture{'s' * (count > 1)} in {options.out}", file=sys.stderr)
     return 0
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What is drawn, from where, before what."""
+
+    views: list
+    background: tuple[float, float, float]  # where the options give none
+    scene_at: Callable  # (x, row of the view) -> Scene
+    model: object = None  # the one that a budget is measured with
+
+
+def open_one(options: Options, size: tuple[int, int] | None) -> Opened:
+    """A scene of one model, with the parts of --select."""
+    from scene.framing import default_background
+    from scene.scene import Scene, SceneObject
+
+    model = open_model(options.scene, options)
+    views = choose_views(options, model, size)
+    selectors = [choose_selectors(options.select, model, view) for view in views]
+
+    def scene_at(x: float, row: int) -> Scene:
+        return Scene((SceneObject("scene", model, x=x, selectors=selectors[row]),))
+
+    return Opened(views, default_background(model, (0.0, 0.0, 0.0)), scene_at, model)
+
+
+def open_objects(options: Options, size: tuple[int, int] | None) -> Opened:
+    """The objects of a scene file, each where and as the file says."""
+    from app.errors import UsageError
+    from app.scene_files import open_scene_file, scene_views
+
+    for name in ("x", "select", "target_ms", "floor_db"):
+        if getattr(options, name) != getattr(Options, name):
+            option = f"--{name.replace('_', '-')}"
+            raise UsageError(f"{option} is for one model; leave it out with a scene file.")
+    file, _, scene = open_scene_file(options.scene, options)
+    views = scene_views(options, file, scene, size)
+    return Opened(views, (0.0, 0.0, 0.0), lambda x, row: scene)
 
 
 def check_one_of(options: Options, budget) -> None:
@@ -162,8 +201,8 @@ def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
         raise UsageError(f"--select {error}") from None
 
 
-def draw_all(renderer, things: list, views: list, paths: list[Path], eye_distance: float) -> None:
-    """A picture of each thing from its view; two eyes side by side where they are apart."""
+def draw_all(renderer, scenes: list, views: list, paths: list[Path], eye_distance: float) -> None:
+    """A picture of each scene from its view; two eyes side by side where they are apart."""
     import numpy as np
     from rich.console import Console
     from rich.progress import track
@@ -171,13 +210,12 @@ def draw_all(renderer, things: list, views: list, paths: list[Path], eye_distanc
     from app.drawing import save_png
     from app.picture_legend import with_legend
     from renderer.debug import debug_legend
-    from scene.scene import Scene
     from scene.stereo import stereo_pair
 
     console = Console(stderr=True)
-    work = list(zip(things, views, paths, strict=True))
-    for thing, view, path in track(work, "drawing", console=console, transient=True):
-        renderer.update(Scene((thing,)))
+    work = list(zip(scenes, views, paths, strict=True))
+    for scene, view, path in track(work, "drawing", console=console, transient=True):
+        renderer.update(scene)
         eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
         stats = renderer.draw(eyes)
         picture = np.concatenate([renderer.resolved(i) for i in range(len(eyes))], axis=1)

@@ -78,6 +78,7 @@ def run(options: Options) -> int:
 def make_simulation(file, acts: tuple):
     """The scene with its models, bodies and physics.  Raises BadFile."""
     from app.opening import PATIENCE_S, progress_after, sentence
+    from app.scene_files import tell_findings
     from runtime_models.model import BadFile
     from runtime_models.plain_splats import Reading
     from scene.collider_files import colliders_of
@@ -93,9 +94,8 @@ def make_simulation(file, acts: tuple):
         simulation = Simulation(file, models, colliders, physics, acts, HZ)
     except ValueError as error:
         raise error if isinstance(error, BadFile) else BadFile(str(error)) from None
-    unique = {id(model): model for model in models.values()}
-    findings = [finding for model in unique.values() for finding in model.findings]
-    for finding in (*findings, *physics.findings):
+    tell_findings(models)
+    for finding in physics.findings:
         print(sentence(finding), file=sys.stderr)
     return simulation
 

@@ -82,8 +82,9 @@ def test_pictures_show_what_moves(tmp_path):
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == ["00000.png", "00054.png", "00108.png", "run.jsonl"]
     first, second, third = (np.asarray(Image.open(tmp_path / n)).astype(int) for n in names[:3])
-    assert first.shape == (90, 160, 3) and np.abs(first - second).max() < 40  # only settled
-    assert (np.abs(third - second).max(axis=2) > 60).sum() > 20  # the ring was lifted
+    assert first.shape == (90, 160, 3)
+    settled, lifted = ((np.abs(a - second).max(axis=2) > 60).sum() for a in (first, third))
+    assert settled < 60 < 100 < lifted  # pixels: things fall a millimetre, then the ring is lifted
 
 
 def test_nothing_is_replaced_unasked_and_an_input_never(example, tmp_path):

@@ -1,0 +1,91 @@
+"""How commands open a scene file: its models with progress and findings, its views."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
+
+if TYPE_CHECKING:
+    from runtime_models.model import Model
+    from scene.pose import View
+    from scene.scene import Scene
+    from scene.scene_file import SceneFile
+
+OF_OBJECTS = ("mode", "up", "flip")  # options that the file has for each object of its own
+
+
+def open_scene_file(
+    path: Path, options: ReadingOptions
+) -> tuple["SceneFile", dict[str, "Model"], "Scene"]:
+    """What the file says, the model of each object, and what is drawn.
+
+    Progress and findings go to stderr.  Raises BadFile, and UsageError for options that an object
+    has in the file.
+    """
+    from dataclasses import replace
+
+    from app.errors import UsageError
+    from scene.read_scene_file import read_scene_file
+    from scene.scene_file import read_models, scene_of
+
+    for name in OF_OBJECTS:
+        if getattr(options, name):
+            raise UsageError(f"--{name} is for one model; in {path.name} each object has its own.")
+    file = read_scene_file(path)
+    with progress_after(PATIENCE_S) as told:
+        models = read_models(file, replace(options.reading(), told=told))
+    tell_findings(models)
+    return file, models, scene_of(file, models)
+
+
+def tell_findings(models: dict[str, "Model"]) -> None:
+    """What is wrong with the models, each told once however many objects have it."""
+    for model in {id(model): model for model in models.values()}.values():
+        for finding in model.findings:
+            print(sentence(finding), file=sys.stderr)
+
+
+def scene_views(
+    options, file: "SceneFile", scene: "Scene", size: tuple[int, int] | None
+) -> list["View"]:
+    """The views that --camera of `render` stands for; `size` None leaves the pixels to a file."""
+    from app.camera_files import scene_cameras
+    from scene.framing import frame_points, orbit_path, scene_points
+    from scene.scene_file import first_view
+
+    if options.camera == "front" or (options.camera == "orbit" and options.frames == 1):
+        return [first_view(file, scene, size or (640, 360))]
+    if options.camera == "orbit":
+        centre, radius = frame_points(*scene_points(scene))
+        return orbit_path(options.frames, centre, radius, size or (640, 360))
+    cameras = scene_cameras(options.camera, options.scene, None, options, size)
+    for note in cameras.notes:
+        print(note, file=sys.stderr)
+    return list(cameras.views)
+
+
+def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:
+    """What `launch.py info` prints of a scene file."""
+    from scene.scene_file import FORMAT
+
+    return {
+        "format": FORMAT,
+        "splats": sum(models[item.name].splat_count for item in file.all_items),
+        "floor_y": file.floor_y,
+        "gravity_m_s2": file.gravity_m_s2,
+        "bytes": path.stat().st_size,
+        "objects": [
+            {
+                "name": item.name,
+                "model": item.model,
+                "splats": models[item.name].splat_count,
+                "x": item.x,
+                "position": list(item.position),
+                "collider": item.collider,
+                "static": item.static,
+                "reactions": len(item.reactions),
+            }
+            for item in file.all_items
+        ],
+    }
