@@ -79,7 +79,6 @@ def make_simulation(file, acts: tuple):
     """The scene with its models, bodies and physics.  Raises BadFile."""
     from app.opening import PATIENCE_S, progress_after, sentence
     from app.scene_files import tell_findings
-    from runtime_models.model import BadFile
     from runtime_models.plain_splats import Reading
     from scene.collider_files import colliders_of
     from scene.physics import Physics
@@ -89,13 +88,10 @@ def make_simulation(file, acts: tuple):
     with progress_after(PATIENCE_S) as shown:
         models = read_models(file, Reading(told=shown))
         colliders = colliders_of(file, models, shown)
-    try:
-        physics = Physics(file.gravity_m_s2, file.floor_y, HZ)
-        simulation = Simulation(file, models, colliders, physics, acts, HZ)
-    except ValueError as error:
-        raise error if isinstance(error, BadFile) else BadFile(str(error)) from None
+    physics = Physics(file.gravity_m_s2, file.floor_y, HZ)
+    simulation = Simulation(file, models, colliders, physics, acts, HZ)
     tell_findings(models)
-    for finding in physics.findings:
+    for finding in simulation.findings:
         print(sentence(finding), file=sys.stderr)
     return simulation
 

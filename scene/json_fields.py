@@ -82,13 +82,16 @@ class Fields:
             raise self.refuse(key, wanted)
         return float(value) if is_number(value) else value
 
-    def numbers(self, key: str, count: int, default: object = _ABSENT) -> tuple[float, ...]:
+    def numbers(
+        self, key: str, count: int, default: object = _ABSENT, most: float = 1e12
+    ) -> tuple[float, ...]:
+        """So many, none larger than `most` either way."""
         value = self.take(key, default)
         if key not in self.data:
             return value
         good = isinstance(value, list) and len(value) == count and all(map(is_number, value))
-        if not (good and all(abs(n) <= 1e12 for n in value)):
-            raise self.refuse(key, f"a list of {count} finite numbers")
+        if not (good and all(abs(n) <= most for n in value)):
+            raise self.refuse(key, f"a list of {count} finite numbers up to {most:g}")
         return tuple(map(float, value))
 
     def flag(self, key: str, default: bool = False) -> bool:

@@ -13,6 +13,7 @@ from scene.reactions import KINDS, Reaction, State, TwoAxes
 from scene.scene_file import (
     BACKGROUND,
     ENDING,
+    FAR_M,
     FORMAT,
     FirstView,
     SceneFile,
@@ -36,7 +37,7 @@ def read_scene_file(path: str | Path) -> SceneFile:
         raise file.refuse("format", f"'{FORMAT}', which this program reads,")
     floor_y = file.take("floor_y", None)
     if floor_y is not None:
-        floor_y = file.number("floor_y", None, "metres, or null for no floor,")
+        floor_y = file.number("floor_y", None, "metres, or null for no floor,", -FAR_M, FAR_M)
     gravity = file.number("gravity_m_s2", 9.81, "0 to 100 m/s2", 0, GRAVITY)
     background = file.inner(BACKGROUND)
     rows = file.rows("objects", MOST_OBJECTS, "object")
@@ -115,7 +116,7 @@ def read_selectors(row: Fields) -> tuple[Selector, ...]:
 def read_pose(row: Fields | None) -> dict:
     if row is None:
         return {}
-    position = row.numbers("position", 3, SceneItem.position)
+    position = row.numbers("position", 3, SceneItem.position, FAR_M)
     wxyz = row.numbers("wxyz", 4, SceneItem.wxyz)
     if not abs(math.hypot(*wxyz) - 1) <= UNIT_SLACK:
         raise row.refuse("wxyz", "a quaternion of length 1")

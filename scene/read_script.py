@@ -11,7 +11,7 @@ import numpy as np
 from runtime_models.model import BadFile
 from scene.json_fields import MOST_BYTES, Fields, read_object
 from scene.pose import UNIT_SLACK, Pose
-from scene.scene_file import SceneItem
+from scene.scene_file import FAR_M, SceneItem
 from scene.selector import UPRIGHT
 
 DEEDS = ("hand", "grab", "release", "lose", "ray", "control")
@@ -74,7 +74,8 @@ def read_act(row: Fields, number: int, before: list[Act], items: Sequence[SceneI
 
 
 def read_hand(row: Fields, items: Sequence[SceneItem]) -> dict:
-    position, wxyz = row.numbers("position", 3), row.numbers("wxyz", 4, UPRIGHT)
+    position = row.numbers("position", 3, most=FAR_M)
+    wxyz = row.numbers("wxyz", 4, UPRIGHT)
     length = math.hypot(*wxyz)
     if not abs(length - 1) <= UNIT_SLACK:
         raise row.refuse("wxyz", "a quaternion of length 1")
@@ -90,7 +91,7 @@ def read_grab(row: Fields, items: Sequence[SceneItem]) -> dict:
 
 
 def read_ray(row: Fields, items: Sequence[SceneItem]) -> dict:
-    origin, direction = row.numbers("origin", 3), row.numbers("direction", 3)
+    origin, direction = row.numbers("origin", 3, most=FAR_M), row.numbers("direction", 3)
     if not 1e-6 < math.hypot(*direction) < 1e6:
         raise row.refuse("direction", "a direction, not zero,")
     return {"origin": origin, "direction": direction}

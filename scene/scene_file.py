@@ -23,6 +23,7 @@ FORMAT = "shapeshift-scene 1"
 ENDING = ".scene.json"
 HULLS = "hulls"  # as a collider: made from the splats
 BACKGROUND = "background"  # the name of the background's object
+FAR_M = 1e4  # metres: farther from the origin the physics is coarser than a millimetre
 MARK_WITHIN = 4096  # bytes from the start in which a file without the ending says its format
 
 

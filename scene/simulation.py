@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from runtime_models.model import Model
+from runtime_models.model import BadFile, Finding, Model
 from scene.pose import Pose
 from scene.reactions import Event, Fired, Machine, Standing, advance, start, steer
 from scene.read_script import Act, HandPath
@@ -69,8 +69,12 @@ class Simulation:
         self.physics, self.acts, self.hz = physics, list(acts), hz
         self.scene = scene_of(file, models)
         self.moving: dict[str, Moving] = {}
+        self.findings: list[Finding] = []  # of the physics: clamped masses and the like
         for item in file.all_items:
+            known = len(physics.findings)
             body = add_body(physics, item, colliders.get(item.name))
+            name = f"object '{item.name}'"
+            self.findings += [replace(new, file=name) for new in physics.findings[known:]]
             machine = machine_of(item, models[item.name])
             self.moving[item.name] = Moving(item, body, machine, start(machine, item.x), item.pose)
         self.names = {m.body: name for name, m in self.moving.items() if m.body is not None}
@@ -197,15 +201,16 @@ DO = {
 
 
 def add_body(physics, item: SceneItem, collider) -> int | None:
-    """The object's body: the background as the mesh it is, everything else as convex pieces."""
+    """The object's body: the background as a mesh, all else as convex pieces.  Raises BadFile."""
     if collider is None:
         return None
-    if item.static:
-        shape = collider.mesh if item.name == BACKGROUND else collider.hulls
-        return physics.add_static(shape, item.pose, item.friction, item.restitution)
-    return physics.add_body(
-        collider.hulls, item.pose, item.mass_kg, item.friction, item.restitution
-    )
+    mass = () if item.static else (item.mass_kg,)
+    add = physics.add_static if item.static else physics.add_body
+    shape = collider.mesh if item.name == BACKGROUND else collider.hulls
+    try:
+        return add(shape, item.pose, *mass, item.friction, item.restitution)
+    except ValueError as error:
+        raise BadFile(f"object '{item.name}': {error}") from None
 
 
 def event_row(name: str, fired: Fired) -> dict:

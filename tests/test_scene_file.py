@@ -145,6 +145,8 @@ WRONG = [
     (("format",), "shapeshift-scene 2", FORMAT),
     (("gravity_m_s2",), -1, "m/s2"),
     (("floor_y",), "low", "metres"),
+    (("floor_y",), 10001, "metres"),
+    (("objects", 0, "pose", "position"), [0, 0, -10001], "up to 10000"),
     (("view",), [], "braces"),
     (("view", "eye"), [0, 1], "3 finite numbers"),
     (("view", "target"), [0, 5, 2], "straight above"),

@@ -52,6 +52,7 @@ def test_a_script_reads_as_it_says(tmp_path):
         ({"t": 1}, "'do' is missing"), ({"t": 1, "do": "jump"}, "'do' is \"jump\""),
         ({"t": 1, "do": "hand"}, "'position' is missing"),
         ({"t": 1, "do": "hand", "position": [1, 2]}, "3 finite numbers"),
+        ({"t": 1, "do": "hand", "position": [1, 2, 1e5]}, "up to 10000"),
         ({"t": 1, "do": "hand", "position": [1, 2, 3], "wxyz": [2, 0, 0, 0]}, "length 1"),
         ({"t": 1, "do": "hand", "position": [1, 2, 3], "hnad": "left"}, "did you mean 'hand'?"),
         ({"t": 1, "do": "grab", "hand": "left"}, "hand 'left' is nowhere yet"),

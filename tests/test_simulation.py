@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime_models.model import SplatLayers, Stop
+from runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from scene.pose import Pose
 from scene.reactions import Reaction, State, TwoAxes
 from scene.read_script import Act
@@ -35,6 +35,7 @@ class Points:
     def __init__(self, hz: int = 90) -> None:
         self.hz, self.place, self.speed, self.hold, self.still = hz, {}, {}, {}, set()
         self.told: list[tuple] = []
+        self.findings: list[Finding] = []
 
     def add_static(self, shape, pose, friction, restitution) -> int:
         self.told.append((shape, friction, restitution))
@@ -42,6 +43,10 @@ class Points:
         return self.add_body((), pose, 0, friction, restitution)
 
     def add_body(self, hulls, pose, mass_kg, friction, restitution) -> int:
+        if mass_kg > 100:
+            raise ValueError("hull 0 is flat.")
+        if mass_kg > 5:
+            self.findings.append(Finding(f"the mass {mass_kg:g} kg", 1, "taken as 5 kg"))
         number = len(self.place) + 1
         self.place[number], self.speed[number] = pose.position.copy(), 0.0
         return number
@@ -234,3 +239,10 @@ def test_the_same_script_gives_the_same_rows():
         for _ in range(2)
     ]
     assert runs[0] == runs[1]
+
+
+def test_what_the_physics_says_names_its_object():
+    world = simulation(item(), item("b", mass_kg=9.0), item("c"))
+    assert [(f.file, f.what) for f in world.findings] == [("object 'b'", "the mass 9 kg")]
+    with pytest.raises(BadFile, match="object 'b': hull 0 is flat"):
+        simulation(item(), item("b", mass_kg=900.0))

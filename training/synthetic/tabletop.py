@@ -2,7 +2,7 @@
 
     python3 -m training.synthetic.tabletop assets
 
-writes touch.scene.json, touch.jsonl and the folder touch/ anew, byte for byte.
+writes touch.scene.json, touch.jsonl and the folder touch/ anew, the same each time.
 """
 
 import math
