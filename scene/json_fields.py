@@ -8,7 +8,7 @@ from pathlib import Path
 from runtime_models.model import BadFile
 from scene.camera_list import is_number
 
-MOST_BYTES = 64 << 20  # of JSON
+MOST_BYTES = 32 << 20  # of JSON: a million painted weights
 LONGEST_TEXT = 1000  # letters
 _ABSENT = object()
 
@@ -29,8 +29,11 @@ def read_object(text: bytes | str, where: str) -> "Fields":
     except BadFile:
         raise
     except json.JSONDecodeError as error:
-        place = f"line {error.lineno}, column {error.colno}"
+        place = f"line {error.lineno}, " if error.lineno > 1 else ""
+        place += f"column {error.colno}"
         raise BadFile(f"{where} is not JSON: {error.msg} at {place}.") from None
+    except UnicodeDecodeError:
+        raise BadFile(f"{where} is not JSON, and no text at all.") from None
     except (ValueError, RecursionError) as error:
         raise BadFile(f"{where} is not JSON: {str(error)[:80]}.") from None
     if not isinstance(data, dict):

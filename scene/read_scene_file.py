@@ -23,7 +23,7 @@ from scene.selector import Box, Selector, Sphere
 from scene.selector_rows import made, read_selector_row
 
 MOST_OBJECTS = 1000
-MOST_ROWS = 1000  # of selectors, states and reactions each
+MOST_ROWS = 100  # of selectors, states and reactions each
 LONGEST_NAME = 100  # letters
 GRAVITY, MASS, FRICTION, RESTITUTION = 100.0, 1e6, 10.0, 1.0  # at most: m/s2, kg
 

@@ -18,6 +18,7 @@ DEEDS = ("hand", "grab", "release", "lose", "ray", "control")
 HAND = "right"  # where a line names none
 REACH_M = 0.05  # from a hand to what it grabs
 LONGEST_S = 24 * 3600.0
+MOST_LINES = 100_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,30 +48,39 @@ def read_script(path: Path, items: Sequence[SceneItem] = ()) -> tuple[Act, ...]:
         raise BadFile(f"{path} is no file; a script of JSON lines is wanted.")
     if (size := path.stat().st_size) > MOST_BYTES:
         raise BadFile(f"{path} has {size:,} bytes; at most {MOST_BYTES:,} are read.")
+    lines = path.read_bytes().split(b"\n")
+    if len(lines) > MOST_LINES:
+        raise BadFile(f"{path.name} has {len(lines):,} lines; at most {MOST_LINES:,} are read.")
     acts: list[Act] = []
-    for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
+    hands: set[str] = set()  # that have a place by now
+    for number, line in enumerate(lines, 1):
         if line.strip() and not line.lstrip().startswith(b"#"):
             row = read_object(line, f"{path.name}, line {number}")
-            acts.append(read_act(row, number, acts, items))
+            acts.append(read_act(row, number, acts[-1].t if acts else 0.0, items))
+            check_hand(acts[-1], hands, row.where)
     return tuple(acts)
 
 
-def read_act(row: Fields, number: int, before: list[Act], items: Sequence[SceneItem]) -> Act:
+def read_act(row: Fields, number: int, before_s: float, items: Sequence[SceneItem]) -> Act:
     t = row.number("t", None, "seconds, 0 to a day,", 0, LONGEST_S)
     if t is None:
         raise BadFile(f"{row.where}: 't' is missing.")
-    if before and t < before[-1].t:
-        raise BadFile(f"{row.where}: 't' is {t:g} after {before[-1].t:g}; lines go on in time.")
+    if t < before_s:
+        raise BadFile(f"{row.where}: 't' is {t:g} after {before_s:g}; lines go on in time.")
     do = row.text("do", known=DEEDS)
     values = READ[do](row, items)
     row.done()
-    act = Act(line=number, t=t, do=do, **values)
-    if do in ("grab", "release", "lose") and not any(
-        past.do == "hand" and past.hand == act.hand for past in before
-    ):
-        raise BadFile(f"{row.where}: hand '{act.hand}' is nowhere yet; a line with 'do': 'hand' "
-                      "must come first.")  # fmt: skip
-    return act
+    return Act(line=number, t=t, do=do, **values)
+
+
+def check_hand(act: Act, hands: set[str], where: str) -> None:
+    """A hand must be somewhere before it does anything."""
+    if act.do == "hand":
+        hands.add(act.hand)
+    elif act.do in ("grab", "release", "lose") and act.hand not in hands:
+        raise BadFile(
+            f"{where}: hand '{act.hand}' is nowhere yet; a line with 'do': 'hand' must come first."
+        )
 
 
 def read_hand(row: Fields, items: Sequence[SceneItem]) -> dict:

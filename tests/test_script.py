@@ -115,3 +115,25 @@ def test_between_is_the_shorter_way_and_of_length_one(seed):
     assert abs(half @ q[0]) >= math.cos(math.pi / 4) - 1e-12
     same = between(first, Pose(np.ones(3), -q[0]), 0.3)
     np.testing.assert_allclose(same.wxyz, q[0], atol=1e-12)
+
+
+def test_anything_in_a_line_is_an_act_or_one_sentence(tmp_path):
+    lines = [
+        HAND | {"wxyz": [1, 0, 0, 0], "hand": "left"}, {"t": 1, "do": "grab", "reach_m": 1},
+        {"t": 1, "do": "ray", "origin": [0, 1, 0], "direction": [0, -2, 0]},
+        {"t": 1, "do": "control", "object": "b", "balance": -1, "power": 0.5},
+    ]  # fmt: skip
+    bad = (None, True, -1, 0.5, 1e300, "", "x", [], [0], [0, 0, 1e300], {}, "hand", "\ud800", "a\0")
+    for line in lines:
+        for key in line:
+            for value in bad:
+                path = write(tmp_path, HAND, line | {key: value})
+                try:
+                    assert len(read_script(path, ITEMS)) == 2
+                except BadFile as error:
+                    assert str(error).startswith("s.jsonl, line 2")
+
+
+def test_a_script_without_end_is_refused(tmp_path):
+    with pytest.raises(BadFile, match="100,002 lines"):
+        read_script(write(tmp_path, *[""] * 100_002))
