@@ -19,6 +19,7 @@ GAP = 2  # cells on either side of a gap that is closed
 WIDE_GAP = 6  # the same, tried where the skin would else be a shell
 ROOM = WIDE_GAP + 3  # empty cells around everything
 OFFSET = 0.9  # cells that the surface runs outside of the points before it is moved back
+FAR = 4.0  # cells; no distance beyond is needed, and to look for them takes minutes
 LEAST_HALF = 0.35  # cells that half of a thin part keeps
 LEAST_PART = 0.03  # of the cells of the largest piece; a smaller piece is a floater
 LEAKS = 2.0  # times the solid cells that closing more must give for the skin to have leaked
@@ -99,11 +100,12 @@ def distance_field(
     taken = np.zeros_like(solid)
     taken[tuple(((points - low) / cell_m).astype(np.int32).T)] = True
     hollow = solid & (ndimage.distance_transform_edt(~taken) > 1.8)  # no point beside it
-    out = np.minimum(ndimage.distance_transform_edt(~solid), 4).astype(np.float32)
+    out = np.minimum(ndimage.distance_transform_edt(~solid), FAR).astype(np.float32)
     near = (out < 3) & (~solid | (ndimage.distance_transform_edt(solid) < 3))
     where = np.argwhere(near)
     tree = cKDTree(thin((points - low) / cell_m))
-    away = tree.query(where + 0.5)[0].astype(np.float32)
+    away = tree.query(where + 0.5, distance_upper_bound=FAR)[0].astype(np.float32)
+    away = np.minimum(away, FAR)  # Inf where no point is so near
     if hollow.any():
         to_hollow = ndimage.distance_transform_edt(~hollow)[near]
         away = np.minimum(away, to_hollow)

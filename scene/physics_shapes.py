@@ -6,6 +6,7 @@ import numpy as np
 
 from runtime_models.model import Finding
 from scene.pose import UNIT_SLACK, Pose
+from scene.thicken import thickened
 from scene.triangle_mesh import TriangleMesh
 
 FAR = 1e4  # metres from the world's origin: beyond, float32 is coarser than a millimetre
@@ -101,8 +102,8 @@ def thinnest_extent(points: np.ndarray) -> float:
     return float(np.ptp(centred @ axes[-1]))
 
 
-def mesh_shape(mesh: TriangleMesh) -> tuple[object, Finding | None]:
-    """The engine's shape of a static triangle mesh, met from both sides.  Raises ValueError.
+def mesh_shape(mesh: TriangleMesh) -> tuple[object, list[Finding]]:
+    """The engine's shape of a static triangle mesh, thickened.  Raises ValueError.
 
     Inner edges are smoothed: without, a box that slides over a flat grid of triangles stumbles.
     """
@@ -118,8 +119,13 @@ def mesh_shape(mesh: TriangleMesh) -> tuple[object, Finding | None]:
     solid = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2 >= LEAST_AREA
     if not solid.any():
         raise ValueError("a static mesh has no triangle with an area; at least one is wanted.")
-    flags = TriMeshFlags.FIX_INTERNAL_EDGES_TWO_SIDED
-    shape = SharedShape.trimesh(vertices, faces[solid].astype(np.uint32), flags)
-    lost = int((~solid).sum())
-    what = f"{lost} triangles of a static mesh have no area"
-    return shape, Finding(what, lost, "dropped") if lost else None
+    findings = []
+    if lost := int((~solid).sum()):
+        findings.append(Finding(f"{lost} triangles of a static mesh have no area", lost, "dropped"))
+    points, triangles, outward = thickened(vertices, faces[solid])
+    flags = TriMeshFlags.FIX_INTERNAL_EDGES
+    if not outward:
+        flags = TriMeshFlags.FIX_INTERNAL_EDGES_TWO_SIDED
+        what = "neighbours in a static mesh are wound against each other"
+        findings.append(Finding(what, 0, "met from both sides, not thickened", repaired=False))
+    return SharedShape.trimesh(points, triangles, flags), findings

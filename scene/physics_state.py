@@ -2,6 +2,11 @@
 
 import hashlib
 import json
+from collections.abc import Iterable
+
+import numpy as np
+
+from scene.pose import Pose
 
 MARK = b"shapeshift physics 1\n"
 HASH_BYTES = 32
@@ -25,3 +30,12 @@ def unpack(data: bytes) -> tuple[dict, bytes]:
         )
     length = int.from_bytes(rest[:8], "little")
     return json.loads(rest[8 : 8 + length]), rest[8 + length :]
+
+
+def hash_of(rows: Iterable[tuple[int, Pose, np.ndarray, np.ndarray]]) -> str:
+    """SHA-256 of things: id, pose, (3,) m/s and (3,) rad/s of each, to the bit."""
+    digest = hashlib.sha256()
+    for number, pose, linear, turning in rows:
+        row = np.concatenate([[number], pose.position, pose.wxyz, linear, turning])
+        digest.update(row.astype("<f8").tobytes())
+    return digest.hexdigest()

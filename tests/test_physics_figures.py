@@ -58,6 +58,27 @@ def test_a_hand_pushes_nothing_through_a_table(kind, speed, bound, mass, shape):
     assert all(np.linalg.norm(physics.velocity(other)[0]) < 0.5 for other in others)
 
 
+@pytest.mark.parametrize("kind", ["slab", "sheet"])
+@pytest.mark.parametrize(("speed", "bound"), [(1, 2 * MM), (5, 5 * MM)])
+def test_nor_does_it_with_what_it_turns_while_it_pushes(kind, speed, bound):
+    rng = np.random.default_rng(5)
+    for trial in range(12):
+        physics = Physics()
+        table(physics, kind)
+        hulls = [box(*PLATE)] if trial % 3 == 0 else cup()
+        turn, axis = rng.standard_normal(4), rng.standard_normal(3)
+        axis /= np.linalg.norm(axis)
+        pose = at(0.01, 0.3, 0.02, turn / np.linalg.norm(turn))
+        body = physics.add_body(hulls, pose, (0.05, 0.3, 5.0)[trial // 4])
+        grab = physics.grab(body, at(0, 0.3, 0), (0, 0.3, 0))
+        height = 0.3
+        for i in range(90):
+            height, half = max(-0.3, height - speed / 90), i / 90
+            physics.move_hand(grab, at(0, height, 0, (np.cos(half), *(np.sin(half) * axis))))
+            physics.step()
+            assert -lowest(physics, body, hulls) <= bound
+
+
 @pytest.mark.parametrize("below", [0.05, 0.1])
 @pytest.mark.parametrize("ratio", [10, 50, 100])
 def test_a_heavy_box_on_a_light_one_sinks_under_two_millimetres(below, ratio):
