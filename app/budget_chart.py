@@ -13,7 +13,7 @@ from app.budget import Budget, Choice, choose
 from app.chart_rows import write_text
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model
 
 if TYPE_CHECKING:
     from app.chart_measure import ChartRow, Pricing
@@ -35,7 +35,7 @@ class BudgetRow:
 class Drawn:
     """What is going to be drawn: the chart belongs to exactly this."""
 
-    model: AnchorModel | SplatLayers
+    model: Model
     x: float
     size: tuple[int, int]
     eyes: int = 1

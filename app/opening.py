@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from runtime_models.model import AnchorModel, Finding, SplatLayers
+from runtime_models.model import Finding, Model
 from runtime_models.plain_splats import Reading
 
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
@@ -50,7 +50,7 @@ class ReadingOptions:
 
 def open_model(
     path: Path, options: ReadingOptions, told: Callable[[str, float], None] | None = None
-) -> AnchorModel | SplatLayers:
+) -> Model:
     """The model in a file or folder; progress and findings go to stderr.  Raises BadFile.
 
     `told` takes the progress instead: (what, part 0..1), from the thread that reads.
