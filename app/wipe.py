@@ -49,6 +49,7 @@ def comparing(viewer: "Viewer", options: "Options") -> Iterator["Wipe | None"]:
     drawing = viewer.renderer.backends["drawing"].split()[0]
     with Renderer(viewer.window.ctx, drawing) as renderer:
         wipe = Wipe(viewer, renderer, side)
+        viewer.say("Drag the line, or press , and . for it; C takes it away")
         try:
             yield wipe
         finally:
