@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 
 from app.opening import PATIENCE_S, ReadingOptions, progress_after
@@ -41,14 +40,14 @@ def examine(options: Options) -> dict:
     """The findings of a scene and the numbers that they rest on.  Raises BadFile."""
     from dataclasses import replace
 
-    from runtime_models.lint_whole import fill_of
+    from runtime_models.lint_whole import fill_ratio, sample_of
     from runtime_models.read_scene import describe, read_model
 
     with progress_after(PATIENCE_S) as told:
         model = read_model(options.scene, replace(options.reading(), told=told))
     facts = describe(model, options.scene)
     splats = splats_of(model)
-    low, high = np.percentile(splats.means, (1, 99), axis=0)
+    sample = sample_of(splats.means, splats.scales, splats.opacity)
     return {
         "file": str(options.scene),
         "refused": False,
@@ -56,9 +55,9 @@ def examine(options: Options) -> dict:
         "splats": facts["splats"],
         "sh_degree": facts["sh_degree"],
         "bytes": facts["bytes"],
-        "extent_m": [round(float(side), 4) for side in high - low],
+        "extent_m": [round(float(side), 4) for side in sample.high - sample.low],
         "origin_m": [float(c) for c in getattr(model, "origin", (0, 0, 0))],
-        "splats_over_a_pixel": round(fill_of(splats.means, splats.scales, splats.opacity), 2),
+        "splats_over_a_pixel": round(fill_ratio(sample), 2),
         "findings": [asdict(finding) for finding in model.findings],
     }
 
