@@ -22,7 +22,7 @@ from runtime_models.read_scaffold import is_scaffold, read_scaffold
 from runtime_models.read_sog import is_sog
 from runtime_models.read_streamed import TREE, is_streamed, read_sog_folder, read_streamed
 from runtime_models.sog_files import META
-from runtime_models.thin import thin
+from runtime_models.thin import left_whole, thin
 
 KNOWN = (
     "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
@@ -40,6 +40,8 @@ def read_model(path: str | Path, reading: Reading | None = None) -> Model:
             f"{Path(path).name} does not fit this machine's memory ({error}); close other "
             "programs, or open fewer layers."
         ) from error
+    if isinstance(model, AnchorModel):
+        return left_whole(model, reading.most_splats, Path(path).name)
     return thin(model, reading.most_splats) if isinstance(model, SplatLayers) else model
 
 
