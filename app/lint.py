@@ -27,7 +27,8 @@ def run(options: Options) -> int:
         facts = examine(options)
     except BadFile as refusal:
         if options.json:
-            print(json.dumps({"file": str(options.scene), "refused": True, "why": str(refusal)}))
+            why = {"file": str(options.scene), "refused": True, "why": str(refusal), "findings": []}
+            print(json.dumps(why, indent=1, ensure_ascii=False))
         raise
     if options.json:
         print(json.dumps(facts, indent=1, ensure_ascii=False))
@@ -55,7 +56,7 @@ def examine(options: Options) -> dict:
         "splats": facts["splats"],
         "sh_degree": facts["sh_degree"],
         "bytes": facts["bytes"],
-        "extent_m": [round(float(side), 4) for side in sample.high - sample.low],
+        "extent_m": [round(float(side), 4) + 0.0 for side in sample.high - sample.low],
         "origin_m": [float(c) for c in getattr(model, "origin", (0, 0, 0))],
         "splats_over_a_pixel": round(fill_ratio(sample), 2),
         "findings": [asdict(finding) for finding in model.findings],
@@ -98,5 +99,14 @@ def print_report(facts: dict) -> None:
         table.add_row(*(Text(text) for text in (found["file"], found["what"], rows, found["done"])))
     console.print(table)
     repaired = sum(found["repaired"] for found in findings)
-    several = "s" * (len(findings) > 1)
-    console.print(f"{len(findings)} finding{several}, {repaired} repaired on opening.")
+    console.print(summary(len(findings), repaired))
+
+
+def summary(count: int, repaired: int) -> str:
+    """The last line of the report."""
+    findings, legal = f"{count} finding{'s' * (count > 1)}", count - repaired
+    if not legal:
+        return f"{findings}, all repaired on opening."
+    if not repaired:
+        return f"{findings}, only worth knowing."
+    return f"{findings}: {repaired} repaired on opening, {legal} only worth knowing."
