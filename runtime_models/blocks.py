@@ -54,6 +54,8 @@ def each_block(
         thread.join()
     if errors:
         raise errors[0]
+    if tell and threads:
+        tell(1.0)  # another one may have done the last block
 
 
 def block_of(bytes_a_row: int) -> int:
