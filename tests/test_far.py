@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from runtime_models.model import SplatLayers, Stop
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import read_layers
 from runtime_models.recentre import COARSE, FINE, place_of
+from runtime_models.write_plain import told_lost, writer_of
 from runtime_models.write_ply import write_ply
 
 FAR = (5e6 + 0.25, -3_141_592.5, 4e5)  # metres, in the file's axes
@@ -78,6 +80,17 @@ def test_float32_that_is_fine_enough_says_nothing_of_loss(tmp_path):
     far = read_plain(scene_file(tmp_path / "a.ply", (60_000.0, 0, 0), {}))
     (found,) = far.findings
     assert "far from zero" in found.what and far.origin[0] == pytest.approx(60_000, abs=2)
+
+
+@pytest.mark.parametrize("ending", [".ply", ".glb", ".splat", ".compressed.ply"])
+@pytest.mark.parametrize("place", [FAR, (0.5, 0, -3.0)])
+def test_what_rounds_far_places_says_so(near_and_far, ending, place):
+    splats = replace(read_plain(near_and_far[0]), origin=place)
+    lost = told_lost(splats, writer_of(Path("a" + ending)))
+    if place is FAR and ending in (".splat", ".compressed.ply"):
+        assert "steps of 0.5 m" in lost[0].what and ".ply and .glb keep them" in lost[0].done
+    else:
+        assert lost == ()
 
 
 def sample(far, half, size) -> Sample:
