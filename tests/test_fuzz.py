@@ -93,7 +93,7 @@ def test_mutations_do_the_same_every_time_and_reach_inside(tmp_path, kind):
             try:
                 with zipfile.ZipFile(io.BytesIO(once)) as archive:
                     whole += archive.testzip() is None and once != data
-            except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError):
+            except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):
                 continue
         elif kind == "gzip" and once != data:
             try:
