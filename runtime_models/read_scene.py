@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.formats import format_of
+from runtime_models.lint_package import refuse_filling
 from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
 from runtime_models.plain_splats import Reading
@@ -87,7 +88,10 @@ def read_upright(path: Path, reading: Reading) -> AnchorModel:
         raise BadFile(
             f"{path.name} is a package, and +Y is up in all of them; leave out --up and --flip."
         )
-    return read_package(path)
+    model = read_package(path)
+    if not reading.allow_huge:
+        refuse_filling(model, path.name)
+    return model
 
 
 def is_package(path: Path) -> bool:
