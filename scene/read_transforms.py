@@ -23,6 +23,8 @@ from scene.read_points import read_points
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG")
 POSES = ("transform_matrix", "c2w_opencv", "c2w")
 SPLITS = {"train": "train", "test": "test", "val": "test"}
+LENS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy",
+        "k1", "k2", "k3", "k4", "p1", "p2", "w", "h")  # fmt: skip
 STRAIGHT = 0.5  # pixels that lens distortion may shift a corner before it matters
 
 
@@ -152,6 +154,10 @@ def find_image(path: Path, where: str) -> Path:
 
 def photo_of(shot: Shot, world: CaptureWorld, folder: Path) -> Photo:
     entry, where = shot.entry, shot.where
+    for key in LENS:
+        value = entry.get(key, 0)
+        if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e30:
+            raise BadFile(f"{where}: '{key}' is {str(value)[:40]!r}; a number is wanted")
     claimed = (int(entry["w"]), int(entry["h"])) if "w" in entry and "h" in entry else None
     size = image_size(shot.path, claimed)
     focal, centre = intrinsics(entry, size, where)

@@ -228,20 +228,12 @@ def picture_seeds() -> list[Seed]:
     return seeds
 
 
-def capture_seeds(folder: Path) -> list[Seed]:
-    """A capture with its photos, as training and eval read it, and the list of recent files."""
+def recent_seed() -> Seed:
+    """The list of recent files: a broken one counts as empty."""
     from app.recent import RecentFiles
-    from scene.read_capture import read_capture
-    from tests.captures import simple, write_transforms
 
-    capture = folder / "capture"
-    frames, more = simple(capture, 3)
-    write_transforms(capture, frames, **more)
     recent = json.dumps({"recent": ["/a/b.ply", "C:\\c d\\\u00e9.splat"]}).encode()
-    return [
-        Seed("capture", files_of(capture), read_capture),
-        Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent)),
-    ]
+    return Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent))
 
 
 def camera_seeds(folder: Path) -> list[Seed]:
@@ -285,5 +277,5 @@ def all_seeds(folder: Path) -> list[Seed]:
     seeds = splat_seeds(folder) + real_seeds() + point_seeds() + archive_seeds(folder)
     legacy = gzip.compress(b"NGSP" + bytes([1, 0, 0, 0, 2, 0, 0, 0, 0, 12, 0, 0]) + bytes(2 * 17))
     seeds.append(Seed("spz v1", {"v1.spz": legacy}, forgiving, {"v1.spz": "gzip"}))
-    seeds += thermal_seeds(folder) + picture_seeds() + capture_seeds(folder)
+    seeds += [*thermal_seeds(folder), *picture_seeds(), recent_seed()]
     return seeds + camera_seeds(folder) + text_seeds()
