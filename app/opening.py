@@ -77,9 +77,9 @@ def sentence(finding: Finding) -> str:
 @contextmanager
 def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
-    from rich.console import Console
     from rich.markup import escape
-    from rich.progress import Progress
+
+    from app.progress import progress_bar
 
     began, bar, task = time.monotonic(), None, None
 
@@ -88,7 +88,7 @@ def progress_after(seconds: float) -> Iterator:
         if bar is None:
             if time.monotonic() - began < seconds:
                 return
-            bar = Progress(console=Console(stderr=True), transient=True)
+            bar = progress_bar()
             bar.start()
             task = bar.add_task(escape(what), total=1.0)
         bar.update(task, description=escape(what), completed=part)

@@ -165,18 +165,16 @@ def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
 def draw_all(renderer, things: list, views: list, paths: list[Path], eye_distance: float) -> None:
     """A picture of each thing from its view; two eyes side by side where they are apart."""
     import numpy as np
-    from rich.console import Console
-    from rich.progress import track
 
     from app.drawing import save_png
     from app.picture_legend import with_legend
+    from app.progress import tracked
     from renderer.debug import debug_legend
     from scene.scene import Scene
     from scene.stereo import stereo_pair
 
-    console = Console(stderr=True)
     work = list(zip(things, views, paths, strict=True))
-    for thing, view, path in track(work, "drawing", console=console, transient=True):
+    for thing, view, path in tracked(work, "drawing"):
         renderer.update(Scene((thing,)))
         eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
         stats = renderer.draw(eyes)
