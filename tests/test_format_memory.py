@@ -11,7 +11,9 @@ import pytest
 from runtime_models import write_compressed_ply as compressed_ply
 from runtime_models import write_spz as spz
 from runtime_models.blocks import each_block
+from runtime_models.model import SplatLayers
 from runtime_models.plain_splats import PlainSplats
+from runtime_models.read_scene import read_model
 from runtime_models.write_compressed_ply import write_compressed_ply
 from runtime_models.write_spz import write_spz
 
@@ -55,6 +57,30 @@ def test_writing_takes_little_beside_the_file(tmp_path, name, write, most):
     write(some_splats(10), path)  # imports
     peak, _ = peak_of(lambda: write(splats, path))
     assert peak <= most * path.stat().st_size
+
+
+def arrays_of(model: SplatLayers) -> int:
+    names = ("means", "scales", "wxyz", "opacity", "sh", "layer")
+    return sum(getattr(model, name).nbytes for name in names)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [
+        ("a.compressed.ply", write_compressed_ply),
+        ("a.spz", partial(write_spz, version=2)),
+        ("a.spz", write_spz),
+        ("a.spz", partial(write_spz, version=4)),
+    ],
+)
+def test_opening_takes_little_beside_the_arrays_and_the_file(tmp_path, name, write):
+    """The whole way, from the path to a checked scene."""
+    path = tmp_path / name
+    write(some_splats(10), path)
+    read_model(path)  # imports
+    write(some_splats(COUNT), path)
+    peak, model = peak_of(lambda: read_model(path))
+    assert peak <= 1.15 * arrays_of(model) + path.stat().st_size
 
 
 @pytest.mark.parametrize("count", [1, 255, 256, 257, 3000])
