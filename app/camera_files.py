@@ -36,6 +36,8 @@ def named_cameras(
     path = Path(camera)
     if camera == AUTO:
         path = find_cameras(scene) or find_floor(scene)
+        if path is None and not scene.exists():
+            raise UsageError(f"{scene} does not exist; name a scene.")
         if path is None:
             raise UsageError(f"no cameras lie with {scene}; give --camera a file of them.")
     return read_camera_list(path, camera_reading(options, size))

@@ -238,6 +238,8 @@ def test_bad_options_are_one_sentence(scene, tmp_path, capsys, extra):
 def test_a_missing_scene_is_one_sentence(tmp_path, capsys):
     assert render(tmp_path / "none.shift", "--out", tmp_path / "out") == 2
     assert "none.shift does not exist" in capsys.readouterr().err
+    assert render(tmp_path / "none.shift", "--camera", "auto", "--out", tmp_path / "out") == 2
+    assert "none.shift does not exist" in capsys.readouterr().err
 
 
 def test_png_holds_the_bytes_and_the_maker(tmp_path):
