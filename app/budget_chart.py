@@ -13,7 +13,7 @@ from app.budget import Budget, Choice, choose
 from app.chart_rows import write_text
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model
 
 if TYPE_CHECKING:
     from app.chart_measure import ChartRow, Pricing
@@ -35,7 +35,7 @@ class BudgetRow:
 class Drawn:
     """What is going to be drawn: the chart belongs to exactly this."""
 
-    model: AnchorModel | SplatLayers
+    model: Model
     x: float
     size: tuple[int, int]
     eyes: int = 1
@@ -89,22 +89,19 @@ def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
 
 def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
     """Prices the quick settings with progress on stderr; the renderer keeps its settings."""
-    from rich.console import Console
-    from rich.progress import track
-
     from app.chart_measure import Pricing, twin_of
     from app.chart_settings import settings_of
     from app.chart_stage import QUICK, make_stage
+    from app.progress import tracked
 
     kept = renderer.settings
     stage = make_stage([drawn.model], drawn.x, drawn.size, QUICK)
-    console = Console(stderr=True)
     try:
         with twin_of(renderer, ctx) as twin:
             pricing = Pricing((renderer, twin), ctx, stage, kept.background)
             table = [replace(named, eyes=drawn.eyes)
                      for named in settings_of(pricing.drawing, quick=True)]  # fmt: skip
-            work = track(table, "measuring this scene once", console=console, transient=True)
+            work = tracked(table, "measuring this scene once")
             priced = [(pricing.settings(named), pricing.row(named, False)) for named in work]
     finally:
         renderer.settings = kept

@@ -23,11 +23,10 @@ def camera_reading(options, size: tuple[int, int] | None = None) -> "CameraReadi
     return CameraReading(size, math.radians(fov_y), options.up, options.flip)
 
 
-def scene_cameras(
-    camera: str, scene: Path, model: "AnchorModel | SplatLayers", options,
-    size: tuple[int, int] | None = None,
-) -> "CameraList":  # fmt: skip
-    """What --camera names, a path or auto, as the model's own origin sees it.
+def named_cameras(
+    camera: str, scene: Path, options, size: tuple[int, int] | None = None
+) -> "CameraList":
+    """What --camera names, a path or auto, as its file says; the scene need not be open yet.
 
     Raises UsageError where nothing lies with the scene, BadFile where it cannot be read.
     """
@@ -37,9 +36,19 @@ def scene_cameras(
     path = Path(camera)
     if camera == AUTO:
         path = find_cameras(scene) or find_floor(scene)
+        if path is None and not scene.exists():
+            raise UsageError(f"{scene} does not exist; name a scene.")
         if path is None:
             raise UsageError(f"no cameras lie with {scene}; give --camera a file of them.")
-    return in_scene(read_camera_list(path, camera_reading(options, size)), model)
+    return read_camera_list(path, camera_reading(options, size))
+
+
+def scene_cameras(
+    camera: str, scene: Path, model: "AnchorModel | SplatLayers", options,
+    size: tuple[int, int] | None = None,
+) -> "CameraList":  # fmt: skip
+    """named_cameras as the model's own origin sees them."""
+    return in_scene(named_cameras(camera, scene, options, size), model)
 
 
 def in_scene(cameras: "CameraList", model: "AnchorModel | SplatLayers") -> "CameraList":

@@ -126,15 +126,16 @@ def draws_on_cpu(drawing: str, ctx) -> bool:
 
 def measure_rows(pricing, file, settings, pictures: bool) -> None:
     """Adds the rows that the file lacks, one after the other, with progress on stderr."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining
+
+    from app.progress import progress_bar
 
     known = {row.name for row in file.rows}
     missing = [named for named in settings if named.name not in known]
     columns = (TextColumn("{task.description}", markup=False), BarColumn(),
                MofNCompleteColumn(), Remaining())  # fmt: skip
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with progress_bar(*columns) as progress:
         task = progress.add_task("", total=len(settings), completed=len(settings) - len(missing))
         for named in missing:
             progress.update(task, description=named.name)

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.chart_settings import Distances
 from app.quick_chart import turned
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model
 from scene.framing import default_view, frame_points, framing_view, model_points, scene_points
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene, SceneObject
@@ -52,7 +52,7 @@ class Stage:
 
 
 def make_stage(
-    models: Sequence[AnchorModel | SplatLayers],
+    models: Sequence[Model],
     x: float,
     size: tuple[int, int],
     walk: Walk,
@@ -78,7 +78,7 @@ def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
     return tuple(turned(first, centre, step * (i - half)) for i in range(-WARM_UP, walk.frames))
 
 
-def side_by_side(models: Sequence[AnchorModel | SplatLayers], x: float) -> Scene:
+def side_by_side(models: Sequence[Model], x: float) -> Scene:
     """Objects along the world's x, framed radii touching; the first stays where it is."""
     things, at, before = [], 0.0, None
     for number, model in enumerate(models):

@@ -34,12 +34,10 @@ class DecodeRow:
 
 def run_decode(folder: Path, context: str, command: str) -> int:
     """Writes decode.csv, decode.svg and decode.png; rows that are there are kept."""
-    from rich.console import Console
-    from rich.progress import track
-
     from app.chart import machine_line
     from app.drawing import open_renderer
     from app.headless import DEMO
+    from app.progress import tracked
     from runtime_models.read_scene import read_model
 
     model = read_model(DEMO)
@@ -49,8 +47,7 @@ def run_decode(folder: Path, context: str, command: str) -> int:
         known = {(row.back_end, row.anchors) for row in file.rows}
         wanted = [(name, n) for name in BACK_ENDS if ctx or name != "GL compute" for n in ANCHORS]
         missing = [job for job in wanted if job not in known]
-        for name, anchors in track(missing, "decoding", console=Console(stderr=True),
-                                   transient=True):  # fmt: skip
+        for name, anchors in tracked(missing, "decoding"):
             file.add(decode_row(name, ctx, with_anchors(model, anchors)))
     draw_decode(file.rows, folder)
     print(f"{len(file.rows)} rows in {folder / 'decode.csv'}; {folder / 'decode.png'} shows them.",

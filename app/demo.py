@@ -87,13 +87,11 @@ def made_before(folder: Path, recipe: dict) -> bool:
 
 
 def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from app.progress import progress_bar
     from training.synthetic.workshop import make_workshop
 
     processes = options.processes or min(os.cpu_count() or 1, 8)
-    with Progress(console=Console(file=sys.stderr)) as progress:
+    with progress_bar(transient=False) as progress:
         task = progress.add_task("photographing the workshop")
 
         def tell(done: int, all_of_them: int) -> None:

@@ -49,6 +49,7 @@ def run(options: Options) -> int:
     from app.errors import UsageError
     from app.exported import Look, check_output, export, is_folder
     from app.stage import origin_of
+    from runtime_models.evaluate import follows_eye
     from runtime_models.write_plain import writer_of
 
     scenes = choose_scenes(options)
@@ -62,6 +63,12 @@ def run(options: Options) -> int:
     models = [open_model(path, options) for path in scenes]
     if package:
         return export_package(options, models)
+    if eye and not any(map(follows_eye, models)):
+        print(
+            "--eye changes nothing: the shapes of this scene are the same from everywhere, and its "
+            "colours are written for all directions.",
+            file=sys.stderr,
+        )
     origin = origin_of(models[0])
     parts = [
         make_part(path, model, origin_of(model) - origin, options)

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 
 from app.opening import PATIENCE_S, ReadingOptions, progress_after
@@ -28,7 +27,8 @@ def run(options: Options) -> int:
         facts = examine(options)
     except BadFile as refusal:
         if options.json:
-            print(json.dumps({"file": str(options.scene), "refused": True, "why": str(refusal)}))
+            why = {"file": str(options.scene), "refused": True, "why": str(refusal), "findings": []}
+            print(json.dumps(why, indent=1, ensure_ascii=False))
         raise
     if options.json:
         print(json.dumps(facts, indent=1, ensure_ascii=False))
@@ -41,14 +41,14 @@ def examine(options: Options) -> dict:
     """The findings of a scene and the numbers that they rest on.  Raises BadFile."""
     from dataclasses import replace
 
-    from runtime_models.lint_whole import fill_of
+    from runtime_models.lint_whole import fill_ratio, sample_of
     from runtime_models.read_scene import describe, read_model
 
     with progress_after(PATIENCE_S) as told:
         model = read_model(options.scene, replace(options.reading(), told=told))
     facts = describe(model, options.scene)
     splats = splats_of(model)
-    low, high = np.percentile(splats.means, (1, 99), axis=0)
+    sample = sample_of(splats.means, splats.scales, splats.opacity)
     return {
         "file": str(options.scene),
         "refused": False,
@@ -56,9 +56,9 @@ def examine(options: Options) -> dict:
         "splats": facts["splats"],
         "sh_degree": facts["sh_degree"],
         "bytes": facts["bytes"],
-        "extent_m": [round(float(side), 4) for side in high - low],
+        "extent_m": [round(float(side), 4) + 0.0 for side in sample.high - sample.low],
         "origin_m": [float(c) for c in getattr(model, "origin", (0, 0, 0))],
-        "splats_over_a_pixel": round(fill_of(splats.means, splats.scales, splats.opacity), 2),
+        "splats_over_a_pixel": round(fill_ratio(sample), 2),
         "findings": [asdict(finding) for finding in model.findings],
     }
 
@@ -99,5 +99,14 @@ def print_report(facts: dict) -> None:
         table.add_row(*(Text(text) for text in (found["file"], found["what"], rows, found["done"])))
     console.print(table)
     repaired = sum(found["repaired"] for found in findings)
-    several = "s" * (len(findings) > 1)
-    console.print(f"{len(findings)} finding{several}, {repaired} repaired on opening.")
+    console.print(summary(len(findings), repaired))
+
+
+def summary(count: int, repaired: int) -> str:
+    """The last line of the report."""
+    findings, legal = f"{count} finding{'s' * (count > 1)}", count - repaired
+    if not legal:
+        return f"{findings}, all repaired on opening."
+    if not repaired:
+        return f"{findings}, only worth knowing."
+    return f"{findings}: {repaired} repaired on opening, {legal} only worth knowing."

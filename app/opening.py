@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from runtime_models.model import AnchorModel, Finding, SplatLayers
+from runtime_models.model import Finding, Model
 from runtime_models.plain_splats import Reading
 
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
@@ -50,7 +50,7 @@ class ReadingOptions:
 
 def open_model(
     path: Path, options: ReadingOptions, told: Callable[[str, float], None] | None = None
-) -> AnchorModel | SplatLayers:
+) -> Model:
     """The model in a file or folder; progress and findings go to stderr.  Raises BadFile.
 
     `told` takes the progress instead: (what, part 0..1), from the thread that reads.
@@ -81,9 +81,9 @@ def sentence(finding: Finding) -> str:
 @contextmanager
 def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
-    from rich.console import Console
     from rich.markup import escape
-    from rich.progress import Progress
+
+    from app.progress import progress_bar
 
     began, bar, task = time.monotonic(), None, None
 
@@ -92,7 +92,7 @@ def progress_after(seconds: float) -> Iterator:
         if bar is None:
             if time.monotonic() - began < seconds:
                 return
-            bar = Progress(console=Console(stderr=True), transient=True)
+            bar = progress_bar()
             bar.start()
             task = bar.add_task(escape(what), total=1.0)
         bar.update(task, description=escape(what), completed=part)

@@ -60,7 +60,7 @@ KEYS = (
 def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float, hooks: Hooks) -> Box:
     """The whole left panel; changes the stage's settings and palette.  Returns where it is.
 
-    `hooks` hold what other parts of the program add: under the title, and after Regions.
+    `hooks` hold what other parts of the program add: under the title, after Regions, to the keys.
     """
     imgui.set_next_window_pos(Vec(MARGIN * ui_scale, MARGIN * ui_scale))
     screen = imgui.get_io().display_size
@@ -104,7 +104,7 @@ def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float, ho
     if section("Machine"):
         rows(readings.machine.items(), share=0.34)
     if section("Keys"):
-        rows(KEYS, share=0.40)
+        rows((*KEYS, *hooks.keys), share=0.40)
     box = theme.window_box()
     imgui.end()
     return box

@@ -11,6 +11,7 @@ import tyro
 
 from app.opening import ReadingOptions, open_model
 
+AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
 
@@ -88,17 +89,11 @@ def run(options: Options) -> int:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
     settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
     check_one_of(options, budget)
-    opening = open_objects if is_scene_file(options.scene) else open_one
-    opened = opening(options, size)
+    # What needs no scene comes before it: large ones take a while to open.
+    cameras = choose_cameras(options, size)
+    pairs, paths = choose_paths(options, controls, len(cameras.views) if cameras else None)
+    opened = (open_objects if is_scene_file(options.scene) else open_one)(options, cameras, size)
     views = opened.views
-    count = len(controls) * len(views)
-    if count > MOST_VALUES:
-        raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
-    pairs = [(x, i) for x in controls for i in range(len(views))]
-    paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
-    taken = [p for p in paths if p.exists()]
-    if taken and not options.overwrite:
-        raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
         background = options.background or opened.background
@@ -110,7 +105,7 @@ def run(options: Options) -> int:
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
         scenes = [opened.scene_at(x, i) for x, i in pairs]
         draw_all(renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
-    print(f"{count} picture{'s' * (count > 1)} in {options.out}", file=sys.stderr)
+    print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {options.out}", file=sys.stderr)
     return 0
 
 
@@ -124,13 +119,14 @@ class Opened:
     model: object = None  # the one that a budget is measured with
 
 
-def open_one(options: Options, size: tuple[int, int] | None) -> Opened:
+def open_one(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     """A scene of one model, with the parts of --select."""
+    from app.camera_files import in_scene
     from scene.framing import default_background
     from scene.scene import Scene, SceneObject
 
     model = open_model(options.scene, options)
-    views = choose_views(options, model, size)
+    views = in_scene(cameras, model).views if cameras else own_views(options, model, size)
     selectors = [choose_selectors(options.select, model, view) for view in views]
 
     def scene_at(x: float, row: int) -> Scene:
@@ -139,7 +135,7 @@ def open_one(options: Options, size: tuple[int, int] | None) -> Opened:
     return Opened(views, default_background(model, (0.0, 0.0, 0.0)), scene_at, model)
 
 
-def open_objects(options: Options, size: tuple[int, int] | None) -> Opened:
+def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     """The objects of a scene file, each where and as the file says."""
     from app.errors import UsageError
     from app.scene_files import open_scene_file, scene_views
@@ -149,7 +145,7 @@ def open_objects(options: Options, size: tuple[int, int] | None) -> Opened:
             option = f"--{name.replace('_', '-')}"
             raise UsageError(f"{option} is for one model; leave it out with a scene file.")
     file, _, scene = open_scene_file(options.scene, options)
-    views = scene_views(options, file, scene, size)
+    views = cameras.views if cameras else scene_views(options, file, scene, size)
     return Opened(views, (0.0, 0.0, 0.0), lambda x, row: scene)
 
 
@@ -174,20 +170,48 @@ def choose_settings(options: Options):
         raise UsageError(f"--{str(error).replace('_', '-', 1)}") from None
 
 
-def choose_views(options: Options, model, size: tuple[int, int] | None) -> list:
-    """The views that --camera stands for; `size` None leaves the pixels to the camera file."""
-    from app.camera_files import scene_cameras
-    from scene.framing import default_view, frame_points, model_points, orbit_path
+def choose_cameras(options: Options, size: tuple[int, int] | None):
+    """The CameraList of the files that --camera names, in their own world; None: views around the
+    scene.  `size` None leaves the pixels to the file.
+    """
+    from app.camera_files import named_cameras
 
-    if options.camera == "front" or (options.camera == "orbit" and options.frames == 1):
-        return [default_view(model, size or (640, 360))]
-    if options.camera == "orbit":
-        centre, radius = frame_points(*model_points(model))
-        return orbit_path(options.frames, centre, radius, size or (640, 360))
-    cameras = scene_cameras(options.camera, options.scene, model, options, size)
+    if options.camera in AROUND:
+        return None
+    cameras = named_cameras(options.camera, options.scene, options, size)
     for note in cameras.notes:
         print(note, file=sys.stderr)
-    return list(cameras.views)
+    return cameras
+
+
+def choose_paths(
+    options: Options, controls: list[float], views: int | None
+) -> tuple[list[tuple[float, int]], list[Path]]:
+    """(x, number of the view) of every picture, and its file.  UsageError where one is there."""
+    from app.drawing import MOST_VALUES
+    from app.errors import UsageError
+
+    views = views or (options.frames if options.camera == "orbit" else 1)
+    count = len(controls) * views
+    if count > MOST_VALUES:
+        raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
+    pairs = [(x, i) for x in controls for i in range(views)]
+    paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
+    taken = [p for p in paths if p.exists()]
+    if taken and not options.overwrite:
+        raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
+    return pairs, paths
+
+
+def own_views(options: Options, model, size: tuple[int, int] | None) -> list:
+    """The views around the scene: as many as --frames on the orbit, else the one from the front."""
+    from scene.framing import default_view, frame_points, model_points, orbit_path
+
+    size = size or (640, 360)
+    if options.camera == "front" or options.frames == 1:
+        return [default_view(model, size)]
+    centre, radius = frame_points(*model_points(model))
+    return orbit_path(options.frames, centre, radius, size)
 
 
 def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
@@ -204,17 +228,15 @@ def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
 def draw_all(renderer, scenes: list, views: list, paths: list[Path], eye_distance: float) -> None:
     """A picture of each scene from its view; two eyes side by side where they are apart."""
     import numpy as np
-    from rich.console import Console
-    from rich.progress import track
 
     from app.drawing import save_png
     from app.picture_legend import with_legend
+    from app.progress import tracked
     from renderer.debug import debug_legend
     from scene.stereo import stereo_pair
 
-    console = Console(stderr=True)
     work = list(zip(scenes, views, paths, strict=True))
-    for scene, view, path in track(work, "drawing", console=console, transient=True):
+    for scene, view, path in tracked(work, "drawing"):
         renderer.update(scene)
         eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
         stats = renderer.draw(eyes)

@@ -49,20 +49,14 @@ def tell_findings(models: dict[str, "Model"]) -> None:
 def scene_views(
     options, file: "SceneFile", scene: "Scene", size: tuple[int, int] | None
 ) -> list["View"]:
-    """The views that --camera of `render` stands for; `size` None leaves the pixels to a file."""
-    from app.camera_files import scene_cameras
+    """The views around the objects: --frames of `render` on the orbit, else the file's own."""
     from scene.framing import frame_points, orbit_path, scene_points
     from scene.scene_file import first_view
 
-    if options.camera == "front" or (options.camera == "orbit" and options.frames == 1):
+    if options.camera == "front" or options.frames == 1:
         return [first_view(file, scene, size or (640, 360))]
-    if options.camera == "orbit":
-        centre, radius = frame_points(*scene_points(scene))
-        return orbit_path(options.frames, centre, radius, size or (640, 360))
-    cameras = scene_cameras(options.camera, options.scene, None, options, size)
-    for note in cameras.notes:
-        print(note, file=sys.stderr)
-    return list(cameras.views)
+    centre, radius = frame_points(*scene_points(scene))
+    return orbit_path(options.frames, centre, radius, size or (640, 360))
 
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:

@@ -30,6 +30,7 @@ class Hooks:
     opened: list[Callable[[], None]] = field(default_factory=list)  # after every change of scene
     status: list[Callable[[], str]] = field(default_factory=list)  # short words for the status
     #                                                                line; "" = nothing to say
+    keys: list[tuple[str, str]] = field(default_factory=list)  # (key, what it does), under Keys
     # over: called once the splats are on the screen, before the overlay, in every frame
     over: list[Callable[["Wish"], None]] = field(default_factory=list)
     # marks: called with ui_scale; over the picture, under the panel, not in saved pictures

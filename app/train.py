@@ -159,18 +159,17 @@ def interrupts() -> Iterator[list]:
 
 def train(trainer: "Trainer", checkpoint: Path) -> bool:
     """The run with its progress on standard error; True when Ctrl-C ended it early."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
+    from app.progress import progress_bar
     from training.checkpoint import write_checkpoint
 
     columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
     look, saved = 1 / LOOKS, time.monotonic()
     with (
         interrupts() as asked,
-        Progress(
-            BarColumn(24), *map(TextColumn, columns), TimeElapsedColumn(),
-            console=Console(file=sys.stderr),
+        progress_bar(
+            BarColumn(24), *map(TextColumn, columns), TimeElapsedColumn(), transient=False
         ) as bar,
     ):  # fmt: skip
         task = bar.add_task("compiling kernels", total=1.0, psnr="", loss="")

@@ -31,6 +31,10 @@ Vec = imgui.ImVec2
 GRAB = 10.0  # logical pixels on either side of the line that take hold of it
 STEP = 0.02  # of the window's width, for a press of , or .
 MARGIN = 12.0  # logical pixels between the line and a name
+KEYS = (
+    (", .", "move the line of the wipe"),
+    ("C", "wipe on, off"),
+)
 TOP = 14.0  # of the names, logical pixels from the window's upper edge
 
 
@@ -49,6 +53,7 @@ def comparing(viewer: "Viewer", options: "Options") -> Iterator["Wipe | None"]:
     drawing = viewer.renderer.backends["drawing"].split()[0]
     with Renderer(viewer.window.ctx, drawing) as renderer:
         wipe = Wipe(viewer, renderer, side)
+        viewer.say("Drag the line, or press , and . for it; C takes it away")
         try:
             yield wipe
         finally:
@@ -75,6 +80,7 @@ class Wipe:
         hooks.marks.append(self.draw_marks)
         hooks.takes.append(self.take)
         hooks.status.append(self.status)
+        hooks.keys += KEYS
         hooks.each_frame.append(lambda: self.on and self._waiting)
 
     @property

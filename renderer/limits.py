@@ -2,7 +2,7 @@
 
 from rasterizer.device import Device
 from rasterizer.project import RECORD
-from runtime_models.model import AnchorModel, BadFile, SplatLayers
+from runtime_models.model import BadFile, Model, SplatLayers
 
 MOST_INDEX = 2**31 - 1  # the kernels count floats with 32 bits and a sign
 
@@ -22,7 +22,7 @@ def too_many(count: int, most: int, limit: str, instead: str) -> TooLarge:
     )
 
 
-def check_tiles(device: Device, models: list[AnchorModel | SplatLayers]) -> None:
+def check_tiles(device: Device, models: list[Model]) -> None:
     """Raises TooLarge where an array of these objects' splats is longer than the device allows."""
     count = sum(model.splat_count for model in models)
     most = MOST_INDEX // RECORD

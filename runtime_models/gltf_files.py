@@ -44,7 +44,8 @@ class Asset:
         if name not in owner:
             return otherwise
         value = owner[name]
-        if not isinstance(value, kind) or (kind is int and (isinstance(value, bool) or value < 0)):
+        usual = isinstance(value, kind) and (kind is not int or not isinstance(value, bool))
+        if not usual or (kind is int and not 0 <= value < 1 << 63):
             raise self.refuse(f"'{name}' is {str(value)[:40]!r}, expected {WANTED[kind]}.")
         return value
 
@@ -100,7 +101,8 @@ class Asset:
         """A file in the folder of this one, or below; nothing else is ever opened."""
         name, folder = unquote(uri), self.path.parent.resolve()
         usual = not name.startswith("/") and not any(c in STRANGE or c < " " for c in name)
-        usual &= len(name) < 200  # of any letters, fits what a file may be called
+        usual &= all(len(part.encode("utf-8", "replace")) < 256 for part in name.split("/"))
+        usual &= len(name) < 1000  # what disks take
         target = (folder / name).resolve() if usual else None
         if target is None or not target.is_relative_to(folder):
             raise self.refuse(
@@ -154,7 +156,7 @@ class Asset:
         return np.maximum(table.astype(np.float32) / LARGEST[code], -1)
 
 
-WANTED = {dict: "an object", list: "a list", int: "a whole number from 0", str: "text",
+WANTED = {dict: "an object", list: "a list", int: "a whole number from 0 below 2^63", str: "text",
           bool: "true or false"}  # fmt: skip
 
 

@@ -2,14 +2,12 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from runtime_models.lint_rows import mend_rows
-from runtime_models.lint_whole import read_coding, refuse_boundless, refuse_filling
+from runtime_models.lint_whole import read_coding, refuse_boundless, refuse_filling, sample_of
 from runtime_models.model import BadFile, Finding
 from runtime_models.own_units import to_own_units
 from runtime_models.plain_splats import PlainSplats, RawSplats, Reading
-from runtime_models.recentre import recentre
+from runtime_models.recentre import about, place_of
 from runtime_models.turn import ours_from_file
 
 
@@ -26,19 +24,21 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     findings += mend_rows(raw, odd, filed)
     if not len(raw.means):
         raise BadFile(f"{raw.file}: not one of {count:,} splats can be drawn{because(findings)}.")
-    refuse_boundless(raw)
-    refuse_filling(raw, reading.allow_huge)
-    origin, found = recentre(raw)
+    sample = sample_of(raw.means, raw.scales, raw.opacity)
+    refuse_boundless(raw.file, sample)
+    if not reading.allow_huge:
+        refuse_filling(raw.file, sample)
+    origin, found = place_of(sample, raw.means.dtype, raw.file)
     findings += found
     if reading.strict:
         refuse_repairs(raw.file, findings)
     return PlainSplats(
-        raw.means.astype(np.float32, copy=False),
+        about(raw.means, origin),
         raw.scales,
         raw.wxyz,
         raw.opacity,
         raw.sh,
-        origin=tuple(map(float, origin)),
+        origin=origin,
         antialiased=raw.antialiased,
         labels=raw.labels,
         extra=raw.extra,

@@ -20,16 +20,24 @@ def morton_order(points: np.ndarray) -> np.ndarray:
     """
     if len(points) < 2:
         return np.arange(len(points))
-    points = points.astype(np.float64, copy=False)
-    low, middle, high = np.quantile(points, (0.05, 0.5, 0.95), axis=0)
-    spread = np.where(high > low, high - low, 1.0)
-    bent = np.arcsinh((points - middle) / spread)
-    bent -= bent.min(axis=0)
-    largest = bent.max(axis=0)
-    share = bent / np.where(largest > 0, largest, 1.0)
-    cells = (share * (2**BITS - 1)).astype(np.uint64)
-    keys = spaced(cells[:, 0]) | spaced(cells[:, 1]) << np.uint64(1)
-    return np.argsort(keys | spaced(cells[:, 2]) << np.uint64(2), kind="stable")
+    keys = np.zeros(len(points), np.uint64)
+    for axis in range(3):  # one after the other: a tenth of the memory
+        keys |= spaced(cells(points[:, axis])) << np.uint64(axis)
+    return np.argsort(keys, kind="stable")
+
+
+def cells(places: np.ndarray) -> np.ndarray:
+    """(N,) uint64 below 2**BITS of places (N,) along an axis."""
+    bent = places.astype(np.float64)
+    low, middle, high = np.quantile(bent, (0.05, 0.5, 0.95))
+    bent -= middle
+    bent /= high - low if high > low else 1.0
+    np.arcsinh(bent, out=bent)
+    bent -= bent.min()
+    largest = bent.max()
+    bent /= largest if largest > 0 else 1.0
+    bent *= 2**BITS - 1
+    return bent.astype(np.uint64)
 
 
 def spaced(numbers: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.blocks import each_block
+from runtime_models.blocks import block_of, each_block
 from runtime_models.odd_rows import is_odd, odd_in
 from runtime_models.plain_splats import RawSplats
 from runtime_models.rotation import normalize
@@ -41,7 +41,7 @@ def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawS
         turn_rows(raw.means[rows], raw.wxyz[rows], raw.sh[rows])
 
     with np.errstate(over="ignore", invalid="ignore"):
-        each_block(len(raw.means), work)
+        each_block(len(raw.means), work, block=block_of(44 + 12 * raw.sh.shape[1]))
     found.sort(key=lambda each: each[0][0] if len(each[0]) else 0)
     if not found:
         found = [(np.empty(0, np.intp), [getattr(filed, name)[:0] for name in ARRAYS])]

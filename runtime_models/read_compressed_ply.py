@@ -47,23 +47,26 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
         logits=False,
         antialiased="splatrendermode: mip" in [comment.lower() for comment in header.comments],
     )
-    coefficient = harmonic_of_code()
+    colored = set(COLORS) <= set(ranges.dtype.names)
 
     def decode(rows: slice, _: object) -> None:
         words = packed[rows]
         near = ranges[rows.start // CHUNK : -(-rows.stop // CHUNK)]  # blocks begin with a chunk
-        raw.means[rows] = within(unpack(words["packed_position"], BITS_11_10_11), near, POSITIONS)
-        raw.scales[rows] = within(unpack(words["packed_scale"], BITS_11_10_11), near, SCALES)
-        raw.wxyz[rows] = unpack_smallest_three(words["packed_rotation"])
-        shown = unpack(words["packed_color"], BITS_8888)  # (n, 4) 0..1
-        raw.opacity[rows] = shown[:, 3]
-        colored = set(COLORS) <= set(ranges.dtype.names)
-        color = within(shown[:, :3], near, COLORS) if colored else shown[:, :3]
+        places, sizes = (
+            unpack(words[name], BITS_11_10_11) for name in ("packed_position", "packed_scale")
+        )
+        *shades, raw.opacity[rows] = unpack(words["packed_color"], BITS_8888)
+        within(places, near, POSITIONS, raw.means[rows])
+        within(sizes, near, SCALES, raw.scales[rows])
+        unpack_smallest_three(words["packed_rotation"], raw.wxyz[rows])
+        color = np.stack(shades, axis=1)
+        if colored:
+            within(shades, near, COLORS, color)
         raw.sh[rows, 0] = (color - 0.5) / C0
-        raw.sh[rows, 1:] = coefficient[rest[rows]].transpose(0, 2, 1)
+        raw.sh[rows, 1:] = harmonics(rest[rows])
 
     with np.errstate(invalid="ignore", over="ignore"):  # ranges of NaN or Inf are for the judge
-        each_block(count, decode, teller(path, reading), block=8 * CHUNK)
+        each_block(count, decode, teller(path, reading))
     return raw
 
 
@@ -110,38 +113,56 @@ def harmonics_of(path: Path, header: PlyHeader, count: int) -> np.ndarray:
     return codes.view(np.uint8).reshape(count, 3, -1)
 
 
-def harmonic_of_code() -> np.ndarray:
-    """(256,) the coefficient that each byte stands for: the middle of its bin, the ends exact."""
-    share = (np.arange(256) + 0.5) / 256
-    share[[0, 255]] = 0, 1
-    return ((share - 0.5) * SH_SPAN).astype(np.float32)
+def harmonics(codes: np.ndarray) -> np.ndarray:
+    """(N, M - 1, 3) coefficients of bytes (N, 3, M - 1): the middle of a bin, the ends exact."""
+    count, _, width = codes.shape
+    by_coefficient = np.arange(3 * width).reshape(3, width).T.reshape(-1)
+    near = codes.reshape(count, 3 * width).take(
+        by_coefficient, axis=1
+    )  # far quicker than a transpose
+    out = near.astype(np.float32)
+    out -= np.float32(127.5)
+    out *= np.float32(SH_SPAN / 256)  # a power of two: exact
+    np.copyto(out, np.float32(-SH_SPAN / 2), where=near == 0)
+    np.copyto(out, np.float32(SH_SPAN / 2), where=near == 255)
+    return out.reshape(count, width, 3)
 
 
-def unpack(packed: np.ndarray, bits: tuple[tuple[int, int], ...]) -> np.ndarray:
-    """(N, k) float32 in 0..1 of words (N,) with k codes each."""
-    codes = [((packed >> shift) & largest) / np.float32(largest) for shift, largest in bits]
-    return np.stack(codes, 1, dtype=np.float32)
+def unpack(packed: np.ndarray, bits: tuple[tuple[int, int], ...]) -> list[np.ndarray]:
+    """k arrays (N,) float32 in 0..1 of words (N,) with k codes each."""
+    return [
+        ((packed >> shift) & largest).astype(np.float32) / np.float32(largest)
+        for shift, largest in bits
+    ]
 
 
-def within(shares: np.ndarray, ranges: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """(N, 3) values at shares 0..1 of the way from the least to the most of their chunk."""
-    table = np.stack([ranges[name] for name in names], 1)  # (chunks, 6)
-    ends = np.repeat(table, CHUNK, axis=0)[: len(shares)]
-    return ends[:, :3] * (1 - shares) + ends[:, 3:] * shares
+def within(
+    shares: list[np.ndarray], ranges: np.ndarray, names: tuple[str, ...], out: np.ndarray
+) -> None:
+    """out (N, 3): values at shares 0..1 of the way from the least to the most of their chunk."""
+    whole = len(out) // CHUNK * CHUNK  # the last chunk may be a part of one
+    for axis, share in enumerate(shares):
+        low, high = ranges[names[axis]], ranges[names[axis + 3]]
+        for part, wide in ((slice(0, whole), CHUNK), (slice(whole, None), len(out) - whole)):
+            if wide and len(out[part]):
+                near = slice(part.start // CHUNK, -(-len(out[: part.stop]) // CHUNK))
+                way = share[part].reshape(-1, wide)
+                ends = low[near, None] * (1 - way) + high[near, None] * way
+                out[part, axis] = ends.reshape(-1)
 
 
-def unpack_smallest_three(packed: np.ndarray) -> np.ndarray:
-    """(N, 4) wxyz: 2 bits say which entry is the largest, 10 bits each hold the others."""
-    small = [(packed >> shift) & 1023 for shift in (20, 10, 0)]
-    small = (np.stack(small, 1, dtype=np.float32) / 1023 - 0.5) * np.float32(2**0.5)
-    return from_smallest_three(small, packed >> 30)
+def unpack_smallest_three(packed: np.ndarray, out: np.ndarray) -> None:
+    """out (N, 4) wxyz: 2 bits say which entry is the largest, 10 bits each hold the others."""
+    small = unpack(packed, ((20, 1023), (10, 1023), (0, 1023)))
+    small = [(share - np.float32(0.5)) * np.float32(2**0.5) for share in small]
+    from_smallest_three(small, packed >> 30, out)
 
 
-def from_smallest_three(small: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """(N, 4) quaternions of three entries in order (N, 3) and which one is left out (N,)."""
-    rest = np.sqrt(np.maximum(0, 1 - (small * small).sum(1)))
-    places = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])[largest]  # (N, 3)
-    out = np.empty((len(small), 4), np.float32)
-    np.put_along_axis(out, places, small, axis=1)
-    np.put_along_axis(out, largest[:, None].astype(np.intp), rest[:, None], axis=1)
-    return out
+def from_smallest_three(small: list[np.ndarray], largest: np.ndarray, out: np.ndarray) -> None:
+    """out (N, 4): quaternions of three entries in order, (N,) each, and which one is left out."""
+    a, b, c = small
+    rest = np.sqrt(np.maximum(0, 1 - (a * a + b * b + c * c)))
+    out[:, 0] = np.where(largest == 0, rest, a)
+    out[:, 1] = np.where(largest == 0, a, np.where(largest == 1, rest, b))
+    out[:, 2] = np.where(largest == 3, c, np.where(largest == 2, rest, b))
+    out[:, 3] = np.where(largest == 3, rest, c)

@@ -26,6 +26,7 @@ NUMBER = re.compile(r"(?:iteration|point_cloud)_([0-9]{1,18})", re.ASCII)
 PAIR = ("color", "thermal")
 NO_SPLATS = {"input.ply", "points3d.ply"}  # what a run started from: points
 
+
 def newest_cloud(folder: Path) -> Path | None:
     """The cloud of the largest iteration in a run's folder; None where it is no such folder."""
     for name in ("point_cloud", "point_cloud_color", "point_cloud_thermal"):

@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from runtime_models.blocks import BLOCK, each_block
+from runtime_models.blocks import block_of, each_block
 from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.ply_file import Element, PlyHeader, read_header
@@ -127,12 +127,12 @@ class Columns:
 
 def read_records(path: Path, begins: int, splats: Columns, reading: Reading) -> None:
     """Fills the columns from a binary file, several blocks at once."""
-    size = splats.row.itemsize
+    size, block = splats.row.itemsize, block_of(splats.row.itemsize)
 
     @contextmanager
     def opened() -> Iterator[tuple[BinaryIO, np.ndarray]]:
         with path.open("rb", buffering=0) as file:
-            yield file, np.empty(BLOCK, splats.row)
+            yield file, np.empty(block, splats.row)
 
     def work(rows: slice, own: tuple[BinaryIO, np.ndarray]) -> None:
         file, table = own[0], own[1][: rows.stop - rows.start]
@@ -141,7 +141,7 @@ def read_records(path: Path, begins: int, splats: Columns, reading: Reading) -> 
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         splats.fill(rows, table)
 
-    each_block(splats.count, work, teller(path, reading), opened)
+    each_block(splats.count, work, teller(path, reading), opened, block)
 
 
 def read_fully(file: BinaryIO, into: memoryview) -> int:

@@ -89,17 +89,25 @@ def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) ->
 
 def colors_of(table: np.ndarray) -> np.ndarray:
     """(N, 1, 3) float32 harmonics of degree 0: the points' colours, or gray."""
-    names = next((three for three in (*COLORS, DIRECT) if set(three) <= set(table.dtype.names)), ())
-    if names == DIRECT:
-        return np.stack([table[name] for name in names], 1, dtype=np.float32)[:, None]
-    if not names:
+    shades = shades_of(table)
+    if shades is None and set(DIRECT) <= set(table.dtype.names):
+        return np.stack([table[name] for name in DIRECT], 1, dtype=np.float32)[:, None]
+    if shades is None:
         return np.full((len(table), 1, 3), (GRAY - 0.5) / C0, np.float32)
+    return ((shades - 0.5) / np.float32(C0))[:, None]
+
+
+def shades_of(table: np.ndarray) -> np.ndarray | None:
+    """(N, 3) float32 red, green and blue, 1 the most that an integer can say; None without."""
+    names = next((three for three in COLORS if set(three) <= set(table.dtype.names)), None)
+    if names is None:
+        return None
     shades = []
     for name in names:
         kind = table.dtype[name]
         most = np.iinfo(kind).max if kind.kind in "iu" else 1.0
         shades.append(table[name].astype(np.float32) / np.float32(most))
-    return ((np.stack(shades, 1) - 0.5) / np.float32(C0))[:, None]
+    return np.stack(shades, 1)
 
 
 def others_of(table: np.ndarray) -> dict[str, np.ndarray]:

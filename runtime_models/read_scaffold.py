@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.blocks import BLOCK
+from runtime_models.lint_whole import sample_of
 from runtime_models.model import OCTREE_RULES, BadFile, Finding, Octree, ScaffoldModel, Stop
-from runtime_models.plain_splats import COLMAP_UP, RawSplats, Reading
-from runtime_models.recentre import recentre
+from runtime_models.plain_splats import COLMAP_UP, Reading
+from runtime_models.recentre import place_of
 from runtime_models.scaffold_budget import refuse_filling, within_budget
 from runtime_models.scaffold_cloud import Cloud, read_cloud
 from runtime_models.scaffold_networks import Networks, Shape, read_networks, turn_networks
@@ -57,7 +58,9 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
     shape = Shape(features, k, octree is not None, boolean(settings.get("add_level")))
     networks = read_networks(file.parent, shape)
     anchors, features_of, offsets, scales, _ = cloud.kept()
-    origin, far = place_of(anchors, scales, file.name)
+    sample = sample_of(anchors, scales, np.ones(len(anchors)))
+    place, far = place_of(sample, anchors.dtype, file.name)
+    origin = np.array(place)
     anchors -= origin.astype(np.float32)
     if octree is not None:
         octree.places[:] -= origin.astype(np.float32)
@@ -94,15 +97,6 @@ def provenance_of(
     if boolean(settings.get("white_background")):
         found["background"] = (1.0, 1.0, 1.0)
     return found
-
-
-def place_of(anchors: np.ndarray, scales: np.ndarray, file: str) -> tuple[np.ndarray, list]:
-    """(3,) metres that are taken off, zeros unless the scene lies far away; what is said of it."""
-    sizes = RawSplats(
-        anchors, scales, np.zeros((0, 4), np.float32), np.ones(len(anchors), np.float32),
-        np.zeros((0, 1, 3), np.float32), file, "Scaffold-GS", log_scales=False, logits=False,
-    )  # fmt: skip
-    return recentre(sizes)
 
 
 def turn_places(places: np.ndarray, rotation: np.ndarray) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.formats import format_of
+from runtime_models.lint_package import refuse_filling
 from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
 from runtime_models.plain_splats import Reading
@@ -22,7 +23,7 @@ from runtime_models.read_scaffold import is_scaffold, read_scaffold
 from runtime_models.read_sog import is_sog
 from runtime_models.read_streamed import TREE, is_streamed, read_sog_folder, read_streamed
 from runtime_models.sog_files import META
-from runtime_models.thin import thin
+from runtime_models.thin import left_whole, thin
 
 KNOWN = (
     "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
@@ -40,6 +41,8 @@ def read_model(path: str | Path, reading: Reading | None = None) -> Model:
             f"{Path(path).name} does not fit this machine's memory ({error}); close other "
             "programs, or open fewer layers."
         ) from error
+    if isinstance(model, AnchorModel):
+        return left_whole(model, reading.most_splats, Path(path).name)
     return thin(model, reading.most_splats) if isinstance(model, SplatLayers) else model
 
 
@@ -85,7 +88,10 @@ def read_upright(path: Path, reading: Reading) -> AnchorModel:
         raise BadFile(
             f"{path.name} is a package, and +Y is up in all of them; leave out --up and --flip."
         )
-    return read_package(path)
+    model = read_package(path)
+    if not reading.allow_huge:
+        refuse_filling(model, path.name)
+    return model
 
 
 def is_package(path: Path) -> bool:

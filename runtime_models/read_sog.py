@@ -193,9 +193,9 @@ def read_quaternions(sog: Sog) -> np.ndarray:
     unknown = pixels[:, 3] < FIRST_MODE
 
     def fill(rows: slice, _: object) -> None:
-        small = (pixels[rows, :3].astype(np.float32) / 255 - 0.5) * np.float32(2**0.5)
+        small = (pixels[rows, :3].T.astype(np.float32, order="C") / 255 - 0.5) * np.float32(2**0.5)
         mode = np.maximum(pixels[rows, 3], FIRST_MODE) - np.uint8(FIRST_MODE)
-        wxyz[rows] = from_smallest_three(small, mode)
+        from_smallest_three(small, mode, wxyz[rows])
 
     each_block(sog.count, fill)
     if unknown.any():

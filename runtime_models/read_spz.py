@@ -1,12 +1,15 @@
 """The .spz format (Niantic), versions 1 to 4: 16 to 64 bytes a splat, compressed; SH 0 to 3."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.blocks import BLOCK
 from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import RawSplats, Reading
-from runtime_models.spz_file import ANTIALIASED, REST, Spz, is_spz, unpack_spz
+from runtime_models.read_compressed_ply import from_smallest_three
+from runtime_models.spz_file import ANTIALIASED, REST, SpzHeader, is_spz, unpack_spz
 
 COLOR_SCALE = 0.15  # of the first coefficient: code / 255 = 0.5 + 0.15 f
 AXES_EXTENSION = 0xADBE0003  # Adobe's: which axes the places are in
@@ -29,101 +32,114 @@ def read_raw_spz(path: Path, reading: Reading) -> RawSplats:
 
 def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
     """The same of a file in memory; x right, y up, z back, if no extension says otherwise."""
-    reading.tell(f"decompressing {file}", 0.0)
     spz = unpack_spz(data, file)
-    reading.tell(f"reading {file}", 0.6)
-    findings: list[Finding] = []
-    up = axis_up(spz, findings)
-    _, alphas, colors, scales, _, _ = spz.streams
-    sh = unpack_harmonics(spz, findings)
-    sh[:, 0] = (codes(colors, 3) / np.float32(255) - np.float32(0.5)) / np.float32(COLOR_SCALE)
-    return RawSplats(
-        means=unpack_places(spz),
-        scales=codes(scales, 3) / np.float32(16) - np.float32(10),
-        wxyz=unpack_rotations(spz),
-        opacity=(codes(alphas, 1) / np.float32(255))[:, 0],
-        sh=sh,
+    header = spz.header
+    count, there = header.count, REST[header.degree]
+    kept = min(there, REST[3])
+    raw = RawSplats(
+        means=np.empty((count, 3), np.float32),
+        scales=np.empty((count, 3), np.float32),
+        wxyz=np.empty((count, 4), np.float32),
+        opacity=np.empty(count, np.float32),
+        sh=np.empty((count, 1 + kept, 3), np.float32),
         file=file,
-        format=f"spz v{spz.header.version}",
+        format=f"spz v{header.version}",
         logits=False,
-        up=up,
-        antialiased=bool(spz.header.flags & ANTIALIASED),
-        findings=tuple(findings),
+        antialiased=bool(header.flags & ANTIALIASED),
     )
+    streams = zip(header.widths, decoders(raw, header), strict=True)
+    for done, (width, decode) in enumerate(streams):
+        reading.tell(f"reading {file}", done / len(header.widths))
+        for first in range(0, count if width else 0, BLOCK):  # one after the other, as they lie
+            rows = slice(first, min(first + BLOCK, count))
+            stream = spz.take(width * (rows.stop - first))
+            decode(rows, np.frombuffer(stream, np.uint8).reshape(-1, width))
+    findings: list[Finding] = []
+    raw.up = axis_up(spz.extensions(), file, findings)
+    if kept < there:
+        what = f"{there - kept} coefficients of SH degree 4 a splat"
+        done = "left out, degree 3 is drawn"
+        findings.append(Finding(what, 0, done, file=file, repaired=False))
+    raw.findings = tuple(findings)
+    return raw
 
 
-def codes(stream: memoryview, columns: int) -> np.ndarray:
-    """(N, columns) uint8 of a stream."""
-    return np.frombuffer(stream, np.uint8).reshape(-1, columns)
+def decoders(raw: RawSplats, header: SpzHeader) -> tuple[Callable[[slice, np.ndarray], None], ...]:
+    """For each of the streams, what fills in some rows from their codes (n, width) uint8."""
+
+    def places(rows: slice, codes: np.ndarray) -> None:
+        raw.means[rows] = unpack_places(codes, header)
+
+    def alphas(rows: slice, codes: np.ndarray) -> None:
+        raw.opacity[rows] = codes[:, 0] / np.float32(255)
+
+    def colors(rows: slice, codes: np.ndarray) -> None:
+        shades = codes / np.float32(255) - np.float32(0.5)
+        np.divide(shades, np.float32(COLOR_SCALE), out=raw.sh[rows, 0])
+
+    def scales(rows: slice, codes: np.ndarray) -> None:
+        raw.scales[rows] = codes / np.float32(16) - np.float32(10)
+
+    def rotations(rows: slice, codes: np.ndarray) -> None:
+        unpack = unpack_first_three if header.version < 3 else unpack_smallest_three
+        unpack(codes, raw.wxyz[rows])
+
+    def harmonics(rows: slice, codes: np.ndarray) -> None:
+        kept = 3 * (raw.sh.shape[1] - 1)  # of degree 4 those up to degree 3
+        values = codes[:, :kept].astype(np.float32)
+        values -= np.float32(128)
+        values *= np.float32(1 / 128)
+        raw.sh[rows].reshape(len(codes), -1)[:, 3:] = values
+
+    return places, alphas, colors, scales, rotations, harmonics
 
 
-def unpack_places(spz: Spz) -> np.ndarray:
-    """(N, 3) float32, exact: 24 bits, or half floats in version 1."""
-    stream = spz.streams[0]
-    if spz.header.version == 1:
-        return np.frombuffer(stream[:-1], "<f2").reshape(-1, 3).astype(np.float32)
-    # A word at every third byte: pushing the fourth one out leaves the code, with its sign.
-    words = np.ndarray(3 * spz.header.count, "<i4", stream, strides=(3,))
-    out = ((words << 8) >> 8).astype(np.float32)
-    out *= np.float32(0.5**spz.header.fractional_bits)
-    return out.reshape(-1, 3)
-
-
-def unpack_rotations(spz: Spz) -> np.ndarray:
-    """(N, 4) wxyz, unit but for rounding: of x y z, or (from version 3) of the smallest three."""
-    stream = spz.streams[4]
-    out = np.empty((spz.header.count, 4), np.float32)
-    if spz.header.version < 3:
-        xyz = codes(stream, 3) / np.float32(127.5) - np.float32(1)
-        out[:, 1:] = xyz
-        out[:, 0] = np.sqrt(np.maximum(0, 1 - (xyz * xyz).sum(1)))
-        return out
-    words = np.frombuffer(stream, "<u4")
-    largest = words >> 30  # 0 to 3: x, y, z or w
-    total = np.zeros(len(words), np.float32)
-    for step, shift in enumerate((20, 10, 0)):
-        code = words >> np.uint32(shift)
-        value = (code & 511).astype(np.float32) * SMALL
-        value[(code & 512) > 0] *= -1
-        total += value * value
-        entry = step + (largest <= step)  # the step-th of those that are not the largest
-        out[np.arange(len(words)), (entry + 1) % 4] = value
-    rest = np.sqrt(np.maximum(0, 1 - total))
-    out[np.arange(len(words)), (largest + 1) % 4] = rest
+def unpack_places(codes: np.ndarray, header: SpzHeader) -> np.ndarray:
+    """(n, 3) float32, exact: 24 bits each, or half floats in version 1."""
+    if header.version == 1:
+        return codes.view("<f2").astype(np.float32)
+    words = np.zeros((len(codes), 3, 4), np.uint8)
+    words[:, :, 1:] = codes.reshape(-1, 3, 3)
+    # The code is on top of its word, with its sign.
+    out = (words.view("<i4")[:, :, 0] >> 8).astype(np.float32)
+    out *= np.float32(0.5**header.fractional_bits)
     return out
 
 
-def unpack_harmonics(spz: Spz, findings: list[Finding]) -> np.ndarray:
-    """(N, M, 3) coefficients, the first not filled in; of degree 4 those up to degree 3."""
-    there = REST[spz.header.degree]
-    kept = min(there, REST[3])
-    if kept < there:
-        what = f"{there - kept} coefficients of SH degree 4 a splat"
-        findings.append(
-            Finding(what, 0, "left out, degree 3 is drawn", file=spz.header.file, repaired=False)
-        )
-    sh = np.empty((spz.header.count, 1 + kept, 3), np.float32)
-    if kept:
-        coded = codes(spz.streams[5], 3 * there).reshape(-1, there, 3)
-        np.subtract(coded[:, :kept], np.float32(128), out=sh[:, 1:], dtype=np.float32)
-        sh[:, 1:] /= 128
-    return sh
+def unpack_first_three(codes: np.ndarray, out: np.ndarray) -> None:
+    """out (n, 4) wxyz, unit but for rounding, of x y z."""
+    xyz = codes / np.float32(127.5) - np.float32(1)
+    out[:, 1:] = xyz
+    out[:, 0] = np.sqrt(np.maximum(0, 1 - (xyz * xyz).sum(1)))
 
 
-def axis_up(spz: Spz, findings: list[Finding]) -> str:
+def unpack_smallest_three(codes: np.ndarray, out: np.ndarray) -> None:
+    """out (n, 4) wxyz: 2 bits for which of x y z w is left out, 1 + 9 bits for each other."""
+    words = codes.view("<u4")[:, 0]
+    small = []
+    for shift in (20, 10, 0):
+        code = words >> np.uint32(shift)
+        value = (code & 511).astype(np.float32) * SMALL
+        small.append(np.where(code & 512, -value, value))
+    xyzw = np.empty_like(out)
+    from_smallest_three(small, words >> 30, xyzw)
+    out[:] = xyzw[:, (3, 0, 1, 2)]
+
+
+def axis_up(extensions: dict[int, bytes], file: str, findings: list[Finding]) -> str:
     """The file's axis that points up.  Raises BadFile for axes that are a mirror image."""
-    told = spz.extensions.get(AXES_EXTENSION, b"")
-    others = [kind for kind in spz.extensions if kind != AXES_EXTENSION]
+    told = extensions.get(AXES_EXTENSION, b"")
+    others = [kind for kind in extensions if kind != AXES_EXTENSION]
     if others:
         what = f"extensions {', '.join(f'{kind:#010x}' for kind in others)}"
-        findings.append(Finding(what, 0, "not looked at", file=spz.header.file, repaired=False))
+        findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
     number = int.from_bytes(told, "little") if len(told) == 4 else 0
     if not 1 <= number <= len(NAMED_AXES):
         return "+Y"
     axes = NAMED_AXES[number - 1]
     if not right_handed(axes):
         raise BadFile(
-            f"{spz.header.file} has the axes {axes}, a mirror image of ours; write it again with "
+            f"{file} has the axes {axes}, a mirror image of ours; write it again with "
             "RUB, the format's own."
         )
     place = next(i for i, letter in enumerate(axes) if letter in "UD")

@@ -14,6 +14,7 @@ from runtime_models.package_files import DAMAGED
 
 META = "meta.json"
 LARGEST_META = 4 << 20  # bytes; real ones have some kilobytes
+LONGEST_NAME = 255  # bytes, of a file or a folder on disks
 SMALL = 1 << 16  # bytes that any file may have
 # Pillow on a damaged or hostile picture; DecompressionBombError is no ValueError.
 UNREADABLE = (
@@ -107,8 +108,10 @@ def webp_size(data: bytes) -> tuple[int, int]:
 
 def check_name(name: str, said_by: str) -> None:
     """Raises BadFile where a name, as a file states it, leads out of its folder."""
-    outside = any(part in ("", ".", "..") for part in name.split("/"))
-    if outside or set(name) & set("\\:\0"):
+    parts = name.split("/")
+    outside = any(part in ("", ".", "..") for part in parts)
+    outside |= any(len(part.encode("utf-8", "replace")) > LONGEST_NAME for part in parts)
+    if outside or not name.isprintable() or len(parts) > 8 or set(name) & set("\\:\0"):
         raise BadFile(f"{said_by} names the file {name[:60]!r}, which is none of its own.")
 
 

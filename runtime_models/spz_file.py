@@ -1,4 +1,4 @@
-"""The .spz container (Niantic): its header, and its six streams decompressed within bounds.
+"""The .spz container (Niantic): its header, and its six streams, decompressed piece by piece.
 
 Versions 1 to 3 are one gzip stream (or, raw, none) of a header of 16 bytes and the streams one
 after another; version 4 is a plain header of 32 bytes, extensions, a table, and a zstd stream each.
@@ -24,6 +24,7 @@ MOST_FRACTIONAL_BITS = 30
 MOST_RATIO = 32  # decompressed bytes a byte of the file
 ALWAYS_FREE = 1 << 24  # decompressed bytes that any file may have
 MOST_EXTENSION_BYTES = 1 << 16
+PIECE = 1 << 16  # bytes of a gzip stream that are given to zlib at a time
 
 
 @dataclass(frozen=True)
@@ -36,20 +37,44 @@ class SpzHeader:
     file: str  # for messages
 
     @property
-    def sizes(self) -> tuple[int, ...]:
-        """Bytes of places, alphas, colours, scales, rotations and harmonics."""
+    def widths(self) -> tuple[int, ...]:
+        """Bytes a splat of places, alphas, colours, scales, rotations and harmonics."""
         place, rotation = (6 if self.version == 1 else 9), (4 if self.version >= 3 else 3)
-        return tuple(self.count * n for n in (place, 1, 3, 3, rotation, 3 * REST[self.degree]))
+        return place, 1, 3, 3, rotation, 3 * REST[self.degree]
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """The same in bytes of all splats."""
+        return tuple(self.count * width for width in self.widths)
 
 
-@dataclass(frozen=True)
 class Spz:
-    """A file's streams, and whatever else it holds."""
+    """A file's header, and its streams one after the other: take(size) gives their next bytes.
 
-    header: SpzHeader
-    streams: tuple[memoryview, ...]  # places (and one byte more, so that a word fits at each
-    #                                  code), alphas, colours, scales, rotations, harmonics
-    extensions: dict[int, bytes]
+    The streams are places, alphas, colours, scales, rotations and harmonics.
+    """
+
+    def __init__(self, header: SpzHeader, source: "Inflate | Raw | Zstd", extensions: bytes | None):
+        self.header, self._source, self._extensions, self._taken = header, source, extensions, 0
+
+    def take(self, size: int) -> bytes:
+        """Exactly `size` bytes.  Raises BadFile."""
+        part = self._source.take(size)
+        self._taken += len(part)
+        if len(part) < size:
+            count, needed = self.header.count, sum(self.header.sizes)
+            raise BadFile(
+                f"{self.header.file} is cut off: {count:,} splats need {needed:,} bytes, not "
+                f"{self._taken:,}."
+            )
+        return part
+
+    def extensions(self) -> dict[int, bytes]:
+        """{type: content}; to be asked when all streams have been taken."""
+        data = self._extensions
+        if data is None:  # after the streams
+            data = self._source.take(MOST_EXTENSION_BYTES)
+        return read_extensions(data) if self.header.flags & EXTENSIONS else {}
 
 
 def is_spz(head: bytes) -> bool:
@@ -63,7 +88,7 @@ def is_spz(head: bytes) -> bool:
 
 
 def unpack_spz(data: bytes, file: str) -> Spz:
-    """The container of a whole file in memory.  Raises BadFile."""
+    """The container of a whole file in memory, nothing of it decompressed yet.  Raises BadFile."""
     if data[:4] != MAGIC and data[:2] != GZIP:
         raise BadFile(f"{file} begins neither with NGSP nor as gzip, as an .spz does.")
     if data[:4] == MAGIC and int.from_bytes(data[4:8], "little") >= 4:
@@ -104,19 +129,7 @@ def unpack_legacy(data: bytes, file: str) -> Spz:
     if version >= 4:
         raise BadFile(f"{file} is .spz version {version} inside gzip; 1 to 3 are there.")
     header = checked(SpzHeader(version, count, degree, bits, flags, file), len(data))
-    needed = sum(header.sizes)
-    body = inflate.take(needed)
-    if len(body) < needed:
-        raise BadFile(
-            f"{file} is cut off: {count:,} splats need {needed:,} bytes, not {len(body):,}."
-        )
-    streams, at = [], 0
-    for size in header.sizes:
-        streams.append(memoryview(body)[at : at + size + (at == 0)])
-        at += size
-    rest = inflate.take(MOST_EXTENSION_BYTES)
-    extensions = read_extensions(rest) if flags & EXTENSIONS else {}
-    return Spz(header, tuple(streams), extensions)
+    return Spz(header, inflate, None)
 
 
 class Raw:
@@ -135,16 +148,26 @@ class Inflate:
     """A gzip stream, taken piece by piece: never more than is asked for."""
 
     def __init__(self, data: bytes, file: str) -> None:
-        self._data, self._file, self._zlib = data, file, zlib.decompressobj(31)
+        self._data, self._at, self._file = memoryview(data), 0, file
+        self._zlib = zlib.decompressobj(31)
 
     def take(self, size: int) -> bytes:
         """`size` bytes, fewer at the end.  Raises BadFile."""
-        try:
-            part = self._zlib.decompress(self._data, size)
-        except zlib.error as error:
-            raise BadFile(f"{self._file}: its gzip stream is broken ({error}).") from error
-        self._data = self._zlib.unconsumed_tail
-        return part
+        parts, left = [], size
+        while left and not self._zlib.eof:
+            given = self._zlib.unconsumed_tail
+            if not given:
+                given = self._data[self._at : self._at + PIECE]
+                self._at += len(given)
+            try:
+                part = self._zlib.decompress(given, left)
+            except zlib.error as error:
+                raise BadFile(f"{self._file}: its gzip stream is broken ({error}).") from error
+            if not part and not given:
+                break  # cut off
+            parts.append(part)
+            left -= len(part)
+        return b"".join(parts)
 
 
 def unpack_zstd(data: bytes, file: str) -> Spz:
@@ -160,7 +183,7 @@ def unpack_zstd(data: bytes, file: str) -> Spz:
             f"{file} has {streams} streams and their table at byte {table}; SH degree {degree} "
             f"needs {len(sizes)} and {len(data):,} bytes are there."
         )
-    parts = []
+    packed_streams = []
     for i, size in enumerate(sizes):
         packed, unpacked = TABLE_ROW.unpack_from(data, table + i * TABLE_ROW.size)
         if unpacked != size or packed > len(data) - at:
@@ -168,29 +191,41 @@ def unpack_zstd(data: bytes, file: str) -> Spz:
                 f"{file}: stream {i} is said to be {packed:,} bytes that become {unpacked:,}; "
                 f"{count:,} splats need {size:,}, and {len(data) - at:,} bytes are left."
             )
-        part = decompress_zstd(memoryview(data)[at : at + packed], size, f"{file}: stream {i}")
-        parts.append(part if i == 0 else part[:-1])
+        packed_streams.append((memoryview(data)[at : at + packed], size))
         at += packed
-    parts += [memoryview(b"")] * (len(header.sizes) - len(parts))
-    extensions = read_extensions(data[HEADER.size : table]) if flags & EXTENSIONS else {}
-    return Spz(header, tuple(parts), extensions)
+    extensions = data[HEADER.size : table] if flags & EXTENSIONS else b""
+    return Spz(header, Zstd(packed_streams, file), extensions)
 
 
-def decompress_zstd(packed: memoryview, size: int, what: str) -> memoryview:
-    """Exactly `size` bytes, and a zero.  Raises BadFile."""
-    import zstandard
+class Zstd:
+    """Streams of zstd one after the other, taken piece by piece; a piece lies within one."""
 
-    view, at = memoryview(bytearray(size + 1)), 0
-    try:
-        with zstandard.ZstdDecompressor().stream_reader(packed) as stream:
-            while at < size and (read := stream.readinto(view[at:size])):
-                at += read
-            more = stream.read(1)
-    except zstandard.ZstdError as error:
-        raise BadFile(f"{what} is broken ({error}).") from error
-    if at < size or more:
-        raise BadFile(f"{what} becomes {'more' if more else f'{at:,}'} bytes, expected {size:,}.")
-    return view
+    def __init__(self, packed: list[tuple[memoryview, int]], file: str) -> None:
+        self._packed, self._file, self._opened = packed, file, 0
+        self._at = self._size = 0  # decompressed bytes, of the stream that is open
+
+    def take(self, size: int) -> bytearray:
+        """`size` bytes.  Raises BadFile."""
+        import zstandard
+
+        if self._at == self._size:
+            data, self._size = self._packed[self._opened]
+            self._stream = zstandard.ZstdDecompressor().stream_reader(data)
+            self._opened, self._at = self._opened + 1, 0
+        out, had = bytearray(size), 0
+        what, more = f"{self._file}: stream {self._opened - 1}", b""
+        try:
+            while had < size and (read := self._stream.readinto(memoryview(out)[had:])):
+                had += read
+            self._at += had
+            if self._at == self._size:
+                more = self._stream.read(1)
+        except zstandard.ZstdError as error:
+            raise BadFile(f"{what} is broken ({error}).") from error
+        if had < size or more:
+            became = "more" if more else f"{self._at:,}"
+            raise BadFile(f"{what} becomes {became} bytes, expected {self._size:,}.")
+        return out
 
 
 def read_extensions(data: bytes) -> dict[int, bytes]:

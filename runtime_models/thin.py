@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.model import Finding, SplatLayers
+from runtime_models.model import AnchorModel, Finding, SplatLayers
 from runtime_models.morton import morton_order
 
 ROWS = ("means", "scales", "wxyz", "opacity", "sh", "layer", "labels")  # of SplatLayers
@@ -16,8 +16,8 @@ NEARLY_SURE = 0.999  # chance from which a splat stays for certain
 def thin(layers: SplatLayers, most: int) -> SplatLayers:
     """`most` of the splats in their order, or all of them where most is 0 or there are no more.
 
-    Not simply the largest: those leave holes where detail was, which costs up to 4 dB (see
-    docs/bench/thin.csv).  A finding says how many stay.
+    Not simply the largest: those leave holes where detail was, which costs 1 to 3.4 dB at
+    half of a scene (docs/bench/thin.csv).  A finding says how many stay.
     """
     count = layers.splat_count
     if not 0 < most < count:
@@ -37,6 +37,20 @@ def thin(layers: SplatLayers, most: int) -> SplatLayers:
         extra={name: column[kept] for name, column in layers.extra.items()},
         findings=(*layers.findings, found),
     )
+
+
+def left_whole(model: AnchorModel, most: int, file: str) -> AnchorModel:
+    """The model with a finding where it has more than `most` splats: anchors are not thinned."""
+    if not 0 < most < model.splat_count:
+        return model
+    found = Finding(
+        f"{model.splat_count:,} splats of anchors, --max-splats asks for {most:,}",
+        0,
+        "all are shown, a model of anchors has no splats that could go",
+        file=file,
+        repaired=False,
+    )
+    return replace(model, findings=(*model.findings, found))
 
 
 def prominence(layers: SplatLayers) -> np.ndarray:

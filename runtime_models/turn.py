@@ -12,7 +12,7 @@ from runtime_models.spherical_harmonics import HALF_TURN_SIGNS, basis
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
 PLACE_SIGNS = np.array([1, -1, -1], np.float32)  # of that half turn
-TILED_SIGNS = np.tile(PLACE_SIGNS, BLOCK)
+TILED_SIGNS = np.tile(PLACE_SIGNS, 4 * BLOCK)  # of the longest block
 QUATERNION_SIGNS = np.array([-1, 1, -1, 1], np.float32)  # of x w z y
 HARMONIC_SIGNS = np.repeat(HALF_TURN_SIGNS, 3)  # of every channel
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0])  # about z
@@ -67,7 +67,7 @@ def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
 
 def turn_rows_half(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
     """Half a turn about x, in place: nothing but signs, and quaternions (0, 1, 0, 0) * wxyz."""
-    if means.flags.c_contiguous and len(means) <= BLOCK:
+    if means.flags.c_contiguous and 3 * len(means) <= len(TILED_SIGNS):
         flat = means.reshape(-1)  # one long loop, not one of three for each
         flat *= TILED_SIGNS[: flat.size]
     else:

@@ -1,9 +1,12 @@
 """Plain splats to PlayCanvas's compressed PLY, in COLMAP's axes: inverse of read_compressed_ply."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.blocks import BLOCK, each_block
 from runtime_models.morton import morton_order
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_compressed_ply import (
@@ -17,7 +20,7 @@ from runtime_models.read_compressed_ply import (
     SH_SPAN,
 )
 from runtime_models.spherical_harmonics import C0
-from runtime_models.turn import turn_half
+from runtime_models.turn import HALF_TURN, PLACE_SIGNS, turner
 from runtime_models.whole_file import write_whole
 
 LOG_SCALES = (-20.0, 20.0)  # 2e-9 m to 5e8 m, as the format's own writer cuts them
@@ -30,30 +33,58 @@ def write_compressed_ply(splats: PlainSplats, path: str | Path) -> None:
     scale, 1/510 in opacity and of a chunk's range in colour, 7e-4 in a quaternion's entries, 1/64
     in the other harmonics (1/32 at their ends, which are -4 and 4).
     """
-    back = turn_half(splats)
-    order = morton_order(back.means)
-    means = back.means[order].astype(np.float64) + back.origin
+    order = morton_order(splats.means * PLACE_SIGNS)
+    ranges, packed = chunks_and_splats(splats, order)
+    rest = 3 * (splats.sh.shape[1] - 1)
+    head = header(len(ranges), len(order), rest, splats.antialiased)
+    write_whole(Path(path), records(head, ranges, packed, splats, order))
+
+
+def records(
+    head: bytes, ranges: np.ndarray, packed: np.ndarray, splats: PlainSplats, order: np.ndarray
+) -> Iterator[bytes | memoryview]:
+    """The bytes of the file, part after part."""
+    yield head
+    yield ranges.data
+    yield packed.data
+    for first in range(0, len(order) if splats.sh.shape[1] > 1 else 0, BLOCK):
+        _, _, sh = in_file_axes(splats, order[first : first + BLOCK])
+        rest = sh[:, 1:].transpose(0, 2, 1).reshape(len(sh), -1)  # all of red first
+        yield np.clip((rest / SH_SPAN + 0.5) * 256, 0, 255).astype(np.uint8).tobytes()
+
+
+def in_file_axes(
+    splats: PlainSplats, order: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, quaternions and harmonics of the rows of `order`, turned back."""
+    turned = splats.means[order], splats.wxyz[order], splats.sh[order]
+    turner(HALF_TURN, splats.sh.shape[1])(*turned)  # its own inverse
+    return turned
+
+
+def chunks_and_splats(splats: PlainSplats, order: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(chunks, 18) float32 ranges and (N, 4) words of the splats in that order."""
+    count = len(order)
+    ranges = np.empty((-(-count // CHUNK), 18), "<f4")
+    packed = np.empty((count, 4), "<u4")
+    origin = HALF_TURN @ np.array(splats.origin)  # metres, in the file's axes
+
+    def fill(rows: slice, _: object) -> None:
+        some = order[rows]
+        means, wxyz, sh = in_file_axes(replace(splats, sh=splats.sh[:, :1]), some)
+        logs = np.log(splats.scales[some]).clip(*LOG_SCALES)
+        near = slice(rows.start // CHUNK, -(-rows.stop // CHUNK))  # blocks begin with a chunk
+        parts = [ranged(means + origin), ranged(logs), ranged(sh[:, 0] * C0 + 0.5)]
+        ranges[near] = np.concatenate([ends for ends, _ in parts], axis=1)
+        places, sizes, shades = (shares for _, shares in parts)
+        packed[rows, 0] = pack(places, BITS_11_10_11)
+        packed[rows, 1] = pack_smallest_three(wxyz)
+        packed[rows, 2] = pack(sizes, BITS_11_10_11)
+        packed[rows, 3] = pack(np.column_stack([shades, splats.opacity[some]]), BITS_8888)
+
     with np.errstate(divide="ignore"):  # a scale of 0 has the smallest logarithm
-        scales = np.log(back.scales[order]).clip(*LOG_SCALES)
-    colors = back.sh[order, 0] * C0 + 0.5
-    places, place_shares = ranged(means)
-    sizes, size_shares = ranged(scales)
-    shades, shade_shares = ranged(colors)
-    packed = [
-        pack(place_shares, BITS_11_10_11),
-        pack_smallest_three(back.wxyz[order]),
-        pack(size_shares, BITS_11_10_11),
-        pack(np.column_stack([shade_shares, back.opacity[order]]), BITS_8888),
-    ]
-    rest = back.sh[order, 1:].transpose(0, 2, 1).reshape(len(order), -1)  # all of red first
-    bytes_of_rest = np.clip((rest / SH_SPAN + 0.5) * 256, 0, 255).astype(np.uint8)
-    tables = [
-        np.concatenate([places, sizes, shades], axis=1).astype("<f4"),
-        np.stack(packed, axis=1).astype("<u4"),
-        bytes_of_rest,
-    ]
-    head = header(len(tables[0]), len(order), rest.shape[1], splats.antialiased)
-    write_whole(Path(path), head + b"".join(t.tobytes() for t in tables))
+        each_block(count, fill)
+    return ranges, packed
 
 
 def header(chunks: int, splats: int, rest: int, antialiased: bool) -> bytes:

@@ -9,6 +9,7 @@ import numpy as np
 from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_layers import joined, moved, widened
+from runtime_models.recentre import FINE
 from runtime_models.spherical_harmonics import COEFFICIENTS
 from runtime_models.turn import turn
 
@@ -23,6 +24,7 @@ class Writer:
     function: str  # of the module of the same name
     antialiased: bool = True  # has a place for the flag
     columns: bool = False  # has a place for labels and other columns
+    far: bool = True  # keeps places far from zero, or refuses them
 
     def write(self, splats: PlainSplats, path: Path) -> None:
         """Atomic; what the format cannot hold is lost."""
@@ -31,11 +33,11 @@ class Writer:
 
 
 WRITERS = (  # of two endings that fit a name, the longer one stands first
-    Writer("compressed PLY", ".compressed.ply", 3, "write_compressed_ply"),
+    Writer("compressed PLY", ".compressed.ply", 3, "write_compressed_ply", far=False),
     Writer("3DGS PLY", ".ply", 3, "write_ply", columns=True),
     Writer("spz", ".spz", 3, "write_spz"),
     Writer("glTF", ".glb", 3, "write_gltf", antialiased=False),
-    Writer(".splat", ".splat", 0, "write_splat", antialiased=False),
+    Writer(".splat", ".splat", 0, "write_splat", antialiased=False, far=False),
 )
 
 
@@ -60,6 +62,11 @@ def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
         said = ", ".join(names[:FEW]) + (", ..." if len(names) > FEW else "")
         done = f"left out, {writer.name} has no place for them; .ply has"
         findings.append(Finding(f"other columns ({said})", 0, done, repaired=False))
+    step = np.spacing(np.float32(np.abs(splats.origin).max()))
+    if not writer.far and step > FINE * np.median(splats.scales.max(axis=1)):
+        what = f"the scene lies far from zero, where float32 has steps of {step:.3g} m"
+        done = f"{writer.name} rounds its places to that; .ply and .glb keep them"
+        findings.append(Finding(what, 0, done, repaired=False))
     return tuple(findings)
 
 

@@ -1,10 +1,12 @@
 """Plain splats to the .spz format (Niantic), versions 2 to 4: the inverse of read_spz."""
 
-import gzip
+import zlib
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.blocks import BLOCK
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_spz import COLOR_SCALE
 from runtime_models.spz_file import (
@@ -34,40 +36,71 @@ def write_spz(splats: PlainSplats, path: str | Path, version: int = 3) -> None:
     if version not in VERSIONS:
         raise ValueError(f".spz version {version} was asked for; {VERSIONS} are written.")
     degree = REST.index(splats.sh.shape[1] - 1)
-    places = splats.means.astype(np.float64) + splats.origin
-    bits = fractional_bits(places, splats.scales, path)
-    rotations = pack_smallest_three if version >= 3 else pack_first_three
-    with np.errstate(divide="ignore"):  # a scale of 0 has the smallest code
-        log_scales = np.log(splats.scales)
-    streams = [
-        pack_places(places, bits),
-        as_bytes(splats.opacity * 255),
-        as_bytes((splats.sh[:, 0] * np.float32(COLOR_SCALE) + np.float32(0.5)) * 255),
-        as_bytes((log_scales + 10) * 16),
-        rotations(splats.wxyz),
-        as_bytes(splats.sh[:, 1:] * 128 + 128),
-    ]
+    count, bits = len(splats.means), fractional_bits(splats, path)
     flags = ANTIALIASED if splats.antialiased else 0
-    head = (MAGIC, version, len(places), degree, bits, flags)
-    write_whole(Path(path), whole_file(head, [stream.tobytes() for stream in streams]))
+    head = (MAGIC, version, count, degree, bits, flags)
+    streams = [blocks_of(rows_of, count) for rows_of in streams_of(splats, bits, version)]
+    write_whole(Path(path), (deflated if version < 4 else compressed)(head, streams))
 
 
-def whole_file(head: tuple, streams: list[bytes]) -> bytes:
-    """The container around the streams, as spz_file reads it."""
-    version = head[1]
-    if version < 4:
-        return gzip.compress(LEGACY_HEADER.pack(*head, 0) + b"".join(streams), 6, mtime=0)
+def streams_of(splats: PlainSplats, bits: int, version: int) -> list[Callable[[slice], np.ndarray]]:
+    """The codes of some rows, for each of the streams."""
+    rotations = pack_smallest_three if version >= 3 else pack_first_three
+
+    def scales(rows: slice) -> np.ndarray:
+        with np.errstate(divide="ignore"):  # a scale of 0 has the smallest code
+            return as_bytes((np.log(splats.scales[rows]) + 10) * 16)
+
+    def colors(rows: slice) -> np.ndarray:
+        return as_bytes((splats.sh[rows, 0] * np.float32(COLOR_SCALE) + np.float32(0.5)) * 255)
+
+    return [
+        lambda rows: pack_places(splats.means[rows].astype(np.float64) + splats.origin, bits),
+        lambda rows: as_bytes(splats.opacity[rows] * 255),
+        colors,
+        scales,
+        lambda rows: rotations(splats.wxyz[rows]),
+        lambda rows: as_bytes(splats.sh[rows, 1:] * 128 + 128),
+    ]
+
+
+def blocks_of(rows_of: Callable[[slice], np.ndarray], count: int) -> Iterator[bytes]:
+    """The bytes of a stream, a block of splats at a time."""
+    for first in range(0, count, BLOCK):
+        yield rows_of(slice(first, first + BLOCK)).tobytes()
+
+
+def deflated(head: tuple, streams: list[Iterable[bytes]]) -> Iterator[bytes]:
+    """The container of versions 2 and 3: one gzip stream of it all, never whole in memory."""
+    packer = zlib.compressobj(6, zlib.DEFLATED, 31)
+    yield packer.compress(LEGACY_HEADER.pack(*head, 0))
+    for stream in streams:
+        yield from map(packer.compress, stream)
+    yield packer.flush()
+
+
+def compressed(head: tuple, streams: list[Iterable[bytes]]) -> Iterator[bytes]:
+    """The container of version 4.  Its table of sizes stands first, so all that is compressed is
+    in memory, and one stream as it was: zstd packs a little worse piece by piece.
+    """
     import zstandard
 
-    streams = [stream for stream in streams if stream]
-    packed = [zstandard.ZstdCompressor(level=LEVEL).compress(stream) for stream in streams]
-    rows = [TABLE_ROW.pack(len(p), len(s)) for p, s in zip(packed, streams, strict=True)]
-    return b"".join([HEADER.pack(*head, len(streams), HEADER.size), *rows, *packed])
+    rows, packed = [], []
+    for stream in streams:
+        whole = bytearray()
+        for part in stream:
+            whole += part
+        if whole:
+            packed.append(zstandard.ZstdCompressor(level=LEVEL).compress(whole))
+            rows.append(TABLE_ROW.pack(len(packed[-1]), len(whole)))
+    yield b"".join([HEADER.pack(*head, len(rows), HEADER.size), *rows])
+    yield from packed
 
 
-def fractional_bits(places: np.ndarray, scales: np.ndarray, path: str | Path) -> int:
-    """The most bits below the metre with which places (N, 3) fit 24.  Raises ValueError."""
-    farthest = float(np.abs(places).max())
+def fractional_bits(splats: PlainSplats, path: str | Path) -> int:
+    """The most bits below the metre with which places fit 24.  Raises ValueError."""
+    ends = np.stack([splats.means.min(axis=0), splats.means.max(axis=0)])  # NaN stays
+    farthest = float(np.abs(ends.astype(np.float64) + splats.origin).max())
     if not farthest <= LARGEST_CODE:
         raise ValueError(
             f"{path} cannot be written: the splats lie up to {farthest:.3g} m from the origin, an "
@@ -76,7 +109,7 @@ def fractional_bits(places: np.ndarray, scales: np.ndarray, path: str | Path) ->
     bits = FINEST_BITS
     while bits and round(farthest * 2**bits) > LARGEST_CODE:
         bits -= 1
-    step, size = 2.0**-bits, float(np.median(scales.max(axis=1)))
+    step, size = 2.0**-bits, float(np.median(splats.scales.max(axis=1)))
     if bits < 12 and step > size:
         raise ValueError(
             f"{path} cannot be written: splats up to {farthest:,.0f} m from the origin leave steps "

@@ -12,6 +12,7 @@ from runtime_models.model import BadFile
 from runtime_models.turn import UPSIDE_DOWN, ours_from_file
 from scene.capture_rules import rigid
 from scene.framing import FOV_Y
+from scene.json_values import is_number
 from scene.pose import OPENCV_FROM_EYE, Pose, View
 
 SIZE = (640, 360)  # pixels, where neither the file nor its reader says
@@ -80,12 +81,6 @@ def read_name(value: object) -> str:
     text = "" if value is None else str(value)[:LONGEST_NAME]
     words = "".join(c if c.isprintable() else " " for c in text).split()
     return " ".join(words).encode("utf-8", "replace").decode()
-
-
-def is_number(value: object) -> bool:
-    """A finite number; true and false are none, and neither are integers beyond every float."""
-    good = isinstance(value, int | float) and not isinstance(value, bool)
-    return good and abs(value) <= 1e300 and math.isfinite(value)
 
 
 def pose_matrix(value: object, where: str) -> np.ndarray:

@@ -11,9 +11,11 @@ import numpy as np
 from runtime_models.model import STOP_KINDS, BadFile, Stop
 from runtime_models.stop_names import guess_kind
 from scene.capture import Capture, Photo
+from scene.json_values import number_in, numbers_in, shortened, shown, text_in
 from scene.photo import load_photo, open_image
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
+FARTHEST = 1e12  # metres from zero: beyond that no photo was taken
 TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, from the first
 # Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
 # trained elsewhere from the same model then lie where the capture is.
@@ -59,7 +61,7 @@ class CaptureWorld:
             notes["background"] = "found in the photos" if background else "none stated, none found"
         for stop in stops:
             if not any(p.modality == stop.name and p.split == "train" for p in photos):
-                raise BadFile(f"{folder}: modality {stop.name!r} has no photos to train on")
+                raise BadFile(f"{folder}: modality {shown(stop.name)} has no photos to train on")
         if points is not None:
             points = (points @ self.ours_from_file[:3, :3].T).astype(np.float32)
         return Capture(
@@ -68,7 +70,7 @@ class CaptureWorld:
             tuple(photos),
             points,
             colors,
-            tuple(map(float, background)) if background is not None else None,
+            background,
             notes,
         )
 
@@ -80,9 +82,13 @@ def rigid(matrix: object, where: str) -> np.ndarray:
     except (TypeError, ValueError, OverflowError):
         raise BadFile(f"{where}: the pose is no matrix of numbers; give 4 rows of 4") from None
     if m.shape not in ((3, 4), (4, 4)):
-        raise BadFile(f"{where}: the pose has shape {m.shape}; give 4 rows of 4 numbers")
+        raise BadFile(f"{where}: the pose has shape {m.shape!s:.40}; give 4 rows of 4 numbers")
     if not np.isfinite(m).all():
         raise BadFile(f"{where}: the pose holds NaN or Inf; pose this photo again or drop it")
+    if not np.abs(m[:3, 3]).max() <= FARTHEST:
+        raise BadFile(
+            f"{where}: the pose is beyond {FARTHEST:g} m; pose this photo again or drop it"
+        )
     rotation = m[:3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # 1e300 is no rotation either
         error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
@@ -152,23 +158,40 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
     )
 
 
+def stops_from(listed: object, where: str) -> list[Stop]:
+    """The stops of a list of JSON objects, in its order, every field checked."""
+    if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
+        raise BadFile(f"{where}: 'modalities' must be a list of names or of objects")
+    stops = [stop_from(entry, where) for entry in listed]
+    if len({stop.name for stop in stops}) < len(stops):
+        raise BadFile(f"{where}: two modalities have the same name; rename one")
+    return stops
+
+
 def stop_from(entry: dict, where: str) -> Stop:
-    """A Stop from its JSON entry, every field checked."""
-    name, x, kind = entry.get("name"), entry.get("x"), entry.get("kind", "rgb")
-    if not isinstance(name, str) or not name:
+    name = text_in(entry, "name", f"{where}: a modality")
+    if not name:
         raise BadFile(f"{where}: a modality has no name; give each one a 'name'")
-    if not isinstance(x, int | float) or not 0 <= x <= 1:
-        raise BadFile(f"{where}: modality {name!r} has x = {x!r}; give a number from 0 to 1")
+    whose = f"{where}: modality {shown(name)}"
+    x, kind = number_in(entry, "x", whose), text_in(entry, "kind", whose, "rgb")
+    if not 0 <= x <= 1:
+        raise BadFile(f"{whose} has x = {x:g}; give a number from 0 to 1")
     if kind not in STOP_KINDS:
-        raise BadFile(
-            f"{where}: modality {name!r} is of kind {kind!r}; use {', '.join(STOP_KINDS)}"
-        )
-    span = entry.get("value_range")
-    if span is not None:
-        span = tuple(map(float, span))
-        if len(span) != 2 or not span[0] < span[1]:
-            raise BadFile(f"{where}: modality {name!r} needs value_range [low, high], not {span}")
-    return Stop(name, float(x), kind, entry.get("palette") or "", span, entry.get("unit") or "")
+        raise BadFile(f"{whose} is of kind {shown(kind)}; use {', '.join(STOP_KINDS)}")
+    span = numbers_in(entry, "value_range", 2, whose)
+    if span is not None and not span[0] < span[1]:
+        raise BadFile(f"{whose} needs value_range [low, high], not {list(span)}")
+    return Stop(
+        name, x, kind, text_in(entry, "palette", whose), span, text_in(entry, "unit", whose)
+    )
+
+
+def background_from(entry: dict, where: str) -> tuple[float, ...] | None:
+    """The colour 'background', display sRGB; None where none is stated."""
+    color = numbers_in(entry, "background", 3, where)
+    if color is not None and not all(0 <= c <= 1 for c in color):
+        raise BadFile(f"{where}: 'background' is {list(color)}; give three numbers from 0 to 1")
+    return color
 
 
 def split_every_8th(photos: list[Photo]) -> list[Photo]:
@@ -186,7 +209,7 @@ def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
         size = image.size
     if claimed is not None and claimed != size:
         raise BadFile(
-            f"{path}: the image has {size[0]}x{size[1]} pixels, the capture says "
+            f"{shortened(path)}: the image has {size[0]}x{size[1]} pixels, the capture says "
             f"{claimed[0]}x{claimed[1]}; resize the images or scale the intrinsics with them"
         )
     return size

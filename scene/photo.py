@@ -12,6 +12,8 @@ from runtime_models.model import BadFile
 from scene.capture import Photo
 
 MOST_PIXELS = 1 << 27
+# Of one colour a picture packs 1000 pixels into a byte; 4K may pack better still.
+FREE_PIXELS, PIXELS_A_BYTE = 1 << 23, 1024
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
 GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
 
@@ -60,10 +62,12 @@ def load_photo(
 
 def read_pixels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     with open_image(path) as image:
-        if image.width * image.height > MOST_PIXELS:
+        size = path.stat().st_size
+        most = min(MOST_PIXELS, max(FREE_PIXELS, PIXELS_A_BYTE * size))
+        if image.width * image.height > most:
             raise BadFile(
-                f"{path}: {image.width}x{image.height} pixels, at most {MOST_PIXELS:,} are read; "
-                "scale it down"
+                f"{path}: {image.width}x{image.height} pixels, at most {most:,} are read out of "
+                f"{size:,} bytes; scale it down or save it again"
             )
         try:
             with quiet():

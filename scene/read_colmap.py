@@ -10,13 +10,15 @@ from scene.capture import Capture, Photo
 from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
+    background_from,
     image_size,
     split_every_8th,
     spread_stops,
-    stop_from,
+    stops_from,
 )
 from scene.colmap_points import read_colmap_points
 from scene.colmap_tables import Lens, find_model, read_tables
+from scene.json_values import shortened, shown, text_in
 from scene.pose import View
 from scene.read_colmap_cameras import camera_pose
 from scene.read_transforms import STRAIGHT, read_json
@@ -47,7 +49,8 @@ def read_colmap(folder: Path) -> Capture:
     xyz, rgb = read_colmap_points(model / f"points3D{ending}")
     points, colors = (xyz, rgb.astype(np.float32) / 255) if len(xyz) else (None, None)
     photos = split_every_8th(photos)
-    background, guessed = said.get("background"), not said.get("modalities")
+    background = background_from(said, f"{folder}/capture.json")
+    guessed = not said.get("modalities")
     return world.capture(folder, stops, photos, points, colors, background, guessed)
 
 
@@ -61,21 +64,21 @@ def modalities(
         order = {"rgb": 0, "thermal": 1, "layer": 2}
         found = sorted(set(first.values()), key=lambda n: (order[guess_kind(n, 2)], n))
         return spread_stops(found), first
-    entries = said["modalities"]
-    stops = [stop_from(e, f"{folder}/capture.json") for e in entries]
+    where, entries = f"{folder}/capture.json", said["modalities"]
+    stops = stops_from(entries, where)
     of = {}
     for stop, entry in zip(stops, entries, strict=True):
-        prefix = entry.get("folder", stop.name).rstrip("/") + "/"
+        prefix = text_in(entry, "folder", where, stop.name).rstrip("/") + "/"
         mine = [n for n in names if n.startswith(prefix)]
         if not mine:
             raise BadFile(
-                f"{folder}/capture.json: modality {stop.name!r} has no images under "
-                f"images/{prefix}; add them to the COLMAP model or drop the modality"
+                f"{where}: modality {shown(stop.name)} has no images under "
+                f"images/{shortened(prefix)}; add them to the COLMAP model or drop the modality"
             )
         of |= dict.fromkeys(mine, stop.name)
     left = sorted(set(names) - set(of))
     if left:
-        raise BadFile(f"{folder}/capture.json: image {left[0]} belongs to no listed modality")
+        raise BadFile(f"{where}: image {left[0]} belongs to no listed modality")
     return tuple(sorted(stops, key=lambda s: s.x)), of
 
 

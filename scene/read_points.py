@@ -1,71 +1,99 @@
 """Coloured points that come with a capture: points.npz, or a PLY cloud as nerfstudio writes it."""
 
+import io
+import math
+import os
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.model import BadFile
+from runtime_models.package_files import DAMAGED, refuse_bomb
+from runtime_models.ply_file import read_header
+from runtime_models.read_package import BAD_HEADER
+from runtime_models.read_points_ply import read_records, shades_of
+from scene.capture_rules import FARTHEST
+from scene.json_values import shortened
 
-PLY_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
-    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
-    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
+LIMITED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacking the others stops at no limit
+HEADERS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 
 
 def read_points(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """(P, 3) float64 positions and (P, 3) float32 colours 0..1 or None, in the file's own world."""
-    if not path.is_file():
-        raise BadFile(f"{path}: the file of points is missing; put it there or drop its entry")
-    xyz, rgb = read_ply(path) if path.suffix.lower() == ".ply" else read_npz(path)
+    where = shortened(path)
+    if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
+        raise BadFile(f"{where}: the file of points is missing; put it there or drop its entry")
+    xyz, rgb = read_ply(path, where) if path.suffix.lower() == ".ply" else read_npz(path, where)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
-        raise BadFile(f"{path}: points have shape {xyz.shape}; (P, 3) is wanted")
-    if not np.isfinite(xyz).all():
+        raise BadFile(f"{where}: points have shape {xyz.shape!s:.40}; (P, 3) is wanted")
+    wrong = ~(np.abs(xyz) <= FARTHEST)
+    if wrong.any():
         raise BadFile(
-            f"{path}: {(~np.isfinite(xyz)).sum()} coordinates are NaN or Inf; remove them"
+            f"{where}: {wrong.sum()} coordinates are NaN, Inf or over {FARTHEST:g} m; remove them"
         )
     if rgb is not None and rgb.shape != xyz.shape:
-        raise BadFile(f"{path}: colours {rgb.shape} do not fit points {xyz.shape}")
+        raise BadFile(f"{where}: colours {rgb.shape!s:.40} do not fit points {xyz.shape}")
     if rgb is not None:
-        rgb = rgb.astype(np.float32) / (255 if rgb.dtype == np.uint8 else 1)
+        rgb = rgb / np.float32(255) if rgb.dtype == np.uint8 else rgb
+        if not ((rgb >= 0) & (rgb <= 1)).all():
+            raise BadFile(f"{where}: colours go beyond 0 to 1; give bytes, or numbers in 0 to 1")
+        rgb = rgb.astype(np.float32)
     return xyz.astype(np.float64), rgb
 
 
-def read_npz(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
+def read_npz(path: Path, where: str) -> tuple[np.ndarray, np.ndarray | None]:
     try:
-        with np.load(path) as arrays:
-            if "xyz" not in arrays:
-                raise BadFile(f"{path}: holds {sorted(arrays)}; an array 'xyz' (P, 3) is wanted")
-            return arrays["xyz"], arrays["rgb"] if "rgb" in arrays else None
-    except (zipfile.BadZipFile, EOFError, OSError) as error:
-        raise BadFile(f"{path}: the npz cannot be read ({error}); copy it again") from None
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            if "xyz.npy" not in names:
+                held = shortened(", ".join(names))
+                raise BadFile(f"{where}: lacks the array 'xyz' (P, 3), holds {held or 'nothing'}")
+            xyz = read_array(archive, "xyz.npy", where)
+            return xyz, read_array(archive, "rgb.npy", where) if "rgb.npy" in names else None
+    except BadFile:
+        raise
+    except (*DAMAGED, *BAD_HEADER) as error:
+        raise BadFile(f"{where}: the npz cannot be read ({error!s:.80}); copy it again") from None
 
 
-def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """The vertices of an ASCII or binary little-endian PLY whose first element is `vertex`."""
-    data = path.read_bytes()
-    head, mark, body = data.partition(b"end_header\n")
-    lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
-    elements = [i for i, line in enumerate(lines) if line[:1] == ["element"]]
-    if not mark or lines[0] != ["ply"] or not elements or lines[elements[0]][1] != "vertex":
-        raise BadFile(f"{path}: not a PLY that starts with vertices; write the points as npz")
-    count = int(lines[elements[0]][2])
-    stop = elements[1] if len(elements) > 1 else len(lines)
-    fields = [line[1:] for line in lines[elements[0] + 1 : stop] if line[:1] == ["property"]]
-    if any(kind not in PLY_TYPES for kind, *_ in fields):
-        raise BadFile(f"{path}: the vertices hold lists; write plain x y z red green blue")
-    row = np.dtype([(name, "<" + PLY_TYPES[kind]) for kind, name in fields])
-    if ["format", "ascii", "1.0"] in lines:
-        table = [tuple(line.split()) for line in body.decode("ascii").splitlines()[:count]]
-        vertices = np.array(table, [(n, "f8") for n in row.names])
-    elif ["format", "binary_little_endian", "1.0"] in lines and len(body) >= count * row.itemsize:
-        vertices = np.frombuffer(body, row, count)
-    else:
-        raise BadFile(f"{path}: cut off, or not ASCII or little-endian; write it again")
-    if not {"x", "y", "z"} <= set(row.names):
-        raise BadFile(f"{path}: the vertices have {row.names}; x, y and z are wanted")
-    rgb = None
-    if {"red", "green", "blue"} <= set(row.names):
-        rgb = np.stack([vertices[c].astype(np.uint8) for c in ("red", "green", "blue")], axis=1)
-    return np.stack([vertices[c].astype(np.float64) for c in "xyz"], axis=1), rgb
+def read_array(archive: zipfile.ZipFile, name: str, where: str) -> np.ndarray:
+    """An array of plain numbers, as many as its header states.  Nothing is unpickled."""
+    entry = archive.getinfo(name)
+    packed = min(entry.compress_size, os.path.getsize(archive.filename))
+    refuse_bomb(f"{where}: {name}", entry.file_size, packed)
+    if entry.compress_type not in LIMITED:
+        raise BadFile(f"{where}: {name} is packed in an unusual way; write it with numpy.savez")
+    with archive.open(entry) as stream:  # archive.read would unpack 2 GB, then cut
+        data = stream.read(entry.file_size + 1)
+    file = io.BytesIO(data)
+    read_header_of = HEADERS.get(np.lib.format.read_magic(file))
+    if read_header_of is None:
+        raise BadFile(f"{where}: {name} is of an unknown version; write it with numpy.savez")
+    shape, by_columns, kind = read_header_of(file)
+    if kind.kind not in "fiu":
+        raise BadFile(f"{where}: {name} holds {kind!s:.40}; plain numbers are wanted")
+    there = len(data) - file.tell()
+    if min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != there:
+        raise BadFile(
+            f"{where}: {name} states the shape {shape!s:.40}, but {there:,} bytes follow; copy it "
+            "again"
+        )
+    numbers = np.frombuffer(data, kind, offset=file.tell())
+    return numbers.reshape(shape, order="F" if by_columns else "C")
+
+
+def read_ply(path: Path, where: str) -> tuple[np.ndarray, np.ndarray | None]:
+    """The vertices of a PLY, binary or ASCII; all that its header promises is there."""
+    header = read_header(path)
+    vertex, begins = header.find("vertex")
+    lacking = [axis for axis in "xyz" if axis not in vertex.row.names]
+    if lacking:
+        raise BadFile(f"{where}: its vertices have no {lacking[0]}; x, y and z are wanted")
+    table = read_records(path, header, vertex, begins)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused by the caller
+        return np.stack([table[axis].astype(np.float64) for axis in "xyz"], 1), shades_of(table)

@@ -1,6 +1,8 @@
 """transforms.json and cameras.json -> Capture: nerfstudio, Blender, our own form, OpenCV tables."""
 
 import json
+import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,18 +13,22 @@ from scene.capture import Capture, Photo
 from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
+    background_from,
     image_size,
     rigid,
     split_every_8th,
     spread_stops,
-    stop_from,
+    stops_from,
 )
+from scene.json_values import is_number, shortened, shown, text_in
 from scene.pose import OPENCV_FROM_EYE, View
 from scene.read_points import read_points
 
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG")
 POSES = ("transform_matrix", "c2w_opencv", "c2w")
 SPLITS = {"train": "train", "test": "test", "val": "test"}
+LENS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy",
+        "k1", "k2", "k3", "k4", "p1", "p2", "w", "h")  # fmt: skip
 STRAIGHT = 0.5  # pixels that lens distortion may shift a corner before it matters
 
 
@@ -45,7 +51,9 @@ def read_transforms(*files: Path) -> Capture:
     shots = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
     for stop in stops:
         if not any(s.modality == stop.name for s in shots):
-            raise BadFile(f"{where}: modality {stop.name!r} has no images; add frames or drop it")
+            raise BadFile(
+                f"{where}: modality {shown(stop.name)} has no images; add frames or drop it"
+            )
     world = CaptureWorld.of(
         np.array([s.world_from_camera for s in shots]),
         (0, 0, 1),
@@ -56,16 +64,14 @@ def read_transforms(*files: Path) -> Capture:
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors = None, None
-    name = data.get("points") or data.get("ply_file_path")
+    name = text_in(data, "points", where) or text_in(data, "ply_file_path", where)
     if name or (folder / "points3d.npz").is_file():
         points, colors = read_points(folder / (name or "points3d.npz"))
-    named = any(isinstance(m, dict) for m in data.get("modalities", ()))
-    background = data.get("background")
-    if background is not None and np.shape(background) != (3,):
-        raise BadFile(f"{where}: 'background' is {background!r}; give three numbers from 0 to 1")
-    return world.capture(
-        folder, stops, photos, points, colors, background, not named, data.get("notes")
-    )
+    named = any(isinstance(m, dict) for m in data.get("modalities") or ())
+    background, notes = background_from(data, where), data.get("notes")
+    if not isinstance(notes, dict | None):
+        raise BadFile(f"{where}: 'notes' is {shown(notes)}; an object is wanted")
+    return world.capture(folder, stops, photos, points, colors, background, not named, notes)
 
 
 def gather(files: tuple[Path, ...]) -> tuple[dict, list[dict]]:
@@ -94,32 +100,38 @@ def read_json(file: Path) -> dict:
     if data.get("format", "shapeshift-capture") == "shapeshift-capture":
         version = data.get("version", 1)
         if version != 1:
-            raise BadFile(f"{file}: version {version!r} of the capture form; this program reads 1")
+            raise BadFile(
+                f"{file}: version {shown(version)} of the capture form; this program reads 1"
+            )
     return data
 
 
 def stops_of(data: dict, entries: list[dict], where: str) -> tuple[Stop, ...]:
     listed = data.get("modalities")
     if not listed:
-        return spread_stops(dict.fromkeys(e.get("modality", "RGB") for e in entries))
-    if all(isinstance(m, str) for m in listed):
+        names = [
+            text_in(entry, "modality", f"{where}: frame {i}", "RGB")
+            for i, entry in enumerate(entries)
+        ]
+        if "" in names:
+            raise BadFile(f"{where}: frame {names.index('')}: 'modality' is empty; give it a name")
+        return spread_stops(dict.fromkeys(names))
+    if isinstance(listed, list) and all(isinstance(name, str) and name for name in listed):
+        if len(set(listed)) < len(listed):
+            raise BadFile(f"{where}: two modalities have the same name; rename one")
         return spread_stops(listed)
-    if not all(isinstance(m, dict) for m in listed):
-        raise BadFile(f"{where}: 'modalities' must be a list of names or of objects")
-    stops = tuple(stop_from(m, where) for m in listed)
-    if len({s.name for s in stops}) < len(stops):
-        raise BadFile(f"{where}: two modalities have the same name; rename one")
-    return tuple(sorted(stops, key=lambda s: s.x))
+    return tuple(sorted(stops_from(listed, where), key=lambda stop: stop.x))
 
 
 def shots_of(
     entry: dict, number: int, data: dict, stops: tuple[Stop, ...], folder: Path, where: str
 ) -> list[Shot]:
     """The photos of one frame: one, or one a modality where the frame names none of several."""
-    file = entry.get("file_path") or entry.get("file")
-    if not isinstance(file, str):
-        raise BadFile(f"{where}: frame {number} names no image; give it a 'file_path'")
-    where = f"{where}: frame {number} ({file})"
+    where = f"{where}: frame {number}"
+    file = text_in(entry, "file_path", where) or text_in(entry, "file", where)
+    if not file:
+        raise BadFile(f"{where} names no image; give it a 'file_path'")
+    where = f"{where} ({shortened(file)})"
     key = next((k for k in POSES if k in entry), None)
     if key is None:
         raise BadFile(f"{where} has no pose; run COLMAP first, or give it a 'transform_matrix'")
@@ -128,9 +140,11 @@ def shots_of(
         matrix = matrix @ OPENCV_FROM_EYE
     names = [s.name for s in stops]
     if "modality" in entry or len(names) == 1:
-        modality = entry.get("modality", names[0])
+        modality = text_in(entry, "modality", where, names[0])
         if modality not in names:
-            raise BadFile(f"{where} is of modality {modality!r}; the file lists {names}")
+            raise BadFile(
+                f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
+            )
         return [Shot(entry, modality, find_image(folder / file, where), matrix, where)]
     return [Shot(entry, n, find_image(folder / n / file, where), matrix, where) for n in names]
 
@@ -144,25 +158,35 @@ def opencv_axes(entry: dict) -> bool:
 
 def find_image(path: Path, where: str) -> Path:
     for ending in ENDINGS:
-        found = path.with_name(path.name + ending)
-        if found.is_file():
-            return found
-    raise BadFile(f"{where}: the image file {path} is missing; put it there or drop the frame")
+        if os.path.isfile(f"{path}{ending}"):  # unlike Path.is_file it takes any text for a name
+            return Path(f"{path}{ending}")
+    raise BadFile(
+        f"{where}: the image file {shortened(path)} is missing; put it there or drop the frame"
+    )
 
 
 def photo_of(shot: Shot, world: CaptureWorld, folder: Path) -> Photo:
     entry, where = shot.entry, shot.where
-    claimed = (int(entry["w"]), int(entry["h"])) if "w" in entry and "h" in entry else None
+    for key in LENS:
+        value = entry.get(key, 0)
+        if not (is_number(value) and abs(value) <= 1e30):
+            raise BadFile(f"{where}: '{key}' is {shown(value)}; a number is wanted")
+    claimed = (entry["w"], entry["h"]) if "w" in entry and "h" in entry else None
     size = image_size(shot.path, claimed)
     focal, centre = intrinsics(entry, size, where)
-    split = entry.get("split", "train")
+    split = text_in(entry, "split", where, "train")
     if split not in SPLITS:
-        raise BadFile(f"{where} has split {split!r}; use train or test")
-    mask = entry.get("mask_path") or entry.get("mask")
-    if mask is not None:
-        mask = folder / mask
+        raise BadFile(f"{where} has split {shown(split)}; use train or test")
+    mask, name = None, text_in(entry, "mask_path", where) or text_in(entry, "mask", where)
+    if name:
+        mask = folder / name
+        if not os.path.isfile(mask):
+            raise BadFile(f"{where}: the mask {shortened(mask)} is missing; put it there")
         image_size(mask, size)
-    view = View.from_pinhole(world.turned(shot.world_from_camera), focal, centre, size)
+    try:
+        view = View.from_pinhole(world.turned(shot.world_from_camera), focal, centre, size)
+    except ValueError as error:
+        raise BadFile(f"{where}: {error}") from None
     return Photo(view, shot.path, shot.modality, mask, SPLITS[split])
 
 
@@ -173,10 +197,9 @@ def intrinsics(entry: dict, size: tuple[int, int], where: str) -> tuple[tuple, t
         fx = float(entry["fl_x"])
         fy = float(entry.get("fl_y", fx))
     elif "camera_angle_x" in entry:
-        fx = width / 2 / np.tan(float(entry["camera_angle_x"]) / 2)
-        fy = fx
+        fx = fy = focal_of(entry, "camera_angle_x", width, where)
         if "camera_angle_y" in entry:
-            fy = height / 2 / np.tan(float(entry["camera_angle_y"]) / 2)
+            fy = focal_of(entry, "camera_angle_y", height, where)
     else:
         raise BadFile(f"{where} has no focal length; give 'fl_x' in pixels or 'camera_angle_x'")
     if not (0 < fx < np.inf and 0 < fy < np.inf):
@@ -185,11 +208,18 @@ def intrinsics(entry: dict, size: tuple[int, int], where: str) -> tuple[tuple, t
     x, y = max(cx, width - cx) / fx, max(cy, height - cy) / fy
     k1, k2, k3, k4, p1, p2 = (float(entry.get(k, 0)) for k in ("k1", "k2", "k3", "k4", "p1", "p2"))
     r2 = x * x + y * y
-    bend = abs(k1) * r2 + abs(k2) * r2**2 + abs(k3) * r2**3 + abs(k4) * r2**4
-    shift = fx * (np.sqrt(r2) * bend + 3 * (abs(p1) + abs(p2)) * r2)
+    bend = r2 * (abs(k1) + r2 * (abs(k2) + r2 * (abs(k3) + r2 * abs(k4))))
+    shift = fx * (math.sqrt(r2) * bend + 3 * (abs(p1) + abs(p2)) * r2)
     if not shift <= STRAIGHT or "FISHEYE" in str(entry.get("camera_model", "")):
         raise BadFile(
             f"{where} was taken through a lens that shifts its corners by {shift:.1f} pixels; "
             "undistort the images first (colmap image_undistorter, or ns-process-data)"
         )
     return (fx, fy), (cx, cy)
+
+
+def focal_of(entry: dict, key: str, side: int, where: str) -> float:
+    """Pixels of focal length of an angle of view in radians across `side` pixels."""
+    if not 0 < entry[key] < math.pi:
+        raise BadFile(f"{where}: '{key}' is {entry[key]:g}; radians between 0 and pi are wanted")
+    return side / 2 / math.tan(entry[key] / 2)

@@ -49,3 +49,23 @@ def simple(folder: Path, count: int = 4, **more) -> tuple[list[dict], dict]:
         pose = opencv_pose(i, (0.0, 0.0, 1.0)) @ OPENCV_FROM_EYE
         frames.append({"file_path": f"images/{i:03}.png", "transform_matrix": pose.tolist()})
     return frames, {"fl_x": 20.0, "w": 16, "h": 12} | more
+
+
+def whole(folder: Path) -> tuple[list[dict], dict]:
+    """The same with every key that our own form has, with masks and points."""
+    frames, _ = simple(folder, 3)
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(20, 3)).astype(np.float32)
+    colors = rng.integers(0, 256, (20, 3), np.uint8)
+    np.savez_compressed(folder / "points.npz", xyz=points, rgb=colors)
+    Image.new("L", (16, 12), 255).save(folder / "mask.png")
+    lens = {"w": 16, "h": 12, "fl_x": 20.0, "fl_y": 21, "cx": 8, "cy": 6.0, "k1": 0.0, "p2": 0}
+    for frame, modality in zip(frames, ("RGB", "Heat", "RGB"), strict=True):
+        frame |= lens | {"modality": modality, "mask_path": "mask.png", "split": "train"}
+    heat = {"name": "Heat", "x": 1, "kind": "thermal", "palette": "ironbow",
+            "value_range": [10, 60], "unit": "K"}  # fmt: skip
+    return frames, {
+        "format": "shapeshift-capture", "version": 1, "convention": "opengl", "up": [0, 0, 1],
+        "background": [0, 0.5, 1], "points": "points.npz", "notes": {"by": "hand"},
+        "modalities": [{"name": "RGB", "x": 0.0, "kind": "rgb"}, heat],
+    }  # fmt: skip

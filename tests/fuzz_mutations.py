@@ -23,7 +23,8 @@ SPECIAL_TEXTS = (
 DEEP = 3000  # levels of nesting
 SPECIAL_VALUES = (
     None, True, False, -1, 0, 1, 2**31, 2**32 - 1, 2**63, 10**400, 1e308, -1e308, 1e-320,
-    float("nan"), float("inf"), "", "x", "../../etc/passwd", "/etc/passwd", "\x00", "é" * 300,
+    float("nan"), float("inf"), "", "x", "../../etc/passwd", "/etc/passwd", "\x00",
+    "é" * 300, "é" * 150, "\ud800",
     "\n", [], {}, [[]], [None], {"a": 1}, [0] * 50, ["x"] * 20, 0.5, [1, 2, 3], [1e308] * 16,
 )  # fmt: skip
 

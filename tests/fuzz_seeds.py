@@ -229,19 +229,43 @@ def picture_seeds() -> list[Seed]:
 
 
 def capture_seeds(folder: Path) -> list[Seed]:
-    """A capture with its photos, as training and eval read it, and the list of recent files."""
-    from app.recent import RecentFiles
+    """Captures with their photos and points, as training and eval read them, and parts of them."""
     from scene.read_capture import read_capture
-    from tests.captures import simple, write_transforms
+    from scene.read_points import read_points
+    from tests.captures import simple, whole, write_transforms
 
-    capture = folder / "capture"
-    frames, more = simple(capture, 3)
-    write_transforms(capture, frames, **more)
+    seeds = []
+    for name, make in (("simple", simple), ("whole", whole)):
+        capture = folder / f"capture_{name}"
+        frames, more = make(capture)
+        write_transforms(capture, frames, **more)
+        seeds.append(Seed(f"capture {name}", files_of(capture), read_capture))
+        table = {"transforms.json": seeds[-1].files["transforms.json"]}
+        photos = {name: data for name, data in seeds[-1].files.items() if name not in table}
+        seeds.append(Seed(f"capture {name} table", table, with_photos(photos, read_capture)))
+    packed = (folder / "capture_whole/points.npz").read_bytes()
+    seeds.append(Seed("capture points", {"points.npz": packed}, read_points))
+    cloud = next(seed for seed in point_seeds() if seed.name == "points").files["a.ply"]
+    return [*seeds, Seed("capture cloud", {"a.ply": cloud}, read_points)]
+
+
+def with_photos(photos: dict[str, bytes], read: Callable) -> Callable:
+    """Opens a table alone: its photos, which stay as they are, are put beside it first."""
+
+    def open_table(path: Path) -> object:
+        if not (path.parent / next(iter(photos))).is_file():
+            Seed("", photos, read).put(path.parent)
+        return read(path)
+
+    return open_table
+
+
+def recent_seed() -> Seed:
+    """The list of recent files: a broken one counts as empty."""
+    from app.recent import RecentFiles
+
     recent = json.dumps({"recent": ["/a/b.ply", "C:\\c d\\\u00e9.splat"]}).encode()
-    return [
-        Seed("capture", files_of(capture), read_capture),
-        Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent)),
-    ]
+    return Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent))
 
 
 def camera_seeds(folder: Path) -> list[Seed]:
@@ -285,5 +309,5 @@ def all_seeds(folder: Path) -> list[Seed]:
     seeds = splat_seeds(folder) + real_seeds() + point_seeds() + archive_seeds(folder)
     legacy = gzip.compress(b"NGSP" + bytes([1, 0, 0, 0, 2, 0, 0, 0, 0, 12, 0, 0]) + bytes(2 * 17))
     seeds.append(Seed("spz v1", {"v1.spz": legacy}, forgiving, {"v1.spz": "gzip"}))
-    seeds += thermal_seeds(folder) + picture_seeds() + capture_seeds(folder)
+    seeds += [*thermal_seeds(folder), *picture_seeds(), *capture_seeds(folder), recent_seed()]
     return seeds + camera_seeds(folder) + text_seeds()

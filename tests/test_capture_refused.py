@@ -83,7 +83,7 @@ def negative_focal(frames, more):
 
 def nan_focal(frames, more):
     more["fl_x"] = float("nan")
-    return "above 0"
+    return "'fl_x' is nan; a number"
 
 
 def bent_lens(frames, more):

@@ -12,7 +12,11 @@ from runtime_models.formats import format_of, read_plain
 from runtime_models.model import BadFile
 from runtime_models.morton import morton_order
 from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_compressed_ply import read_raw_compressed_ply
+from runtime_models.read_compressed_ply import (
+    from_smallest_three,
+    harmonics,
+    read_raw_compressed_ply,
+)
 from runtime_models.write_compressed_ply import write_compressed_ply
 
 C0 = 0.28209479177387814
@@ -271,3 +275,22 @@ def test_the_real_biker_and_guitar(data):
         assert got.dropped == 0 and got.format == "compressed PLY"
         height, width, depth = np.ptp(got.means, axis=0)[[1, 0, 2]]
         assert height > max(width, depth)  # both stand upright
+
+
+def test_every_code_of_a_harmonic_is_the_middle_of_its_bin_to_the_bit():
+    share = (np.arange(256) + 0.5) / 256
+    share[[0, 255]] = 0, 1
+    codes = np.arange(256, dtype=np.uint8)
+    every = np.tile(codes, 90)[: 256 * 90].reshape(-1, 3, 15)
+    wanted = ((share - 0.5) * 8).astype(np.float32)[every].transpose(0, 2, 1)
+    assert np.array_equal(harmonics(every), wanted)
+    assert harmonics(every[:, :, :0]).shape == (len(every), 0, 3)
+
+
+@pytest.mark.parametrize("largest", [0, 1, 2, 3])
+def test_the_entry_left_out_of_a_quaternion_goes_to_its_place(largest):
+    small = np.random.default_rng(0).uniform(-0.5, 0.5, (100, 3)).astype(np.float32)
+    out = np.empty((100, 4), np.float32)
+    from_smallest_three(list(small.T), np.full(100, largest, np.uint32), out)
+    assert np.array_equal(np.delete(out, largest, axis=1), small)
+    assert np.array_equal(out[:, largest], np.sqrt(1 - (small * small).sum(1)))

@@ -205,6 +205,15 @@ def test_options_that_cannot_be(scenes, tmp_path, capsys, words, said):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("scene", ["random.shift", "plain.ply", "layers"])
+def test_an_eye_that_changes_nothing_is_said_and_changes_nothing(scenes, tmp_path, capsys, scene):
+    assert export(scenes / scene, "--out", tmp_path / "without.ply") == 0
+    assert "--eye" not in capsys.readouterr().err
+    assert export(scenes / scene, "--out", tmp_path / "with.ply", "--eye", "9,2,-3") == 0
+    assert capsys.readouterr().err.count("--eye changes nothing: the shapes") == 1
+    assert (tmp_path / "with.ply").read_bytes() == (tmp_path / "without.ply").read_bytes()
+
+
 @pytest.mark.parametrize("name", ["a.png", "a.ksplat", "a.sog", "a.gltf", "a.txt"])
 def test_endings_that_are_not_written(scenes, tmp_path, capsys, name):
     refused(capsys, "no ending that can be written", scenes / "plain.ply", "--out", tmp_path / name)

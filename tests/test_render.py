@@ -139,6 +139,33 @@ def test_only_what_was_asked_for_is_overwritten(scene, tmp_path, capsys):
     assert {p.name for p in tmp_path.iterdir()} == {"notes.txt", "0000_x0.000.png"}
 
 
+@pytest.mark.parametrize(
+    ("words", "last"),
+    [((), 0), (("--x", "sweep:3"), 2), (("--frames", 3), 2), (("--camera", "front"), 0),
+     (("--camera", "eyes"), 1), (("--camera", "eyes", "--x", "sweep:2"), 3)],
+)  # fmt: skip
+def test_pictures_that_exist_are_found_before_the_scene_is_opened(
+    tmp_path, capsys, monkeypatch, words, last
+):
+    """The last picture of each run is there; the scene is one that nobody could open."""
+    broken = tmp_path / "broken.shift"
+    broken.write_bytes(b"PK")
+    poses = (np.eye(4), np.diag([1.0, -1, -1, 1]))
+    rows = [{"matrix": pose.tolist(), "fov_y": 0.8} for pose in poses]
+    (tmp_path / "eyes").write_text(json.dumps(rows))
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "out"
+    out.mkdir()
+    x = parse_controls(words[-1:])[-1] if "--x" in words else 0
+    (out / f"{last:04}_x{x:.3f}.png").write_text("mine")
+    (out / f"{last + 1:04}_x{x:.3f}.png").write_text("mine, in nobody's way")
+    assert render(broken, "--out", out, *words, *TINY) == 2
+    assert f"{last:04}_x{x:.3f}.png exists; choose" in capsys.readouterr().err
+    assert render(broken, "--out", out, *words, *TINY, "--overwrite") == 2
+    assert "broken.shift is not a package" in capsys.readouterr().err  # then it is the scene's turn
+    assert {p.read_text()[:4] for p in out.iterdir()} == {"mine"}
+
+
 def test_a_file_in_place_of_the_folder_is_one_sentence(scene, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert render(scene, "--out", tmp_path / "file", *TINY) == 2
@@ -210,6 +237,8 @@ def test_bad_options_are_one_sentence(scene, tmp_path, capsys, extra):
 
 def test_a_missing_scene_is_one_sentence(tmp_path, capsys):
     assert render(tmp_path / "none.shift", "--out", tmp_path / "out") == 2
+    assert "none.shift does not exist" in capsys.readouterr().err
+    assert render(tmp_path / "none.shift", "--camera", "auto", "--out", tmp_path / "out") == 2
     assert "none.shift does not exist" in capsys.readouterr().err
 
 

@@ -201,8 +201,33 @@ def test_a_meta_json_that_is_none(tmp_path, text):
         read_model(folder)
 
 
-def test_places_beyond_float32_are_left_to_the_judge(tmp_path):
+def test_a_range_of_places_beyond_float32_is_refused_with_its_width(tmp_path):
     meta, pictures = random_sog(400)
     meta["means"]["maxs"] = [1000.0, 3.0, 0.5]  # e to the 1000
-    layers = read_model(write_folder(tmp_path / "scene", meta, pictures))
-    assert 0 < layers.splat_count < 400 and np.isfinite(layers.means).all()
+    folder = write_folder(tmp_path / "scene", meta, pictures)
+    raw = read_raw_sog(folder, Reading())  # decodes, without a warning of numpy's
+    assert raw.means.shape == (400, 3) and np.isinf(raw.means[:, 0]).any()
+    assert np.isfinite(raw.means[:, 1:]).all()
+    refused(folder, r"scene: its positions spread over .*e\+\d\d m, at most 1e\+12 m")
+
+
+def test_one_place_beyond_float32_is_dropped_alone(tmp_path):
+    """All splats at x = 0 but one, which stands at the end of a range of e to the 700 metres."""
+    meta, pictures = random_sog(400)
+    meta["means"]["mins"][0], meta["means"]["maxs"][0] = 0.0, 700.0
+    kept = read_model(write_folder(tmp_path / "before", meta, pictures | at_end(pictures, ())))
+    layers = read_model(write_folder(tmp_path / "after", meta, pictures | at_end(pictures, (7,))))
+    assert kept.splat_count == 400 and layers.splat_count == 399
+    np.testing.assert_array_equal(layers.means, np.delete(kept.means, 7, axis=0))
+    (dropped,) = [finding for finding in layers.findings if finding.done == "dropped"]
+    assert dropped.count == 1 and dropped.rows == (7,)
+
+
+def at_end(pictures, rows):
+    """The pictures of the places with x at the start of its range, or at its end in some rows."""
+    changed = {}
+    for name in ("means_l.webp", "means_u.webp"):
+        changed[name] = pictures[name].copy()
+        changed[name][..., 0] = 0
+        changed[name].reshape(-1, pictures[name].shape[-1])[list(rows), 0] = 255
+    return changed

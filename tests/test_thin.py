@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import make_random_model
 from ply_files import some_splats
 
 from runtime_models.model import Stop
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import join_layers
 from runtime_models.read_scene import read_model
-from runtime_models.thin import certain_ones, evenly, largest, thin
+from runtime_models.thin import certain_ones, evenly, largest, left_whole, thin
 from runtime_models.write_ply import write_ply
 
 WEIGHTS = {
@@ -108,3 +109,11 @@ def test_parts_share_the_first_origin_and_all_columns():
     assert layers.extra["b"].tolist() == [0, 0, 0, 0, 1, 2, 3]
     assert layers.labels.tolist() == [0, 0, 0, 0, 1, 2, 3]
     assert (layers.sh[:3, 1:] == 0).all() and layers.layer.tolist() == [0] * 3 + [1] * 4
+
+
+def test_a_model_of_anchors_stays_whole_and_says_so():
+    model = make_random_model(20, k=3)
+    assert left_whole(model, 0, "a") is model and left_whole(model, 60, "a") is model
+    same = left_whole(model, 59, "a")
+    (found,) = same.findings
+    assert same.splat_count == 60 and "asks for 59" in found.what and not found.repaired

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, ControlEncoding, Mlp, SplatLayers, Stop
+from runtime_models.model import AnchorModel, ControlEncoding, Mlp, Model, SplatLayers, Stop
 from runtime_models.spherical_harmonics import C0
 from scene.pose import Pose, View, perspective
 from scene.scene import IDENTITY, Scene, SceneObject
@@ -69,7 +69,7 @@ def small_model(anchors: int = 60, k: int = 5, seed: int = 0) -> AnchorModel:
     return AnchorModel(*arrays, networks, k, ControlEncoding(), stops)
 
 
-def alone(model: AnchorModel | SplatLayers, pose=IDENTITY, x: float = 0.0) -> Scene:
+def alone(model: Model, pose=IDENTITY, x: float = 0.0) -> Scene:
     return Scene((SceneObject("thing", model, pose, x),))
 
 

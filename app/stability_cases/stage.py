@@ -11,7 +11,7 @@ from app.stability_cases.finding import Panel
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import FrameStats, RenderSettings
-from runtime_models.model import AnchorModel, SplatLayers
+from runtime_models.model import Model
 from scene.framing import default_view, frame_points, model_points
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene, SceneObject
@@ -25,7 +25,7 @@ class Stage:
 
     renderer: Renderer
     ctx: object  # moderngl.Context, or None with tiles alone
-    model: AnchorModel | SplatLayers
+    model: Model
     size: tuple[int, int]
     reopen: Callable[[], AbstractContextManager]  # another context and renderer of this kind
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)

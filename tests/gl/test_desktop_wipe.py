@@ -12,7 +12,7 @@ from app.compare_sides import SceneSide
 from app.desktop import Options, Viewer
 from app.stage import Stage
 from app.window import Drag, KeyDown, Press, Release
-from app.wipe import Wipe
+from app.wipe import KEYS, Wipe
 from renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
@@ -109,3 +109,17 @@ def test_zeros_that_lie_elsewhere_are_respected(stand):
     wipe._side = replace(wipe._side, model=replace(b, origin=(100.0, 0.0, 0.0)))
     offset = wipe._offset(viewer.stage.scene)
     np.testing.assert_array_equal(offset, [-100.0, 0.0, 0.0])
+
+
+def test_the_panel_lists_its_keys(stand, monkeypatch):
+    import app.panel
+
+    viewer, _, _ = stand
+    listed = []
+    monkeypatch.setattr(app.panel, "section", lambda name, open_first=False: name == "Keys")
+    monkeypatch.setattr(app.panel, "rows", lambda pairs, share: listed.append(tuple(pairs)))
+    viewer.overlay = True
+    run_frames(viewer, 1)
+    (keys,) = listed
+    assert keys[: len(app.panel.KEYS)] == app.panel.KEYS
+    assert keys[len(app.panel.KEYS) :] == KEYS and {k for k, _ in KEYS} == {", .", "C"}

@@ -14,6 +14,7 @@ EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "22000"))
 
 @pytest.mark.slow
 def test_twenty_thousand_wrong_files_become_a_model_or_one_sentence(tmp_path):
-    count, then = fuzz_all(tmp_path, EXAMPLES, os.environ.get("FUZZ_ONLY", ""))
+    only = os.environ.get("FUZZ_ONLY", "")  # a word in the names of seeds
+    count, then = fuzz_all(tmp_path, EXAMPLES, only)
     assert count >= EXAMPLES
-    assert then.opened > 0 and then.drawn > 0
+    assert then.opened > 0 and (only or then.drawn > 0)
