@@ -14,16 +14,18 @@ MAY_IMPORT = {
     "scene": {"runtime_models"},
     "renderer": {"rasterizer", "scene", "runtime_models"},
     "training": {"rasterizer", "scene", "runtime_models"},
-    "app": {"renderer", "training", "rasterizer", "scene", "runtime_models"},
+    "vr": {"renderer", "scene", "runtime_models"},
+    "app": {"vr", "renderer", "training", "rasterizer", "scene", "runtime_models"},
 }
 # folder: outside packages it must never see
 NEVER = {
-    "runtime_models": {"rapier3d", "moderngl", "torch", "pyopencl", "glfw", "imgui_bundle"},
-    "rasterizer": {"rapier3d", "moderngl", "torch", "PIL", "onnx", "onnxruntime", "glfw"},
-    "scene": {"moderngl", "torch", "pyopencl", "glfw"},
-    "renderer": {"rapier3d", "torch", "glfw", "imgui_bundle", "moderngl_window"},
-    "training": {"rapier3d", "moderngl", "glfw", "imgui_bundle", "torch"},
-    "app": {"rapier3d", "torch"},
+    "runtime_models": {"xr", "rapier3d", "moderngl", "torch", "pyopencl", "glfw", "imgui_bundle"},
+    "rasterizer": {"xr", "rapier3d", "moderngl", "torch", "PIL", "onnx", "onnxruntime", "glfw"},
+    "scene": {"xr", "moderngl", "torch", "pyopencl", "glfw"},
+    "renderer": {"xr", "rapier3d", "torch", "glfw", "imgui_bundle", "moderngl_window"},
+    "training": {"xr", "rapier3d", "moderngl", "glfw", "imgui_bundle", "torch"},
+    "vr": {"rapier3d", "torch", "imgui_bundle", "moderngl_window", "pyopencl"},
+    "app": {"rapier3d", "torch", "xr"},
 }
 
 

@@ -1,0 +1,48 @@
+"""What one frame of a headset is, in our own words: eyes, head, hands, time.  No OpenXR here.
+
+Everything is in play space: metres of the room, +Y up, the floor at y = 0 where the runtime knows
+it, as the runtime's reference space says.  `Standing` (vr/standing.py) says where that room is in
+the world.
+"""
+
+from dataclasses import dataclass
+
+from scene.pose import Pose, View
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class Hand:
+    """One controller as it is at the time that the frame will be seen.
+
+    A lost hand, or one whose actions are inactive, has `active` False, no poses, and rests.
+    """
+
+    active: bool = False
+    grip: Pose | None = None  # play_from_grip: the palm
+    aim: Pose | None = None  # play_from_aim: points along its -Z
+    squeeze: float = 0.0  # 0..1
+    trigger: float = 0.0  # 0..1
+    stick: tuple[float, float] = (0.0, 0.0)  # -1..1, right and forward; a trackpad that is pressed
+    stick_click: bool = False
+    primary: bool = False  # A or X; the trackpad's own where there is no such button
+    secondary: bool = False  # B or Y
+    menu: bool = False
+
+
+LOST = Hand()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a frame loop gives: where the eyes and hands will be, and when."""
+
+    views: tuple[View, ...]  # play_from_eye, one an eye, off-centre tangents, pixels of its target
+    head: Pose  # play_from_head
+    hands: dict[str, Hand]  # of SIDES
+    seen_s: float  # the runtime's predicted display time, seconds since the session began
+    period_s: float  # of the runtime's frames
+    drawn: bool  # False: nothing is shown now, so nothing is to be drawn
+    focused: bool  # False: somebody else has the hands; they are LOST
+    recentred: bool = False  # the room has a new origin since the last frame
