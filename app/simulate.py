@@ -81,19 +81,18 @@ def make_simulation(file, acts: tuple):
     from app.scene_files import tell_findings
     from runtime_models.plain_splats import Reading
     from scene.collider_files import colliders_of
-    from scene.physics import Physics
     from scene.scene_file import read_models
     from scene.simulation import Simulation
+    from scene.world import World
 
     with progress_after(PATIENCE_S) as shown:
         models = read_models(file, Reading(told=shown))
         colliders = colliders_of(file, models, shown)
-    physics = Physics(file.gravity_m_s2, file.floor_y, HZ)
-    simulation = Simulation(file, models, colliders, physics, acts, HZ)
+    world = World(file, models, colliders, hz=HZ)
     tell_findings(models)
-    for finding in simulation.findings:
+    for finding in world.findings:
         print(sentence(finding), file=sys.stderr)
-    return simulation
+    return Simulation(world, acts)
 
 
 def refuse_taken(paths: list[Path], options: Options) -> None:
@@ -113,16 +112,17 @@ def tell(simulation, steps: int, path: Path, options: Options):
 
     Lines are whole at every moment: who stops it keeps what was told until then.
     """
+    world = simulation.world
     with path.open("w", encoding="utf-8", newline="\n") as out:
-        head = {"scene": options.scene.name, "hz": simulation.hz, "steps": steps}
-        out.write(line({**head, "objects": list(simulation.moving)}))
+        head = {"scene": options.scene.name, "hz": world.hz, "steps": steps}
+        out.write(line({**head, "objects": list(world.things)}))
         yield 0
         for number in range(1, steps + 1):
             record = simulation.step()
             if record.is_news:
                 out.write(line(record.row()))
             yield number
-        out.write(line({"end": steps, "hash": simulation.physics.hash()}))
+        out.write(line({"end": steps, "hash": world.physics.hash()}))
 
 
 def line(row: dict) -> str:
@@ -136,11 +136,11 @@ def draw_run(told, simulation, file, size: tuple[int, int], options: Options) ->
     from app.drawing import open_renderer, save_png
     from scene.scene_file import first_view
 
-    view = first_view(file, simulation.scene, size)
+    view = first_view(file, simulation.world.drawn(), size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         renderer.settings = replace(renderer.settings, background=(0.0, 0.0, 0.0))
         for number in told:
             if number % options.pictures == 0:
-                renderer.update(simulation.drawn())
+                renderer.update(simulation.world.drawn())
                 renderer.draw([view])
                 save_png(renderer.resolved(0), options.out / f"{number:05d}.png")

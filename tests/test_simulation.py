@@ -15,6 +15,7 @@ from scene.read_script import Act
 from scene.scene_file import SceneFile, SceneItem
 from scene.selector import Sphere
 from scene.simulation import Simulation
+from scene.world import World
 
 UP = np.array([1.0, 0, 0, 0])
 SOLID = SimpleNamespace(hulls=(), mesh="mesh")
@@ -106,7 +107,7 @@ def simulation(*items: SceneItem, acts: tuple = (), solid: bool = True, **file) 
     scene = SceneFile(folder=Path(), items=items, **file)
     names = [item.name for item in scene.all_items]
     colliders = dict.fromkeys(names, SOLID) if solid else {}
-    return Simulation(scene, dict.fromkeys(names, model()), colliders, Points(), acts)
+    return Simulation(World(scene, dict.fromkeys(names, model()), colliders, Points()), acts)
 
 
 def item(name: str = "a", **changes) -> SceneItem:
@@ -126,13 +127,13 @@ def reaction(on: str, to, **changes) -> Reaction:
     return Reaction(on=on, to=to, **({"seconds": 0.0} | changes))
 
 
-def play(world: Simulation, steps: int) -> list[dict]:
-    return [record.row() for _ in range(steps) if (record := world.step()).is_news]
+def play(run: Simulation, steps: int) -> list[dict]:
+    return [record.row() for _ in range(steps) if (record := run.step()).is_news]
 
 
 def test_what_falls_collides_once_and_changes_x():
-    world = simulation(item(reactions=(reaction("collision", "ice", least_impulse_n_s=1.0),)))
-    rows = play(world, 90)
+    run = simulation(item(reactions=(reaction("collision", "ice", least_impulse_n_s=1.0),)))
+    rows = play(run, 90)
     hit = [row for row in rows if "events" in row]
     assert len(hit) == 1 and abs(hit[0]["t"] - np.sqrt(2 / 9.81)) < 2 / 90
     assert hit[0]["events"] == [
@@ -141,13 +142,13 @@ def test_what_falls_collides_once_and_changes_x():
     assert hit[0]["contacts"][0]["between"] == ["floor", "a"]
     assert hit[0]["x"] == {"a": 0.5} and hit[0]["poses"] == {"a": [0, 0, 0, 1, 0, 0, 0]}
     assert [row for row in rows if row["t"] > hit[0]["t"]] == []  # it lies: nothing is new
-    assert world.drawn().objects[0].x == 0.5
+    assert run.world.drawn().objects[0].x == 0.5
 
 
 def test_both_sides_of_a_contact_answer_in_the_order_of_ids():
     answer = (reaction("collision", "ice"),)
-    world = simulation(item("a", reactions=answer), item("b", reactions=answer))
-    row = next(row for row in play(world, 90) if "events" in row)
+    run = simulation(item("a", reactions=answer), item("b", reactions=answer))
+    row = next(row for row in play(run, 90) if "events" in row)
     assert [event["object"] for event in row["events"]] == ["a", "b"]
     assert [contact["between"] for contact in row["contacts"]] == [["floor", "a"], ["floor", "b"]]
 
@@ -157,8 +158,8 @@ def test_a_hand_grabs_carries_and_releases():
         hand(0.0, 0, 1, 0), act(0.0, "grab"), hand(0.5, 2, 1, 0), act(0.5, "release"),
         act(0.6, "release"),
     )  # fmt: skip
-    world = simulation(item(reactions=(reaction("grab", "fire"),)), acts=acts)
-    rows = play(world, 60)
+    run = simulation(item(reactions=(reaction("grab", "fire"),)), acts=acts)
+    rows = play(run, 60)
     assert rows[0]["hands"] == [{"hand": "right", "did": "grab", "object": "a"}]
     assert rows[0]["x"] == {"a": 1.0}
     carried = {row["step"]: row["poses"]["a"][0] for row in rows if "poses" in row}
@@ -175,39 +176,39 @@ def test_a_hand_that_is_far_or_lost_holds_nothing():
         hand(0.0, 0, 1.2, 0), act(0.0, "grab", reach_m=0.1), act(0.1, "grab", reach_m=0.5),
         act(0.2, "lose"),
     )  # fmt: skip
-    world = simulation(item(), acts=acts)
-    deeds = [deed for row in play(world, 30) for deed in row.get("hands", [])]
+    run = simulation(item(), acts=acts)
+    deeds = [deed for row in play(run, 30) for deed in row.get("hands", [])]
     assert deeds == [
         {"hand": "right", "did": "miss"}, {"hand": "right", "did": "grab", "object": "a"},
         {"hand": "right", "did": "lose", "object": "a"},
     ]  # fmt: skip
-    assert not world.holds and not world.physics.hold
+    assert not run.world.holds and not run.world.physics.hold
 
 
 def test_a_second_grab_lets_go_of_the_first():
     acts = (hand(0.0, 0, 1, 0), act(0.0, "grab"), act(0.1, "grab"))
-    world = simulation(item(), acts=acts)
-    deeds = [deed["did"] for row in play(world, 20) for deed in row.get("hands", [])]
+    run = simulation(item(), acts=acts)
+    deeds = [deed["did"] for row in play(run, 20) for deed in row.get("hands", [])]
     assert deeds == ["grab", "release", "grab"]
 
 
 def test_a_ray_hits_and_misses():
     shot = act(0.1, "ray", origin=(0, 1, 3), direction=(0, 0, -2))
-    world = simulation(item(reactions=(reaction("ray", "fire"),)), acts=(shot,))
-    row = next(row for row in play(world, 20) if "rays" in row)
+    run = simulation(item(reactions=(reaction("ray", "fire"),)), acts=(shot,))
+    row = next(row for row in play(run, 20) if "rays" in row)
     assert row["rays"][0]["object"] == "a" and row["rays"][0]["distance_m"] > 2.9
-    assert world.physics.told == [("ray", (0, 0, -1))]
+    assert run.world.physics.told == [("ray", (0, 0, -1))]
     assert row["step"] == 10 and row["x"] == {"a": 1.0}  # 0.1 s is the begin of step 10
-    world = simulation(item(reactions=(reaction("ray", "fire"),), collider=None), acts=(shot,),
+    run = simulation(item(reactions=(reaction("ray", "fire"),), collider=None), acts=(shot,),
                        solid=False)  # fmt: skip
-    row = next(row for row in play(world, 20) if "rays" in row)
+    row = next(row for row in play(run, 20) if "rays" in row)
     assert row["rays"] == [{"origin": [0, 1, 3], "object": None}]
 
 
 def test_a_region_that_is_fallen_into():
     region = Sphere(centre=(0, 0, 0), radius=0.5, x=0, space="world")
-    world = simulation(item(reactions=(reaction("enter", "ice", region=region),)))
-    event = next(row for row in play(world, 60) if "events" in row)
+    run = simulation(item(reactions=(reaction("enter", "ice", region=region),)))
+    event = next(row for row in play(run, 60) if "events" in row)
     assert event["poses"]["a"][1] == pytest.approx(0.5, abs=0.05)
 
 
@@ -216,17 +217,17 @@ def test_controls_by_x_and_by_two_axes():
         act(0.0, "control", item="a", x=0.3),
         act(0.1, "control", item="a", balance=-0.5, power=1.0),
     )
-    world = simulation(item(two_axes=TwoAxes()), acts=acts)
-    xs = [row["x"]["a"] for row in play(world, 20) if "x" in row]
+    run = simulation(item(two_axes=TwoAxes()), acts=acts)
+    xs = [row["x"]["a"] for row in play(run, 20) if "x" in row]
     assert xs == [0.3, 0.25]
 
 
 def test_what_has_no_collider_stays_and_what_is_static_stays():
     table = SceneItem(name="background", model="m", static=True, friction=0.3)
-    world = simulation(item("b", static=True), background=table)
-    rows = play(world, 30)
+    run = simulation(item("b", static=True), background=table)
+    rows = play(run, 30)
     assert len(rows) == 1 and set(rows[0]["poses"]) == {"background", "b"}
-    assert [shape for shape, *_ in world.physics.told] == ["mesh", ()]
+    assert [shape for shape, *_ in run.world.physics.told] == ["mesh", ()]
     assert len(play(simulation(item(), solid=False), 30)) == 1
 
 
@@ -242,7 +243,7 @@ def test_the_same_script_gives_the_same_rows():
 
 
 def test_what_the_physics_says_names_its_object():
-    world = simulation(item(), item("b", mass_kg=9.0), item("c"))
-    assert [(f.file, f.what) for f in world.findings] == [("object 'b'", "the mass 9 kg")]
+    run = simulation(item(), item("b", mass_kg=9.0), item("c"))
+    assert [(f.file, f.what) for f in run.world.findings] == [("object 'b'", "the mass 9 kg")]
     with pytest.raises(BadFile, match="object 'b': hull 0 is flat"):
         simulation(item(), item("b", mass_kg=900.0))
