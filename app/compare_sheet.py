@@ -25,7 +25,7 @@ def written(picture: np.ndarray, text: str) -> np.ndarray:
     """The picture with a line in its upper left corner."""
     from PIL import Image, ImageDraw
 
-    from app.letters import drawable, letters
+    from renderer.letters import drawable, letters
 
     image = Image.fromarray((np.clip(np.nan_to_num(picture), 0, 1) * 255 + 0.5).astype(np.uint8))
     draw = ImageDraw.Draw(image)

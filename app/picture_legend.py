@@ -13,7 +13,7 @@ def with_legend(picture: np.ndarray, rows: Rows) -> np.ndarray:
         return picture
     from PIL import Image, ImageDraw
 
-    from app.letters import drawable, letters
+    from renderer.letters import drawable, letters
 
     image = Image.fromarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
     draw = ImageDraw.Draw(image)

@@ -166,7 +166,7 @@ def test_a_scene_is_no_folder_of_pictures(pair, tmp_path):
 
 
 def test_names_in_any_letters_are_drawn_or_marked():
-    from app.letters import drawable
+    from renderer.letters import drawable
 
     assert drawable("M\u00f6hre a\u2192b \u03a9", 20) == "M\u00f6hre a\u2192b \u03a9"
     assert drawable("\u30c4 \u6f22", 20) == "? ?"

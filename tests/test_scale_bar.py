@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.scale_bar import nice_ticks, tick_text
+from renderer.ticks import nice_ticks, tick_text
 
 
 @pytest.mark.parametrize(

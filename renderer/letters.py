@@ -14,12 +14,13 @@ MISSING = "\uffff"  # no letter: its shape is that of all letters which the font
 
 
 @cache
-def letters(height: int) -> "ImageFont.FreeTypeFont":
+def letters(height: int, bold: bool = False) -> "ImageFont.FreeTypeFont":
     """The font, `height` pixels high."""
     import matplotlib
     from PIL import ImageFont
 
-    path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name
     return ImageFont.truetype(str(path), height)
 
 
