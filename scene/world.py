@@ -11,37 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime_models.model import BadFile, Finding, Model
+from runtime_models.model import Finding, Model
 from scene.pose import Pose
-from scene.reactions import Event, Machine, Standing, advance, start, steer
+from scene.reactions import Event, advance, steer
 from scene.read_script import between
 from scene.record import Record, event_row, rounded
-from scene.scene import Scene, SceneObject
-from scene.scene_file import BACKGROUND, SceneFile, SceneItem, labelled, machine_of, object_of
+from scene.scene import Scene
+from scene.scene_file import SceneFile, SceneItem, labelled
+from scene.thing import Thing, drawn_thing, new_thing, same_pose
 
 FLOOR_NAME = "floor"
 REACH_M = 0.05  # from a hand to what it grabs
 MOST_STEPS = 8  # made up for at once, after a frame that took long; the rest of the time is lost
 SLACK = 1e-6  # of a step: sixty frames of 1/60 s are ninety steps, whatever rounding says
-
-
-@dataclass(frozen=True)
-class Thing:
-    """One object on its way: where it stands and what its x does."""
-
-    item: SceneItem
-    body: int | None  # of the physics; None: nothing can touch it
-    machine: Machine
-    standing: Standing
-    pose: Pose
-    drawn: SceneObject  # as it was drawn last
-    before: Pose  # at the step before, for pictures between two steps
-    collider: object | None = None  # scene.collider.Collider
-
-    @property
-    def moves(self) -> bool:
-        """Whether the physics moves it and a hand can hold it."""
-        return self.body is not None and not self.item.static
 
 
 @dataclass(frozen=True)
@@ -116,16 +98,13 @@ class World:
             raise ValueError(f"there is an object '{item.name}'; each wants a name of its own.")
         if label is None:
             label = max((thing.drawn.label for thing in self.things.values()), default=0) + 1
-        drawn, machine = object_of(item, model, label), machine_of(item, model)
         known = len(self.physics.findings)
-        body = add_body(self.physics, item, collider)
+        thing = new_thing(item, model, collider, label, self.physics)
         of = f"object '{item.name}'"
         self.findings += [replace(new, file=of) for new in self.physics.findings[known:]]
-        pose, standing = item.pose, start(machine, item.x)
-        thing = Thing(item, body, machine, standing, pose, drawn, pose, collider)
         self.things[item.name] = thing
-        if body is not None:
-            self.names[body] = item.name
+        if thing.body is not None:
+            self.names[thing.body] = item.name
 
     def remove(self, name: str) -> None:
         """Takes an object out; hands that held it are empty, and what lay on it falls."""
@@ -259,12 +238,11 @@ class World:
         if self.holds or self._events:
             return False
         return all(
-            thing.standing.motion is None and not (thing.moves and not self._sleeps(thing))
+            thing.standing.motion is None
+            and same_pose(thing.before, thing.pose)
+            and (not thing.moves or self.physics.sleeps(thing.body))
             for thing in self.things.values()
         )
-
-    def _sleeps(self, thing: Thing) -> bool:
-        return self.physics.sleeps(thing.body)
 
     def step(self) -> Record:
         """One step of 1/hz seconds, whether paused or not."""
@@ -341,27 +319,11 @@ class World:
 
     def drawn(self) -> Scene:
         """The scene as it stands now, for the renderer; the same object until something changes."""
-        objects = tuple(self._stood(name) for name in self.things)
-        if len(objects) != len(self._drawn.objects) or any(
-            new is not old for new, old in zip(objects, self._drawn.objects, strict=True)
-        ):
+        self.things = {name: drawn_thing(t, self._part) for name, t in self.things.items()}
+        objects = tuple(thing.drawn for thing in self.things.values())
+        if list(map(id, objects)) != list(map(id, self._drawn.objects)):
             self._drawn = Scene(objects)
         return self._drawn
-
-    def _stood(self, name: str) -> SceneObject:
-        thing = self.things[name]
-        same = np.array_equal(thing.pose.position, thing.before.position) and np.array_equal(
-            thing.pose.wxyz, thing.before.wxyz
-        )
-        still = same or self._part == 1.0
-        pose = thing.pose if still else between(thing.before, thing.pose, self._part)
-        drawn, x = thing.drawn, thing.standing.x
-        was = drawn.world_from_object
-        if drawn.x == x and (*was.position, *was.wxyz) == (*pose.position, *pose.wxyz):
-            return drawn
-        drawn = replace(drawn, world_from_object=pose, x=x)
-        self.things[name] = replace(thing, drawn=drawn)
-        return drawn
 
     # ---- all of it
 
@@ -380,16 +342,3 @@ class World:
         self.names = {t.body: name for name, t in self.things.items() if t.body is not None}
         self._events, self._hands_told, self._rays_told, self._told = {}, [], [], {}
         self._hands_before, self._behind_s, self._part = dict(saved.hands), 0.0, 1.0
-
-
-def add_body(physics, item: SceneItem, collider) -> int | None:
-    """The object's body: the background as a mesh, all else as convex pieces.  Raises BadFile."""
-    if collider is None:
-        return None
-    mass = () if item.static else (item.mass_kg,)
-    add = physics.add_static if item.static else physics.add_body
-    shape = collider.mesh if item.name == BACKGROUND else collider.hulls
-    try:
-        return add(shape, item.pose, *mass, item.friction, item.restitution)
-    except ValueError as error:
-        raise BadFile(f"object '{item.name}': {error}") from None

@@ -1,0 +1,70 @@
+"""One object of a world: what the file says of it, where it stands now, and how it is drawn."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from runtime_models.model import BadFile, Model
+from scene.pose import Pose
+from scene.reactions import Machine, Standing, start
+from scene.read_script import between
+from scene.scene import SceneObject
+from scene.scene_file import BACKGROUND, SceneItem, machine_of, object_of
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object on its way: where it stands and what its x does."""
+
+    item: SceneItem
+    body: int | None  # of the physics; None: nothing can touch it
+    machine: Machine
+    standing: Standing
+    pose: Pose
+    before: Pose  # at the step before, for pictures between two steps
+    drawn: SceneObject  # as it was drawn last
+    collider: object | None = None  # scene.collider.Collider
+
+    @property
+    def moves(self) -> bool:
+        """Whether the physics moves it and a hand can hold it."""
+        return self.body is not None and not self.item.static
+
+
+def new_thing(item: SceneItem, model: Model, collider, label: int, physics) -> Thing:
+    """The object where the file puts it, its body in the physics.  Raises BadFile."""
+    drawn, machine = object_of(item, model, label), machine_of(item, model)
+    body = add_body(physics, item, collider)
+    pose, standing = item.pose, start(machine, item.x)
+    return Thing(item, body, machine, standing, pose, pose, drawn, collider)
+
+
+def add_body(physics, item: SceneItem, collider) -> int | None:
+    """The object's body: the background as a mesh, all else as convex pieces.  Raises BadFile."""
+    if collider is None:
+        return None
+    mass = () if item.static else (item.mass_kg,)
+    add = physics.add_static if item.static else physics.add_body
+    shape = collider.mesh if item.name == BACKGROUND else collider.hulls
+    try:
+        return add(shape, item.pose, *mass, item.friction, item.restitution)
+    except ValueError as error:
+        raise BadFile(f"object '{item.name}': {error}") from None
+
+
+def drawn_thing(thing: Thing, part: float) -> Thing:
+    """With what is drawn at a part 0..1 of the way from the step before to this one.
+
+    The same thing, and the same SceneObject in it, where that is what was drawn last.
+    """
+    still = part == 1.0 or same_pose(thing.before, thing.pose)
+    pose = thing.pose if still else between(thing.before, thing.pose, part)
+    drawn, x = thing.drawn, thing.standing.x
+    if drawn.x == x and same_pose(drawn.world_from_object, pose):
+        return thing
+    return replace(thing, drawn=replace(drawn, world_from_object=pose, x=x))
+
+
+def same_pose(a: Pose, b: Pose) -> bool:
+    """To the last bit."""
+    return np.array_equal(a.position, b.position) and np.array_equal(a.wxyz, b.wxyz)
