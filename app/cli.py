@@ -21,6 +21,7 @@ COMMANDS = {
     "export": ("export", "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat"),
     "cameras": ("cameras", "list a file of cameras, or convert it"),
     "simulate": ("simulate", "a scene file in motion: hands and rays of a script, told as lines"),
+    "vr": ("headset", "a scene in a headset: walk into it and touch it"),
     "train": ("train", "posed photos of several modalities to a scene"),
     "eval": ("evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
     "demo": ("demo", "make the bundled demo again: ray-trace its capture, train it"),

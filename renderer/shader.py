@@ -52,10 +52,10 @@ def compile_compute(ctx: moderngl.Context, name: str, **defines: object) -> mode
 
 
 def compile_program(
-    ctx: moderngl.Context, vertex: str, fragment: str, **defines: object
+    ctx: moderngl.Context, vertex: str, fragment: str, folder: Path = SHADERS, **defines: object
 ) -> moderngl.Program:
     """The program of a .vert and a .frag file; ShaderError where it does not compile or link."""
-    stages = [read_shader(vertex, **defines), read_shader(fragment, **defines)]
+    stages = [read_shader(name, folder, **defines) for name in (vertex, fragment)]
     try:
         return ctx.program(vertex_shader=joined(stages[0]), fragment_shader=joined(stages[1]))
     except moderngl.Error as failure:

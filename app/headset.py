@@ -1,0 +1,123 @@
+"""launch.py vr: a scene in a headset; without one a sentence, and the viewer where it can open."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.opening import ReadingOptions
+
+DEMO = Path(__file__).resolve().parents[1] / "assets" / "touch.scene.json"
+NO_HEADSET = 4  # exit code
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Walk into a scene and touch it, see docs/vr.md."""
+
+    scene: Annotated[Path | None, tyro.conf.Positional] = None
+    """A scene file, a package or splats; none: three things on a table."""
+    eye_part: float = 1.0
+    """Of the width and height that the runtime recommends for an eye."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
+    mirror: bool = True
+    """Show the left eye in a window too, where there is a display."""
+    frames: int = 0
+    """End after so many frames, for tests and benchmarks; 0: stay until it is ended."""
+    report: Path | None = None
+    """Write what the run was like here, as JSON, at its end."""
+    lines: Path | None = None
+    """Write one line of JSON a frame here, as it happens."""
+    pictures: Path | None = None
+    """Folder for the pictures of both eyes."""
+    every: int = 1
+    """Of --pictures: every so many frames."""
+    pixels: str = ""
+    """Format of the runtime's pictures, such as SRGB8_ALPHA8 or RGBA16F; default: the best."""
+
+
+def run(options: Options) -> int:
+    """0 after a session; NO_HEADSET, or the viewer's code, without one."""
+    from vr.instance import Lost, NoHeadset
+
+    check(options)
+    try:
+        return wear(options)
+    except (NoHeadset, Lost) as reason:
+        return without_headset(str(reason), options)
+
+
+def check(options: Options) -> None:
+    """UsageError, one sentence, for what makes no sense."""
+    from app.errors import UsageError
+
+    if not 0.1 <= options.eye_part <= 2:
+        raise UsageError(f"--eye-part is {options.eye_part:g}, expected 0.1 to 2.")
+    if options.frames < 0:
+        raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
+    if options.every < 1:
+        raise UsageError(f"--every is {options.every}, expected 1 or more.")
+    if options.scene is not None and not options.scene.exists():
+        raise UsageError(f"there is no {options.scene}.")
+
+
+def wear(options: Options) -> int:
+    """The session from its door to its end.  Raises NoHeadset, Lost."""
+    from app.cli import has_display
+    from app.drawing import make_folder
+    from app.headset_report import Report
+    from app.mirror import open_mirror
+    from app.wearing import Eyes, Wearing
+    from app.worn_scene import open_worn
+    from renderer.renderer import Renderer
+    from vr.instance import Instance
+    from vr.session import Session
+
+    with Instance() as instance:
+        scene = open_worn(options.scene or DEMO, options)
+        if options.pictures:
+            make_folder(options.pictures)
+        with (
+            Report(options.report, options.lines, options.pictures, options.every) as report,
+            open_mirror(has_display(), options.mirror) as mirror,
+            Session(instance, mirror.ctx, options.eye_part, options.pixels) as session,
+            Renderer(mirror.ctx, options.drawing) as renderer,
+            Eyes(mirror.ctx, session.sizes) as eyes,
+        ):
+            wearing = Wearing(session, renderer, eyes, mirror, scene, report)
+            try:
+                wearing.loop(options.frames)
+            finally:
+                report.write(describe(instance, session))
+    return 0
+
+
+def describe(instance, session) -> dict:
+    """The report without how it ended."""
+    return {
+        "runtime": instance.runtime,
+        "headset": instance.headset,
+        "states": session.life.states,
+        "space": session.play.kind,
+        "recentrings": session.recentrings,
+        "profiles": session.profiles,
+        "pixels": session.pixels.name,
+        "eyes": session.sizes,
+        **session.pace.report(),
+    }
+
+
+def without_headset(reason: str, options: Options) -> int:
+    """Says why, and opens the viewer, unless nobody looks: a measured run, or no display."""
+    from app.cli import has_display
+
+    print(f"shapeshift vr: {reason}", file=sys.stderr)
+    if options.frames or options.report or not has_display():
+        return NO_HEADSET
+    from app import desktop
+
+    print("Opening the scene in a window instead.", file=sys.stderr)
+    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,)))

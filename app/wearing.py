@@ -1,0 +1,106 @@
+"""The loop of a headset: what happens in a frame, in order."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import moderngl
+
+from app.headset_report import Report
+from app.mirror import Mirror, NoMirror
+from app.worn_scene import WornScene
+from renderer.renderer import Renderer
+from renderer.settings import FrameStats
+from scene.pose import View
+from vr.frame import Frame
+from vr.session import Session
+from vr.stance import standing_before
+from vr.standing import Standing
+
+
+class Eyes:
+    """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`."""
+
+    def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
+        self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
+
+    @property
+    def textures(self) -> list[moderngl.Texture]:
+        return [framebuffer.color_attachments[0] for framebuffer in self.framebuffers]
+
+    def __enter__(self) -> "Eyes":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
+            framebuffer.release()
+            texture.release()
+
+
+class Wearing:
+    """One session with one scene, from the first frame to the last."""
+
+    def __init__(
+        self,
+        session: Session,
+        renderer: Renderer,
+        eyes: Eyes,
+        mirror: Mirror | NoMirror,
+        scene: WornScene,
+        report: Report,
+    ) -> None:
+        self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
+        self.scene, self.world, self.report = scene, scene.world, report
+        self.standing = Standing()
+        self.scale = 1.0  # the true one
+        self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
+        self.stats = FrameStats()
+        self._seen_s: float | None = None  # when the frame before was to be seen
+        background = scene.background
+        renderer.settings = replace(renderer.settings, background=background)
+
+    def loop(self, frames: int = 0) -> None:
+        """Until the runtime, the person at the desk or `frames` (0: none) end it."""
+        leaving = False
+        for frame in self.session.frames(self.mirror.rest):
+            self.frame(frame)
+            done = 0 < frames <= self.session.pace.frames
+            if (done or self.mirror.closing) and not leaving:
+                leaving = True
+                self.report.ended = "frames" if done else "closed at the desk"
+                self.session.leave()
+
+    def frame(self, frame: Frame) -> None:
+        """One frame: the person, the world, the pictures of both eyes."""
+        seconds = self._time_passed(frame)
+        self.pulses.clear()
+        if self._seen_s is None or frame.recentred:
+            self.recentre(frame)
+        self._seen_s = frame.seen_s
+        records = self.world.advance(seconds)
+        if frame.drawn:
+            views = [self.standing.view(view) for view in frame.views]
+            self.draw(views)
+            self.session.submit(self.eyes.textures)
+            self.mirror.show(self.eyes.textures[0])
+        self.report.note(self, frame, records)
+
+    def draw(self, views: list[View]) -> None:
+        """Splats with one sort for both eyes."""
+        self.renderer.update(self.world.drawn())
+        self.stats = self.renderer.draw(views)
+        for i, framebuffer in enumerate(self.eyes.framebuffers):
+            self.renderer.present(framebuffer, i)
+
+    def recentre(self, frame: Frame) -> None:
+        """Back to where the scene is looked at first, whoever asks for it."""
+        scene = self.scene
+        self.standing = standing_before(scene.eye, frame.head, scene.floor_y, self.scale)
+
+    def pulse(self, side: str, strength: float, seconds: float) -> None:
+        """Buzzes a hand."""
+        self.pulses.append((side, strength, seconds))
+        self.session.hands.pulse(side, strength, seconds)
+
+    def _time_passed(self, frame: Frame) -> float:
+        """Seconds since the frame before, by the runtime's clock."""
+        return 0.0 if self._seen_s is None else max(frame.seen_s - self._seen_s, 0.0)

@@ -1,0 +1,57 @@
+"""Opens what is to be seen in a headset as a world of objects: a scene file, or one scene alone."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
+from app.scene_files import open_scene_file
+from runtime_models.model import Model
+from scene.collider_files import colliders_of
+from scene.framing import default_background, default_view
+from scene.pose import Pose
+from scene.scene_file import SceneFile, SceneItem, first_view, is_scene_file
+from scene.world import World
+
+HZ = 90  # steps of the physics a second
+BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB, behind objects: as in the window
+ANY_SIZE = (640, 360)  # of a view that only says where to stand
+
+
+@dataclass(frozen=True)
+class WornScene:
+    """A world, and from where it is looked at first."""
+
+    world: World
+    models: dict[str, Model]
+    eye: Pose  # world_from_eye
+    floor_y: float | None  # metres, world; None: the scene says nothing about a floor
+    background: tuple[float, float, float]
+
+
+def open_worn(path: Path, options: ReadingOptions) -> WornScene:
+    """Reads the scene with progress and findings on stderr.  Raises BadFile."""
+    if not is_scene_file(path):
+        return open_alone(path, options)
+    file, models, scene = open_scene_file(path, options)
+    with progress_after(PATIENCE_S) as told:
+        colliders = colliders_of(file, models, told)
+    world = World(file, models, colliders, hz=HZ)
+    for finding in world.findings:
+        print(sentence(finding), file=sys.stderr)
+    eye = first_view(file, scene, ANY_SIZE).world_from_eye
+    return WornScene(world, models, eye, file.floor_y, BACKGROUND)
+
+
+def open_alone(path: Path, options: ReadingOptions) -> WornScene:
+    """One model that nothing can touch, where its file has it."""
+    model = open_model(path, options)
+    x = min((stop.x for stop in model.stops), default=0.0)
+    item = SceneItem(name=path.stem or path.name, model=str(path), x=x, static=True)
+    file = SceneFile(folder=Path(), items=(item,), gravity_m_s2=0.0)
+    world = World(file, {item.name: model}, {}, hz=HZ)
+    eye = default_view(model, ANY_SIZE).world_from_eye
+    background = tuple(map(float, np.array(default_background(model, BACKGROUND))))
+    return WornScene(world, {item.name: model}, eye, None, background)

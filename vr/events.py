@@ -1,0 +1,66 @@
+"""What the runtime tells between frames, in our own words."""
+
+import ctypes
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class StateChanged:
+    state: str  # READY, FOCUSED, ...
+
+
+@dataclass(frozen=True)
+class Recentred:
+    """The origin of a reference space moves at a time of the runtime's clock."""
+
+    space: str
+    time_ns: int
+
+
+@dataclass(frozen=True)
+class ControllersChanged:
+    pass
+
+
+@dataclass(frozen=True)
+class GoingAway:
+    """The runtime itself ends soon."""
+
+
+Event = StateChanged | Recentred | ControllersChanged | GoingAway
+
+
+def take_events(xr, instance: object) -> list[Event]:
+    """All that have come since the last call; those of no meaning to us are left out."""
+    events = []
+    while True:
+        try:
+            told = xr.poll_event(instance)
+        except xr.exception.EventUnavailable:
+            return events
+        event = read_event(xr, told)
+        if event is not None:
+            events.append(event)
+
+
+def read_event(xr, told) -> Event | None:
+    """An event buffer as one of ours; None for one that means nothing to us."""
+    kinds, kind = xr.StructureType, int(told._type)
+    if kind == int(kinds.EVENT_DATA_SESSION_STATE_CHANGED):
+        changed = _as(told, xr.EventDataSessionStateChanged)
+        return StateChanged(xr.SessionState(changed._state).name)
+    if kind == int(kinds.EVENT_DATA_REFERENCE_SPACE_CHANGE_PENDING):
+        pending = _as(told, xr.EventDataReferenceSpaceChangePending)
+        names = {int(getattr(xr.ReferenceSpaceType, name)): name
+                 for name in ("LOCAL_FLOOR", "STAGE", "LOCAL")}  # fmt: skip
+        space = names.get(int(pending._reference_space_type), "")
+        return Recentred(space, int(pending.change_time))
+    if kind == int(kinds.EVENT_DATA_INTERACTION_PROFILE_CHANGED):
+        return ControllersChanged()
+    if kind == int(kinds.EVENT_DATA_INSTANCE_LOSS_PENDING):
+        return GoingAway()
+    return None
+
+
+def _as(told, kind):
+    return ctypes.cast(ctypes.byref(told), ctypes.POINTER(kind)).contents

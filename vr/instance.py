@@ -1,0 +1,136 @@
+"""The door to OpenXR: which runtime is active, which headset it has, or one sentence why none."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+NAME = "Shapeshift"
+API = (1, 0, 34)  # every runtime still in use speaks it
+DRAWING = ("XR_KHR_opengl_enable", "XR_MNDX_egl_enable")  # one of them is needed
+WANTED = ("XR_EXT_local_floor",)  # good to have
+HOW_TO = (
+    "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, "
+    "or name its manifest in XR_RUNTIME_JSON"
+)
+
+
+class NoHeadset(RuntimeError):
+    """Nothing to show a scene in.  The message names the runtime and says what to do."""
+
+
+class Lost(RuntimeError):
+    """The runtime, or our session with it, went away while it ran."""
+
+
+class Instance:
+    """An open instance and its headset; use it in a `with`.
+
+    `xr`: pyopenxr, loaded only here; `handle`, `system`: what its functions want; `runtime`: name
+    and version, `headset`: what the runtime calls it; `extensions`: those that are switched on.
+    """
+
+    def __init__(self) -> None:
+        self.xr = xr = load()
+        self.runtime = "the active OpenXR runtime"
+        self.extensions = self._choose_extensions()
+        with self.asked("open"):
+            self.handle = xr.create_instance(
+                xr.InstanceCreateInfo(
+                    application_info=xr.ApplicationInfo(NAME, 1, NAME, 0, xr.Version(*API)),
+                    enabled_extension_names=list(self.extensions),
+                )
+            )
+        try:
+            self._name_runtime()
+            self._find_headset()
+        except BaseException:
+            self.close()
+            raise
+
+    def _choose_extensions(self) -> tuple[str, ...]:
+        with self.asked("list its extensions"):
+            found = self.xr.enumerate_instance_extension_properties()
+        offered = {_text(each.extension_name) for each in found}
+        chosen = tuple(name for name in (*DRAWING, *WANTED) if name in offered)
+        if not set(chosen) & set(DRAWING):
+            raise NoHeadset(
+                f"{self.runtime} takes no OpenGL pictures; SteamVR's does, for the same headsets: "
+                "make it the active one."
+            )
+        return chosen
+
+    def _name_runtime(self) -> None:
+        with self.asked("say its name"):
+            told = self.xr.get_instance_properties(self.handle)
+        version = self.xr.Version(told.runtime_version)
+        numbers = f"{version.major}.{version.minor}.{version.patch}"
+        self.runtime = f"the OpenXR runtime {_text(told.runtime_name)} {numbers}"
+
+    def _find_headset(self) -> None:
+        xr = self.xr
+        try:
+            with self.asked("name its headset"):
+                wanted = xr.SystemGetInfo(xr.FormFactor.HEAD_MOUNTED_DISPLAY)
+                self.system = xr.get_system(self.handle, wanted)
+                told = xr.get_system_properties(self.handle, self.system)
+        except xr.exception.FormFactorUnavailableError:
+            raise NoHeadset(
+                f"{self.runtime} finds no headset; connect it, switch it on, and start again."
+            ) from None
+        except xr.exception.FormFactorUnsupportedError:
+            raise NoHeadset(f"{self.runtime} is not for headsets; {HOW_TO}.") from None
+        self.headset = _text(told.system_name)
+
+    @contextmanager
+    def asked(self, what: str) -> Iterator[None]:
+        """Turns what a runtime answers when it is absent, broken or gone into a sentence."""
+        errors = self.xr.exception
+        try:
+            yield
+        except errors.RuntimeUnavailableError:
+            raise NoHeadset(_no_runtime()) from None
+        except (errors.InstanceLostError, errors.SessionLostError) as error:
+            raise Lost(f"{self.runtime} went away ({type(error).__name__}).") from None
+        except (errors.RuntimeFailureError, errors.InitializationFailedError) as error:
+            raise Lost(f"{self.runtime} failed to {what} ({type(error).__name__}).") from None
+
+    def close(self) -> None:
+        try:
+            self.xr.destroy_instance(self.handle)
+        except self.xr.exception.ErrorResult:
+            pass  # lost already: nothing is left to give back
+
+    def __enter__(self) -> "Instance":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.close()
+
+
+def load():
+    """pyopenxr; NoHeadset where it is absent or knows nothing of this system."""
+    if not (sys.platform.startswith("linux") or sys.platform == "win32"):
+        raise NoHeadset("OpenXR runs on Windows and Linux; there is none for this system.")
+    os.environ.setdefault("XR_LOADER_DEBUG", "none")  # its lines on stderr say what we say better
+    try:
+        import xr
+    except (ImportError, OSError) as missing:
+        raise NoHeadset(
+            f"the package pyopenxr cannot be loaded ({missing}); install it with "
+            "`pip install pyopenxr`, and on Linux libgl1."
+        ) from missing
+    return xr
+
+
+def _no_runtime() -> str:
+    named = os.environ.get("XR_RUNTIME_JSON")
+    if named:
+        return (
+            f"the OpenXR runtime that XR_RUNTIME_JSON names, {named}, cannot be loaded; {HOW_TO}."
+        )
+    return f"no OpenXR runtime is active on this machine; {HOW_TO}."
+
+
+def _text(told: bytes | str) -> str:
+    return told.decode(errors="replace") if isinstance(told, bytes) else str(told)

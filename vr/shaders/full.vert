@@ -1,0 +1,7 @@
+// full: one triangle that covers the viewport.
+out vec2 place;  // 0..1 from lower left
+
+void main() {
+    place = vec2(gl_VertexID == 1 ? 2.0 : 0.0, gl_VertexID == 2 ? 2.0 : 0.0);
+    gl_Position = vec4(2.0 * place - 1.0, 0.0, 1.0);
+}

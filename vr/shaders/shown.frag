@@ -1,0 +1,18 @@
+// shown: an eye's display-encoded picture, or a part of it, into another framebuffer.
+// FRAMEBUFFER_SRGB is off, so values arrive as they are written: an sRGB image of the runtime wants
+// them encoded, as they are; for a linear one they are decoded here, the one conversion there is.
+in vec2 place;
+uniform sampler2D image;  // display sRGB
+uniform vec4 part;        // left, bottom, width, height of the image, 0..1
+uniform bool linear;      // the framebuffer holds light, not display values
+out vec4 shown;
+
+// IEC 61966-2-1
+vec3 linear_from_srgb(vec3 c) {
+    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+}
+
+void main() {
+    vec3 color = texture(image, part.xy + part.zw * place).rgb;
+    shown = vec4(linear ? linear_from_srgb(color) : color, 1.0);
+}
