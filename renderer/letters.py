@@ -3,7 +3,7 @@
 Pillow's own font has English ones only: all others would be boxes.
 """
 
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ def letters(height: int, bold: bool = False) -> "ImageFont.FreeTypeFont":
     return ImageFont.truetype(str(path), height)
 
 
+@lru_cache(maxsize=1024)
 def drawable(text: str, height: int) -> str:
     """The text with a question mark for every letter that the font has not."""
     font = letters(height)
