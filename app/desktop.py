@@ -15,7 +15,7 @@ from app.dial import FLOOR_DB, TARGET_MS, Dial
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.export_panel import attach_export
-from app.files import Files, first_camera, home_of, named_cameras
+from app.files import Files, first_camera, home_of, named_cameras, opened_scene
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
 from app.opened import read_files
@@ -30,7 +30,7 @@ from app.scale_bar import draw_scale_bar
 from app.sections import Hooks
 from app.shown import Shown, Wish
 from app.slider import draw_slider_bar
-from app.stage import Stage, scene_of
+from app.stage import Stage
 from app.status_line import draw_status
 from app.stepping import Steps
 from app.window import Event, Window
@@ -98,10 +98,15 @@ def run(options: Options) -> int:
     refiner = Refiner(options)
     stage = Stage(refiner.open)
     paths = tuple(map(plain, options.scenes)) or (DEMO,)
-    found = named_cameras(options, read_files(paths, refiner.open, camera_reading(options), None))
+    read = read_files(paths, refiner.open, camera_reading(options), None, options.reading())
+    found = named_cameras(options, read)
     if not found.sources:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
-    stage.take(found.sources, scene_of(found.sources, options.x), home_of(found))
+    if found.file is not None and (options.x is not None or options.compare):
+        name = "--x" if options.x is not None else "--compare"
+        raise UsageError(f"{name} is for one model; {found.path.name} is a scene of objects.")
+    scene, document = opened_scene(found, options.x)
+    stage.take(found.sources, scene, home_of(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
     with refiner, Window("Shapeshift", size) as window:

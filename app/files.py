@@ -1,10 +1,12 @@
 """The viewer's files: those it opens while the window goes on, and those it opened before."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.camera_files import camera_reading, in_scene
 from app.controls import Camera
+from app.document import Document, document_from, document_of
 from app.opened import Found, Opener, ReadModel, read_files
 from app.opening import sentence
 from app.paths import config_folder
@@ -14,6 +16,8 @@ from app.stage import scene_of
 from runtime_models.model import BadFile
 from scene.pose import View
 from scene.read_cameras import read_camera_list
+from scene.scene import Scene
+from scene.scene_file import scene_of as scene_of_file
 
 if TYPE_CHECKING:
     from app.desktop import Options, Viewer
@@ -41,8 +45,10 @@ class Files:
     def open_soon(self, paths: tuple[Path, ...]) -> None:
         """Begins to read files; the window stays alive meanwhile."""
         viewer = self._viewer
-        reading = camera_reading(viewer.options)
-        self._opener.start(paths, lambda paths, told: read_files(paths, self.read, reading, told))
+        reading, plain = camera_reading(viewer.options), viewer.options.reading()
+        self._opener.start(
+            paths, lambda paths, told: read_files(paths, self.read, reading, told, plain)
+        )
         viewer.say(self._opener.note)
 
     def started(self, found: Found, options: "Options") -> None:
@@ -51,9 +57,8 @@ class Files:
         viewer.set_title()
         if options.screenshot is None:
             self.recent = RecentFiles.read(config_folder())
-            for source in found.sources:
-                if options.scenes:
-                    self.remember(source.path)
+            if options.scenes:
+                self.remember_all(found)
         self.take_cameras(found, stand=options.camera is not None)
         viewer.say(told_of(found))
 
@@ -83,18 +88,17 @@ class Files:
         viewer = self._viewer
         stage = viewer.stage
         if found.sources:
-            scene = scene_of(found.sources)
             try:
+                scene, document = opened_scene(found)
                 viewer.renderer.update(scene)
             except BadFile as error:
                 stage.problem = str(error)
                 viewer.shown.forget()
                 return
-            stage.take(found.sources, scene, home_of(found))
+            stage.take(found.sources, scene, home_of(found), document)
             viewer.show_scene()
         self.take_cameras(found, stand=not found.sources)
-        for source in found.sources:
-            self.remember(source.path)
+        self.remember_all(found)
         viewer.say(told_of(found))
 
     def take_cameras(self, found: Found, stand: bool) -> None:
@@ -119,6 +123,12 @@ class Files:
         if chosen is not None:
             self.open_soon((chosen,))
 
+    def remember_all(self, found: Found) -> None:
+        """What was opened by name: the scene file, not what is in it."""
+        inside = len(found.file.all_items) if found.file else 0
+        for path in [found.path] * (inside > 0) + [s.path for s in found.sources[inside:]]:
+            self.remember(path)
+
     def remember(self, path: Path) -> None:
         """Puts a file first in the list of recent ones."""
         if self.recent is None:
@@ -128,6 +138,22 @@ class Files:
         except OSError as error:
             self._viewer.say(f"The list of recent files cannot be kept: {error.strerror}.")
             self.recent = None
+
+
+def opened_scene(found: Found, x: float | None = None) -> tuple[Scene, Document]:
+    """What is drawn of what was opened, each at x or its first stop, and its file.
+
+    Raises BadFile for a scene file whose objects cannot be as it says.
+    """
+    if found.file is None:
+        scene = scene_of(found.sources, x)
+        return scene, document_from(scene, found.sources)
+    file, inside = found.file, len(found.file.all_items)
+    document = document_of(found.path, file, found.sources[:inside])
+    for source in found.sources[inside:]:
+        document.add(source)
+    file = document.file
+    return scene_of_file(file, document.models_by_name()), document
 
 
 def told_of(found: Found) -> str:
@@ -148,7 +174,7 @@ def home_of(found: Found) -> View | None:
 def first_camera(viewer: "Viewer") -> Camera:
     """The camera of a new scene: on its floor where one is given, else the whole in view."""
     stage = viewer.stage
-    camera = Camera(stage.first_view(viewer.free_size()), stage.centre, stage.radius)
+    camera = Camera(stage.first_view(viewer.free_size()), stage.first_target, stage.radius)
     if stage.home is not None:
         camera.toggle_flying()
         camera.stand(stage.home.world_from_eye, stage.home_fov_y)
@@ -160,4 +186,4 @@ def named_cameras(options: "Options", found: Found) -> Found:
     if options.camera is None:
         return found
     cameras = read_camera_list(options.camera, camera_reading(options))
-    return Found(found.sources, cameras, found.floor, cameras.notes)
+    return replace(found, cameras=cameras, notes=cameras.notes)

@@ -3,16 +3,22 @@
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from contextlib import nullcontext
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from app.opening import PATIENCE_S, progress_after
+from app.scene_files import tell_findings
 from runtime_models.model import BadFile, Model
 from runtime_models.package_files import MANIFEST
+from runtime_models.plain_splats import Reading
 from runtime_models.read_output_folder import newest_cloud
 from runtime_models.read_scene import describe
 from scene.camera_list import CameraList, CameraReading
 from scene.colmap_tables import TABLES, find_model
 from scene.read_cameras import SPLITS, find_cameras, find_floor, is_cameras, read_camera_list
+from scene.read_scene_file import read_scene_file
+from scene.scene_file import SceneFile, is_scene_file, read_models
 
 Told = Callable[[str, float], None]  # what is being done, part done 0..1
 ReadModel = Callable[[Path, Told | None], Model]
@@ -25,37 +31,51 @@ class Source:
     path: Path
     model: Model
     facts: dict = field(default_factory=dict)
+    reading: Reading = field(default_factory=Reading)  # how it was read
 
 
 @dataclass(frozen=True)
 class Found:
     """What the files hold that were dropped or named together."""
 
-    sources: tuple[Source, ...] = ()
+    sources: tuple[Source, ...] = ()  # of a scene file: its objects, the background first
+    file: SceneFile | None = None  # the scene file that was among them
+    path: Path | None = None  # of that
     cameras: CameraList | None = None
     floor: CameraList | None = None  # where to stand, of splatapult's NAME_vr.json
     notes: tuple[str, ...] = ()
 
 
 def read_files(
-    paths: Sequence[Path], read_model: ReadModel, reading: CameraReading, told: Told | None
+    paths: Sequence[Path],
+    read_model: ReadModel,
+    reading: CameraReading,
+    told: Told | None,
+    plain: Reading | None = None,
 ) -> Found:
     """Reads scenes and files of cameras, told apart by what is in them.  Raises BadFile, OSError.
 
-    Cameras that lie with the first scene are read too unless others were named; what is wrong
-    with those is a note.
+    `plain` is how models are read.  Cameras that lie with the first scene are read too unless
+    others were named; what is wrong with those is a note.
     """
-    camera_paths = [path for path in paths if means_cameras(path)]
-    sources = []
+    plain = plain or Reading()
+    scene_files = [path for path in paths if is_scene_file(path)]
+    if len(scene_files) > 1:
+        raise BadFile(
+            f"{scene_files[0].name} and {scene_files[1].name} are two scene files; open one, then "
+            "add what else is wanted."
+        )
+    file, sources = read_scene(scene_files[0], plain, told) if scene_files else (None, [])
+    camera_paths = [path for path in paths if path not in scene_files and means_cameras(path)]
     for path in paths:
-        if path not in camera_paths:
+        if path not in (*camera_paths, *scene_files):
             model = read_model(path, told)
-            sources.append(Source(path, model, describe(model, path)))
+            sources.append(Source(path, model, describe(model, path), plain))
     cameras = [read_camera_list(path, reading) for path in camera_paths]
     floors = [c for c in cameras if c.format == "splatapult floor"]
     lists = [c for c in cameras if c not in floors]
     notes = [note for found in cameras for note in found.notes]
-    if sources:
+    if sources and file is None:
         first = sources[0].path
         for found, find in ((lists, find_cameras), (floors, find_floor)):
             path = None if found else find(first)
@@ -63,7 +83,26 @@ def read_files(
                 beside, note = read_beside(path, reading)
                 found += beside
                 notes += note
-    return Found(tuple(sources), last(lists), last(floors), tuple(notes))
+    path = scene_files[0] if scene_files else None
+    return Found(tuple(sources), file, path, last(lists), last(floors), tuple(notes))
+
+
+def read_scene(path: Path, plain: Reading, told: Told | None) -> tuple[SceneFile, list[Source]]:
+    """A scene file and the model of each of its objects; findings go to stderr."""
+    if plain.mode or plain.up or plain.flip:
+        raise BadFile(f"{path.name} says for each object how layers add up and which way is up.")
+    file = read_scene_file(path)
+    with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
+        models = read_models(file, replace(plain, told=tell))
+    tell_findings(models)
+    facts: dict[Path, dict] = {}
+    sources = []
+    for item in file.all_items:
+        at, model = file.path(item.model), models[item.name]
+        first = at not in facts  # bytes count once, however many objects share a model
+        facts[at] = describe(model, at) if first else facts[at] | {"bytes": 0}
+        sources.append(Source(at, model, facts[at], Reading(item.mode, item.up, item.flip)))
+    return file, sources
 
 
 def read_beside(path: Path, reading: CameraReading) -> tuple[list[CameraList], list[str]]:

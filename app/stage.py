@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from app.document import Document, document_from, first_stop
 from app.opened import Source
 from app.regions import Regions
 from renderer.settings import DEBUG_VIEWS, RenderSettings
-from runtime_models.model import Finding, Model, Stop
+from runtime_models.model import Finding, Model
 from scene.control import Sweep
+from scene.edits import free_name
 from scene.framing import (
     default_background,
     default_view,
@@ -22,8 +24,10 @@ from scene.framing import (
 from scene.pick import Hit, Picker
 from scene.pose import Pose, View, perspective
 from scene.scene import IDENTITY, Scene, SceneObject
+from scene.scene_file import first_view
 
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
+MOST_SLIDERS = 2  # at the lower edge; more would take the picture's place
 AS_FILED = ""  # the palette that the scene's own stops name
 
 
@@ -35,6 +39,8 @@ class Stage:
         self._filed: tuple[Model, ...] = ()  # as read, before a palette was chosen
         self.scene = Scene(())
         self.sources: tuple[Source, ...] = ()  # where the scene's objects come from
+        self.document = document_from(self.scene, ())  # the same as a scene file, to be edited
+        self.chosen = ""  # name of the object that is edited; "": none
         self.home: View | None = None  # the first look at the scene where a file gives one
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
@@ -52,14 +58,21 @@ class Stage:
         sources = [Source(path, self.read_model(path)) for path in paths]
         self.take(sources, scene_of(sources, x))
 
-    def take(self, sources: Sequence[Source], scene: Scene, home: View | None = None) -> None:
-        """Shows what has been opened; `scene` is `scene_of(sources)`."""
+    def take(
+        self,
+        sources: Sequence[Source],
+        scene: Scene,
+        home: View | None = None,
+        document: Document | None = None,
+    ) -> None:
+        """Shows what has been opened; `scene` is `scene_of(sources)` or of the document's file."""
         self.sources, self.home = tuple(sources), home
-        self.show(scene)
+        self.show(scene, document)
 
-    def show(self, scene: Scene) -> None:
+    def show(self, scene: Scene, document: Document | None = None) -> None:
         """Takes a scene over and frames it."""
-        self.scene = scene
+        self.scene, self.chosen = scene, ""
+        self.document = document or document_from(scene, self.sources)
         if scene.objects:
             background = default_background(scene.objects[0].model, BACKGROUND)
             self.settings = replace(self.settings, background=background)
@@ -68,10 +81,14 @@ class Stage:
         self.sweeps = [Sweep.over(thing.model.stops) for thing in scene.objects]
         for sweep, thing in zip(self.sweeps, scene.objects, strict=True):
             sweep.resume_at(thing.x)
-        self._points = scene_points(scene)
-        self.centre, self.radius = frame_points(*self._points)
+        self.reframe()
         self.regions.clear()
         self.regions.radius = self.radius
+
+    def reframe(self) -> None:
+        """Where the middle of all is now, and how far it reaches."""
+        self._points = scene_points(self.scene)
+        self.centre, self.radius = frame_points(*self._points)
 
     def replace_model(self, index: int, model: Model) -> None:
         """Another model of the same thing: x, sweep, regions, camera and settings stay.
@@ -80,6 +97,7 @@ class Stage:
         """
         objects, filed = list(self.scene.objects), list(self._filed)
         filed[index] = model
+        self.document.refine(index, model)
         if self.palette != AS_FILED:
             model = with_palette(model, self.palette)
         objects[index] = replace(objects[index], model=model)
@@ -91,9 +109,17 @@ class Stage:
         """The view of a single package if it gives one, else everything framed."""
         if self.home is not None:
             return replace(self.home, tangents=perspective(self.home_fov_y, size), size=size)
+        if self.document.file.view is not None:
+            return first_view(self.document.file, self.scene, size)
         if len(self.scene.objects) == 1:
             return default_view(self.scene.objects[0].model, size)
         return framing_view(*self._points, size)
+
+    @property
+    def first_target(self) -> np.ndarray:
+        """(3,) metres: what the first view looks at and turns about."""
+        view = self.document.file.view
+        return self.centre if view is None else np.array(view.target)
 
     @property
     def home_fov_y(self) -> float:
@@ -125,7 +151,7 @@ class Stage:
         before, scene = self._shown
         if before is None or before[0] is not self.scene or before[1:] != made_of[1:]:
             things = [
-                replace(thing, selectors=self.regions.selectors(index, view))
+                replace(thing, selectors=thing.selectors + self.regions.selectors(index, view))
                 for index, thing in enumerate(self.scene.objects)
             ]
             scene = Scene(tuple(things))
@@ -197,10 +223,25 @@ class Stage:
             sweep.resume_at(self.scene.objects[index].x)
 
     @property
-    def sliders(self) -> list[int]:
+    def movable(self) -> list[int]:
         """Indices of the objects that have somewhere to go: two stops or more."""
         things = enumerate(self.scene.objects)
         return [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+
+    @property
+    def sliders(self) -> list[int]:
+        """Of those, the ones that there is room for: all of a few, else the chosen one."""
+        movable = self.movable
+        if len(movable) <= MOST_SLIDERS:
+            return movable
+        chosen = self.chosen_index
+        return [chosen if chosen in movable else movable[0]]
+
+    @property
+    def chosen_index(self) -> int | None:
+        """Where the chosen object is in the scene; None: none is."""
+        names = [thing.name for thing in self.scene.objects]
+        return names.index(self.chosen) if self.chosen in names else None
 
     @property
     def playing(self) -> bool:
@@ -237,6 +278,7 @@ def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
         pose = Pose(moved, IDENTITY.wxyz) if moved.any() else IDENTITY
         start = first_stop(model).x if x is None else x
         name = path.name if path.is_dir() else path.stem
+        name = free_name({thing.name for thing in objects}, name)
         objects.append(SceneObject(name, model, pose, x=start))
     return Scene(tuple(objects))
 
@@ -244,11 +286,6 @@ def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
 def origin_of(model: Model) -> np.ndarray:
     """(3,) metres that were taken off a model's places."""
     return np.array(getattr(model, "origin", (0.0, 0.0, 0.0)), np.float64)
-
-
-def first_stop(model: Model) -> Stop:
-    """The stop with the smallest x; a scene without stops starts at 0."""
-    return min(model.stops, key=lambda stop: stop.x, default=Stop("", 0.0))
 
 
 def with_palette(model: Model, name: str) -> Model:

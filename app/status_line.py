@@ -25,7 +25,7 @@ def scene_words(stage: Stage) -> list[str]:
     size = sum(source.facts.get("bytes", 0) for source in sources)
     size_words = [bytes_text(size)] if size else []
     if len(things) > 1:
-        return [f"{len(things)} scenes", splats, *size_words]
+        return [f"{len(things)} objects", splats, *size_words]
     facts = sources[0].facts if sources else {}
     degree = facts.get("sh_degree")
     stops = len(things[0].model.stops)

@@ -257,7 +257,7 @@ def test_the_status_line_says_what_is_open(tmp_path):
     assert words[1:4] == ["1\u2009234 splats", "SH 1", "1 stop"]
     assert words[-1] == bytes_text(path.stat().st_size)
     stage.take(sources * 2, scene_of(sources * 2))
-    assert scene_words(stage)[:2] == ["2 scenes", "2\u2009468 splats"]
+    assert scene_words(stage)[:2] == ["2 objects", "2\u2009468 splats"]
 
 
 def test_what_was_repaired_is_told_at_opening(tmp_path):

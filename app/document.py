@@ -1,0 +1,150 @@
+"""The scene file behind the window: what it says now, what it was, and where it is saved."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from app.opened import Source
+from runtime_models.model import Model, Stop
+from scene import edits
+from scene.edits import History
+from scene.scene import Scene
+from scene.scene_file import ENDING, SceneFile, SceneItem
+from scene.selector import Lens
+
+ModelKey = tuple  # what makes two objects have the same model: path, mode, up, flip
+
+
+@dataclass
+class Document:
+    """Edits change `history`; a model that was read once stays in `sources`, for undo."""
+
+    history: History
+    path: Path | None = None  # of the scene file; None: it is none yet
+    saved: SceneFile | None = None  # as it lies there; an edit gives another object
+    stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
+    sources: dict[ModelKey, Source] = field(default_factory=dict)
+
+    @property
+    def file(self) -> SceneFile:
+        return self.history.file
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether something would be lost; moving the slider of what was just opened is not."""
+        if self.file is self.saved:
+            return False
+        changed = edits.changes(self.saved, self.file)
+        if self.path is None:
+            return any(change.fields != {"x"} for change in changed)
+        return bool(changed)
+
+    def model(self, item: SceneItem) -> Model:
+        return self.sources[key_of(item)].model
+
+    def models_by_name(self) -> dict[str, Model]:
+        return {item.name: self.model(item) for item in self.file.all_items}
+
+    def add(self, source: Source) -> str:
+        """One more object, of what was read from a path of its own; returns its name."""
+        item = replace(item_of(source), x=first_stop(source.model).x)
+        self.sources[key_of(item)] = source
+        self.history = self.history.take(edits.add(self.file, item), f"add {item.name}")
+        return self.file.items[-1].name
+
+    def refine(self, index: int, model: Model) -> None:
+        """A finer level of detail of one object's model."""
+        if index < len(self.file.all_items):
+            key = key_of(self.file.all_items[index])
+            self.sources[key] = replace(self.sources[key], model=model)
+
+    @property
+    def name(self) -> str:
+        """For the title, and for saving."""
+        if self.path is not None:
+            return self.path.name
+        return self.file.all_items[0].name + ENDING if self.file.all_items else "scene" + ENDING
+
+
+def first_stop(model: Model) -> Stop:
+    """The stop with the smallest x; a scene without stops starts at 0."""
+    return min(model.stops, key=lambda stop: stop.x, default=Stop("", 0.0))
+
+
+def key_of(item: SceneItem) -> ModelKey:
+    return (item.model, item.mode, item.up, item.flip)
+
+
+def document_of(path: Path, file: SceneFile, sources: Sequence[Source]) -> Document:
+    """A scene file that was opened, and the models of its objects in their order."""
+    by_key = {key_of(item): source for item, source in zip(file.all_items, sources, strict=True)}
+    return Document(History.of(file), path, file, stamp_of(path), by_key)
+
+
+def document_from(scene: Scene, sources: Sequence[Source]) -> Document:
+    """What was opened without a scene file, as one that is not saved yet."""
+    items, by_key = [], {}
+    for number, thing in enumerate(scene.objects):
+        source = sources[number] if number < len(sources) else Source(Path(thing.name), thing.model)
+        item = replace(
+            item_of(source),
+            name=thing.name,
+            position=tuple(map(float, thing.world_from_object.position)),
+            wxyz=tuple(map(float, thing.world_from_object.wxyz)),
+            x=thing.x,
+        )
+        items.append(item)
+        by_key[key_of(item)] = source
+    file = SceneFile(folder=Path.cwd(), items=tuple(items))
+    return Document(History.of(file), saved=file, sources=by_key)
+
+
+def item_of(source: Source) -> SceneItem:
+    """An object for what was opened from a path of its own."""
+    path, reading = source.path, source.reading
+    name = " ".join((path.name if path.is_dir() else path.stem).split())
+    printable = "".join(letter for letter in name if letter.isprintable())
+    return SceneItem(
+        name=printable[: edits.LONGEST_NAME] or "object",
+        model=path.absolute().as_posix(),
+        mode=reading.mode,
+        up=reading.up,
+        flip=reading.flip,
+    )
+
+
+def stamp_of(path: Path) -> tuple:
+    """What changes when somebody else writes the file; () where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return ()
+    return found.st_mtime_ns, found.st_size
+
+
+def beside(file: SceneFile, folder: Path) -> SceneFile:
+    """With models and colliders that lie below the folder named from there, so it can be moved."""
+    for item in file.all_items:
+        values = {"model": below(item.model, folder)}
+        if item.collider is not None:
+            values["collider"] = below(item.collider, folder)
+        file = edits.change(file, item.name, **values)
+    return file
+
+
+def below(text: str, folder: Path) -> str:
+    path, root = Path(text), folder.absolute()
+    if path.is_absolute() and path.is_relative_to(root):
+        return path.relative_to(root).as_posix()
+    return text
+
+
+def with_regions(file: SceneFile, selectors: Sequence[Sequence]) -> SceneFile:
+    """With the regions of each object, in the file's order, as its selectors; a lens is nobody's
+    but the eye's.
+    """
+    for item, more in zip(file.all_items, selectors, strict=True):
+        kept = tuple(selector for selector in more if not isinstance(selector, Lens))
+        if kept:
+            file = edits.change(file, item.name, selectors=(*item.selectors, *kept))
+    return file
