@@ -75,6 +75,28 @@ def take_hold(
     return hold
 
 
+def carry(holds: list[tuple[Hold, object]], body: object, moved: np.ndarray) -> None:
+    """A body, the hands that hold it and where they have been jump by (4, 4) now_from_before.
+
+    Velocities turn along, so that a throw right after a jump is as it was before it.
+    """
+    turn = moved[:3, :3]
+    for part in (body, *(hand for _, hand in holds)):
+        part.position = isometry(jumped(pose_of(part.position), moved))
+    for name in ("linvel", "angvel"):
+        v = getattr(body, name)
+        setattr(body, name, tuple(map(float, turn @ (v.x, v.y, v.z))))
+    for hold, _ in holds:
+        hold.target = jumped(hold.target, moved)
+        hold.trail = deque((jumped(pose, moved) for pose in hold.trail), maxlen=TRAIL)
+    body.wake_up(True)
+
+
+def jumped(pose: Pose, moved: np.ndarray) -> Pose:
+    """A pose of the world after everything moved by a rigid (4, 4)."""
+    return Pose.from_matrix(moved @ pose.matrix())
+
+
 def lag(hold: Hold, hand: object, body: object) -> float:
     """Metres by which the point held is behind where its hand wants it."""
     ends = (hand.position, hold.grip), (body.position, hold.body_grip)

@@ -14,13 +14,14 @@ from scene.contacts import Contact, Tally, velocities
 from scene.grab import (
     WITH_HAND,
     Hold,
+    carry,
     hold_from_json,
     hold_to_json,
     lag,
     take_hold,
     throw,
 )
-from scene.physics_rules import MOST_SPEED, more_substeps, new_world
+from scene.physics_rules import MOST_SPEED, more_substeps, new_world, stopped_bodies
 from scene.physics_shapes import (
     LEAST_EXTENT,
     MOST_FRICTION,
@@ -297,16 +298,9 @@ class Physics:
             speeds = velocities(bodies)
         for hold in self._holds.values():
             hold.trail.append(hold.target)
-        self._note_quarantine()
+        self.findings += stopped_bodies(self._world, self._handles)
         self._queries_stale = True
         return tally.contacts()
-
-    def _note_quarantine(self) -> None:
-        """The engine stops a body whose numbers are no longer finite where it last was."""
-        lost = self._world.quarantine.bodies
-        for number in [n for n, handle in self._handles.items() if handle in lost] if lost else []:
-            what = f"body {number} was thrown out of all numbers"
-            self.findings.append(Finding(what, 1, "stopped where it last was"))
 
     # ---- hands
 
@@ -333,6 +327,13 @@ class Physics:
             return
         hold.target = checked_pose(pose, "a hand")
         self._world.rigid_bodies[self._handles[hold.body]].wake_up(True)
+
+    def carry(self, grab: int, moved: np.ndarray) -> None:
+        """A hand jumps by (4, 4) now_from_before, rigid, with what it holds and who else does."""
+        body = self._hold(grab).body
+        holds = [(h, self._hand(h)) for h in self._holds.values() if h.body == body]
+        carry(holds, self._body(body), moved)
+        self._queries_stale = True
 
     def release(self, grab: int) -> None:
         """Lets go: the body flies on with its hand's velocity, unless something kept it back."""

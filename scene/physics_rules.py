@@ -1,5 +1,7 @@
 """The engine's settings, found by sweeps over the figures of tests/test_physics_figures.py."""
 
+from runtime_models.model import Finding
+
 MOST_SPEED = 40.0  # m/s: whatever is faster is slowed to it
 LENGTH_UNIT = 0.1  # metres: what things to be held measure; scales the engine's tolerances
 SOLVER_ITERATIONS = 8  # a substep; with the default of 4 a stack of 1 : 100 sinks
@@ -23,6 +25,16 @@ def new_world(gravity_m_s2: float) -> object:
     rules.contact_softness = SpringCoefficients(*CONTACT)
     rules.static_contact_softness = SpringCoefficients(*STATIC_CONTACT)
     return world
+
+
+def stopped_bodies(world: object, handles: dict[int, object]) -> list[Finding]:
+    """The engine stops a body whose numbers are no longer finite where it last was."""
+    lost = world.quarantine.bodies
+    return [
+        Finding(f"body {number} was thrown out of all numbers", 1, "stopped where it last was")
+        for number, handle in (handles.items() if lost else ())
+        if handle in lost
+    ]
 
 
 def more_substeps(speeds: dict[int, tuple[float, float, float]]) -> int:
