@@ -35,6 +35,15 @@ LOST = Hand()
 
 
 @dataclass(frozen=True)
+class Pulse:
+    """A buzz for a hand."""
+
+    side: str  # of SIDES
+    strength: float  # 0..1
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Frame:
     """What a frame loop gives: where the eyes and hands will be, and when."""
 

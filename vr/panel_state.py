@@ -6,8 +6,10 @@ Places on it are pixels of its picture, from its upper left corner.
 from dataclasses import dataclass, field
 
 from runtime_models.model import Stop
+from vr.frame import Pulse
 
 QUALITIES = ("auto", "fast", "balanced", "best")  # auto: the budget keeps the headset's period
+STICKS = ("", "slides", "rests", "walks")  # rests: came to a stop and has to be let go
 ON_STOP = 1e-3  # of the slider's range
 
 Place = tuple[float, float]  # pixels of the panel's picture
@@ -44,7 +46,7 @@ class Panel:
     elsewhere: frozenset[str] = frozenset()  # sides whose press began beside the panel
     grip_px: float = 0.0  # from the pointer to the knob's middle, where it was taken
     exit_s: float = 0.0  # seconds for which Exit asks "really?"
-    stick_rests: bool = False  # the thumbstick came to a stop and has to be let go
+    stick: str = ""  # what the carrying hand's thumbstick does since it left its middle: STICKS
 
     @property
     def open(self) -> bool:
@@ -88,15 +90,6 @@ class PutBack:
 @dataclass(frozen=True)
 class Exit:
     """VR is to end."""
-
-
-@dataclass(frozen=True)
-class Pulse:
-    """A buzz for a hand."""
-
-    side: str
-    strength: float  # 0..1
-    seconds: float
 
 
 Wish = SetX | SetQuality | SetScale | Recentre | PutBack | Exit | Pulse

@@ -39,6 +39,32 @@ def level_ground(floor_y: float) -> Ground:
     return ground
 
 
+def ground_of(world, level_y: float | None = None) -> Ground:
+    """What does not move in a scene.world.World, and a level where that has no floor.
+
+    At a wall one lands at its foot; on what can be carried away nobody stands.
+    """
+    level = level_ground(level_y) if level_y is not None else None
+
+    def ground(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, bool] | None:
+        way = end - start
+        length = float(np.linalg.norm(way))
+        hit = world.aim(start, way) if length > 0 else None
+        if hit is None or hit.distance_m > length:
+            return level(start, end) if level else None
+        above = hit.point - way / length * SLIVER + [0.0, SLIVER, 0.0]
+        below = world.aim(above, np.array([0.0, -1.0, 0.0]))
+        if below is None:
+            return hit.point, False
+        stands = all(
+            met.object not in world.things or not world.things[met.object].moves
+            for met in (hit, below)
+        )
+        return below.point, stands
+
+    return ground
+
+
 def throw_arc(aim: Pose, standing: Standing, ground: Ground) -> Arc:
     """The arc of a hand that aims."""
     along = -aim.matrix()[:3, 2]
