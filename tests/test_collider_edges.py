@@ -37,7 +37,7 @@ def test_an_open_mesh_keeps_its_border(turned):
     if turned:  # the second triangle the other way round
         corners[1] = corners[1, ::-1]
     assert lengths(edges_of(corners)) == [1.0] * 4  # a square, without its diagonal
-    corners[1, 1 if turned else 2, 2] = 0.3
+    corners[1, 0 if turned else 2, 2] = 0.3
     assert len(edges_of(corners)) == 5
 
 
