@@ -177,30 +177,38 @@ def test_arrows_go_through_the_objects():
 def test_a_closed_panel_does_nothing():
     panel, wishes = point(replace(a_panel(), side=""), (300.0, 300.0), down=True)
     assert wishes == [] and panel.hovers == panel.held == {} and taken(panel) == frozenset()
-    assert push(panel, 1.0, 0.1)[1] == []
+    assert push(panel, (1.0, 0.0), 0.1)[1] == []
 
 
 def test_the_thumbstick_rests_at_every_stop():
     panel, x, rested = a_panel(0.0), 0.0, []
     for _ in range(400):
-        panel, wishes = push(panel, 1.0, 0.01)
+        panel, wishes = push(panel, (1.0, 0.2), 0.01)
         for wish in wishes:
             if isinstance(wish, SetX):
                 x = wish.x
                 sliders = (Slider("cube", STOPS, x),)
                 panel = replace(panel, facts=replace(panel.facts, sliders=sliders))
-        if panel.stick_rests:
-            assert push(panel, 1.0, 0.01)[1] == []
+        if panel.stick == "rests":
+            assert push(panel, (1.0, 0.2), 0.01)[1] == []
             rested.append(x)
-            panel, _ = push(panel, 0.0, 0.01)
+            panel, _ = push(panel, (0.0, 0.0), 0.01)
     assert rested == [0.25, 0.5, 1.0]
-    assert push(a_panel(0.3), DEAD, 1.0)[1] == []
+    assert push(a_panel(0.3), (DEAD, 0.0), 1.0)[1] == []
+
+
+def test_a_thumbstick_that_began_to_walk_walks_on():
+    panel, wishes = push(a_panel(0.1), (0.3, 0.9), 0.1)
+    panel, more = push(panel, (0.9, 0.1), 0.1)
+    assert wishes + more == [] and panel.stick == "walks"
+    panel, _ = push(panel, (0.1, 0.0), 0.1)
+    assert push(panel, (0.9, 0.1), 0.1)[1]
 
 
 def test_the_thumbstick_ends_at_the_end_without_a_stop_there():
     stops = STOPS[:3]
     panel = Panel(Facts((Slider("cube", stops, 0.95),)), side="left")
-    assert push(panel, 1.0, 1.0)[1] == [SetX("cube", 1.0)]
+    assert push(panel, (1.0, 0.0), 1.0)[1] == [SetX("cube", 1.0)]
 
 
 @pytest.mark.parametrize(

@@ -59,22 +59,26 @@ def press(
     return panel, wishes
 
 
-def push(panel: Panel, stick_x: float, seconds: float) -> tuple[Panel, list[Wish]]:
-    """The thumbstick of the hand that carries the panel moves x; it rests at every stop."""
-    slider = panel.slider
-    if not abs(stick_x) > DEAD or slider is None or not panel.open:
-        return replace(panel, stick_rests=False), []
-    if panel.stick_rests or "track" in panel.held.values():
+def push(panel: Panel, stick: tuple[float, float], seconds: float) -> tuple[Panel, list[Wish]]:
+    """The thumbstick of the hand that carries the panel: sideways it moves x, and rests at every
+    stop; first pushed ahead or back it is not the panel's until it is let go.
+    """
+    slider, (aside, ahead) = panel.slider, stick
+    if slider is None or not panel.open or not max(abs(aside), abs(ahead)) > DEAD:
+        return replace(panel, stick=""), []
+    if not panel.stick:
+        panel = replace(panel, stick="slides" if abs(aside) > abs(ahead) else "walks")
+    if panel.stick != "slides" or not abs(aside) > DEAD or "track" in panel.held.values():
         return panel, []
-    speed = (min(abs(stick_x), 1.0) - DEAD) / (1 - DEAD) * STICK_SPEED
-    moved = min(max(slider.x + (speed if stick_x > 0 else -speed) * seconds, 0.0), 1.0)
+    speed = (min(abs(aside), 1.0) - DEAD) / (1 - DEAD) * STICK_SPEED
+    moved = min(max(slider.x + (speed if aside > 0 else -speed) * seconds, 0.0), 1.0)
     low, high = sorted((slider.x, moved))
     passed = [s.x for s in slider.stops if low <= s.x <= high and abs(s.x - slider.x) > ON_STOP]
     if not passed:
-        return panel, [SetX(slider.name, moved)]
+        return panel, [SetX(slider.name, moved)] if moved != slider.x else []
     stop_x = min(passed, key=lambda x: abs(x - slider.x))
     wishes = [SetX(slider.name, stop_x), Pulse(panel.side, *CLICK)]
-    return replace(panel, stick_rests=True), wishes
+    return replace(panel, stick="rests"), wishes
 
 
 def taken(panel: Panel) -> frozenset[str]:

@@ -1,0 +1,64 @@
+"""The panel from frame to frame: the menu button, where it hangs, what hands do to it."""
+
+from dataclasses import dataclass, field, replace
+
+from scene.pose import Pose
+from vr.frame import SIDES, Frame, Hand
+from vr.panel import press, push, taken
+from vr.panel_layout import lay_out
+from vr.panel_place import NOBODY, Pointing, hang, point_at
+from vr.panel_state import Facts, Panel, Wish
+
+
+@dataclass(frozen=True)
+class Carried:
+    """A panel and where it is; at first it hangs on the left hand, so that everybody finds it."""
+
+    panel: Panel = field(default_factory=lambda: Panel(side="left"))
+    play_from_panel: Pose | None = None
+    pointing: Pointing = NOBODY
+    menus: frozenset[str] = frozenset()  # sides whose menu button was down
+
+
+def carry(
+    carried: Carried, facts: Facts, frame: Frame, seconds: float
+) -> tuple[Carried, list[Wish], dict[str, Hand]]:
+    """One frame of `seconds`: the panel, its wishes, and the hands without what it takes of them.
+
+    Those are for the world: a trigger that presses a button here fires nothing there.
+    """
+    panel = replace(_toggled(carried, frame.hands), facts=facts)
+    menus = frozenset(side for side in SIDES if frame.hands[side].menu)
+    carried = replace(carried, panel=panel, menus=menus)
+    if not panel.open:
+        panel, _ = press(panel, [])
+        return replace(carried, panel=panel, play_from_panel=None), [], dict(frame.hands)
+    layout = lay_out(panel)
+    before = None if frame.recentred else carried.play_from_panel
+    pose = hang(before, frame.hands[panel.side], frame.head, layout.size_m, seconds)
+    pointing, pointers = point_at(carried.pointing, pose, layout, frame.hands, panel.side)
+    panel, wishes = press(panel, pointers, seconds)
+    panel, more = push(panel, frame.hands[panel.side].stick, seconds)
+    carried = replace(carried, panel=panel, play_from_panel=pose, pointing=pointing)
+    return carried, wishes + more, left_over(carried, frame.hands)
+
+
+def left_over(carried: Carried, hands: dict[str, Hand]) -> dict[str, Hand]:
+    """The hands with what the panel takes of them at rest."""
+    panel, left = carried.panel, dict(hands)
+    for side in taken(panel):
+        squeeze = 0.0 if side in carried.pointing.near else hands[side].squeeze
+        left[side] = replace(hands[side], trigger=0.0, squeeze=squeeze)
+    if panel.open and panel.stick in ("slides", "rests"):
+        left[panel.side] = replace(left[panel.side], stick=(0.0, 0.0))
+    return left
+
+
+def _toggled(carried: Carried, hands: dict[str, Hand]) -> Panel:
+    """A menu button opens it on its hand, takes it over to that hand, or closes it there."""
+    panel = carried.panel
+    for side in SIDES:
+        if hands[side].menu and side not in carried.menus:
+            now = "" if panel.side == side else side
+            panel = replace(panel, side=now, hovers={}, held={}, stick="", exit_s=0.0)
+    return panel

@@ -1,0 +1,152 @@
+"""Where the panel hangs in the room, and where hands point at it.
+
+Its own frame: the origin in its middle, +X right, +Y up, +Z towards who reads it; metres.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from scene.pose import Pose
+from vr.frame import SIDES, Hand
+from vr.glove import fingertip
+from vr.panel import Pointer
+from vr.panel_layout import METRES_PER_PIXEL, Layout
+from vr.panel_state import Place
+
+ABOVE_HAND = 0.09  # metres from the grip to the lower edge: knuckles and thumb stay free
+BEFORE_HEAD = np.array([0.0, -0.12, -0.55])  # without a hand to hang on, metres in a level head
+CALM_S = 0.06  # time constant at which it follows: hands tremble
+JUMP_M = 0.5  # farther than this it is there at once
+RAY_M = 3.0  # as far one can point at it
+NEAR_M = 0.09  # a fingertip so close points itself, not the ray
+TOUCH_M, LEAVE_M, THROUGH_M = 0.004, 0.016, 0.07  # a finger presses, lets go, is behind it
+PRESS, RELEASE = 0.6, 0.4  # of trigger and squeeze
+
+
+@dataclass(frozen=True)
+class Pointing:
+    """What is remembered of the hands between frames."""
+
+    near: frozenset[str] = frozenset()  # sides whose finger points, not their ray
+    down: frozenset[str] = frozenset()  # sides that press
+
+    def without(self, side: str) -> "Pointing":
+        return Pointing(self.near - {side}, self.down - {side})
+
+
+NOBODY = Pointing()
+
+
+def hang(
+    before: Pose | None, hand: Hand, head: Pose, size_m: tuple[float, float], seconds: float
+) -> Pose:
+    """play_from_panel: over the hand and turned to the head; where it was once the hand is lost."""
+    if hand.grip is None:
+        return before or _facing(_before(head), head)
+    place = hand.grip.position + np.array([0.0, ABOVE_HAND + size_m[1] / 2, 0.0])
+    if before is not None and np.linalg.norm(place - before.position) < JUMP_M:
+        part = -math.expm1(-max(seconds, 0.0) / CALM_S)
+        place = before.position + (place - before.position) * part
+    return _facing(place, head)
+
+
+def point_at(
+    pointing: Pointing, panel_pose: Pose, layout: Layout, hands: dict[str, Hand], carrier: str
+) -> tuple[Pointing, list[Pointer]]:
+    """The pointers of all hands but the one that carries the panel; a lost hand has none."""
+    panel_from_play = np.linalg.inv(panel_pose.matrix())
+    pointers = []
+    for side in SIDES:
+        hand = hands[side]
+        if side == carrier or hand.grip is None:
+            pointing = pointing.without(side)
+            continue
+        near = _near(panel_from_play, fingertip(side, hand), layout, side in pointing.near)
+        if near is None:
+            at, down = (
+                _ray_place(panel_from_play, hand, layout),
+                _firm(hand.trigger, side, pointing),
+            )
+        else:
+            at, depth = near
+            firm = _firm(max(hand.trigger, hand.squeeze), side, pointing)
+            touches = depth < (LEAVE_M if side in pointing.down else TOUCH_M)
+            down = firm or touches
+        pointing = Pointing(
+            _with(pointing.near, side, near is not None), _with(pointing.down, side, down)
+        )
+        pointers.append(Pointer(side, at, down))
+    return pointing, pointers
+
+
+def play_point(panel_pose: Pose, layout: Layout, at: Place) -> np.ndarray:
+    """(3,) metres of the room of a place on the panel's picture."""
+    width, height = layout.size
+    local = np.array([at[0] - width / 2, height / 2 - at[1], 0.0]) * METRES_PER_PIXEL
+    return panel_pose.matrix()[:3, :3] @ local + panel_pose.position
+
+
+def _near(
+    panel_from_play: np.ndarray, tip: np.ndarray, layout: Layout, was: bool
+) -> tuple[Place, float] | None:
+    """The place below a fingertip close to the panel, and its height over it, metres."""
+    local = panel_from_play[:3, :3] @ tip + panel_from_play[:3, 3]
+    slack = 1.3 if was else 1.0  # no trembling between finger and ray
+    half = np.array(layout.size_m) / 2 + (0.03 if was else 0.0)
+    if not (-THROUGH_M < local[2] < NEAR_M * slack and (np.abs(local[:2]) <= half).all()):
+        return None
+    return _pixels(local, layout), float(local[2])
+
+
+def _ray_place(panel_from_play: np.ndarray, hand: Hand, layout: Layout) -> Place | None:
+    """Where the hand's ray meets the plane from its front; None where it does not."""
+    if hand.aim is None:
+        return None
+    origin = panel_from_play[:3, :3] @ hand.aim.position + panel_from_play[:3, 3]
+    along = panel_from_play[:3, :3] @ -hand.aim.matrix()[:3, 2]
+    if not (origin[2] > 0 and along[2] < -1e-3 and -origin[2] / along[2] <= RAY_M):
+        return None
+    return _pixels(origin - along * origin[2] / along[2], layout)
+
+
+def _pixels(local: np.ndarray, layout: Layout) -> Place:
+    width, height = layout.size
+    return (
+        float(width / 2 + local[0] / METRES_PER_PIXEL),
+        float(height / 2 - local[1] / METRES_PER_PIXEL),
+    )
+
+
+def _firm(value: float, side: str, pointing: Pointing) -> bool:
+    return value >= (RELEASE if side in pointing.down else PRESS)
+
+
+def _with(sides: frozenset[str], side: str, belongs: bool) -> frozenset[str]:
+    return sides | {side} if belongs else sides - {side}
+
+
+def _before(head: Pose) -> np.ndarray:
+    """(3,) a place before the head, which may look up or down."""
+    back = head.matrix()[:3, 2] * (1, 0, 1)
+    length = np.linalg.norm(back)
+    back = back / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
+    right = np.array([back[2], 0.0, -back[0]])
+    x, y, z = BEFORE_HEAD
+    return head.position + right * x + np.array([0.0, y, 0.0]) + back * z
+
+
+def _facing(place: np.ndarray, head: Pose) -> Pose:
+    """Upright and turned to the head's place."""
+    normal = head.position - place
+    length = np.linalg.norm(normal)
+    normal = normal / length if length > 1e-6 else head.matrix()[:3, 2]
+    right = np.cross([0.0, 1.0, 0.0], normal)
+    if not np.linalg.norm(right) > 1e-3:  # straight below or above the head
+        right = head.matrix()[:3, 0] - normal * (head.matrix()[:3, 0] @ normal)
+    right /= np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([right, np.cross(normal, right), normal], axis=1)
+    matrix[:3, 3] = place
+    return Pose.from_matrix(matrix)
