@@ -84,6 +84,29 @@ def test_two_hands_hold_one_body_and_one_hand_one_body():
     world.step()
 
 
+def test_a_jump_takes_hand_and_body_along():
+    """A snap turn by 90 degrees in the middle of a swing: what is thrown goes where it turned."""
+    world = real(item(position=(0, 1, 0)), floor_y=None, gravity_m_s2=0.0)
+    world.move_hand("right", at(0, 1, 0))
+    world.grab("right")
+    turn = at(0, 0, 0, wxyz=(0.5**0.5, 0, 0.5**0.5, 0)).matrix()  # +X becomes -Z
+    turned = np.eye(3)
+    for number in range(1, 45):
+        if number == 30:
+            world.carry("right", turn)
+            turned = turn[:3, :3]
+            np.testing.assert_allclose(world.things["a"].pose.position[0], 0, atol=1e-3)
+        hand = turned @ np.array([2.0 * number / 90, 1, 0])
+        world.move_hand("right", Pose(hand, world.hands["right"].wxyz))
+        world.advance(1 / 90)
+    world.release("right")
+    world.step()
+    thrown, _ = world.physics.velocity(world.things["a"].body)
+    assert np.linalg.norm(thrown - [0, 0, -2.0]) < 0.1
+    world.carry("right", turn)  # an empty hand
+    assert np.allclose(world.hands["right"].position, turn[:3, :3] @ hand)
+
+
 @pytest.mark.parametrize("name", ["table", "nobody", FLOOR_NAME])
 def test_what_cannot_be_held_is_not(name):
     world = real(item("a"), item("table", static=True))
