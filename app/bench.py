@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.opening import ReadingOptions, open_model
+from app.opening import ReadingOptions
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -20,7 +20,7 @@ class Options(ReadingOptions):
     """Time frames on an orbit and an x sweep, and measure the image error beside them."""
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat or a folder of PLY layers."""
+    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
     json: Path | None = None
     """Write the result here; - writes it to standard output."""
     frames: int = 60
@@ -30,7 +30,8 @@ class Options(ReadingOptions):
     size: str = "640x360"
     """WIDTHxHEIGHT in pixels."""
     x: float | None = None
-    """Control value of the orbit, 0 to 1; default: the first stop."""
+    """Control value of the orbit, 0 to 1, of all objects; default: the first stop, and in a scene
+    file what it says for each."""
     quality_size: str = "256x144"
     """Size of the images that are compared with the float64 reference."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
@@ -53,6 +54,7 @@ def run(options: Options) -> int:
     from app.drawing import open_renderer, parse_size
     from app.errors import UsageError
     from app.measure import Measure
+    from app.subject import open_subject
 
     size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
     quality_size = parse_size(options.quality_size, "--quality-size")
@@ -63,16 +65,16 @@ def run(options: Options) -> int:
         raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
     if options.json not in (None, STANDARD_OUTPUT):
         check_result_path(options.json)
-    model = open_model(options.scene, options)
-    x = model.stops[0].x if options.x is None else options.x
+    subject = open_subject(options.scene, options)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         if budget:
             from app.budget_chart import Drawn, settings_for
 
-            renderer.settings = settings_for(budget, renderer, ctx, Drawn(model, x, size))
+            renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, options.x, size))
         elif options.settings or options.target:
-            renderer.settings = asked_settings(options, renderer, model, size)
-        result = measure(Measure(renderer, ctx, model, x, size), options, quality_size)
+            renderer.settings = asked_settings(options, renderer, subject, size)
+        work = Measure(renderer, ctx, subject, options.x, size)
+        result = measure(work, options, quality_size)
     print_table(result)
     if options.json == STANDARD_OUTPUT:
         print(json.dumps(result, indent=1, allow_nan=False))
@@ -82,22 +84,20 @@ def run(options: Options) -> int:
     return 0
 
 
-def asked_settings(options: Options, renderer, model, size: tuple[int, int]):
+def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
     """RenderSettings of --settings and --target; UsageError where there is none such."""
     from dataclasses import replace
 
     from app.chart_settings import named_settings, render_settings
     from app.chart_stage import distances_of
     from app.errors import UsageError
-    from scene.framing import frame_points, model_points, orbit_path
+    from scene.framing import orbit_path
 
     drawing = renderer.backends["drawing"].split()[0]
     settings = renderer.settings
     if options.settings:
         named = named_settings(options.settings, drawing)
-        distances = distances_of(
-            model_points(model), orbit_path(8, *frame_points(*model_points(model)), size)
-        )
+        distances = distances_of(subject.points(), orbit_path(8, *subject.bounds(), size))
         settings = render_settings(named, settings.background, drawing, distances)
     if options.target and drawing != "quads":
         raise UsageError(f"--target is what quads blend into, and {drawing} are drawn here.")

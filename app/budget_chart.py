@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 from app.budget import Budget, Choice, choose
 from app.chart_rows import write_text
+from app.subject import Subject
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
-from runtime_models.model import Model
 
 if TYPE_CHECKING:
     from app.chart_measure import ChartRow, Pricing
 
-FORMAT = 2  # of the stored file, and of what the measure means: others are measured again
+FORMAT = 3  # of the stored file, and of what the measure means: others are measured again
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class BudgetRow:
 class Drawn:
     """What is going to be drawn: the chart belongs to exactly this."""
 
-    model: Model
-    x: float
+    subject: Subject
+    x: float | None  # of all objects; None: each at its own
     size: tuple[int, int]
     eyes: int = 1
 
@@ -81,8 +81,8 @@ def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
 
     backends = sorted(renderer.backends.items())
     table = [named for named in SETTINGS if named.quick]
-    # Everything but the pixels of a model: numbers, names and versions.
-    key = digest(drawn.model, drawn.x, drawn.size, drawn.eyes, backends,
+    # The scene by its contents, then everything but that: numbers, names and versions.
+    key = digest(drawn.subject.at(drawn.x), drawn.size, drawn.eyes, backends,
                  renderer.settings.background, machine_line(ctx), FORMAT, table)  # fmt: skip
     return cache_folder().parent / "charts" / f"{key}.json"
 
@@ -95,7 +95,7 @@ def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
     from app.progress import tracked
 
     kept = renderer.settings
-    stage = make_stage([drawn.model], drawn.x, drawn.size, QUICK)
+    stage = make_stage([drawn.subject], drawn.x, drawn.size, QUICK)
     try:
         with twin_of(renderer, ctx) as twin:
             pricing = Pricing((renderer, twin), ctx, stage, kept.background)

@@ -43,14 +43,6 @@ def named_cameras(
     return read_camera_list(path, camera_reading(options, size))
 
 
-def scene_cameras(
-    camera: str, scene: Path, model: "AnchorModel | SplatLayers", options,
-    size: tuple[int, int] | None = None,
-) -> "CameraList":  # fmt: skip
-    """named_cameras as the model's own origin sees them."""
-    return in_scene(named_cameras(camera, scene, options, size), model)
-
-
 def in_scene(cameras: "CameraList", model: "AnchorModel | SplatLayers") -> "CameraList":
     """The cameras where the model is: one that was re-centred has an origin of its own."""
     from scene.camera_list import moved

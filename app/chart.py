@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.opening import ReadingOptions, open_model
+from app.opening import ReadingOptions
 
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
@@ -21,7 +21,7 @@ class Options(ReadingOptions):
     """
 
     scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
-    """Packages, .ply, .splat or folders of PLY layers; several stand side by side."""
+    """Packages, .ply, .splat, folders of PLY layers or scene files; several stand side by side."""
     out: Annotated[Path, tyro.conf.arg(name="out")] = Path("out/chart")
     """Folder for rows.csv and the chart."""
     cameras: Path | None = None
@@ -36,7 +36,8 @@ class Options(ReadingOptions):
     frames: int = 0
     """Views on the arc; default 32, with --quick 8."""
     x: float | None = None
-    """Control value on the path, 0 to 1; default: the first stop of the first scene."""
+    """Control value on the path, 0 to 1, of all objects; default: the first stop of the first
+    scene, and with a scene file what it says for each object."""
     quick: bool = False
     """About ten settings, fewer frames, no SSIM."""
     decode: bool = False
@@ -61,54 +62,55 @@ def run(options: Options) -> int:
         raise UsageError(f"--frames is {options.frames}, expected 2 to {MOST_FRAMES}.")
     if options.x is not None and not 0 <= options.x <= 1:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
-    models = read_models(options)
-    cameras = read_views(options, models[0], size)
+    subjects = read_subjects(options)
+    cameras = read_views(options, subjects[0], size)
     make_folder(options.out)
-    return measure_and_draw(options, models, cameras, size)
+    return measure_and_draw(options, subjects, cameras, size)
 
 
-def read_models(options: Options) -> list:
-    """The models in order; a scene that is named twice is read once and shared."""
+def read_subjects(options: Options) -> list:
+    """The scenes in order; one that is named twice is read once and shared."""
+    from app.subject import open_subject
 
-    known = {path: open_model(path, options) for path in dict.fromkeys(options.scenes)}
+    known = {path: open_subject(path, options) for path in dict.fromkeys(options.scenes)}
     return [known[path] for path in options.scenes]
 
 
-def read_views(options: Options, model, size: tuple[int, int]) -> list:
-    from app.camera_files import scene_cameras
+def read_views(options: Options, subject, size: tuple[int, int]) -> list:
+    from app.camera_files import named_cameras
     from app.errors import UsageError
 
     if options.cameras is None:
         return []
     if options.frames:
         raise UsageError("--cameras gives the number of frames; leave --frames out.")
-    cameras = scene_cameras(str(options.cameras), options.scenes[0], model, options, size)
-    return list(cameras.views[:MOST_FRAMES])
+    cameras = named_cameras(str(options.cameras), options.scenes[0], options, size)
+    return list(subject.sees(cameras).views[:MOST_FRAMES])
 
 
-def measure_and_draw(options: Options, models: list, cameras: list, size: tuple[int, int]) -> int:
+def measure_and_draw(options: Options, subjects: list, cameras: list, size: tuple) -> int:
     from app.budget_chart import Drawn, keep_chart
     from app.chart_measure import ChartRow, Pricing, open_pair
     from app.chart_picture import draw_chart
     from app.chart_rows import RowsFile
     from app.chart_settings import settings_of
     from app.chart_stage import QUICK, Walk, digest, make_stage
-    from scene.framing import default_background
 
-    x = models[0].stops[0].x if options.x is None else options.x
+    x = options.x
+    if x is None and not any(subject.file for subject in subjects):
+        x = subjects[0].x  # scenes side by side show one stop
     walk = QUICK if options.quick else Walk()
     walk = replace(walk, frames=options.frames or walk.frames)
-    stage = make_stage(models, x, size, walk, cameras)
-    told = scene_line(options, stage, digest(models, cameras))
+    stage = make_stage(subjects, x, size, walk, cameras)
+    told = scene_line(options, stage, digest([subject.scene for subject in subjects], cameras))
     with open_pair(options.context, options.drawing) as (renderers, ctx):
-        background = default_background(models[0], (0.0, 0.0, 0.0))
-        pricing = Pricing(renderers, ctx, stage, background)
+        pricing = Pricing(renderers, ctx, stage, subjects[0].background)
         on_cpu = draws_on_cpu(pricing.drawing, ctx)
         head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
         file = RowsFile(options.out / "rows.csv", ChartRow, head)
         measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
-        if len(models) == 1 and not (options.quick or cameras):
-            drawn = Drawn(models[0], x, size)
+        if len(subjects) == 1 and not (options.quick or cameras):
+            drawn = Drawn(subjects[0], x, size)
             keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
     title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
     front = draw_chart(file.rows, title, options.out, on_cpu)

@@ -8,10 +8,10 @@ import numpy as np
 
 from app.chart_settings import Distances
 from app.quick_chart import turned
-from runtime_models.model import Model
-from scene.framing import default_view, frame_points, framing_view, model_points, scene_points
+from app.subject import Subject
+from scene.framing import frame_points, framing_view, scene_points
 from scene.pose import Pose, View
-from scene.scene import IDENTITY, Scene, SceneObject
+from scene.scene import IDENTITY, Scene
 
 WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
 GAP = 1.05  # of the sum of two radii, between neighbours
@@ -52,21 +52,24 @@ class Stage:
 
 
 def make_stage(
-    models: Sequence[Model],
-    x: float,
+    subjects: Sequence[Subject],
+    x: float | None,
     size: tuple[int, int],
     walk: Walk,
     cameras: Sequence[View] = (),
 ) -> Stage:
-    """`models` in a row along x, seen from an arc before them or from the views of `cameras`."""
-    scene = side_by_side(models, x)
+    """`subjects` in a row along x, seen from an arc before them or from the views of `cameras`.
+
+    x: of all objects; None: each at its own.
+    """
+    scene = side_by_side(subjects, x)
     points = scene_points(scene)
     centre, radius = frame_points(*points)
     if cameras:
         counted = tuple(cameras)
         path = (counted[0],) * WARM_UP + counted
     else:
-        first = default_view(models[0], size) if len(models) == 1 else framing_view(*points, size)
+        first = subjects[0].view(size) if len(subjects) == 1 else framing_view(*points, size)
         path = arc(first, centre, walk)
     xs = tuple(np.linspace(0, 1, walk.sweep).tolist())
     return Stage(scene, path, xs, distances_of(points, path), EYE_DISTANCE * radius)
@@ -78,18 +81,18 @@ def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
     return tuple(turned(first, centre, step * (i - half)) for i in range(-WARM_UP, walk.frames))
 
 
-def side_by_side(models: Sequence[Model], x: float) -> Scene:
-    """Objects along the world's x, framed radii touching; the first stays where it is."""
+def side_by_side(subjects: Sequence[Subject], x: float | None) -> Scene:
+    """Along the world's x, framed radii touching; the first stays where it is."""
     things, at, before = [], 0.0, None
-    for number, model in enumerate(models):
-        centre, radius = frame_points(*model_points(model))
+    for subject in subjects:
+        centre, radius = subject.bounds()
         if before is None:
             pose, left = IDENTITY, float(centre[0])
         else:
             at += GAP * (before + radius)
             pose = Pose(np.array([left + at - centre[0], 0.0, 0.0]), IDENTITY.wxyz)
         before = radius
-        things.append(SceneObject(f"scene {number}", model, pose, x))
+        things += subject.at(x, pose).objects
     return Scene(tuple(things))
 
 

@@ -22,8 +22,8 @@ class Options(ReadingOptions):
     """Compare two scenes, stops of a scene, or folders of pictures: PSNR, SSIM, differences."""
 
     a: Annotated[str, tyro.conf.Positional]
-    """A scene, a scene at a stop or x (scene.shift@Thermal, scene.shift@0.5), or a folder of
-    pictures."""
+    """A scene, a scene at a stop or x (scene.shift@Thermal, scene.shift@0.5; of a scene file all
+    objects that have the stop), or a folder of pictures."""
     b: Annotated[str, tyro.conf.Positional]
     """The same, to compare with it; pictures are matched by name, else in order."""
     cameras: Path | None = None
@@ -97,10 +97,14 @@ def run_viewer(options: Options) -> int:
     """The same two in a window."""
     from app import desktop
     from app.compare_sides import split_stop, x_of
+    from app.errors import UsageError
     from app.opening import open_model
+    from scene.scene_file import is_scene_file
 
     shared = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}
     path, at = split_stop(options.a)
+    if at and is_scene_file(path):
+        raise UsageError(f"--view shows {path.name} as it says itself; leave @{at} out.")
     stops = () if not at else open_model(path, options).stops
     x = x_of(at, stops, options.a) if at else None
     return desktop.run(desktop.Options(scenes=(path,), x=x, compare=options.b, **shared))
@@ -128,15 +132,14 @@ def choose_views(options: Options, a) -> list:
     from app.camera_files import camera_reading
     from app.drawing import parse_size
     from scene.camera_list import moved
-    from scene.framing import frame_points, model_points, orbit_path
+    from scene.framing import orbit_path
     from scene.read_cameras import read_camera_list
 
     size = parse_size(options.size) if options.size else None
     if options.cameras is not None:
         cameras = read_camera_list(options.cameras, camera_reading(options, size))
-        return moved(cameras.views, -a.origin)
-    centre, radius = frame_points(*model_points(a.model))
-    return orbit_path(VIEWS, centre, radius, size or SIZE)
+        return moved(cameras.views, -a.subject.origin)
+    return orbit_path(VIEWS, *a.subject.bounds(), size or SIZE)
 
 
 def drawn_pairs(options: Options, a, b) -> Iterator[Compared]:
@@ -146,7 +149,6 @@ def drawn_pairs(options: Options, a, b) -> Iterator[Compared]:
     from renderer.renderer import Renderer
     from runtime_models.model import BadFile
     from scene.camera_list import moved
-    from scene.framing import default_background
 
     views = choose_views(options, a)
     files = b.files if isinstance(b, PictureSide) else None
@@ -155,13 +157,13 @@ def drawn_pairs(options: Options, a, b) -> Iterator[Compared]:
             f"{b.name} holds {len(files)} pictures and {options.cameras} {len(views)} cameras; "
             "one picture a camera is wanted."
         )
-    background = options.background or default_background(a.model, (0.0, 0.0, 0.0))
+    background = options.background or a.subject.background
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         draw_a = artist(renderer, a, background)
         if files is None:
             with Renderer(ctx, renderer.backends["drawing"].split()[0]) as other:
                 draw_b = artist(other, b, background)
-                others = moved(views, a.origin - b.origin)
+                others = moved(views, a.subject.origin - b.subject.origin)
                 for i, (view, same) in enumerate(zip(views, others, strict=True)):
                     yield Compared(f"{i:04d}", draw_a(view), draw_b(same))
             return
@@ -175,10 +177,8 @@ def artist(renderer, side, background: tuple[float, float, float]):
     """view -> (H, W, 3): the side's scene alone in this renderer."""
     from dataclasses import replace
 
-    from scene.scene import Scene, SceneObject
-
     renderer.settings = replace(renderer.settings, background=background)
-    renderer.update(Scene((SceneObject(side.name, side.model, x=side.x),)))
+    renderer.update(side.subject.scene)
 
     def draw(view) -> np.ndarray:
         renderer.draw([view])

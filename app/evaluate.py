@@ -32,11 +32,18 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     from app.bench import write_json
+    from app.errors import UsageError
     from rasterizer.device import open_device
     from scene.read_capture import read_capture
+    from scene.scene_file import is_scene_file
     from training.evaluate import evaluate_model, report
 
     started = time.perf_counter()
+    if is_scene_file(options.scene):
+        raise UsageError(
+            f"{options.scene} is a scene file of objects, and photos are of one scene as it was "
+            "trained; name the model of one object."
+        )
     model, capture = open_model(options.scene, options), read_capture(options.capture)
     scores = evaluate_model(
         open_device(), model, capture, options.downscale, options.masks, options.background

@@ -33,6 +33,7 @@ def run(options: Options) -> int:
     from app.drawing import make_folder, open_renderer, parse_size
     from app.errors import UsageError
     from app.measure import Measure
+    from app.subject import Subject
     from runtime_models.read_scene import read_model
     from scene.framing import default_background
 
@@ -48,7 +49,7 @@ def run(options: Options) -> int:
         background = default_background(model, BACKGROUND)
         renderer.settings = replace(renderer.settings, background=background)
         draw_sheet(renderer, model, size, options.out)
-        work = Measure(renderer, ctx, model, model.stops[0].x, size)
+        work = Measure(renderer, ctx, Subject.of(model), None, size)
         result = measure(work, options, QUALITY_SIZE)
     print_table(result)
     write_json(result_path, result)

@@ -1,4 +1,4 @@
-"""launch.py lint: what is wrong with a file of splats, and what opening it would repair."""
+"""launch.py lint: what is wrong with a file of splats or a scene file, and what opening repairs."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from app.opening import PATIENCE_S, ReadingOptions, progress_after
+from app.scene_files import open_scene_file
 from runtime_models.model import BadFile
 
 
@@ -16,7 +17,7 @@ class Options(ReadingOptions):
     """Say what is wrong with a scene; nothing is drawn, nothing is written."""
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """Anything that opens: a file of splats, a folder, a package."""
+    """Anything that opens: a file of splats, a folder, a package, a scene file."""
     json: bool = False
     """JSON on standard output instead of a table."""
 
@@ -38,8 +39,13 @@ def run(options: Options) -> int:
 
 
 def examine(options: Options) -> dict:
-    """The findings of a scene and the numbers that they rest on.  Raises BadFile."""
+    """The findings of a scene and the numbers that they rest on.  Raises BadFile, UsageError."""
     from dataclasses import replace
+
+    from scene.scene_file import is_scene_file
+
+    if is_scene_file(options.scene):
+        return examine_objects(options)
 
     from runtime_models.lint_whole import fill_ratio, sample_of
     from runtime_models.read_scene import describe, read_model
@@ -56,11 +62,75 @@ def examine(options: Options) -> dict:
         "splats": facts["splats"],
         "sh_degree": facts["sh_degree"],
         "bytes": facts["bytes"],
-        "extent_m": [round(float(side), 4) + 0.0 for side in sample.high - sample.low],
+        "extent_m": extent_of(sample),
         "origin_m": [float(c) for c in getattr(model, "origin", (0, 0, 0))],
         "splats_over_a_pixel": round(fill_ratio(sample), 2),
         "findings": [asdict(finding) for finding in model.findings],
     }
+
+
+def examine_objects(options: Options) -> dict:
+    """The same of a scene file and all that it names: models, collider meshes, reactions."""
+    from runtime_models.lint_whole import fill_ratio
+    from runtime_models.read_scene import files_of
+    from scene.read_mesh import read_mesh
+    from scene.scene_file import FORMAT, HULLS, machine_of
+
+    file, models, scene = open_scene_file(options.scene, options, tell=False)
+    meshes = {item.collider: item for item in file.all_items if item.collider not in (None, HULLS)}
+    for name, item in meshes.items():
+        try:
+            read_mesh(file.path(name))
+        except BadFile as error:
+            raise BadFile(f"object '{item.name}': 'collider': {error}") from None
+    for item in file.all_items:
+        machine_of(item, models[item.name])
+    paths = {id(models[item.name]): file.path(item.model) for item in file.all_items}
+    each = {id(model): model for model in models.values()}
+    used = {path for key, model in each.items() for path in files_of(model, paths[key])}
+    used |= {file.path(name) for name in meshes}
+    sample = sample_of_scene(scene)
+    return {
+        "file": str(options.scene),
+        "refused": False,
+        "format": FORMAT,
+        "objects": len(scene.objects),
+        "splats": scene.splat_count,
+        "sh_degree": None,
+        "bytes": sum(path.stat().st_size for path in {options.scene, *used}),
+        "extent_m": extent_of(sample),
+        "origin_m": [0.0, 0.0, 0.0],
+        "splats_over_a_pixel": round(fill_ratio(sample), 2) if sample else 0.0,
+        "findings": [asdict(f) for model in each.values() for f in model.findings],
+    }
+
+
+def sample_of_scene(scene):
+    """A Sample of what shows, where it stands, each object at its x; None where nothing does."""
+    import numpy as np
+
+    from runtime_models.evaluate import evaluate
+    from runtime_models.lint_whole import sample_of
+    from scene.control import control_of
+    from scene.framing import default_view
+
+    parts = []
+    for thing in scene.objects:
+        if not (thing.visible and thing.model.splat_count):
+            continue
+        eye = default_view(thing.model, (640, 360)).world_from_eye.position
+        splats = evaluate(thing.model, control_of(thing), eye)
+        world = thing.world_from_object.matrix()
+        means = splats.means @ world[:3, :3].T + world[:3, 3]
+        parts.append((means, splats.scales, splats.opacity))
+    return sample_of(*map(np.concatenate, zip(*parts, strict=True))) if parts else None
+
+
+def extent_of(sample) -> list[float]:
+    """The sides of the box of the 1st to 99th percentile, metres."""
+    if sample is None:
+        return [0.0, 0.0, 0.0]
+    return [round(float(side), 4) + 0.0 for side in sample.high - sample.low]
 
 
 def splats_of(model):
@@ -79,9 +149,10 @@ def print_report(facts: dict) -> None:
 
     console = Console()
     extent = " x ".join(f"{side:,.3g}" for side in facts["extent_m"])
+    objects = f"{facts['objects']} objects, " if "objects" in facts else ""
     degree = "" if facts["sh_degree"] is None else f", SH degree {facts['sh_degree']}"
     console.print(
-        f"{facts['file']}: {facts['format']}, {facts['splats']:,} splats{degree}, "
+        f"{facts['file']}: {facts['format']}, {objects}{facts['splats']:,} splats{degree}, "
         f"{facts['bytes']:,} bytes; {extent} m (1st to 99th percentile), "
         f"{facts['splats_over_a_pixel']:,.3g} splats over a pixel.",
         markup=False, highlight=False, soft_wrap=True,

@@ -11,12 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from app.subject import Subject
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
-from scene.framing import default_view, frame_points, model_points, orbit_path
+from scene.framing import orbit_path
 from scene.metrics import psnr
 from scene.pose import View
-from scene.scene import Scene, SceneObject
+from scene.scene import Scene
 from scene.stereo import stereo_pair
 
 WARM_UP = 3  # frames that do not count: first use compiles and allocates
@@ -31,12 +32,16 @@ PERCENTILES = (50, 95, 99)
 class Measure:
     """One scene at one size in one renderer."""
 
-    def __init__(self, renderer: Renderer, ctx, model, x: float, size: tuple[int, int]) -> None:
-        self.renderer, self.ctx, self.model, self.x, self.size = renderer, ctx, model, x, size
-        self.centre, self.radius = frame_points(*model_points(model))
+    def __init__(
+        self, renderer: Renderer, ctx, subject: Subject, x: float | None, size: tuple[int, int]
+    ) -> None:
+        """x: of all objects on the orbit; None: each at its own."""
+        self.renderer, self.ctx, self.subject, self.size = renderer, ctx, subject, size
+        self.x = subject.x if x is None else x
+        self.centre, self.radius = subject.bounds()
 
-    def scene(self, x: float) -> Scene:
-        return Scene((SceneObject("scene", self.model, x=x),))
+    def scene(self, x: float | None) -> Scene:
+        return self.subject.at(x)
 
     def all(
         self,
@@ -62,13 +67,14 @@ class Measure:
             "stereo_over_mono": float(np.median(stereo) / np.median(mono)),
             "psnr_db": worst(errors),
             "sweep_worst_ms": max(sweep_ms),
-            "splats": self.model.splat_count,
+            "splats": self.subject.scene.splat_count,
             "drawn": stats.drawn,
             "culled": stats.culled,
             "sorts": float(np.mean(sorts)),
             "draw_passes": [name for name in passes if name in DRAW_PASSES],
             "draw_pass_ratio": float(np.median(mono) / drawing) if drawing else None,
             "x": self.x,
+            "objects": len(self.subject.scene.objects),
             "size": f"{self.size[0]}x{self.size[1]}",
             "quality_size": f"{quality_size[0]}x{quality_size[1]}",
             "quality_images": len(errors),
@@ -125,8 +131,8 @@ class Measure:
         return (time.perf_counter() - start) * 1e3, stats
 
     def sweep(self, count: int) -> list[float]:
-        """ms of each frame while x goes from 0 to 1; every frame runs all five networks."""
-        view = default_view(self.model, self.size)
+        """ms of each frame while x of all objects goes from 0 to 1; all networks run in each."""
+        view = self.subject.view(self.size)
         times = []
         for i, x in enumerate([0.0] * WARM_UP + np.linspace(0, 1, count).tolist()):
             start = time.perf_counter()
@@ -142,14 +148,14 @@ class Measure:
         From several sides at the orbit's x, then from the first side at every stop and half way
         between: speed at one x says nothing about the picture at another.
         """
-        stops = sorted({stop.x for stop in self.model.stops})
+        stops = self.subject.stops
         views = orbit_path(QUALITY_VIEWS, self.centre, self.radius, size)
         others = sorted({*stops, *((a + b) / 2 for a, b in pairwise(stops))} - {self.x})
         return [self.error(self.x, view) for view in views] + [
             self.error(x, views[0]) for x in others
         ]
 
-    def error(self, x: float, view: View) -> float:
+    def error(self, x: float | None, view: View) -> float:
         """PSNR in dB of the premultiplied colours and the alpha of one picture, as it was drawn."""
         self.renderer.update(self.scene(x))
         self.renderer.draw([view])

@@ -62,7 +62,9 @@ def open_model(
     from scene.scene_file import is_scene_file
 
     if is_scene_file(path):
-        raise BadFile(f"{path} is a scene file of objects; render, info and simulate open it.")
+        raise BadFile(
+            f"{path} is a scene file of objects; one model is wanted here: name the file of one."
+        )
     with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
         model = read_model(path, replace(options.reading(), told=tell))
     for finding in model.findings:

@@ -23,8 +23,9 @@ class Options(ReadingOptions):
     """A package, a .ply, a .splat, a folder of PLY layers or a scene file, see docs/scene.md."""
     out: Path
     """Folder for the pictures."""
-    x: tuple[str, ...] = ("0",)
-    """Control values in 0..1, or sweep:N."""
+    x: tuple[str, ...] = ()
+    """Control values in 0..1, or sweep:N; default: 0, and in a scene file what it says for each
+    object."""
     camera: str = "orbit"
     """orbit, front, auto (cameras that lie with the scene), or a file or folder of cameras, see
     docs/cameras.md: ours, cameras.json, transforms.json, camera_path.json, _vr.json, COLMAP."""
@@ -79,7 +80,7 @@ def run(options: Options) -> int:
     from app.errors import UsageError
     from scene.scene_file import is_scene_file
 
-    controls = parse_controls(options.x)
+    controls = parse_controls(options.x) if options.x else [None]
     size = parse_size(options.size) if options.size else None
     if not 1 <= options.frames <= MOST_VALUES:
         raise UsageError(f"--frames is {options.frames}, expected 1 to {MOST_VALUES}.")
@@ -101,7 +102,8 @@ def run(options: Options) -> int:
             settings, target=renderer.settings.target, background=background
         )
         if budget:
-            drawn = Drawn(opened.model, controls[0], views[0].size, 1 + (options.stereo > 0))
+            x, eyes = controls[0], 1 + (options.stereo > 0)
+            drawn = Drawn(opened.subject, x, views[0].size, eyes)
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
         scenes = [opened.scene_at(x, i) for x, i in pairs]
         draw_all(renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
@@ -116,37 +118,36 @@ class Opened:
     views: list
     background: tuple[float, float, float]  # where the options give none
     scene_at: Callable  # (x, row of the view) -> Scene
-    model: object = None  # the one that a budget is measured with
+    subject: object  # what a budget is measured with
 
 
 def open_one(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     """A scene of one model, with the parts of --select."""
-    from app.camera_files import in_scene
-    from scene.framing import default_background
-    from scene.scene import Scene, SceneObject
+    from app.subject import Subject
+    from scene.scene import Scene
 
     model = open_model(options.scene, options)
-    views = in_scene(cameras, model).views if cameras else own_views(options, model, size)
+    subject = Subject.of(model, 0.0)
+    views = subject.sees(cameras).views if cameras else own_views(options, subject, size)
     selectors = [choose_selectors(options.select, model, view) for view in views]
 
-    def scene_at(x: float, row: int) -> Scene:
-        return Scene((SceneObject("scene", model, x=x, selectors=selectors[row]),))
+    def scene_at(x: float | None, row: int) -> Scene:
+        (thing,) = subject.at(x).objects
+        return Scene((replace(thing, selectors=selectors[row]),))
 
-    return Opened(views, default_background(model, (0.0, 0.0, 0.0)), scene_at, model)
+    return Opened(views, subject.background, scene_at, subject)
 
 
 def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     """The objects of a scene file, each where and as the file says."""
     from app.errors import UsageError
-    from app.scene_files import open_scene_file, scene_views
+    from app.subject import open_subject
 
-    for name in ("x", "select", "target_ms", "floor_db"):
-        if getattr(options, name) != getattr(Options, name):
-            option = f"--{name.replace('_', '-')}"
-            raise UsageError(f"{option} is for one model; leave it out with a scene file.")
-    file, _, scene = open_scene_file(options.scene, options)
-    views = cameras.views if cameras else scene_views(options, file, scene, size)
-    return Opened(views, (0.0, 0.0, 0.0), lambda x, row: scene)
+    if options.select:
+        raise UsageError("--select is for one model; a scene file has selectors for each object.")
+    subject = open_subject(options.scene, options)
+    views = cameras.views if cameras else own_views(options, subject, size)
+    return Opened(views, subject.background, lambda x, row: subject.at(x), subject)
 
 
 def check_one_of(options: Options, budget) -> None:
@@ -185,8 +186,8 @@ def choose_cameras(options: Options, size: tuple[int, int] | None):
 
 
 def choose_paths(
-    options: Options, controls: list[float], views: int | None
-) -> tuple[list[tuple[float, int]], list[Path]]:
+    options: Options, controls: list[float | None], views: int | None
+) -> tuple[list[tuple[float | None, int]], list[Path]]:
     """(x, number of the view) of every picture, and its file.  UsageError where one is there."""
     from app.drawing import MOST_VALUES
     from app.errors import UsageError
@@ -196,22 +197,21 @@ def choose_paths(
     if count > MOST_VALUES:
         raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
     pairs = [(x, i) for x in controls for i in range(views)]
-    paths = [options.out / f"{i:04d}_x{x:.3f}.png" for i, (x, _) in enumerate(pairs)]
+    paths = [options.out / f"{i:04d}_x{x or 0:.3f}.png" for i, (x, _) in enumerate(pairs)]
     taken = [p for p in paths if p.exists()]
     if taken and not options.overwrite:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
     return pairs, paths
 
 
-def own_views(options: Options, model, size: tuple[int, int] | None) -> list:
+def own_views(options: Options, subject, size: tuple[int, int] | None) -> list:
     """The views around the scene: as many as --frames on the orbit, else the one from the front."""
-    from scene.framing import default_view, frame_points, model_points, orbit_path
+    from scene.framing import orbit_path
 
     size = size or (640, 360)
     if options.camera == "front" or options.frames == 1:
-        return [default_view(model, size)]
-    centre, radius = frame_points(*model_points(model))
-    return orbit_path(options.frames, centre, radius, size)
+        return [subject.view(size)]
+    return orbit_path(options.frames, *subject.bounds(), size)
 
 
 def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:

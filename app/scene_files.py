@@ -1,4 +1,4 @@
-"""How commands open a scene file: its models with progress and findings, its views."""
+"""How commands open a scene file: its models with progress and findings."""
 
 import sys
 from pathlib import Path
@@ -8,7 +8,6 @@ from app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
 
 if TYPE_CHECKING:
     from runtime_models.model import Model
-    from scene.pose import View
     from scene.scene import Scene
     from scene.scene_file import SceneFile
 
@@ -16,12 +15,12 @@ OF_OBJECTS = ("mode", "up", "flip")  # options that the file has for each object
 
 
 def open_scene_file(
-    path: Path, options: ReadingOptions
+    path: Path, options: ReadingOptions, tell: bool = True
 ) -> tuple["SceneFile", dict[str, "Model"], "Scene"]:
     """What the file says, the model of each object, and what is drawn.
 
-    Progress and findings go to stderr.  Raises BadFile, and UsageError for options that an object
-    has in the file.
+    Progress goes to stderr, and findings unless `tell` is false.  Raises BadFile, and UsageError
+    for options that an object has in the file.
     """
     from dataclasses import replace
 
@@ -35,7 +34,8 @@ def open_scene_file(
     file = read_scene_file(path)
     with progress_after(PATIENCE_S) as told:
         models = read_models(file, replace(options.reading(), told=told))
-    tell_findings(models)
+    if tell:
+        tell_findings(models)
     return file, models, scene_of(file, models)
 
 
@@ -44,19 +44,6 @@ def tell_findings(models: dict[str, "Model"]) -> None:
     for model in {id(model): model for model in models.values()}.values():
         for finding in model.findings:
             print(sentence(finding), file=sys.stderr)
-
-
-def scene_views(
-    options, file: "SceneFile", scene: "Scene", size: tuple[int, int] | None
-) -> list["View"]:
-    """The views around the objects: --frames of `render` on the orbit, else the file's own."""
-    from scene.framing import frame_points, orbit_path, scene_points
-    from scene.scene_file import first_view
-
-    if options.camera == "front" or options.frames == 1:
-        return [first_view(file, scene, size or (640, 360))]
-    centre, radius = frame_points(*scene_points(scene))
-    return orbit_path(options.frames, centre, radius, size or (640, 360))
 
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:

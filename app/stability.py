@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.opening import ReadingOptions, open_model
+from app.opening import ReadingOptions
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -25,7 +25,7 @@ class Options(ReadingOptions):
     """
 
     scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat or a folder of PLY layers."""
+    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
     out: Path
     """Folder for stability.csv and the pictures."""
     cases: tuple[str, ...] = ()
@@ -50,11 +50,11 @@ def run(options: Options) -> int:
     from app.drawing import make_folder, open_renderer, parse_size
     from app.stability_cases.stage import Stage
     from app.stability_cases.table import open_table
-    from scene.framing import default_background
+    from app.subject import open_subject
 
     size = parse_size(options.size)
     names = choose_cases(options)
-    model = open_model(options.scene, options)
+    scene = open_subject(options.scene, options)
     make_folder(options.out)
 
     def reopen():
@@ -62,10 +62,11 @@ def run(options: Options) -> int:
 
     with reopen() as (renderer, ctx):
         table = open_table(
-            options.out, command_line(), subject(options, renderer, model), options.overwrite
+            options.out, command_line(), subject(options, renderer, scene), options.overwrite
         )
-        background = default_background(model, (0.0, 0.0, 0.0))
-        stage = Stage(renderer, ctx, model, size, reopen, background, options.steps, options.rounds)
+        stage = Stage(
+            renderer, ctx, scene, size, reopen, scene.background, options.steps, options.rounds
+        )
         perform(stage, names, table)
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]
@@ -90,13 +91,13 @@ def choose_cases(options: Options) -> list[str]:
     return [name for name in CASES if not options.cases or name in options.cases]
 
 
-def subject(options: Options, renderer, model) -> str:
+def subject(options: Options, renderer, scene) -> str:
     """What the rows are about: rows of another scene, size or drawing do not belong with them."""
     from app.measure import processor
 
     backends = ", ".join(renderer.backends.values())
     return (
-        f"{options.scene.name}, {model.splat_count} splats, {options.mode or 'cumulative'}, "
+        f"{options.scene.name}, {scene.scene.splat_count} splats, {options.mode or 'cumulative'}, "
         f"{options.size}, {options.steps} steps, {options.rounds} rounds, {backends}, {processor()}"
     )
 

@@ -22,7 +22,7 @@ from renderer.renderer import Renderer
 from renderer.resolve import Resolve
 from scene.camera_list import moved
 from scene.metrics import psnr
-from scene.scene import Scene, SceneObject
+from scene.scene import Scene
 
 if TYPE_CHECKING:
     from app.desktop import Options, Viewer
@@ -68,7 +68,7 @@ class Wipe:
         self._shown = Shown(renderer, Readings(drawing=renderer.backends["drawing"]))
         self._resolve = Resolve(Gpu(viewer.window.ctx))
         self._target: moderngl.Framebuffer | None = None  # B's picture, as large as the window
-        self._scene = Scene((SceneObject(side.name, side.model, x=side.x),))
+        self._scene = side.subject.scene
         self._comparison = Comparison()
         self._waiting = False  # the picture has not rested long enough to be measured
         self._holding = False  # the mouse has the line
@@ -109,13 +109,13 @@ class Wipe:
     def _offset(self, scene: Scene) -> np.ndarray:
         """(3,) metres from A's own coordinates to B's: both say where their zero lies."""
         of_a = np.array(getattr(scene.objects[0].model, "origin", (0.0, 0.0, 0.0)))
-        return of_a - self._side.origin
+        return of_a - self._side.subject.origin
 
     def _scene_at(self, scene: Scene) -> Scene:
         """B at its own x where that was given, else at A's; the same object until x changes."""
-        x = self._side.x if self._side.stated else scene.objects[0].x
-        if x != self._scene.objects[0].x:
-            self._scene = Scene((SceneObject(self._side.name, self._side.model, x=x),))
+        x = scene.objects[0].x
+        if not self._side.stated and x != self._scene.objects[0].x:
+            self._scene = self._side.subject.at(x)
         return self._scene
 
     def _framebuffer(self, size: tuple[int, int]) -> moderngl.Framebuffer:

@@ -8,7 +8,7 @@ so that a moved object passes through it.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -199,6 +199,22 @@ def check_x(x: float, whose: str) -> None:
     """ValueError, naming the value, for what is not from 0 to 1: nothing was trained beyond."""
     if not 0 <= x <= 1:
         raise ValueError(f"{whose} has x = {x}; from 0 to 1 is wanted.")
+
+
+def carried(selector: Selector, world_from_before: Pose) -> Selector:
+    """What stands in the world after it is moved; what is fixed to an object goes with that."""
+    if selector.space != "world":
+        return selector
+    moves = world_from_before.matrix()
+    if isinstance(selector, HalfSpace):
+        point = moves[:3, :3] @ selector.point + moves[:3, 3]
+        return replace(selector, point=point, normal=moves[:3, :3] @ selector.normal)
+    at = "position" if isinstance(selector, Lens) else "centre"
+    wxyz = getattr(selector, "wxyz", UPRIGHT)
+    before = Pose(np.array(getattr(selector, at)), np.array(wxyz))
+    now = Pose.from_matrix(moves @ before.matrix())
+    turned = {"wxyz": now.wxyz} if hasattr(selector, "wxyz") else {}
+    return replace(selector, **{at: now.position}, **turned)
 
 
 def _name(selector: object) -> str:

@@ -8,6 +8,7 @@ import pytest
 
 from app import bench, cli, measure
 from app.errors import UsageError
+from app.subject import Subject
 from renderer.reference import reference_image
 from renderer.settings import FrameStats, RenderSettings
 from runtime_models.model import Stop
@@ -68,7 +69,7 @@ def clock(monkeypatch):
 
 
 def measured(model, renderer, frames=4, sweep=5, x=0.0):
-    work = measure.Measure(renderer, None, model, x, (16, 12))
+    work = measure.Measure(renderer, None, Subject.of(model), x, (16, 12))
     return work.all(frames, sweep, (8, 6))
 
 

@@ -13,6 +13,7 @@ from app import budget_chart, cli
 from app.budget import Budget, choose, least_scale, read_budget
 from app.budget_chart import BudgetRow, Drawn, budget_rows, read_rows, steady, store_rows
 from app.errors import UsageError
+from app.subject import Subject
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from runtime_models.write_package import write_package
@@ -158,12 +159,13 @@ def test_measured_once_for_each_thing_that_matters(cache, monkeypatch):
     monkeypatch.setattr(budget_chart, "measure", lambda *what: calls.append(what) or list(ROWS))
     model = make_random_model(20)
     with Renderer(None) as renderer:
-        first = Drawn(model, 0.0, (40, 30))
+        first = Drawn(Subject.of(model), 0.0, (40, 30))
         assert budget_rows(renderer, None, first) == ROWS
-        assert budget_rows(renderer, None, Drawn(make_random_model(20), 0.0, (40, 30))) == ROWS
+        again = Drawn(Subject.of(make_random_model(20)), 0.0, (40, 30))
+        assert budget_rows(renderer, None, again) == ROWS
         assert len(calls) == 1
         others = [replace(first, x=0.5), replace(first, size=(30, 40)), replace(first, eyes=2),
-                  replace(first, model=make_random_model(21))]  # fmt: skip
+                  replace(first, subject=Subject.of(make_random_model(21)))]  # fmt: skip
         for number, other in enumerate(others, 2):
             budget_rows(renderer, None, other)
             assert len(calls) == number

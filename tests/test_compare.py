@@ -21,6 +21,7 @@ from app.compare_sides import (
 )
 from app.errors import UsageError
 from app.opening import ReadingOptions
+from app.subject import Subject
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
 from runtime_models.write_ply import write_ply
@@ -97,13 +98,12 @@ def test_the_same_place_in_the_world_is_compared_whatever_the_zero(tmp_path, cap
     near = splats(50)
     write_ply(near, tmp_path / "a.ply")
     a = open_side(str(tmp_path / "a.ply"), ReadingOptions())
-    shifted = replace(
-        a.model, means=a.model.means - np.float32([3, 0, -2]), origin=(3.0, 0.0, -2.0)
-    )
+    (model,) = a.subject.models
+    shifted = replace(model, means=model.means - np.float32([3, 0, -2]), origin=(3.0, 0.0, -2.0))
     from app.compare import drawn_pairs
 
     options = Options("a", "b", size=SMALL)
-    for pair in drawn_pairs(options, a, SceneSide("b", shifted, 0.0)):
+    for pair in drawn_pairs(options, a, SceneSide("b", Subject.of(shifted, 0.0))):
         assert psnr(pair.a, pair.b) > 60
     views = choose_views(options, a)
     assert len(views) == 8 and views[0].size == (64, 48)
@@ -121,7 +121,7 @@ def test_what_follows_the_last_at_sign_is_the_stop(text, path, at):
 def test_a_path_that_holds_an_at_sign_wins(tmp_path):
     path = put(tmp_path / "me@home.ply", 3)
     assert split_stop(str(path)) == (path, "")
-    assert open_side(str(path), ReadingOptions()).x == 0.0
+    assert open_side(str(path), ReadingOptions()).subject.x == 0.0
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Scene files in render and info: every object where and as the file says."""
+"""Scene files in render, info and lint: every object where and as the file says."""
 
 import json
 from dataclasses import replace
@@ -8,18 +8,28 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app import budget_chart
+from app.budget_chart import BudgetRow
 from app.errors import UsageError
+from app.evaluate import Options as Evaluate
+from app.evaluate import run as evaluate
 from app.info import Options as Info
 from app.info import run as info
+from app.lint import Options as Lint
+from app.lint import run as lint
 from app.opening import ReadingOptions, open_model
 from app.render import Options, run
 from renderer.renderer import Renderer
+from renderer.settings import RenderSettings
 from runtime_models.model import BadFile
+from runtime_models.write_ply import write_ply
 from scene.read_scene_file import read_scene_file
 from scene.scene_file import first_view, read_models, scene_of
+from tests.test_gltf import plain_splats
 
 SCENE = Path(__file__).resolve().parents[1] / "assets" / "touch.scene.json"
 SIZE = (96, 54)
+ROWS = [BudgetRow("exact", RenderSettings(), 2.0, 200.0)]
 
 
 def rendered(scene: Path, out: Path, **changes) -> list[np.ndarray]:
@@ -40,11 +50,18 @@ def test_render_draws_what_the_file_says(tmp_path):
     assert (picture.max(axis=2) > 60).mean() > 0.2
 
 
-def test_a_moved_object_and_another_x_are_seen(tmp_path):
+def absolute() -> dict:
+    """The example for another folder."""
     data = json.loads(SCENE.read_text())
     for item in (data["background"], *data["objects"]):
-        item["model"] = str(SCENE.parent / item["model"])
-    path = tmp_path / "a.scene.json"
+        for key in ("model", "collider"):
+            if item[key] != "hulls":
+                item[key] = str(SCENE.parent / item[key])
+    return data
+
+
+def test_a_moved_object_and_another_x_are_seen(tmp_path):
+    data, path = absolute(), tmp_path / "a.scene.json"
 
     def picture(name: str) -> np.ndarray:
         path.write_text(json.dumps(data))
@@ -68,14 +85,62 @@ def test_orbits_and_stereo(tmp_path):
 
 @pytest.mark.parametrize(
     "changes,said",
-    [({"x": ("1",)}, "--x is for one model"), ({"select": ("sphere:0,0,0:1:1",)}, "--select"),
-     ({"target_ms": 5.0}, "--target-ms"), ({"mode": "exclusive"}, "--mode is for one model"),
-     ({"flip": True}, "--flip"), ({"camera": "auto"}, "no cameras lie with")],
+    [({"select": ("sphere:0,0,0:1:1",)}, "--select is for one model"),
+     ({"mode": "exclusive"}, "--mode is for one model"), ({"flip": True}, "--flip"),
+     ({"camera": "auto"}, "no cameras lie with")],
 )  # fmt: skip
 def test_what_a_scene_file_does_not_take_is_said(tmp_path, changes, said):
     with pytest.raises(UsageError, match=said):
         rendered(SCENE, tmp_path / "out", **changes)
     assert not (tmp_path / "out").exists()
+
+
+def test_x_is_of_all_objects(tmp_path):
+    own, at_one, at_zero = (
+        rendered(SCENE, tmp_path / name, x=x)[0].astype(int)
+        for name, x in (("own", ()), ("one", ("1",)), ("zero", ("0",)))
+    )
+    assert np.abs(own - at_zero).max() > 25, "the ring begins in brass"
+    assert np.abs(at_one - at_zero).max() > 25
+    assert len(rendered(SCENE, tmp_path / "sweep", x=("sweep:3",))) == 3
+
+
+def test_a_budget_is_measured_with_all_objects(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    asked = []
+    monkeypatch.setattr(budget_chart, "measure", lambda *what: asked.append(what[2]) or ROWS)
+    rendered(SCENE, tmp_path / "out", target_ms=5.0)
+    assert asked[0].subject.scene.splat_count == 32_000 and asked[0].x is None
+    assert "exact" in capsys.readouterr().err
+
+
+def test_lint_tells_of_every_model_and_mesh(tmp_path, capsys):
+    assert lint(Lint(SCENE, json=True)) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["objects"], facts["splats"], facts["findings"]) == (5, 32_000, [])
+    assert facts["bytes"] > SCENE.stat().st_size + 200_000
+    data = absolute()
+    broken = tmp_path / "plain.ply"
+    splats = plain_splats(40)
+    splats.opacity[3] = np.nan
+    write_ply(splats, broken)
+    data["objects"][0] = {"name": "broken", "model": "plain.ply"}
+    data["objects"][1] |= {"name": "the same", "model": "plain.ply", "reactions": []}
+    for key in ("states", "two_axes", "mode", "up"):
+        data["objects"][1].pop(key, None)
+    path = tmp_path / "a.scene.json"
+    path.write_text(json.dumps(data))
+    assert lint(Lint(path, json=True)) == 0
+    findings = json.loads(capsys.readouterr().out)["findings"]
+    assert [found["rows"] for found in findings if found["repaired"]] == [[3]]
+    assert lint(Lint(path)) == 0
+    assert "5 objects" in capsys.readouterr().out
+    (tmp_path / "mesh.obj").write_text("nothing")
+    data["objects"][3]["collider"] = str(tmp_path / "mesh.obj")
+    path.write_text(json.dumps(data))
+    with pytest.raises(BadFile, match="object 'plate': 'collider': mesh"):
+        lint(Lint(path, json=True))
+    assert json.loads(capsys.readouterr().out)["refused"] is True
 
 
 def test_info_lists_the_objects(capsys):
@@ -89,6 +154,8 @@ def test_info_lists_the_objects(capsys):
     assert "touch/ring" in capsys.readouterr().out
 
 
-def test_other_commands_say_which_ones_open_it():
-    with pytest.raises(BadFile, match="is a scene file of objects; render, info and simulate"):
+def test_what_wants_one_model_says_so(tmp_path):
+    with pytest.raises(BadFile, match="is a scene file of objects; one model is wanted here"):
         open_model(SCENE, ReadingOptions())
+    with pytest.raises(UsageError, match="photos are of one scene as it was trained"):
+        evaluate(Evaluate(SCENE, tmp_path))

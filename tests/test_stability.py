@@ -116,7 +116,7 @@ def shivering(renderer, image, i):
 def test_the_case_fails_where_the_renderer_does(stage, name, spoil):
     if name == "life":
         result = CASES[name](
-            Stage(stage.renderer, None, stage.model, SIZE, spoiled_reopen, rounds=2)
+            Stage(stage.renderer, None, stage.subject, SIZE, spoiled_reopen, rounds=2)
         )
     else:
         spoiled = Spoiled(stage.renderer, spoil)

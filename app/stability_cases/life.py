@@ -47,7 +47,7 @@ def life(stage: Stage) -> Result:
         ),
         growth(
             "a scene loaded and dropped", loads,
-            max(GROWTH_MB, stage.model.splat_count * LEAST_BYTES / 1e6),
+            max(GROWTH_MB, stage.subject.scene.splat_count * LEAST_BYTES / 1e6),
             "what it holds is 150 bytes a splat and more: this is the least two columns of it",
         ),
     ]  # fmt: skip

@@ -36,7 +36,7 @@ STALE_REASON = (
 
 def sweep(stage: Stage) -> Result:
     """x from stop to stop: no frame darker, emptier, or further off than both its ends allow."""
-    xs = sorted({stop.x for stop in stage.model.stops})
+    xs = stage.subject.stops
     if len(xs) < 2:
         only = not_here("frames between two stops", "the scene has a single stop")
         return Result([only], [])
@@ -47,7 +47,8 @@ def sweep(stage: Stage) -> Result:
         for x in np.linspace(low, high, count + 1):
             image = stage.draw(stage.scene(float(x)), view)
             frames[float(x)] = (image, stage.shown())
-    sigma = stage.model.encoding.sigma if isinstance(stage.model, AnchorModel) else SIGMA
+    learned = [m.encoding.sigma for m in stage.subject.models if isinstance(m, AnchorModel)]
+    sigma = min(learned, default=SIGMA)
     spans = [Span(frames, low, high, sigma) for low, high in pairwise(xs)]
     tables = zip(*(span.findings() for span in spans), strict=True)
     findings = [min(rows, key=lambda row: row.headroom) for rows in tables]
@@ -147,7 +148,7 @@ def stale(stage: Stage, move, bounds: dict[float, float]) -> Result:
             worst = (db, angle, old, exact)
     _, angle, old, exact = worst
     # A model whose opacities follow the eye is put in order wherever that moves.
-    moved = follows_eye(stage.model) and move is not turned
+    moved = any(map(follows_eye, stage.subject.models)) and move is not turned
     told = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
     panels = [
         stage.panel(f"order {angle:g} degrees old", old),

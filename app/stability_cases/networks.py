@@ -60,8 +60,9 @@ def is_sentence(text: str) -> bool:
 
 def broken_heads(stage: Stage) -> Result:
     """NaN and Inf in the weights or biases of one head at a time."""
-    model = stage.model if isinstance(stage.model, AnchorModel) else small_model()
-    view = stage.view() if model is stage.model else front(stage.size)
+    only = stage.subject.models[0] if not stage.subject.file else None
+    model = only if isinstance(only, AnchorModel) else small_model()
+    view = stage.view() if model is only else front(stage.size)
     whole = stage.draw(alone(model), view)
     images, worst = {}, None
     for head in HEADS:

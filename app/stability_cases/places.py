@@ -15,7 +15,6 @@ from app.stability_cases.finding import (
 )
 from app.stability_cases.scenes import alone, front, shell, splats, turns
 from app.stability_cases.stage import Stage, difference, moved, turned, turned_about
-from scene.framing import model_points
 from scene.pose import Pose, View, look_at, perspective
 from scene.scene import IDENTITY
 
@@ -108,7 +107,7 @@ def from_the_middle(stage: Stage) -> list[View]:
 def from_close_up(stage: Stage) -> list[View]:
     """Eyes a hundredth of the radius before splats of the scene, looking at them: the fullest."""
     centre, radius = stage.bounds()
-    means, opacity = model_points(stage.model)
+    means, opacity = stage.subject.points()
     seen = np.flatnonzero((np.linalg.norm(means - centre, axis=1) < radius) & (opacity > 0.1))
     if not len(seen):
         return []

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from app.stability_cases.finding import Panel
+from app.subject import Subject
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import FrameStats, RenderSettings
-from runtime_models.model import Model
-from scene.framing import default_view, frame_points, model_points
 from scene.pose import Pose, View
-from scene.scene import IDENTITY, Scene, SceneObject
+from scene.scene import IDENTITY, Scene
 
 EMPTY = Scene(())
 
@@ -25,7 +24,7 @@ class Stage:
 
     renderer: Renderer
     ctx: object  # moderngl.Context, or None with tiles alone
-    model: Model
+    subject: Subject
     size: tuple[int, int]
     reopen: Callable[[], AbstractContextManager]  # another context and renderer of this kind
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -33,21 +32,17 @@ class Stage:
     rounds: int = 50  # contexts made and closed
     stats: FrameStats = field(default_factory=FrameStats)  # of the last frame
 
-    @property
-    def x(self) -> float:
-        return self.model.stops[0].x
-
     def scene(self, x: float | None = None, pose: Pose = IDENTITY) -> Scene:
-        x = self.x if x is None else x
-        return Scene((SceneObject("scene", self.model, pose, x),))
+        """All objects at x, None: each at its own; the world moved by a pose."""
+        return self.subject.at(x, pose)
 
     def view(self) -> View:
         """The first look at the scene, as every mode takes it."""
-        return default_view(self.model, self.size)
+        return self.subject.view(self.size)
 
     def bounds(self) -> tuple[np.ndarray, float]:
         """Centre (3,) and radius of the scene, metres."""
-        return frame_points(*model_points(self.model))
+        return self.subject.bounds()
 
     def draw(self, scene: Scene, view: View | list[View], **settings) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, a copy; of several views the first."""

@@ -11,6 +11,7 @@ from desktop_stand import ball, run_frames
 from app.compare_sides import SceneSide
 from app.desktop import Options, Viewer
 from app.stage import Stage
+from app.subject import Subject
 from app.window import Drag, KeyDown, Press, Release
 from app.wipe import KEYS, Wipe
 from renderer.renderer import Renderer
@@ -30,7 +31,7 @@ def stand(window, tmp_path, request):
     options = Options(pictures=tmp_path, panel=False, drawing=request.param)
     with Renderer(window.ctx, request.param) as one, Renderer(window.ctx, request.param) as other:
         viewer = Viewer(window, one, stage, options)
-        wipe = Wipe(viewer, other, SceneSide("b", b, 0.0, stated=False))
+        wipe = Wipe(viewer, other, SceneSide("b", Subject.of(b, 0.0), stated=False))
         run_frames(viewer, 5)
         yield viewer, wipe, b
         wipe.release()

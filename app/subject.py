@@ -1,0 +1,112 @@
+"""What a command draws and measures: one model, or the objects of a scene file."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.opening import ReadingOptions, open_model
+from runtime_models.model import Model
+from scene.framing import default_background, default_view, frame_points, scene_points
+from scene.pose import Pose, View
+from scene.scene import IDENTITY, Scene, SceneObject
+from scene.scene_file import SceneFile, first_view, is_scene_file
+from scene.selector import carried
+
+if TYPE_CHECKING:
+    from scene.camera_list import CameraList
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A scene as it opened, and what can be asked of it as of a single model."""
+
+    scene: Scene  # each object at its own x
+    file: SceneFile | None = None  # None: one model, where it is
+
+    @staticmethod
+    def of(model: Model, x: float | None = None) -> "Subject":
+        """One model at x; None: its first stop."""
+        x = model.stops[0].x if x is None else x
+        return Subject(Scene((SceneObject("scene", model, x=x),)))
+
+    @property
+    def models(self) -> tuple[Model, ...]:
+        """Each once, in the order of the objects."""
+        return tuple({id(thing.model): thing.model for thing in self.scene.objects}.values())
+
+    @property
+    def stops(self) -> tuple[float, ...]:
+        """Every x at which an object rests, rising."""
+        xs = {stop.x for model in self.models for stop in model.stops}
+        items = self.file.all_items if self.file else ()
+        return tuple(sorted(xs | {state.x for item in items for state in item.states}))
+
+    @property
+    def x(self) -> float | None:
+        """The control value of all that shows; None where objects have several."""
+        found = {thing.x for thing in self.scene.objects if thing.visible}
+        return found.pop() if len(found) == 1 else None
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) float64 metres: where zero lies in the world of the model's file and its cameras."""
+        alone = None if self.file else self.scene.objects[0].model
+        return np.array(getattr(alone, "origin", (0.0, 0.0, 0.0)), np.float64)
+
+    @property
+    def background(self) -> tuple[float, float, float]:
+        """Display sRGB behind everything: what one model was trained before, else black."""
+        black = (0.0, 0.0, 0.0)
+        return black if self.file else default_background(self.scene.objects[0].model, black)
+
+    def at(self, x: float | None, pose: Pose = IDENTITY) -> Scene:
+        """All objects at x (None: each at its own), the world moved by a pose."""
+        things = self.scene.objects
+        if x is not None:
+            things = tuple(replace(thing, x=x) for thing in things)
+        if pose is not IDENTITY:
+            things = tuple(moved_object(thing, pose) for thing in things)
+        return Scene(things)
+
+    def points(self) -> tuple[np.ndarray, np.ndarray]:
+        """World points (N, 3) and opacity (N,) that stand for what shows."""
+        return scene_points(self.scene)
+
+    def bounds(self) -> tuple[np.ndarray, float]:
+        """Centre (3,) and radius, metres."""
+        return frame_points(*self.points())
+
+    def view(self, size: tuple[int, int]) -> View:
+        """The first look at it."""
+        if self.file:
+            return first_view(self.file, self.scene, size)
+        return default_view(self.scene.objects[0].model, size)
+
+    def sees(self, cameras: "CameraList") -> "CameraList":
+        """Cameras of the file's world where the scene is."""
+        from scene.camera_list import moved
+
+        return replace(cameras, views=tuple(moved(cameras.views, -self.origin)))
+
+
+def moved_object(thing: SceneObject, world_from_before: Pose) -> SceneObject:
+    """An object, with its parts, after its world is moved."""
+    pose = Pose.from_matrix(world_from_before.matrix() @ thing.world_from_object.matrix())
+    parts = tuple(carried(selector, world_from_before) for selector in thing.selectors)
+    return replace(thing, world_from_object=pose, selectors=parts)
+
+
+def open_subject(path: Path, options: ReadingOptions) -> Subject:
+    """A model or a scene file; progress and findings go to stderr.  Raises BadFile, UsageError."""
+    if not is_scene_file(path):
+        return Subject.of(open_model(path, options))
+    from app.scene_files import open_scene_file
+
+    file, _, scene = open_scene_file(path, options)
+    if not scene.objects:
+        from runtime_models.model import BadFile
+
+        raise BadFile(f"{path} has no object; nothing is there to be drawn.")
+    return Subject(scene, file)
