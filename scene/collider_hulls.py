@@ -160,7 +160,17 @@ def solid_hulls(pieces: list[np.ndarray], mesh: TriangleMesh, most: int) -> tupl
     sizes = np.array([hull_volume(hull) for hull in hulls])
     kept = np.flatnonzero(sizes > LEAST_VOLUME * sizes.sum())
     kept = np.sort(kept[np.argsort(-sizes[kept], kind="stable")][:most])
-    return tuple(corners(hulls[i]).astype(np.float32) for i in kept)
+    return tuple(in_float32(corners(hulls[i])) for i in kept)
+
+
+def in_float32(points: np.ndarray) -> np.ndarray:
+    """The corners (V, 3) as float32, without those that rounding has drawn into the hull."""
+    from scipy.spatial import ConvexHull
+
+    points = points.astype(np.float32)
+    while len(used := ConvexHull(points.astype(np.float64)).vertices) < len(points):
+        points = points[np.sort(used)]
+    return points
 
 
 def thick(points: np.ndarray, least: float) -> np.ndarray:

@@ -28,25 +28,28 @@ class Filling:
     splats: int  # that they come from
 
 
+NOTHING = Filling(np.zeros((0, 3)), 0.0, 0)
+
+
 def fill_splats(
     means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
 ) -> Filling:
     """Points within one sigma of the splats that count.  (N, 3) metres twice, (N, 4), (N,)."""
     known = np.isfinite(means).all(1) & np.isfinite(scales).all(1) & np.isfinite(wxyz).all(1)
     rows = np.flatnonzero(known & (opacity >= FAINT))
-    solid = opacity[rows] >= OPAQUE
-    if not solid.any():  # all of it is faint: what is there counts
-        solid[:] = True
-    rows = rows[in_the_object(means[rows], solid)]
     if not len(rows):
-        return Filling(np.zeros((0, 3)), 0.0, 0)
-    solid = opacity[rows] >= OPAQUE
-    solid = solid if solid.any() else np.ones(len(rows), bool)
+        return NOTHING
+    solid = solid_or_all(opacity[rows])
+    kept = in_the_object(means[rows], solid)
+    rows = rows[kept]
+    solid = solid_or_all(opacity[rows])
     longest = np.ptp(means[rows[solid]], axis=0).max()
     slender = scales[rows].max(1) <= WIDEST * longest
     if (slender & solid).any():
         rows, solid = rows[slender], solid[slender]
     rows, solid, spacing = without_lonely(means, scales, rows, solid)
+    if not len(rows):
+        return NOTHING
     reach = np.ptp(means[rows], axis=0) + 2 * np.median(scales[rows].max(1))
     cell_m = max(reach.max() / CELLS, min(SPACING * spacing, reach.max() / COARSEST))
     if not cell_m > 0:
@@ -54,6 +57,12 @@ def fill_splats(
     axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]
     points = scatter(means[rows].astype(np.float64), axes, scales[rows], cell_m)
     return Filling(keep_dense(points, opacity[rows], solid, cell_m), cell_m, len(rows))
+
+
+def solid_or_all(opacity: np.ndarray) -> np.ndarray:
+    """(n,) bool: the opaque ones; where all of them are faint, what is there counts."""
+    solid = opacity >= OPAQUE
+    return solid if solid.any() else np.ones(len(opacity), bool)
 
 
 def in_the_object(means: np.ndarray, solid: np.ndarray) -> np.ndarray:
@@ -66,23 +75,39 @@ def in_the_object(means: np.ndarray, solid: np.ndarray) -> np.ndarray:
 def without_lonely(
     means: np.ndarray, scales: np.ndarray, rows: np.ndarray, solid: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """The rows and their `solid` without floaters, and the metres from a splat to the next."""
+    """The rows and their `solid` without floaters, and the metres from a splat to the next.
+
+    A solid one needs solid neighbours; a faint one any, as it only counts where several add up.
+    """
+    centres = means[rows].astype(np.float64)
+    near = np.zeros(len(rows), bool)
+    near[solid], usual, spacing = neighboured(centres[solid], scales[rows[solid]])
+    if not solid.all():
+        near[~solid] = neighboured(centres, scales[rows], usual)[0][~solid]
+    return rows[near], solid[near], spacing
+
+
+def neighboured(
+    centres: np.ndarray, scales: np.ndarray, usual: float | None = None
+) -> tuple[np.ndarray, float, float]:
+    """(n,) bool: not lonely among themselves; the usual metres to neighbours, to the nearest one.
+
+    centres (n, 3) metres, scales (n, 3); usual: what others have as the usual distance.
+    """
     from scipy.spatial import cKDTree
 
-    centres = means[rows[solid]].astype(np.float64)
     step = -(-len(centres) // MOST_LOOKED_AT)
     tree = cKDTree(centres[::step])
     count = min(NEIGHBOURS + 1, tree.n)
     if count < 2:
-        return rows, solid, 0.0
-    away, which = (found[:, 1:] for found in tree.query(means[rows], k=count))
+        return np.ones(len(centres), bool), 0.0, 0.0
+    away, which = (found[:, 1:] for found in tree.query(centres, k=count))
     mean = away.mean(1)
-    usual = np.median(mean[solid])
-    of_solid = tree.query(tree.data, k=count)[0][:, 1:].mean(1)
-    near = (mean <= LONELY * usual) & (mean <= LONELIER * np.median(of_solid[which], axis=1))
-    near |= mean <= BESIDE * scales[rows].max(1)
-    spacing = float(np.median(away[solid, 0])) / step ** (1 / 3)
-    return rows[near], solid[near], spacing
+    usual = float(np.median(mean)) if usual is None else usual
+    of_theirs = mean[::step][which]  # (n, count - 1)
+    near = (mean <= LONELY * usual) & (mean <= LONELIER * np.median(of_theirs, axis=1))
+    near |= mean <= BESIDE * scales.max(1)
+    return near, usual, float(np.median(away[:, 0])) / step ** (1 / 3)
 
 
 def scatter(

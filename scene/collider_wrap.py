@@ -56,7 +56,7 @@ def fill(points: np.ndarray, low: np.ndarray, cell_m: float) -> tuple[np.ndarray
     taken[tuple(cells.T)] = True
     away = ndimage.distance_transform_edt(~taken)
     solid = enclosed(away, GAP)
-    for more in (enclosed(away, WIDE_GAP), under_a_roof(solid)):
+    for more in (enclosed(away, WIDE_GAP), under_a_roof(away, WIDE_GAP)):
         if more.sum() > (1 + LEAKS) * solid.sum():
             solid |= more
     pieces, count = ndimage.label(solid, np.ones((3, 3, 3)))
@@ -79,15 +79,20 @@ def enclosed(away: np.ndarray, gap: float) -> np.ndarray:
     return ndimage.distance_transform_edt(~outside) > gap
 
 
-def under_a_roof(solid: np.ndarray) -> np.ndarray:
-    """Solid cells and those with solid above (+Y) and on all four sides: what stood on a floor."""
-    found = solid.copy()
-    shut = np.ones_like(solid)
+def under_a_roof(away: np.ndarray, gap: float) -> np.ndarray:
+    """Cells with walls above (+Y) and on all four sides: the inside of what stood on a floor.
+
+    away: cells from each to the nearest taken one.  Holes up to `gap` either way let nothing in.
+    """
+    from scipy import ndimage
+
+    walls = away <= gap
+    shut = np.ones_like(walls)
     for axis, way in ((1, -1), (0, 1), (0, -1), (2, 1), (2, -1)):
-        turned = np.flip(solid, axis) if way < 0 else solid
+        turned = np.flip(walls, axis) if way < 0 else walls
         seen = np.logical_or.accumulate(turned, axis)
         shut &= np.flip(seen, axis) if way < 0 else seen
-    return found | shut
+    return ndimage.distance_transform_edt(walls | shut) > gap
 
 
 def distance_field(
