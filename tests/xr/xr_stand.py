@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -161,6 +162,11 @@ class Program:
         report = self.folder / "report.json"
         assert report.exists(), f"no report, exit code {code}:\n{self.told()[-3000:]}"
         return json.loads(report.read_text()) | {"code": code}
+
+    def interrupt(self, within_s: float = PATIENCE_S) -> int:
+        """Ctrl-C; the exit code."""
+        self.process.send_signal(signal.SIGINT)
+        return self.process.wait(within_s)
 
     def close(self) -> None:
         if self.process.poll() is None:
