@@ -13,7 +13,6 @@ import numpy as np
 
 from runtime_models.model import Finding, Model
 from scene.grab import jumped
-from scene.grab import jumped
 from scene.pose import Pose
 from scene.reactions import Event, advance, steer
 from scene.read_script import between
@@ -196,13 +195,13 @@ class World:
         self._hands_told.append({"hand": hand, "did": did, "object": name})
 
     def carry(self, name: str, moved: np.ndarray) -> None:
-        """A hand jumps by a rigid (4, 4) of the world, and what it holds with it: a snap turn.
+        """What a hand holds jumps by a rigid (4, 4) of the world, as in a snap turn, and the hand.
 
-        Velocities jump too, so that nothing is flung; other hands on the same body come along.
+        Velocities jump too, so that nothing is flung; other hands on the same body come along.  An
+        empty hand stays where it is.
         """
         held = self.held(name)
         if held is None:
-            self.hands[name] = jumped(self.hands[name], moved)
             return
         self.physics.carry(self.holds[name], moved)
         for hand in [hand for hand in self.holds if self.held(hand) == held]:
@@ -210,24 +209,6 @@ class World:
             self._hands_before[hand] = jumped(self._hands_before[hand], moved)
         pose = self.physics.pose(self.things[held].body)
         self.things[held] = replace(self.things[held], pose=pose, before=pose)
-
-    def carry(self, name: str, moved: np.ndarray) -> None:
-        """What a hand holds jumps by (4, 4) now_from_before, rigid, with every hand that holds it.
-
-        Nothing is struck on the way; a hand that is empty stays where it is.
-        """
-        object_name = self.held(name)
-        if object_name is None:
-            return
-        self.physics.carry(self.holds[name], moved)
-        for hand in self.holds:
-            if self.held(hand) == object_name:
-                for poses in (self.hands, self._hands_before):
-                    if hand in poses:
-                        poses[hand] = jumped(poses[hand], moved)
-        thing = self.things[object_name]
-        pose, before = (jumped(pose, moved) for pose in (thing.pose, thing.before))
-        self.things[object_name] = replace(thing, pose=pose, before=before)
 
     def held(self, name: str) -> str | None:
         """What a hand holds."""
