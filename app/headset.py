@@ -2,6 +2,7 @@
 
 import sys
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -23,6 +24,13 @@ class Options(ReadingOptions):
     """Of the width and height that the runtime recommends for an eye."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
     """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
+    quality: Literal["auto", "best", "balanced", "fast"] = "auto"
+    """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
+    frames last, and fewer pixels while frames are late; best: exact, always."""
+    target_ms: float | None = None
+    """Milliseconds that a frame may take us with --quality auto; default: 85 % of the headset's."""
+    floor_db: float | None = None
+    """Never below this PSNR against the exact picture with --quality auto; default 35."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     frames: int = 0
@@ -56,6 +64,11 @@ def check(options: Options) -> None:
 
     if not 0.1 <= options.eye_part <= 2:
         raise UsageError(f"--eye-part is {options.eye_part:g}, expected 0.1 to 2.")
+    for name, value in (("--target-ms", options.target_ms), ("--floor-db", options.floor_db)):
+        if value is not None and not 0 < value < inf:
+            raise UsageError(f"{name} is {value}, expected a number above 0.")
+        if value is not None and options.quality != "auto":
+            raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
     if options.frames < 0:
         raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
     if options.every < 1:
@@ -70,6 +83,7 @@ def wear(options: Options) -> int:
     from app.drawing import make_folder
     from app.headset_report import Report
     from app.mirror import open_mirror
+    from app.pacing import FLOOR_DB, Pacing
     from app.wearing import Eyes, Wearing
     from app.worn_scene import open_worn
     from renderer.renderer import Renderer
@@ -78,6 +92,9 @@ def wear(options: Options) -> int:
 
     with Instance() as instance:
         scene = open_worn(options.scene or DEMO, options)
+        pacing = Pacing(
+            scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms
+        )
         if options.pictures:
             make_folder(options.pictures)
         with (
@@ -87,11 +104,11 @@ def wear(options: Options) -> int:
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
-            wearing = Wearing(session, renderer, eyes, mirror, scene, report)
+            wearing = Wearing(session, renderer, eyes, mirror, scene, pacing, report)
             try:
                 wearing.loop(options.frames)
             finally:
-                report.write(describe(instance, session))
+                report.write(describe(instance, session) | pacing.report())
     return 0
 
 

@@ -65,14 +65,15 @@ class QuickChart:
     """Measures exact and every quick setting on a small turn around what is seen now.
 
     `step` draws one frame; `rows` is complete once `done`.  The exact setting is timed again
-    before each other one, so that a machine that slows down slows both.
+    before each other one, so that a machine that slows down slows both.  `eyes` gives the views
+    that are drawn together with one; errors are of the first.
     """
 
     def __init__(
         self, renderer: Renderer, scene: Scene, view: View, centre: np.ndarray,
-        finish: Callable[[], None],
+        finish: Callable[[], None], eyes: Callable[[View], list[View]] = lambda view: [view],
     ) -> None:  # fmt: skip
-        self._renderer, self._scene, self._finish = renderer, scene, finish
+        self._renderer, self._scene, self._finish, self._eyes = renderer, scene, finish, eyes
         self._views = [turned(view, centre, STEP * i) for i in range(FRAMES + 1)]
         drawing = renderer.backends["drawing"]
         self._exact = exact(renderer.settings, drawing)
@@ -87,6 +88,10 @@ class QuickChart:
         self.frame, self.frames = 0, (FRAMES + 1) + len(self._settings) * (FRAMES + BETWEEN + 2)
         self._work = self._measure()
         self.done = False
+
+    def time_exact(self, number: int) -> float:
+        """Milliseconds of one exact frame of the turn, beside the chart."""
+        return self._draw(self._exact, self._views[number % len(self._views)])
 
     def step(self) -> None:
         """Draws and times one frame more."""
@@ -123,6 +128,6 @@ class QuickChart:
         self._renderer.settings = settings
         start = time.perf_counter()
         self._renderer.update(self._scene)
-        self._renderer.draw([view])
+        self._renderer.draw(self._eyes(view))
         self._finish()
         return (time.perf_counter() - start) * 1e3

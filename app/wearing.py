@@ -1,12 +1,12 @@
 """The loop of a headset: what happens in a frame, in order."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import moderngl
 
 from app.headset_report import Report
 from app.mirror import Mirror, NoMirror
+from app.pacing import Pacing, StereoChart
 from app.worn_scene import WornScene
 from renderer.renderer import Renderer
 from renderer.settings import FrameStats
@@ -46,17 +46,17 @@ class Wearing:
         eyes: Eyes,
         mirror: Mirror | NoMirror,
         scene: WornScene,
+        pacing: Pacing,
         report: Report,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
-        self.scene, self.world, self.report = scene, scene.world, report
+        self.scene, self.world = scene, scene.world
+        self.pacing, self.report = pacing, report
         self.standing = Standing()
         self.scale = 1.0  # the true one
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
-        background = scene.background
-        renderer.settings = replace(renderer.settings, background=background)
 
     def loop(self, frames: int = 0) -> None:
         """Until the runtime, the person at the desk or `frames` (0: none) end it."""
@@ -79,17 +79,32 @@ class Wearing:
         records = self.world.advance(seconds)
         if frame.drawn:
             views = [self.standing.view(view) for view in frame.views]
+            self._choose_quality(views)
             self.draw(views)
             self.session.submit(self.eyes.textures)
+            self.pacing.seen(self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
         self.report.note(self, frame, records)
 
     def draw(self, views: list[View]) -> None:
         """Splats with one sort for both eyes."""
+        self.renderer.settings = self.pacing.settings()
         self.renderer.update(self.world.drawn())
         self.stats = self.renderer.draw(views)
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
+
+    def _choose_quality(self, views: list[View]) -> None:
+        """What of the picture can be had within the display's period: once that is known, and
+        when it is another one.
+        """
+        pace = self.session.pace
+        if not (pace.settled and self.pacing.wants_measure(pace.period_s)):
+            return
+        scene, finish = self.world.drawn(), self.mirror.ctx.finish
+        chart = StereoChart(self.renderer, scene, views, self.scene.centre, finish)
+        self.pacing.measure(chart, pace.period_s)
+        pace.restart()
 
     def recentre(self, frame: Frame) -> None:
         """Back to where the scene is looked at first, whoever asks for it."""

@@ -10,7 +10,7 @@ from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, 
 from app.scene_files import open_scene_file
 from runtime_models.model import Model
 from scene.collider_files import colliders_of
-from scene.framing import default_background, default_view
+from scene.framing import default_background, default_view, frame_points, scene_points
 from scene.pose import Pose
 from scene.scene_file import SceneFile, SceneItem, first_view, is_scene_file
 from scene.world import World
@@ -29,6 +29,11 @@ class WornScene:
     eye: Pose  # world_from_eye
     floor_y: float | None  # metres, world; None: the scene says nothing about a floor
     background: tuple[float, float, float]
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(3,) metres: the middle of what there is now."""
+        return frame_points(*scene_points(self.world.drawn()))[0]
 
 
 def open_worn(path: Path, options: ReadingOptions) -> WornScene:
@@ -53,5 +58,5 @@ def open_alone(path: Path, options: ReadingOptions) -> WornScene:
     file = SceneFile(folder=Path(), items=(item,), gravity_m_s2=0.0)
     world = World(file, {item.name: model}, {}, hz=HZ)
     eye = default_view(model, ANY_SIZE).world_from_eye
-    background = tuple(map(float, np.array(default_background(model, BACKGROUND))))
+    background = default_background(model, BACKGROUND)
     return WornScene(world, {item.name: model}, eye, None, background)

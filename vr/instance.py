@@ -8,7 +8,8 @@ from contextlib import contextmanager
 NAME = "Shapeshift"
 API = (1, 0, 34)  # every runtime still in use speaks it
 DRAWING = ("XR_KHR_opengl_enable", "XR_MNDX_egl_enable")  # one of them is needed
-WANTED = ("XR_EXT_local_floor",)  # good to have
+LOCAL_FLOOR, DISPLAY_RATE = "XR_EXT_local_floor", "XR_FB_display_refresh_rate"
+WANTED = (LOCAL_FLOOR, DISPLAY_RATE)  # good to have
 HOW_TO = (
     "start SteamVR, WiVRn or Monado and make it the active OpenXR runtime, "
     "or name its manifest in XR_RUNTIME_JSON"

@@ -1,38 +1,74 @@
 """Frame pacing: our own time against the runtime's period, and how many frames were dropped."""
 
+from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
 KEPT = 20_000  # frames whose times are kept: a few minutes
+SETTLED = 10  # frames after which what the runtime tells of its period is believed
+RECOVER = 4  # frames
+RECENT = 30  # frames: the shortest of their periods is the display's
 
 
 @dataclass
 class Pace:
-    """Takes times of frames; seconds in, milliseconds out."""
+    """Takes times of frames; seconds in, milliseconds out.
 
+    `display_s` is the display's own period where the runtime tells it.  What it predicts with a
+    frame is no more than a hint: some begin with a guess, and double it for who is slow.
+    """
+
+    display_s: float = 0.0
     frames: int = 0
     dropped: int = 0  # the runtime showed an older one in their place
     over: int = 0  # frames whose own time was longer than the period
-    period_s: float = 0.0  # of the runtime, as told last
     own_ms: list[float] = field(default_factory=list)  # from the runtime's go to our hand-over
     wait_ms: list[float] = field(default_factory=list)  # the runtime let us wait
+    _told: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
     _seen_s: float | None = None  # when the last frame was to be seen
+    _unfair: int = 0  # frames whose times and gaps do not count
+
+    @property
+    def period_s(self) -> float:
+        """Of the display; 0 while nothing is known."""
+        return self.display_s or min(self._told, default=0.0)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the period can be relied upon."""
+        return self.display_s > 0 or self.frames > SETTLED
 
     def start(self, seen_s: float, period_s: float, wait_s: float) -> None:
-        """A frame begins that will be seen at `seen_s`."""
+        """A frame begins that will be seen at `seen_s`; the runtime tells `period_s` with it."""
+        if self.frames == SETTLED:
+            self._told.clear()  # the first were guesses
         if period_s > 0:
-            self.period_s = period_s
-            if self._seen_s is not None:
-                self.dropped += max(round((seen_s - self._seen_s) / period_s) - 1, 0)
+            self._told.append(period_s)
+        if self._seen_s is not None and self.period_s > 0 and self.settled and not self._unfair:
+            self.dropped += max(round((seen_s - self._seen_s) / self.period_s) - 1, 0)
         self._seen_s = seen_s
         self.frames += 1
         _keep(self.wait_ms, wait_s * 1e3)
 
     def end(self, own_s: float) -> None:
         """It was handed over; `own_s` is what we took for it."""
-        self.over += 0 < self.period_s < own_s
+        if self._unfair:
+            self._unfair -= 1
+            return
+        self.over += self.settled and 0 < self.period_s < own_s
         _keep(self.own_ms, own_s * 1e3)
+
+    def restart(self) -> None:
+        """The frame under way took long for a reason of its own: it does not count, nor do
+        those that runtimes need to find their pace again.
+        """
+        self._unfair = RECOVER
+
+    @property
+    def last_ms(self) -> float:
+        """Our own time of the last frame; 0 where it does not count."""
+        return 0.0 if self._unfair or not self.own_ms else self.own_ms[-1]
 
     def pause(self) -> None:
         """The session rests: the time until the next frame is nobody's fault."""

@@ -18,8 +18,9 @@ import numpy as np
 from renderer.context import is_software
 from scene.pose import Pose, View
 from scene.scene import IDENTITY
+from vr.display import display_period
 from vr.events import ControllersChanged, GoingAway, Recentred, StateChanged, take_events
-from vr.frame import LOST, SIDES, Frame
+from vr.frame import Frame
 from vr.graphics import bind_current, check_requirements
 from vr.hands import Hands, pose_of
 from vr.instance import Instance, Lost, NoHeadset
@@ -67,6 +68,7 @@ class Session:
         self.play = open_play_space(instance, self._handle)
         self._view_space = open_head_space(instance, self._handle)
         self.hands.attach(self._handle)
+        self.pace.display_s = display_period(instance, self._handle)
         self._make_swapchains(part, pixels)
 
     def _create(self) -> object:
@@ -281,6 +283,3 @@ def known_part(pose: Pose, old: Pose, placed: bool, turned: bool) -> Pose:
         return Pose(pose.position, old.wxyz) if placed else old
     wxyz = pose.wxyz / np.linalg.norm(pose.wxyz)  # float32 of the runtime
     return Pose(pose.position if placed else old.position, wxyz)
-
-
-NO_HANDS = {side: LOST for side in SIDES}

@@ -7,7 +7,7 @@ import numpy as np
 from scene.pose import Pose
 from scene.scene import IDENTITY
 from vr.hands import pose_of, posef_of
-from vr.instance import Instance, NoHeadset
+from vr.instance import LOCAL_FLOOR, Instance, NoHeadset
 
 # The order of wanting: what has a floor, and the origin where the user last asked for it, first.
 KINDS = ("LOCAL_FLOOR", "STAGE", "LOCAL")
@@ -40,7 +40,7 @@ def open_play_space(instance: Instance, session: object) -> Space:
     xr = instance.xr
     offered = {kind for kind in KINDS if int(getattr(xr.ReferenceSpaceType, kind)) in
                {int(each) for each in xr.enumerate_reference_spaces(session)}}  # fmt: skip
-    if "XR_EXT_local_floor" not in instance.extensions:
+    if LOCAL_FLOOR not in instance.extensions:
         offered.discard("LOCAL_FLOOR")
     try:
         kind = choose_kind(offered)
