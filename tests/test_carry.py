@@ -77,3 +77,24 @@ def test_a_snapshot_after_a_jump_goes_on_to_the_bit():
 def test_who_holds_nothing_cannot_jump():
     with pytest.raises(ValueError, match="there is no grab 9"):
         Physics().carry(9, JUMP)
+
+
+def test_a_world_carries_the_object_and_all_its_hands():
+    from test_world import item, real
+
+    world = real(item(position=(0, 0.5, 0)))
+    for side, x in (("left", -0.06), ("right", 0.06)):
+        world.move_hand(side, at(x, 0.5, 0))
+        assert world.grab(side) == "a"
+    world.move_hand("empty", at(1, 1, 1))
+    world.advance(0.1)
+    before = world.things["a"].pose
+    hands = dict(world.hands)
+    world.carry("right", JUMP)
+    assert np.allclose(world.hands["left"].position, jumped(hands["left"], JUMP).position)
+    assert world.hands["empty"] is hands["empty"]
+    wanted = jumped(before, JUMP).position
+    assert np.allclose(world.drawn().objects[0].world_from_object.position, wanted, atol=1e-6)
+    record = world.advance(1 / 90)[-1]
+    assert not record.contacts and not record.hands
+    assert np.linalg.norm(world.things["a"].pose.position - wanted) < 0.01

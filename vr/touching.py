@@ -1,0 +1,197 @@
+"""What hands do to a world: squeeze takes hold of what is near, trigger acts, both are felt.
+
+`touch` comes before locomotion and `follow` after it, so that what is held goes where the person
+goes; `feel` comes after the world's steps.  The world is a scene.world.World, or as much of one.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from scene.pose import Pose
+from vr.frame import SIDES, Frame, Hand, Pulse
+from vr.locomotion import GRIPS_AT, LETS_GO_AT
+from vr.standing import Standing
+
+REACH_M = 0.10  # of the room, from the palm to what it takes
+SKIN_M = 0.02  # so near a palm touches
+SHOWS_AT, PULLS_AT, RELAXES_AT = 0.1, 0.7, 0.4  # of a trigger: its beam is seen; it acts; again
+BEAM_M = 10.0  # of the room: a beam that meets nothing
+# Strength 0..1 and seconds of what is felt.
+TOUCHED, TAKEN, LEFT, ACTED = (0.2, 0.015), (0.6, 0.04), (0.25, 0.02), (0.5, 0.03)
+FELT_N_S, FULL_N_S = 0.005, 0.5  # impulses: below it is not felt; as strong as it gets
+IMPACT_S = 0.05
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Where a hand's trigger acts or would act; metres of the room."""
+
+    side: str
+    start: np.ndarray  # (3,)
+    end: np.ndarray  # (3,)
+    meets: str | None  # the object's name
+    acts: bool  # in this frame
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Between two frames."""
+
+    squeezing: frozenset[str] = frozenset()
+    pulling: frozenset[str] = frozenset()
+    busy: frozenset[str] = frozenset()  # hands whose squeeze is for an object until they open
+    near: tuple[str | None, ...] = (None,) * len(SIDES)  # what each palm touches
+
+
+@dataclass(frozen=True)
+class Touched:
+    """What came of a frame."""
+
+    pulses: tuple[Pulse, ...] = ()
+    beams: tuple[Beam, ...] = ()
+    held: Mapping[str, str | None] = field(default_factory=dict)  # side -> object
+
+
+def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[Touching, Touched]:
+    """Moves the hands in the world, takes, lets go and acts."""
+    pulses, beams, near, busy = [], [], [], set(touching.busy)
+    squeezing = pressed(frame, "squeeze", touching.squeezing, (GRIPS_AT, LETS_GO_AT))
+    pulling = pressed(frame, "trigger", touching.pulling, (PULLS_AT, RELAXES_AT))
+    for side, before in zip(SIDES, touching.near, strict=True):
+        hand = frame.hands[side]
+        palm = place(world, side, hand, standing, frame.recentred)
+        if palm is None:
+            busy.discard(side)
+            near.append(None)
+            continue
+        begins = side in squeezing - touching.squeezing
+        acts = side in pulling - touching.pulling
+        if side not in squeezing:
+            pulses += let_go(world, side)
+            busy.discard(side)
+        if begins and take(world, side, palm, standing):
+            pulses.append(Pulse(side, *TAKEN))
+            busy.add(side)
+            acts = False  # of a controller with one button, taking is all it does
+        seen = beam(world, side, hand, standing, acts) if acts or shows(hand, busy, side) else None
+        if seen is not None:
+            beams.append(seen)
+            if acts and seen.meets is not None:
+                pulses.append(Pulse(side, *ACTED))
+                busy |= {side} if begins else set()
+        near.append(touched(world, side, palm, standing))
+        if near[-1] is not None and near[-1] != before and world.held(side) is None:
+            pulses.append(Pulse(side, *TOUCHED))
+    held = {side: world.held(side) for side in SIDES}
+    now = Touching(squeezing, pulling, frozenset(busy), tuple(near))
+    return now, Touched(strongest(pulses), tuple(beams), held)
+
+
+def pressed(
+    frame: Frame, what: str, before: frozenset[str], at: tuple[float, float]
+) -> frozenset[str]:
+    """The hands that press, without trembling between yes and no."""
+    hands = frame.hands.items()
+    return frozenset(s for s, hand in hands if getattr(hand, what) >= at[1 if s in before else 0])
+
+
+def place(world, side: str, hand: Hand, standing: Standing, jumps: bool) -> Pose | None:
+    """Where the palm is in the world, told to the world; None: lost, and it has let go."""
+    if not hand.active or hand.grip is None:
+        world.move_hand(side, None)
+        return None
+    palm = standing.pose(hand.grip)
+    if jumps:
+        jump(world, side, palm)
+    world.move_hand(side, palm)
+    return palm
+
+
+def jump(world, side: str, palm: Pose) -> None:
+    """What a hand holds goes there with it at once, through whatever lies between.
+
+    Another hand that holds it too has gone along, and is there already when its turn comes.
+    """
+    if world.held(side) is not None:
+        moved = palm.matrix() @ np.linalg.inv(world.hands[side].matrix())
+        world.carry(side, moved)
+
+
+def take(world, side: str, palm: Pose, standing: Standing) -> bool:
+    """Takes the nearest object within reach."""
+    reach = REACH_M * standing.scale
+    return world.nearest(palm.position, reach) is not None and bool(world.grab(side, reach))
+
+
+def let_go(world, side: str) -> list[Pulse]:
+    """Opens a hand that holds something."""
+    if world.held(side) is None:
+        return []
+    world.release(side)
+    return [Pulse(side, *LEFT)]
+
+
+def touched(world, side: str, palm: Pose, standing: Standing) -> str | None:
+    """The object at the palm."""
+    found = world.nearest(palm.position, SKIN_M * standing.scale)
+    return found[0] if found else None
+
+
+def shows(hand: Hand, busy: set[str], side: str) -> bool:
+    """A trigger pulled lightly shows where it would act."""
+    return hand.trigger >= SHOWS_AT and side not in busy
+
+
+def beam(world, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam | None:
+    """Along the hand's aim; it acts on what it meets first."""
+    if hand.aim is None:
+        return None
+    aim = standing.pose(hand.aim)
+    along = -aim.matrix()[:3, 2]
+    hit = (world.ray if acts else world.aim)(aim.position, along)
+    length = BEAM_M if hit is None else hit.distance_m / standing.scale  # metres of the room
+    start = hand.aim.position
+    end = start - hand.aim.matrix()[:3, 2] * min(length, BEAM_M)
+    meets = hit.object if hit is not None and hit.object in world.things else None
+    return Beam(side, start, end, meets, acts)
+
+
+def at_rest(frame: Frame, touching: Touching) -> Frame:
+    """The frame for locomotion: hands whose squeeze is for an object do not hold the world."""
+    hands = {
+        side: replace(hand, squeeze=0.0) if side in touching.busy else hand
+        for side, hand in frame.hands.items()
+    }
+    return replace(frame, hands=hands)
+
+
+def follow(world, frame: Frame, standing: Standing, jumps: bool) -> None:
+    """The hands where the room has been moved to; at a jump, with what they hold."""
+    for side in SIDES:
+        place(world, side, frame.hands[side], standing, jumps)
+
+
+def feel(world, records: Iterable) -> tuple[Pulse, ...]:
+    """What held objects struck or were struck by in these steps, one pulse a hand."""
+    sides = {side: world.held(side) for side in SIDES}
+    pulses = []
+    for record in records:
+        for contact in record.contacts:
+            impulse = contact["impulse_n_s"]
+            if not impulse >= FELT_N_S:
+                continue
+            for side, name in sides.items():
+                if name is not None and name in contact["between"]:
+                    pulses.append(Pulse(side, min(impulse / FULL_N_S, 1.0) ** 0.5, IMPACT_S))
+    return strongest(pulses)
+
+
+def strongest(pulses: Sequence[Pulse]) -> tuple[Pulse, ...]:
+    """One pulse a hand: a controller plays one at a time."""
+    best: dict[str, Pulse] = {}
+    for pulse in pulses:
+        if pulse.side not in best or pulse.strength > best[pulse.side].strength:
+            best[pulse.side] = pulse
+    return tuple(best.values())
