@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 import tyro
 
+from app.bodies import attach_bodies
 from app.camera_files import camera_reading
 from app.camera_panel import KeptViews, attach_cameras
 from app.controls import SMOOTH_S
@@ -147,6 +148,7 @@ class Viewer:
         self.steps = Steps()
         self.kept = KeptViews(options.pictures)
         self.files = Files(self)
+        attach_bodies(self)
         attach_cameras(self)
         attach_export(self)
         self.shown = Shown(renderer, self.readings)
@@ -283,7 +285,9 @@ class Viewer:
     @property
     def _moving(self) -> bool:
         by_hand = self.camera.moving or push(self.window).any
-        return by_hand or self.steps.moving or self.stage.playing
+        stage = self.stage
+        living = stage.running and not stage.world.resting
+        return by_hand or self.steps.moving or stage.playing or living
 
     def _idle_work_due(self, now: float) -> bool:
         """Whether the picture has rested so long that its error is to be measured."""

@@ -109,6 +109,17 @@ class Regions:
         self.items, self.version = (), self.version + 1
         self.choose(-1)
 
+    def renumber(self, moved: dict[int, int]) -> None:
+        """The objects are others: index before -> index now; regions of one that is gone go."""
+        if all(region.index == moved.get(region.index) for region in self.items):
+            return
+        current = self.current
+        kept = [(r, replace(r, index=moved[r.index])) for r in self.items if r.index in moved]
+        self.items = tuple(after for _, after in kept)
+        stays = [n for n, (before, _) in enumerate(kept) if before is current]
+        self.choose(stays[0] if stays else -1)
+        self.version += 1
+
     def edit(self, number: int, **changes: object) -> None:
         """Changes fields of one region; `version` tells only when something is different."""
         before = self.items[number]

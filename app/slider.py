@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from app import theme
+from app.arrange import steer
 from app.stage import Stage
 from app.status_line import HEIGHT as STATUS_HEIGHT
 from app.theme import Box
@@ -14,6 +15,7 @@ from scene.control import SNAP, snap
 Vec = imgui.ImVec2
 MAX_WIDTH = 760.0  # logical pixels
 ROW = 46.0
+WIDEST_NAME = 140.0  # of an object beside its slider
 
 
 def draw_slider_bar(stage: Stage, left: float, ui_scale: float) -> Box:
@@ -50,17 +52,23 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     if _play_button(sweep.playing, height):
         stage.toggle_play(index)
     imgui.same_line(0, 16 * ui_scale)
-    value_width = imgui.calc_text_size("x 0.000").x + 20 * ui_scale
+    named = len(stage.sliders) == 1 < len(stage.movable)  # one of several: say which
+    name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
+    value_width = max(imgui.calc_text_size("x 0.000").x, name_width) + 20 * ui_scale
     room = imgui.get_content_region_avail().x - value_width
     x, held = track(thing.model.stops, thing.x, height, room)
     if held:
         sweep.playing = False
-        stage.set_x(index, x)
+        steer(stage, index, x)
     imgui.same_line(0, 18 * ui_scale)
     origin = imgui.get_cursor_screen_pos()
     text_y = origin.y + (height - imgui.get_text_line_height()) / 2 + 9 * ui_scale
     imgui.set_cursor_screen_pos(Vec(origin.x, text_y))
     imgui.text_disabled(f"x {thing.x:.3f}")
+    if named:
+        imgui.push_clip_rect(origin, Vec(origin.x + value_width, origin.y + height), True)
+        imgui.get_window_draw_list().add_text(origin, theme.color(theme.TEXT), thing.name)
+        imgui.pop_clip_rect()
 
 
 def _play_button(playing: bool, height: float) -> bool:

@@ -3,9 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.arrange import steer
+from app.bodies import Bodies
 from app.document import Document, document_from, first_stop
 from app.opened import Source
 from app.regions import Regions
@@ -26,6 +29,9 @@ from scene.pose import Pose, View, perspective
 from scene.scene import IDENTITY, Scene, SceneObject
 from scene.scene_file import first_view
 
+if TYPE_CHECKING:
+    from scene.world import World
+
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
 MOST_SLIDERS = 2  # at the lower edge; more would take the picture's place
 AS_FILED = ""  # the palette that the scene's own stops name
@@ -36,10 +42,13 @@ class Stage:
 
     def __init__(self, read_model: Callable[[Path], Model]) -> None:
         self.read_model = read_model
-        self._filed: tuple[Model, ...] = ()  # as read, before a palette was chosen
         self.scene = Scene(())
+        # Of each of the scene's objects:
+        self.filed: tuple[Model, ...] = ()  # its model as read, before a palette was chosen
         self.sources: tuple[Source, ...] = ()  # where the scene's objects come from
         self.document = document_from(self.scene, ())  # the same as a scene file, to be edited
+        self.bodies = Bodies()
+        self._followed: Scene | None = None  # the world's, as it was taken over last
         self.chosen = ""  # name of the object that is edited; "": none
         self.home: View | None = None  # the first look at the scene where a file gives one
         self.sweeps: list[Sweep] = []
@@ -73,10 +82,11 @@ class Stage:
         """Takes a scene over and frames it."""
         self.scene, self.chosen = scene, ""
         self.document = document or document_from(scene, self.sources)
+        self.bodies.forget()
         if scene.objects:
             background = default_background(scene.objects[0].model, BACKGROUND)
             self.settings = replace(self.settings, background=background)
-        self._filed = tuple(thing.model for thing in scene.objects)
+        self.filed = tuple(thing.model for thing in scene.objects)
         self.palette = AS_FILED
         self.sweeps = [Sweep.over(thing.model.stops) for thing in scene.objects]
         for sweep, thing in zip(self.sweeps, scene.objects, strict=True):
@@ -95,13 +105,11 @@ class Stage:
 
         For finer levels of detail.  What was painted on another number of splats is unpainted.
         """
-        objects, filed = list(self.scene.objects), list(self._filed)
+        objects, filed = list(self.scene.objects), list(self.filed)
         filed[index] = model
         self.document.refine(index, model)
-        if self.palette != AS_FILED:
-            model = with_palette(model, self.palette)
-        objects[index] = replace(objects[index], model=model)
-        self.scene, self._filed = Scene(tuple(objects)), tuple(filed)
+        objects[index] = replace(objects[index], model=self.in_palette(model))
+        self.scene, self.filed = Scene(tuple(objects)), tuple(filed)
         self._points = scene_points(self.scene)
         self.regions.fit_painted(index, self.scene.objects[index])
 
@@ -186,23 +194,72 @@ class Stage:
         thing = self.scene.objects[regions.current.index]
         regions.paint(view, cursor, radius, thing, erase)
 
+    @property
+    def world(self) -> "World | None":
+        """What moves and answers to touch; None: nothing can be touched, or not yet."""
+        return self.bodies.world
+
+    @property
+    def running(self) -> bool:
+        """Whether the world goes on by itself: what moves then is no edit."""
+        return self.world is not None and not self.world.paused
+
+    def follow_world(self) -> None:
+        """Takes over where the world's objects are and what their x is."""
+        drawn = self.world.drawn()
+        if drawn is not self._followed:
+            stood = {thing.name: thing for thing in drawn.objects}
+            things = [stood_as(thing, stood.get(thing.name)) for thing in self.scene.objects]
+            self.scene, self._followed = Scene(tuple(things)), drawn
+
+    def rest(self) -> None:
+        """The hand has let go: the next edit is a step of its own."""
+        self.document.history = self.document.history.rest()
+
+    def move(self, index: int, pose: Pose) -> None:
+        """Puts an object elsewhere, at rest; what the file says stays."""
+        thing = self.scene.objects[index]
+        self._put(index, replace(thing, world_from_object=pose))
+        if self.world is not None and thing.name in self.world.things:
+            self.world.place(thing.name, pose)
+
+    def take_rows(self, rows: Sequence[tuple], moved: dict[int, int]) -> None:
+        """Other objects, each with model as read, sweep and source; camera and settings stay.
+
+        `moved` tells where those that stay have gone: index before -> index now.
+        """
+        columns = list(zip(*rows, strict=True)) or [(), (), (), ()]
+        self.scene = Scene(columns[0])
+        self.filed, self.sweeps, self.sources = columns[1], list(columns[2]), columns[3]
+        self.regions.renumber(moved)
+        self._followed = None
+
     def next_debug_view(self, step: int) -> None:
         """The next debug view in their order, the picture itself among them."""
         number = (DEBUG_VIEWS.index(self.settings.debug) + step) % len(DEBUG_VIEWS)
         self.settings = replace(self.settings, debug=DEBUG_VIEWS[number])
 
     def set_x(self, index: int, x: float) -> None:
+        """Moves an object's x; what the file says stays."""
+        thing = self.scene.objects[index]
+        self._put(index, replace(thing, x=x))
+        if self.world is not None and thing.name in self.world.things:
+            self.world.control(thing.name, x)
+
+    def _put(self, index: int, thing: SceneObject) -> None:
         objects = list(self.scene.objects)
-        objects[index] = replace(objects[index], x=x)
+        objects[index] = thing
         self.scene = Scene(tuple(objects))
 
     def go_to_stop(self, number: int) -> None:
         """Every object that has a stop of that number, counted from 0, goes there and rests."""
+        self.rest()
         for index, thing in enumerate(self.scene.objects):
             stops = sorted(thing.model.stops, key=lambda stop: stop.x)
             if number < len(stops):
                 self.sweeps[index].playing = False
-                self.set_x(index, stops[number].x)
+                steer(self, index, stops[number].x, f"stop {number + 1}")
+        self.rest()
 
     def toggle_play(self, index: int | None = None) -> None:
         """Starts or stops one object's sweep, or all together: all stop if any was playing."""
@@ -258,10 +315,14 @@ class Stage:
         """Shows every thermal stop in that palette; AS_FILED gives back the scene's own."""
         self.palette = name
         objects = [
-            replace(thing, model=model if name == AS_FILED else with_palette(model, name))
-            for thing, model in zip(self.scene.objects, self._filed, strict=True)
+            replace(thing, model=self.in_palette(model))
+            for thing, model in zip(self.scene.objects, self.filed, strict=True)
         ]
         self.scene = Scene(tuple(objects))
+
+    def in_palette(self, model: Model) -> Model:
+        """A model as it was read, as it is shown."""
+        return model if self.palette == AS_FILED else with_palette(model, self.palette)
 
     @property
     def has_palettes(self) -> bool:
@@ -281,6 +342,17 @@ def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
         name = free_name({thing.name for thing in objects}, name)
         objects.append(SceneObject(name, model, pose, x=start))
     return Scene(tuple(objects))
+
+
+def stood_as(thing: SceneObject, other: SceneObject | None) -> SceneObject:
+    """The object where another of its name is; the very same where nothing differs."""
+    if other is None:
+        return thing
+    here, there = thing.world_from_object, other.world_from_object
+    same = (*here.position, *here.wxyz) == (*there.position, *there.wxyz)
+    if same and thing.x == other.x:
+        return thing
+    return replace(thing, world_from_object=there, x=other.x)
 
 
 def origin_of(model: Model) -> np.ndarray:

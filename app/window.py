@@ -40,13 +40,18 @@ TEXT_KEYS = {  # what typing a number into a slider needs
     glfw.KEY_C: imgui.Key.c,
     glfw.KEY_V: imgui.Key.v,
     glfw.KEY_X: imgui.Key.x,
+    glfw.KEY_Y: imgui.Key.y,
+    glfw.KEY_Z: imgui.Key.z,
 }
+SHORTCUTS = ("z", "y", "s", "d")  # with Ctrl, by what is printed on the key
+MOVING = (glfw.KEY_W, glfw.KEY_A, glfw.KEY_S, glfw.KEY_D, glfw.KEY_Q, glfw.KEY_E)
 
 
 @dataclass(frozen=True)
 class KeyDown:
     key: int  # glfw.KEY_*: the physical key, named after what is printed there on a US keyboard
     shift: bool
+    shortcut: str = ""  # one of SHORTCUTS, with Ctrl: the letter that is printed on the key
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,7 @@ class Window:
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
         self._popup = False  # a list or a box is open, and the next click is for it
         self._raw: list[Event] = []
+        self._chorded: set[int] = set()  # keys that are down for a shortcut, not for moving
         self._pressed: str | None = None  # the button whose drag the scene owns
         self._last_click = (0.0, 0.0, -1.0)  # x, y, seconds
         self._cursor = (0.0, 0.0)
@@ -161,8 +167,8 @@ class Window:
 
     def held(self, key: int) -> bool:
         """Whether a key is down right now and not typed into the overlay."""
-        typing = imgui.get_io().want_text_input
-        return not typing and glfw.get_key(self._handle, key) == glfw.PRESS
+        busy = imgui.get_io().want_text_input or key in self._chorded
+        return not busy and glfw.get_key(self._handle, key) == glfw.PRESS
 
     def wait(self, seconds: float) -> bool:
         """Takes input, sleeping up to that long for it; True when the overlay must be redrawn."""
@@ -236,11 +242,23 @@ class Window:
         self._note()
         if key in TEXT_KEYS:
             io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
+        if action == glfw.RELEASE:
+            self._chorded.discard(key)
         if action != glfw.PRESS or io.want_text_input:
             return
         if key == glfw.KEY_F11:
             self._window.fullscreen = not self._window.fullscreen
-        self._note(KeyDown(key, bool(mods & glfw.MOD_SHIFT)))
+        shortcut = self._shortcut(key, scancode, mods)
+        if shortcut:
+            self._chorded.add(key)
+        self._note(KeyDown(key, bool(mods & glfw.MOD_SHIFT), shortcut))
+
+    def _shortcut(self, key: int, scancode: int, mods: int) -> str:
+        """The letter of a shortcut; "" while keys are held to move, where Ctrl means slowly."""
+        moving = any(other != key and self.held(other) for other in MOVING)
+        letter = (glfw.get_key_name(key, scancode) or "").lower()
+        with_ctrl = mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER)
+        return letter if with_ctrl and letter in SHORTCUTS and not moving else ""
 
     def _on_char(self, handle, codepoint: int) -> None:
         imgui.get_io().add_input_character(codepoint)

@@ -1,0 +1,157 @@
+"""The world behind the window: colliders of the document's objects, made in a thread, then bodies.
+
+The picture does not wait for it: a scene is there to be seen before it can be touched.
+"""
+
+import threading
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+from app.document import Document, ModelKey, key_of
+from app.opening import sentence
+from runtime_models.model import BadFile
+from scene.scene_file import SceneFile, SceneItem
+
+if TYPE_CHECKING:
+    from app.desktop import Viewer
+    from scene.collider import Collider
+    from scene.world import World
+
+HZ = 90  # steps of the physics a second
+
+
+class Bodies:
+    """Colliders by object, and the world once all that are asked for are there."""
+
+    def __init__(self) -> None:
+        self.world: World | None = None  # None: nothing can be touched, or not yet
+        self.problem = ""  # one sentence: why something cannot be touched; "" = nothing is wrong
+        self.notes: list[str] = []  # what the physics has changed on the way in
+        self._of: dict[str, tuple[tuple, Collider]] = {}  # name -> what it was made of, and it
+        self._made: dict[tuple, Collider | None] = {}  # of a mesh or model; None: there is none
+        self._future: Future | None = None
+        self._stale = True  # the world does not know of the last edits yet
+
+    def forget(self) -> None:
+        """Another scene; a collider that is being made is not waited for."""
+        self.__init__()
+
+    @property
+    def busy(self) -> bool:
+        return self._future is not None
+
+    @property
+    def status(self) -> str:
+        return "making colliders" if self.busy else ""
+
+    def follow(self, document: Document) -> None:
+        """Lets the world know of an edit, as soon as there are the colliders for it.
+
+        Raises BadFile, with the world as it was, for an object that cannot be as the file says.
+        """
+        self._stale = True
+        self._catch_up(document)
+
+    def poll(self, document: Document) -> bool:
+        """Once a frame; True while colliders are being made."""
+        if self._future is not None and self._future.done():
+            future, self._future = self._future, None
+            key, self._made[key], problem = future.result()
+            self.problem = problem or self.problem
+        try:
+            self._catch_up(document)
+        except BadFile as error:
+            self.problem, self._stale = str(error), False
+        return self.busy
+
+    def _catch_up(self, document: Document) -> None:
+        if self.busy or not self._stale:
+            return
+        file = document.file
+        touched = [item for item in file.all_items if item.collider is not None]
+        missing = [item for item in touched if self._collider(item) is MISSING]
+        if missing:
+            self._start(document, missing[0])
+            return
+        found = {item.name: self._collider(item) for item in touched}
+        colliders = {name: made for name, made in found.items() if made is not None}
+        self._of = {i.name: (made_of(i), colliders[i.name]) for i in touched if i.name in colliders}
+        if touched or self.world is not None:
+            self._to_world(file, document, colliders)
+        self._stale = False
+
+    def _to_world(
+        self, file: SceneFile, document: Document, colliders: Mapping[str, "Collider"]
+    ) -> None:
+        from scene.follow import follow
+        from scene.world import World
+
+        models = document.models_by_name()
+        if self.world is None:
+            self.world = World(file, models, colliders, hz=HZ)
+            self.world.paused = True
+            known = 0
+        else:
+            known = len(self.world.findings)
+            follow(self.world, file, models, colliders)
+        self.notes += [sentence(finding) for finding in self.world.findings[known:]]
+
+    def _collider(self, item: SceneItem) -> "Collider | object | None":
+        """What was made for the object, for its like, or MISSING; x may have moved since."""
+        before = self._of.get(item.name)
+        if before is not None and before[0] == made_of(item):
+            return before[1]
+        return self._made.get(made_of(item), MISSING)
+
+    def _start(self, document: Document, item: SceneItem) -> None:
+        """Makes one collider in a thread that the program's end does not wait for."""
+        future = self._future = Future()
+        file, model = document.file, document.model(item)
+        beside = file.folder if document.path is not None else None
+
+        def work() -> None:
+            try:
+                future.set_result((made_of(item), *make(file, item, model, beside)))
+            except BaseException as error:  # handed to the window's thread, which raises it again
+                future.set_exception(error)
+
+        threading.Thread(target=work, name="colliders", daemon=True).start()
+
+
+MISSING = object()
+
+
+def made_of(item: SceneItem) -> tuple[str | None, ModelKey]:
+    return item.collider, key_of(item)
+
+
+def make(file: SceneFile, item: SceneItem, model, beside) -> "tuple[Collider | None, str]":
+    """The collider, or None and why there is none."""
+    from scene.collider import Making
+    from scene.collider_files import one_collider
+
+    try:
+        return one_collider(file, item, model, Making(beside=beside)), ""
+    except BadFile as error:
+        return None, f"{error} It cannot be touched."
+    except MemoryError:
+        return None, f"'{item.name}' needs more memory for its collider than there is."
+
+
+def attach_bodies(viewer: "Viewer") -> None:
+    """Lets a viewer's scene become one that can be touched, and says what stands in the way."""
+    stage = viewer.stage
+
+    def poll() -> bool:
+        bodies = stage.bodies
+        busy = bodies.poll(stage.document)
+        if bodies.problem:
+            stage.problem, bodies.problem = bodies.problem, ""
+        if bodies.notes:
+            notes, bodies.notes = bodies.notes, []
+            viewer.say("\n".join(notes))
+        return busy
+
+    viewer.hooks.each_frame.append(poll)
+    viewer.hooks.status.append(lambda: stage.bodies.status)
