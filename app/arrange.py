@@ -119,6 +119,7 @@ def steer(stage: "Stage", index: int, x: float, together: str = "") -> None:
         history = stage.document.history
         word = together or f"x of {thing.name}"
         stage.document.history = history.take(file, word, together or f"x {thing.name}")
+        stage.bodies.follow(stage.document)
 
 
 def place(stage: "Stage", index: int, pose: Pose) -> None:
@@ -129,6 +130,7 @@ def place(stage: "Stage", index: int, pose: Pose) -> None:
         file = edits.place(stage.document.file, name, pose)
         history = stage.document.history
         stage.document.history = history.take(file, f"move {name}", f"place {name}")
+        stage.bodies.follow(stage.document)
 
 
 def keep_standing(stage: "Stage") -> None:

@@ -158,6 +158,7 @@ class Viewer:
             wanted=(options.target_ms or options.floor_db) is not None,
         )
         self._note_until = 0.0
+        self.seconds = 0.0  # that the frame which is under way lets pass
         self.frames = 0  # drawn since the window opened
         self._overlay_ms = 0.0
         self.save_picture = False
@@ -182,7 +183,7 @@ class Viewer:
 
     def frame(self, seconds: float) -> None:
         """One frame of the window: `seconds` have passed since the last one."""
-        start = time.perf_counter()
+        start, self.seconds = time.perf_counter(), seconds
         for event in self.window.begin_frame():
             self.take(event)
         self.stage.advance(seconds)
