@@ -1,14 +1,15 @@
 """Keeps the drawing of a headset's frames within the runtime's period: settings, then pixels."""
 
 import sys
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import inf
 from statistics import median
 
 import numpy as np
 
 from app.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
-from app.dial import LEAST_SCALE, SMALLEST_SCALE
 from app.quick_chart import QUICK, QuickChart, QuickRow
 from renderer.renderer import Renderer
 from renderer.resolution import Resolution
@@ -25,45 +26,43 @@ FIXED = {  # quality of the panel -> row of the quick chart that it always is
 QUALITIES = (AUTO, *FIXED)
 PART = 0.85  # of the period may be ours: the runtime wants the rest
 SAME = 0.1  # of a period: how much another one may differ and ask for nothing new
+EASY = 0.6  # of that: what takes the exact picture no longer needs no chart
+OVER, LATE = 1.05, 24  # times that, as the median of so many frames, is late
 TRIES = 4  # exact frames that say whether shortcuts are needed at all; one before them warms up
 
 
 class Pacing:
     """Gives the settings of every frame of a headset and takes its time.
 
-    AUTO measures once, before the first picture: shortcuts are chosen only where the exact
-    picture takes longer than PART of the period, never below `floor_db`, and then fewer pixels
-    are drawn while frames are late.  The other qualities stay as they are.
+    AUTO draws the exact picture where it is far from taking PART of the period.  Else the quick
+    chart is measured, once, and the best of it chosen that is fast enough; while frames are late
+    fewer pixels are drawn, as long as they are priced at `floor_db` or better.  The other
+    qualities stay as they are.
     """
 
     def __init__(
         self, background: tuple[float, float, float], quality: str = AUTO,
         floor_db: float = FLOOR_DB, target_ms: float | None = None,
     ) -> None:  # fmt: skip
-        self.quality, self.floor_db, self.target_ms = quality, floor_db, target_ms
-        self.choice: Choice | None = None  # of AUTO, where shortcuts were needed
+        self.quality, self.floor_db, self._fixed_ms = quality, floor_db, target_ms
+        self.choice: Choice | None = None  # of AUTO, where the chart was measured
         self.exact_ms = 0.0  # that the exact picture of both eyes took at first
+        self.target_ms = inf
         self._period_s = 0.0  # that was chosen for
         self._exact = RenderSettings(background=background)
         self._rows: tuple[QuickRow, ...] = ()
         self._resolution: Resolution | None = None
-
-    @property
-    def scale(self) -> float:
-        """Of the width and height of an eye, that is drawn now."""
-        return self.settings().render_scale
+        self._times: deque[float] = deque(maxlen=LATE)  # ms, since something was chosen
 
     def settings(self) -> RenderSettings:
         """Of the next frame."""
         if self.quality != AUTO:
-            changes = QUICK.get(FIXED[self.quality], {})
-            return replace(self._exact, **changes)
-        chosen = self._exact if self.choice is None else self.choice.settings
-        chosen = replace(chosen, background=self._exact.background)
-        if self._resolution is None:
-            return chosen
-        scale = max(chosen.render_scale * self._resolution.scale, SMALLEST_SCALE)
-        return replace(chosen, render_scale=scale)
+            return replace(self._exact, **QUICK.get(FIXED[self.quality], {}))
+        if self.choice is None:
+            return self._exact
+        scale = self._resolution.scale
+        background = self._exact.background
+        return replace(self.choice.settings, background=background, render_scale=scale)
 
     @property
     def chosen(self) -> str:
@@ -73,31 +72,43 @@ class Pacing:
         return self.choice.name if self.choice else EXACT
 
     def wants_measure(self, period_s: float) -> bool:
-        """Whether nothing was chosen yet for a period like this."""
+        """Whether nothing was chosen yet for a period like this, or what was proves too slow."""
         if self.quality != AUTO or not period_s > 0:
             return False
-        return not abs(period_s - self._period_s) <= SAME * self._period_s
+        late = len(self._times) == LATE and median(self._times) > OVER * self.target_ms
+        another = not abs(period_s - self._period_s) <= SAME * self._period_s
+        return another or (late and not self._rows)
 
     def measure(self, chart: "StereoChart", period_s: float) -> None:
-        """Chooses for a period; says on stderr what it chose where the exact picture is too slow.
+        """Chooses for a period; says on stderr what it chose instead of the exact picture.
 
         What was measured once is not measured again.
         """
+        late = bool(self.exact_ms)
+        self._times.clear()
         self._period_s = period_s
-        target = self.target_ms or PART * period_s * 1e3
+        self.target_ms = self._fixed_ms or PART * period_s * 1e3
         self.exact_ms = self.exact_ms or chart.exact_ms()
-        self.choice = None
-        if self.exact_ms > target:
-            self._rows = self._rows or chart.rows()
-            self.choice = choose(self._rows, target, self.floor_db)
+        if not self._rows and not late and self.exact_ms <= EASY * self.target_ms:
+            return
+        self._rows = self._rows or chart.rows()
+        self.choice = choose(self._rows, self.target_ms, self.floor_db)
+        if self.choice.name != EXACT:
             print(self.choice.sentence, file=sys.stderr)
-        # A scale that was priced below the floor is not gone to; unpriced, half is.
-        least = least_scale(self._rows, self.floor_db) if self._rows else LEAST_SCALE
-        self._resolution = Resolution(target, least)
+        # Fewer pixels are priced alone: on top of other shortcuts nobody knows what they cost.
+        chosen = self.choice.settings
+        priced = least_scale(self._rows, self.floor_db)
+        alone = replace(chosen, render_scale=1.0, target="rgba16f", background=(0.0, 0.0, 0.0))
+        scale = chosen.render_scale
+        least = min(priced, scale) if alone == RenderSettings() else scale
+        self._resolution = Resolution(self.target_ms, least, scale)
 
     def seen(self, own_ms: float) -> None:
-        """Takes the time of a frame that was drawn."""
-        if self.quality == AUTO and self._resolution is not None:
+        """Takes the time of a frame that was drawn; 0: it does not count."""
+        if self.quality != AUTO or not own_ms > 0:
+            return
+        self._times.append(own_ms)
+        if self._resolution is not None:
             self._resolution.seen(own_ms)
 
     def report(self) -> dict:
@@ -105,7 +116,7 @@ class Pacing:
             "quality": self.quality,
             "exact_ms": round(self.exact_ms, 3),
             "chosen": self.chosen,
-            "scale": self.scale,
+            "scale": self.settings().render_scale,
         }
 
 
