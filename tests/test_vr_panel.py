@@ -248,7 +248,7 @@ def test_items_do_not_overlap_and_lie_on_the_plate():
 
 
 def test_letters_are_legible_at_arms_length():
-    """360 pixels of a 1,000 pixel eye show the panel at 0.6 m: no letters under ten of them."""
+    """360 pixels of a 1,000 pixel eye show the panel at 0.45 m: no letters under ten of them."""
     assert LEAST * 360 / WIDTH >= 10
 
 

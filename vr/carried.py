@@ -7,7 +7,7 @@ from vr.frame import SIDES, Frame, Hand
 from vr.panel import press, push, taken
 from vr.panel_layout import lay_out
 from vr.panel_place import NOBODY, Pointing, hang, point_at
-from vr.panel_state import Facts, Panel, Wish
+from vr.panel_state import Facts, Panel, Place, Wish
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,7 @@ class Carried:
     panel: Panel = field(default_factory=lambda: Panel(side="left"))
     play_from_panel: Pose | None = None
     pointing: Pointing = NOBODY
+    places: dict[str, Place] = field(default_factory=dict)  # side -> where it points, pixels
     menus: frozenset[str] = frozenset()  # sides whose menu button was down
 
 
@@ -32,14 +33,15 @@ def carry(
     carried = replace(carried, panel=panel, menus=menus)
     if not panel.open:
         panel, _ = press(panel, [])
-        return replace(carried, panel=panel, play_from_panel=None), [], dict(frame.hands)
+        return replace(carried, panel=panel, play_from_panel=None, places={}), [], dict(frame.hands)
     layout = lay_out(panel)
     before = None if frame.recentred else carried.play_from_panel
     pose = hang(before, frame.hands[panel.side], frame.head, layout.size_m, seconds)
     pointing, pointers = point_at(carried.pointing, pose, layout, frame.hands, panel.side)
     panel, wishes = press(panel, pointers, seconds)
     panel, more = push(panel, frame.hands[panel.side].stick, seconds)
-    carried = replace(carried, panel=panel, play_from_panel=pose, pointing=pointing)
+    places = {pointer.side: pointer.at for pointer in pointers if pointer.at is not None}
+    carried = replace(carried, panel=panel, play_from_panel=pose, pointing=pointing, places=places)
     return carried, wishes + more, left_over(carried, frame.hands)
 
 

@@ -16,7 +16,7 @@ WRIST = np.array([0.020, 0.058, 0.0])  # metres, right hand
 FINGERS = ((-0.032, 0.95), (-0.0105, 1.06), (0.0105, 1.0), (0.030, 0.80))
 BONES = np.array([0.043, 0.027, 0.021])  # metres, of a finger of length 1
 THICK = (0.0108, 0.0098, 0.0090, 0.0080)  # radius at the knuckle, the joints, the tip
-REST, FIST = np.array([0.30, 0.40, 0.25]), np.array([1.30, 1.50, 0.95])  # radians at the joints
+REST, FIST = np.array([0.62, 0.85, 0.45]), np.array([1.30, 1.50, 0.95])  # radians at the joints
 THUMB_BASE = np.array([0.008, 0.030, -0.030])  # metres, right hand
 THUMB_OPEN = np.array([[-0.45, -0.55, -0.70], [-0.20, -0.90, -0.40]])  # where its bones point
 THUMB_SHUT = np.array([[-0.80, -0.55, -0.25], [-0.50, -0.60, 0.60]])
@@ -58,12 +58,9 @@ def glove(side: str, hand: Hand, holds: bool = False) -> list[Capsule]:
     for bone, radii in enumerate(((0.0150, 0.0118), (0.0118, 0.0095))):
         parts.append(put(joints[bone], joints[bone + 1], radii, GLOVE))
     cuff = LIT if holds else CUFF
-    parts.append(
-        put(_beside(WRIST, 0.010, -0.012), _beside(WRIST, 0.010, 0.012), (0.0235, 0.0235), cuff)
-    )
-    parts.append(
-        put(_beside(WRIST, 0.024, -0.012), _beside(WRIST, 0.024, 0.012), (0.0245, 0.0245), cuff)
-    )
+    for y in (0.010, 0.024):
+        ends = _beside(WRIST, y, -0.012), _beside(WRIST, y, 0.012)
+        parts.append(put(*ends, (0.024, 0.024), cuff))
     return parts
 
 
@@ -119,13 +116,13 @@ def _ahead(side: str, hand: Hand) -> np.ndarray:
 def _thumb(squeeze: float) -> np.ndarray:
     """(3, 3) metres, right hand: base, joint, tip."""
     part = min(max(squeeze, 0.0), 1.0)
-    first = _unit(
-        np.array([-0.45, -0.55, -0.70]) * (1 - part) + np.array([-0.8, -0.55, -0.25]) * part
-    )
-    second = _unit(np.array([-0.2, -0.9, -0.40]) * (1 - part) + np.array([-0.5, -0.6, 0.60]) * part)
-    base = np.array([0.008, 0.030, -0.030])
-    joint = base + 0.044 * first
-    return np.stack([base, joint, joint + 0.032 * second])
+    bones = THUMB_OPEN + (THUMB_SHUT - THUMB_OPEN) * part
+    joint = THUMB_BASE + 0.044 * _unit(bones[0])
+    return np.stack([THUMB_BASE, joint, joint + 0.032 * _unit(bones[1])])
+
+
+def _beside(place: np.ndarray, y: float, z: float) -> np.ndarray:
+    return place + np.array([0.0, y, z])
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from runtime_models.model import Stop
 from vr.panel_state import QUALITIES, Panel, Place
 
 WIDTH = 1000  # pixels
-WIDTH_M = 0.46  # metres: as wide as a small laptop's screen, held at 0.4 to 0.6 m
+WIDTH_M = 0.37  # metres: in a hand at 0.4 m 400 pixels of an eye with 1,000
 METRES_PER_PIXEL = WIDTH_M / WIDTH
 MARGIN = 52
 TRACK = (92, WIDTH - 92)  # left and right end of the slider's line

@@ -34,7 +34,7 @@ Ink = tuple[int, int, int]
 ACCENT, TEXT, MUTED = (246, 168, 76), (240, 240, 242), (172, 175, 182)
 SURFACE, RAISED, LIFTED, LINE = (26, 27, 31), (50, 52, 58), (74, 77, 85), (92, 95, 102)
 EDGE, WARNING = (70, 73, 80), (214, 74, 62)
-# Heights of letters.  At 0.6 m and 1,000 pixels an eye about 360 pixels show the panel's width, so
+# Heights of letters.  At 0.45 m and 1,000 pixels an eye about 360 pixels show the panel's width, so
 # that 36 of its pixels are 13 of the headset.
 TITLE, BIG, BODY, SMALL, LEAST = 36, 68, 38, 32, 28
 FINE = 4  # corners are drawn so much larger, then made small: no stairs

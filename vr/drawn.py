@@ -1,0 +1,108 @@
+"""What is drawn over the splats for who wears the headset: hands, rays, an arc, the panel, dark.
+
+All of it in metres of the room, so that it is as large as hands are at any scale of the world.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from scene.pose import Pose
+from vr.carried import Carried
+from vr.frame import SIDES, Hand
+from vr.glove import Capsule, glove
+from vr.locomotion import Comfort
+from vr.panel_layout import lay_out
+from vr.panel_place import play_point
+from vr.panel_state import Panel
+
+FINE, WRONG, PALE = (0.96, 0.66, 0.30), (0.90, 0.32, 0.26), (0.92, 0.93, 0.96)  # display sRGB
+RAY_M, RAY_FROM_M = 1.2, 0.06  # metres of a ray that meets nothing, and where it begins to show
+RAY_THICK, ARC_THICK, RING_THICK = 0.0014, 0.006, 0.008  # radii
+RING_M, RING_PARTS = 0.22, 32  # of the ring where a jump lands
+DOT_M = 0.005  # radius of the dot where a ray meets something
+FINGER_DOT_M = 0.003
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One frame's worth, the same for both eyes."""
+
+    hands: tuple[Capsule, ...] = ()  # lit and solid
+    lines: tuple[Capsule, ...] = ()  # they shine, and may fade out
+    panel: Panel | None = None
+    play_from_panel: Pose | None = None
+    vignette: float = 0.0  # 0..1
+    blink: float = 0.0  # 0..1
+
+
+def drawn_of(
+    hands: Mapping[str, Hand],
+    carried: Carried,
+    comfort: Comfort | None = None,
+    holds: frozenset[str] = frozenset(),
+    ends_m: Mapping[str, float] | None = None,
+) -> Drawn:
+    """What a frame shows.
+
+    hands as the runtime has them; holds: sides that hold an object; ends_m: how far, in metres of
+    the room, the ray of a hand is from what it meets in the world, where it meets anything.
+    """
+    comfort = comfort or Comfort()
+    lines: list[Capsule] = []
+    for side in SIDES:
+        if side not in holds and not (comfort.arc is not None and hands[side].primary):
+            lines += ray(side, hands[side], carried, (ends_m or {}).get(side))
+    if comfort.arc is not None:
+        lines += arc(comfort.arc.points, comfort.arc.landing, comfort.arc.fine)
+    solid = [part for side in SIDES for part in glove(side, hands[side], side in holds)]
+    panel = carried.panel if carried.play_from_panel is not None else None
+    return Drawn(tuple(solid), tuple(lines), panel, carried.play_from_panel,
+                 comfort.vignette, comfort.blink)  # fmt: skip
+
+
+def ray(side: str, hand: Hand, carried: Carried, end_m: float | None) -> list[Capsule]:
+    """A thin ray along the aim: to the panel where it points at it, to what it meets, or fading."""
+    panel, pose = carried.panel, carried.play_from_panel
+    if hand.aim is None or side == panel.side:
+        return []
+    along = -hand.aim.matrix()[:3, 2]
+    start = hand.aim.position
+    at = carried.places.get(side)
+    if side in panel.hovers and at is not None and pose is not None:
+        dot = play_point(pose, lay_out(panel), at)
+        held = side in carried.pointing.down
+        if side in carried.pointing.near:
+            return [Capsule(dot, dot, (FINGER_DOT_M,) * 2, (*(FINE if held else PALE), 1.0))]
+        return _beam(start, dot, along, FINE if held else PALE)
+    if end_m is not None:
+        return _beam(start, start + along * end_m, along, FINE)
+    faint, gone = (*PALE, 0.35), (*PALE, 0.0)
+    return [
+        Capsule(start + along * RAY_FROM_M, start + along * RAY_M, (RAY_THICK,) * 2, faint, gone)
+    ]
+
+
+def arc(points: np.ndarray, landing: np.ndarray | None, fine: bool) -> list[Capsule]:
+    """The arc of a jump through points (n, 3), with a ring on the floor where it lands."""
+    color = (*(FINE if fine else WRONG), 1.0)
+    lines = [Capsule(a, b, (ARC_THICK,) * 2, color) for a, b in pairwise(points)]
+    if landing is not None:
+        turns = np.linspace(0, 2 * np.pi, RING_PARTS + 1)
+        flat = np.stack([np.cos(turns), np.zeros_like(turns), np.sin(turns)], axis=1)
+        for radius in (RING_M, 0.25 * RING_M) if fine else (RING_M,):
+            ring = landing + np.array([0.0, RING_THICK, 0.0]) + flat * radius
+            lines += [Capsule(a, b, (RING_THICK,) * 2, color) for a, b in pairwise(ring)]
+    return lines
+
+
+def _beam(start: np.ndarray, end: np.ndarray, along: np.ndarray, color: tuple) -> list[Capsule]:
+    """A ray that comes out of the hand and ends in a dot."""
+    length = float((end - start) @ along)
+    dot = Capsule(end, end, (DOT_M, DOT_M), (*color, 1.0))
+    if not length > RAY_FROM_M:
+        return [dot]
+    first = start + along * RAY_FROM_M
+    return [Capsule(first, end, (RAY_THICK,) * 2, (*color, 0.25), (*color, 0.9)), dot]

@@ -1,0 +1,211 @@
+"""Draws hands, lines, the panel and the vignette over the splats' picture of an eye."""
+
+import moderngl
+import numpy as np
+
+from renderer.shader import compile_program
+from scene.pose import View
+from vr.drawn import Drawn
+from vr.glove import Capsule
+from vr.panel_layout import lay_out
+from vr.panel_picture import panel_picture, picture_key
+from vr.panel_state import Panel
+from vr.shown import SHADERS
+
+SAMPLES = 4  # a pixel: edges of hands and thin lines crawl without
+AROUND, BELOW = 12, 3  # facets of a capsule: around it, and from its equator to its tip
+INSTANCE = "3f 3f 2f 4f 4f/i"
+NAMES = ("a", "b", "radii", "color_a", "color_b")
+ROOM = 256  # capsules that the buffer has room for at first
+OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+
+
+class Overlay:
+    """Programs, the capsule's mesh, the panel's texture; use it in a `with`.
+
+    The context may be anybody's: nothing is enabled afterwards, and bound is what was bound.
+    """
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._capsule = compile_program(ctx, "capsule.vert", "capsule.frag", SHADERS)
+        self._panel = compile_program(ctx, "panel.vert", "panel.frag", SHADERS)
+        self._over = compile_program(ctx, "full.vert", "over.frag", SHADERS)
+        mesh, faces = capsule_mesh()
+        self._mesh, self._faces = ctx.buffer(mesh), ctx.buffer(faces)
+        self._instances = ctx.buffer(reserve=ROOM * 16 * 4)
+        self._capsules = self._vertices()
+        self._corners = ctx.vertex_array(self._panel, [])
+        self._triangle = ctx.vertex_array(self._over, [])
+        self._picture: moderngl.Texture | None = None
+        self._picture_key: tuple | None = None
+        self._target: moderngl.Framebuffer | None = None  # several samples a pixel
+        self._resolved: moderngl.Framebuffer | None = None  # one
+
+    def draw(self, framebuffer: moderngl.Framebuffer, play_view: View, drawn: Drawn) -> None:
+        """Over what the framebuffer, display-encoded, shows of `play_view`, an eye in the room."""
+        anything = bool(drawn.hands or drawn.lines or drawn.panel)
+        if not (anything or drawn.vignette > 0 or drawn.blink > 0):
+            return
+        ctx = self._ctx
+        before = ctx.fbo or ctx.detect_framebuffer(0)
+        try:
+            if anything:
+                self._draw_things(framebuffer.size, play_view, drawn)
+            self._lay_over(framebuffer, play_view, drawn, anything)
+        finally:
+            ctx.enable_only(moderngl.NOTHING)
+            before.use()
+
+    def _draw_things(self, size: tuple[int, int], view: View, drawn: Drawn) -> None:
+        """Hands, the panel, then what may be seen through, each behind what is nearer."""
+        target, ctx = self._target_of(size), self._ctx
+        target.use()
+        target.depth_mask = True
+        target.clear()
+        ctx.blend_func = OVER
+        clip_from_play = view.clip_from_eye() @ view.eye_from_world()
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._draw_capsules(drawn.hands, view, clip_from_play, True)
+        if drawn.panel is not None:
+            ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+            self._draw_panel(drawn.panel, clip_from_play @ drawn.play_from_panel.matrix())
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
+        target.depth_mask = False
+        self._draw_capsules(drawn.lines, view, clip_from_play, False)
+        target.depth_mask = True
+        ctx.copy_framebuffer(self._resolved, target)
+
+    def _draw_capsules(
+        self, capsules: tuple[Capsule, ...], view: View, clip_from_play: np.ndarray, lit: bool
+    ) -> None:
+        if not capsules:
+            return
+        rows = capsule_rows(capsules)
+        if rows.nbytes > self._instances.size:
+            self._instances.orphan(rows.nbytes)
+            self._capsules.release()
+            self._capsules = self._vertices()
+        self._instances.write(rows)
+        program = self._capsule
+        program["clip_from_play"].write(columns(clip_from_play))
+        program["eye"].value = tuple(view.world_from_eye.position)
+        program["tangent_px"].value = (view.tangents[1] - view.tangents[0]) / view.size[0]
+        program["lit"].value = lit
+        self._capsules.render(moderngl.TRIANGLES, instances=len(rows))
+
+    def _draw_panel(self, panel: Panel, clip_from_panel: np.ndarray) -> None:
+        key = picture_key(panel)
+        if key != self._picture_key:
+            self._upload(panel_picture(panel))
+            self._picture_key = key
+        self._picture.use(0)
+        self._panel["picture"].value = 0
+        self._panel["clip_from_panel"].write(columns(clip_from_panel))
+        self._panel["half_size"].value = tuple(side / 2 for side in lay_out(panel).size_m)
+        self._corners.render(moderngl.TRIANGLE_STRIP, vertices=4)
+
+    def _upload(self, picture: np.ndarray) -> None:
+        """(H, W, 4) uint8 as a texture with its smaller levels."""
+        size = (picture.shape[1], picture.shape[0])
+        if self._picture is None or self._picture.size != size:
+            if self._picture is not None:
+                self._picture.release()
+            self._picture = self._ctx.texture(size, 4)
+            self._picture.repeat_x = self._picture.repeat_y = False
+        self._picture.write(np.ascontiguousarray(picture))
+        self._picture.build_mipmaps()
+        self._picture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+
+    def _lay_over(
+        self, framebuffer: moderngl.Framebuffer, view: View, drawn: Drawn, anything: bool
+    ) -> None:
+        framebuffer.use()
+        self._ctx.enable_only(moderngl.BLEND)
+        self._ctx.blend_func = OVER
+        program = self._over
+        if anything:
+            self._resolved.color_attachments[0].use(0)
+        program["drawn"].value = 0
+        program["is_drawn"].value = anything
+        program["tangents"].value = view.tangents
+        program["vignette"].value = float(drawn.vignette)
+        program["blink"].value = float(drawn.blink)
+        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+
+    def _target_of(self, size: tuple[int, int]) -> moderngl.Framebuffer:
+        """Made anew only when the size of the eyes changes."""
+        if self._target is None or self._target.size != tuple(size):
+            self._release_targets()
+            ctx, samples = self._ctx, min(SAMPLES, self._ctx.max_samples)
+            self._target = ctx.framebuffer(
+                [ctx.renderbuffer(size, 4, samples=samples)],
+                ctx.depth_renderbuffer(size, samples=samples),
+            )
+            self._resolved = ctx.framebuffer([ctx.texture(size, 4)])
+        return self._target
+
+    def _vertices(self) -> moderngl.VertexArray:
+        parts = [(self._mesh, "3f 1f", "ball", "upper"), (self._instances, INSTANCE, *NAMES)]
+        return self._ctx.vertex_array(self._capsule, parts, self._faces)
+
+    def _release_targets(self) -> None:
+        for framebuffer in (self._target, self._resolved):
+            if framebuffer is not None:
+                for part in (*framebuffer.color_attachments, framebuffer.depth_attachment):
+                    if part is not None:
+                        part.release()
+                framebuffer.release()
+        self._target = self._resolved = None
+
+    def __enter__(self) -> "Overlay":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self._release_targets()
+        if self._picture is not None:
+            self._picture.release()
+        for part in (
+            self._capsules, self._corners, self._triangle, self._instances, self._mesh,
+            self._faces, self._capsule, self._panel, self._over,
+        ):  # fmt: skip
+            part.release()
+
+
+def columns(matrix: np.ndarray) -> bytes:
+    """A (4, 4) matrix as GLSL reads it."""
+    return matrix.T.astype(np.float32).tobytes()
+
+
+def capsule_rows(capsules: tuple[Capsule, ...]) -> np.ndarray:
+    """(n, 16) float32: ends, radii, colours with their opacity."""
+    rows = np.zeros((len(capsules), 16), np.float32)
+    for row, capsule in zip(rows, capsules, strict=True):
+        color = (*capsule.color, 1.0)[:4]
+        row[0:3], row[3:6], row[6:8] = capsule.a, capsule.b, capsule.radii
+        row[8:12], row[12:16] = color, (*(capsule.color_b or color), 1.0)[:4]
+    return rows
+
+
+def capsule_mesh() -> tuple[np.ndarray, np.ndarray]:
+    """(n, 4) float32: direction of a unit ball and which end it belongs to; (m, 3) int32 facets,
+    anticlockwise from outside.  The equator is there twice, once for either end.
+    """
+    heights = np.linspace(-np.pi / 2, 0, BELOW + 1)
+    heights = np.concatenate([heights, -heights[::-1]])  # radians over the equator
+    turns = np.arange(AROUND) * 2 * np.pi / AROUND
+    height, turn = np.meshgrid(heights, turns, indexing="ij")
+    upper = np.repeat(np.arange(len(heights)) > BELOW, AROUND).reshape(height.shape)
+    ball = np.stack(
+        [np.cos(height) * np.cos(turn), np.cos(height) * np.sin(turn), np.sin(height), upper], -1
+    )
+    ring, step = np.meshgrid(np.arange(len(heights) - 1), np.arange(AROUND), indexing="ij")
+    here, beside = ring * AROUND + step, ring * AROUND + (step + 1) % AROUND
+    over = AROUND  # one ring up
+    faces = np.concatenate(
+        [
+            np.stack([here, beside, beside + over], -1),
+            np.stack([here, beside + over, here + over], -1),
+        ]
+    )
+    return ball.reshape(-1, 4).astype(np.float32), faces.reshape(-1, 3).astype(np.int32)

@@ -1,0 +1,18 @@
+// capsule: soft light from above and from the head for what is solid; lines shine by themselves.
+in vec3 normal;
+in vec3 towards_eye;
+in vec4 color;
+uniform bool lit;
+out vec4 shown;  // display sRGB, premultiplied
+
+void main() {
+    vec3 rgb = color.rgb;
+    if (lit) {
+        vec3 n = normalize(normal);
+        float facing = max(dot(n, normalize(towards_eye)), 0.0);
+        float sky = 0.5 + 0.5 * n.y;
+        rgb *= 0.30 + 0.42 * sky + 0.28 * facing;
+        rgb *= mix(0.72, 1.0, smoothstep(0.0, 0.45, facing));  // a darker outline parts the fingers
+    }
+    shown = vec4(rgb * color.a, color.a);
+}
