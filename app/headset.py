@@ -31,6 +31,12 @@ class Options(ReadingOptions):
     """Milliseconds that a frame may take us with --quality auto; default: 85 % of the headset's."""
     floor_db: float | None = None
     """Never below this PSNR against the exact picture with --quality auto; default 35."""
+    turning: Literal["snap", "smooth", "none"] = "snap"
+    """By the stick that does not walk: 30 degrees at a time, evenly, or by the body alone."""
+    walking_hand: Literal["left", "right"] = "left"
+    """The hand whose stick walks; the other turns and flies."""
+    vignette: float = 0.8
+    """How dark the edge of the picture gets while a stick moves one; 0: not at all, 1: black."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     frames: int = 0
@@ -69,6 +75,8 @@ def check(options: Options) -> None:
             raise UsageError(f"{name} is {value}, expected a number above 0.")
         if value is not None and options.quality != "auto":
             raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
+    if not 0 <= options.vignette <= 1:
+        raise UsageError(f"--vignette is {options.vignette:g}, expected 0 to 1.")
     if options.frames < 0:
         raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
     if options.every < 1:
@@ -88,6 +96,7 @@ def wear(options: Options) -> int:
     from app.worn_scene import open_worn
     from renderer.renderer import Renderer
     from vr.instance import Instance
+    from vr.locomotion import Rules
     from vr.session import Session
 
     with Instance() as instance:
@@ -104,7 +113,8 @@ def wear(options: Options) -> int:
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
-            wearing = Wearing(session, renderer, eyes, mirror, scene, pacing, report)
+            rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
+            wearing = Wearing(session, renderer, eyes, mirror, scene, pacing, report, rules)
             try:
                 wearing.loop(options.frames)
             finally:

@@ -7,14 +7,17 @@ import moderngl
 from app.headset_report import Report
 from app.mirror import Mirror, NoMirror
 from app.pacing import Pacing, StereoChart
+from app.person import Person
 from app.worn_scene import WornScene
 from renderer.renderer import Renderer
 from renderer.settings import FrameStats
 from scene.pose import View
 from vr.frame import Frame
+from vr.locomotion import RULES, Rules
 from vr.session import Session
 from vr.stance import standing_before
 from vr.standing import Standing
+from vr.touching import strongest
 
 
 class Eyes:
@@ -48,10 +51,12 @@ class Wearing:
         scene: WornScene,
         pacing: Pacing,
         report: Report,
+        rules: Rules = RULES,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.scene, self.world = scene, scene.world
         self.pacing, self.report = pacing, report
+        self.person = Person(scene.world, scene.floor_y, rules)
         self.standing = Standing()
         self.scale = 1.0  # the true one
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
@@ -76,7 +81,10 @@ class Wearing:
         if self._seen_s is None or frame.recentred:
             self.recentre(frame)
         self._seen_s = frame.seen_s
+        self.standing = self.person.act(frame, self.standing, seconds)
         records = self.world.advance(seconds)
+        for pulse in strongest(self.person.felt(records)):
+            self.pulse(pulse.side, pulse.strength, pulse.seconds)
         if frame.drawn:
             views = [self.standing.view(view) for view in frame.views]
             self._choose_quality(views)
@@ -110,6 +118,7 @@ class Wearing:
         """Back to where the scene is looked at first, whoever asks for it."""
         scene = self.scene
         self.standing = standing_before(scene.eye, frame.head, scene.floor_y, self.scale)
+        self.person.jumped()
 
     def pulse(self, side: str, strength: float, seconds: float) -> None:
         """Buzzes a hand."""

@@ -1,0 +1,47 @@
+"""The person in a headset between two frames: how they stand, move, and what their hands do."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from scene.world import World
+from vr.frame import Frame, Pulse
+from vr.locomotion import RULES, Comfort, Rules, Travel, move
+from vr.stance import underfoot
+from vr.standing import Standing
+from vr.teleport import ground_of
+from vr.touching import Touched, Touching, at_rest, feel, follow, touch
+
+
+class Person:
+    """Keeps what the pure steps of vr/ hand on; `jumped` is called when a menu moved the room."""
+
+    def __init__(self, world: World, floor_y: float | None, rules: Rules = RULES) -> None:
+        self.world, self.floor_y, self.rules = world, floor_y, rules
+        self.touching, self.travel = Touching(), Travel()
+        self.touched, self.comfort = Touched(), Comfort()  # of the last frame, to be shown
+        self._jumps = False
+
+    def jumped(self) -> None:
+        """The room was put elsewhere or scaled: what is held comes along in the next `act`."""
+        self._jumps = True
+
+    def act(self, frame: Frame, standing: Standing, seconds: float) -> Standing:
+        """Before the world's steps: hands take, let go and act, and the room is moved."""
+        if self._jumps:
+            frame, self._jumps = replace(frame, recentred=True), False
+        self.touching, self.touched = touch(self.world, self.touching, frame, standing)
+        level = standing.point(underfoot(frame.head))[1] if self.floor_y is None else None
+        standing, self.travel, self.comfort = move(
+            standing,
+            self.travel,
+            at_rest(frame, self.touching),
+            seconds,
+            self.rules,
+            ground_of(self.world, level),
+        )
+        follow(self.world, frame, standing, self.comfort.jump is not None)
+        return standing
+
+    def felt(self, records: Sequence) -> tuple[Pulse, ...]:
+        """After the world's steps: what buzzes, of these and of what the hands did."""
+        return (*self.touched.pulses, *feel(self.world, records))
