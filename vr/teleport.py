@@ -73,7 +73,8 @@ def throw_arc(aim: Pose, standing: Standing, ground: Ground) -> Arc:
     seconds = np.arange(STEPS + 1)[:, None] * STEP_S
     points = aim.position + along * SPEED * seconds  # (n, 3) metres, room
     points[:, 1] -= FALL / 2 * seconds[:, 0] ** 2
-    world = [standing.point(point) for point in points]
+    room = standing.world_from_play
+    world = room.position + standing.scale * points @ room.matrix()[:3, :3].T  # (n, 3)
     for number in range(STEPS):
         met = ground(world[number], world[number + 1])
         if met is not None:
