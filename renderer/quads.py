@@ -92,6 +92,9 @@ class QuadsDrawing:
         """
         self._decoder.color(i, x, eye_object, seen)
 
+    def wait_decoded(self) -> None:
+        """Nothing: GL keeps the order of the passes itself."""
+
     def tint(self, i: int, palette: np.ndarray, weights: np.ndarray) -> None:
         """Mixes the colours of object i, just decoded, towards a palette (256, 3) by luminance;
         weights (A,) 0..1, one an anchor (a splat of layers).

@@ -227,6 +227,7 @@ class Renderer:
                     palette = palette_colors(decoded.tint.name)
                     self._drawing.tint(i, palette, decoded.tint.weights)
                 self._color_runs += 1
+            self._drawing.wait_decoded()
 
     def _wanted_anchors(
         self, i: int, thing: SceneObject, decoded: _Decoded, stale: bool, views: list[View]

@@ -124,10 +124,13 @@ class TilesDrawing:
             rows = slice(slot.start, slot.start + slot.count)
             args = (slot.sh, eye_object, rows, self._mean_opacity, self._color, seen)
             shade_sh(self.device, *args)
-            self.device.queue.finish()
         else:
             slot.colors = slot.evaluator.color(x, eye_object, seen, slot.colors)
             pack_color(self.device, slot.colors, slot.start, self._color)
+
+    def wait_decoded(self) -> None:
+        """Returns when what was decoded is there: once for all objects, not after each."""
+        self.device.queue.finish()
 
     def tint(self, i: int, palette: np.ndarray, weights: np.ndarray) -> None:
         """Mixes the colours of object i, just decoded, towards a palette (256, 3) by luminance;
