@@ -34,6 +34,7 @@ from app.slider import draw_slider_bar
 from app.stage import Stage
 from app.status_line import draw_status
 from app.stepping import Steps
+from app.touch import attach_touch
 from app.window import Event, Window
 from app.wipe import comparing
 from renderer.context import describe
@@ -151,6 +152,7 @@ class Viewer:
         attach_bodies(self)
         attach_cameras(self)
         attach_export(self)
+        self.touch = attach_touch(self)
         self.shown = Shown(renderer, self.readings)
         self.dial = Dial(
             options.target_ms or TARGET_MS,

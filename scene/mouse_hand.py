@@ -43,11 +43,14 @@ def along(view: View, place: tuple[float, float], size: Size) -> np.ndarray:
     return view.world_from_eye.matrix()[:3, :3] @ np.array([x, y, -1.0])
 
 
-def take(view: View, place: tuple[float, float], size: Size, point: np.ndarray) -> MouseHand:
-    """A hand at a point (3,) of the world that lies under a place of the picture."""
-    axes = view.world_from_eye.matrix()
-    depth = float(-axes[:3, 2] @ (np.asarray(point) - axes[:3, 3]))
-    return MouseHand(bounded(place, size), bounded_depth(view, depth))
+def take(view: View, size: Size, point: np.ndarray) -> MouseHand:
+    """A hand at a point (3,) of the world before the eye."""
+    x, y, z = (view.eye_from_world() @ np.append(point, 1.0))[:3]
+    left, right, low, high = view.tangents
+    depth = bounded_depth(view, float(-z))
+    across = (x / depth - left) / (right - left) * size[0]
+    down = (high - y / depth) / (high - low) * size[1]
+    return MouseHand((float(across), float(down)), depth)
 
 
 def pose(hand: MouseHand, view: View, size: Size) -> Pose:
@@ -57,8 +60,14 @@ def pose(hand: MouseHand, view: View, size: Size) -> Pose:
 
 
 def moved(hand: MouseHand, dx: float, dy: float, size: Size) -> MouseHand:
-    """Dragged by so many pixels, right and down; it stays within the picture."""
-    return replace(hand, place=bounded((hand.place[0] + dx, hand.place[1] + dy), size))
+    """Dragged by so many pixels, right and down; not out of the picture, nobody could bring it
+    back.
+    """
+    place = tuple(
+        float(np.clip(at + by, min(0, at), max(most, at)))
+        for at, by, most in zip(hand.place, (dx, dy), size, strict=True)
+    )
+    return replace(hand, place=place)
 
 
 def pushed(hand: MouseHand, notches: float, view: View) -> MouseHand:
@@ -83,11 +92,6 @@ def rolled(hand: MouseHand, notches: float, view: View) -> MouseHand:
 def with_turn(hand: MouseHand, turn: np.ndarray) -> MouseHand:
     wxyz = multiply(turn, np.array(hand.wxyz))
     return replace(hand, wxyz=tuple(map(float, wxyz / np.linalg.norm(wxyz))))
-
-
-def bounded(place: tuple[float, float], size: Size) -> tuple[float, float]:
-    """Within the picture: what left it could not be brought back."""
-    return tuple(float(np.clip(at, 0, most)) for at, most in zip(place, size, strict=True))
 
 
 def bounded_depth(view: View, depth: float) -> float:
