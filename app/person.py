@@ -3,23 +3,33 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from scene.pose import Pose
 from scene.world import World
 from vr.frame import Frame, Pulse
 from vr.locomotion import RULES, Comfort, Rules, Travel, move
-from vr.stance import underfoot
+from vr.stance import standing_before, underfoot
 from vr.standing import Standing
 from vr.teleport import ground_of
 from vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
 
 class Person:
-    """Keeps what the pure steps of vr/ hand on; `jumped` is called when a menu moved the room."""
+    """Keeps what the pure steps of vr/ hand on; `jumped` is called when a menu moved the room.
 
-    def __init__(self, world: World, floor_y: float | None, rules: Rules = RULES) -> None:
-        self.world, self.floor_y, self.rules = world, floor_y, rules
+    `eye` is from where the scene is looked at first, world_from_eye.
+    """
+
+    def __init__(
+        self, world: World, eye: Pose, floor_y: float | None, rules: Rules = RULES
+    ) -> None:
+        self.world, self.eye, self.floor_y, self.rules = world, eye, floor_y, rules
         self.touching, self.travel = Touching(), Travel()
         self.touched, self.comfort = Touched(), Comfort()  # of the last frame, to be shown
         self._jumps = False
+
+    def before_scene(self, frame: Frame, scale: float = 1.0) -> Standing:
+        """Where the scene is looked at first, on its floor."""
+        return standing_before(self.eye, frame.head, self.floor_y, scale)
 
     def jumped(self) -> None:
         """The room was put elsewhere or scaled: what is held comes along in the next `act`."""
@@ -39,7 +49,9 @@ class Person:
             self.rules,
             ground_of(self.world, level),
         )
-        follow(self.world, frame, standing, self.comfort.jump is not None)
+        if self.comfort.home:
+            standing = self.before_scene(frame)
+        follow(self.world, frame, standing, self.comfort.jumps)
         return standing
 
     def felt(self, records: Sequence) -> tuple[Pulse, ...]:

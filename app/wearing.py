@@ -15,7 +15,6 @@ from scene.pose import View
 from vr.frame import Frame
 from vr.locomotion import RULES, Rules
 from vr.session import Session
-from vr.stance import standing_before
 from vr.standing import Standing
 from vr.touching import strongest
 
@@ -56,9 +55,8 @@ class Wearing:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.scene, self.world = scene, scene.world
         self.pacing, self.report = pacing, report
-        self.person = Person(scene.world, scene.floor_y, rules)
+        self.person = Person(scene.world, scene.eye, scene.floor_y, rules)
         self.standing = Standing()
-        self.scale = 1.0  # the true one
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
@@ -115,9 +113,8 @@ class Wearing:
         pace.restart()
 
     def recentre(self, frame: Frame) -> None:
-        """Back to where the scene is looked at first, whoever asks for it."""
-        scene = self.scene
-        self.standing = standing_before(scene.eye, frame.head, scene.floor_y, self.scale)
+        """Back to where the scene is looked at first, at the size it has now."""
+        self.standing = self.person.before_scene(frame, self.standing.scale)
         self.person.jumped()
 
     def pulse(self, side: str, strength: float, seconds: float) -> None:

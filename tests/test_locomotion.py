@@ -8,7 +8,7 @@ import pytest
 from vr_frames import LOST, at, frame, hand, tilted, yawed
 
 from scene.pose import Pose
-from vr.locomotion import LONGEST_S, RISES_S, RULES, Comfort, Rules, Travel, move
+from vr.locomotion import HOME_S, LONGEST_S, RISES_S, RULES, Comfort, Rules, Travel, move
 from vr.stance import underfoot
 from vr.standing import Standing
 from vr.teleport import Arc, level_ground, throw_arc
@@ -92,7 +92,7 @@ def test_a_snap_is_thirty_degrees_about_the_head_once_until_the_stick_is_back():
         assert angle_between(START, standing) == pytest.approx(turn)
         head = one.head.position
         assert np.allclose(standing.point(head), START.point(head), atol=1e-12)
-        assert [s.jump is not None for s in shown] == [True] + [False] * 39
+        assert [s.jumps for s in shown] == [True] + [False] * 39
         # half back is not back
         half = frame(right=hand(stick=(math.copysign(0.4, push), 0)))
         again, travel, _ = run([half, one], standing, travel)
@@ -112,7 +112,7 @@ def test_smooth_turning_is_ninety_degrees_a_second_and_none_is_none():
     one = frame(right=hand(stick=(1, 0)))
     standing, _, shown = run([one] * HZ, rules=Rules(turning="smooth"))
     assert angle_between(START, standing) == pytest.approx(-90)
-    assert all(s.jump is None for s in shown) and shown[-1].vignette > 0.5
+    assert not any(s.jumps for s in shown) and shown[-1].vignette > 0.5
     standing, _, _ = run([one] * HZ, rules=Rules(turning="none"))
     assert standing is START
 
@@ -172,7 +172,7 @@ def test_a_jump_lands_where_the_arc_came_down():
     standing, travel, shown = run([let_go], start, travel)
     assert np.allclose(feet(standing, let_go), landing, atol=1e-12)
     assert shown[0].blink == 1 and shown[0].arc is None
-    assert np.allclose(shown[0].jump[:3, 3], landing - feet(start, held))
+    assert shown[0].jumps and not shown[0].home
     _, travel, shown = run([frame()] * 20, standing, travel)
     dark = [s.blink for s in shown]
     assert dark == sorted(dark, reverse=True) and dark[-1] == 0 and travel == Travel()
@@ -188,7 +188,7 @@ def test_a_jump_is_thought_better_of():
         _, travel, _ = run([held, instead])
         assert travel.aims is None
         standing, _, shown = run([frame(right=aiming())], START, replace(travel, grips=()))
-        assert standing is START and shown[0].jump is None
+        assert standing is START and not shown[0].jumps
 
 
 def test_a_button_that_is_down_already_does_not_aim():
@@ -239,7 +239,7 @@ def test_one_hand_draws_the_world_along():
         one = frame(right=hand("right", place, squeeze=1.0))
         standing, travel, comfort = move(standing, travel, one, 1 / HZ)
         assert np.allclose(standing.point(np.array(place)), held, atol=1e-12)
-        assert comfort.vignette == 0 and comfort.jump is None
+        assert comfort.vignette == 0 and not comfort.jumps
     assert np.array_equal(standing.world_from_play.wxyz, start.world_from_play.wxyz)
     still, travel, _ = move(standing, travel, frame(right=hand("right", (1, 1, 1))), 1 / HZ)
     assert still is standing and travel.grips == ()
@@ -322,3 +322,33 @@ def test_a_new_origin_moves_nobody():
     after, _, _ = run([on], after, travel)
     way = after.world_from_play.position - START.world_from_play.position
     assert np.allclose(way, [0, -0.5, 0])
+
+
+# ---- true size, and all anew
+
+
+def test_a_button_brings_the_true_size_back_with_the_feet_on_the_spot():
+    for scale, changes in ((0.25, True), (1.0, False)):
+        start = replace(START, scale=scale)
+        down = frame(right=hand(secondary=True))
+        standing, travel, shown = run([down] * 20 + [frame()], start)
+        assert standing.scale == 1.0 and travel.resets is None
+        assert np.allclose(feet(standing, down), feet(start, down), atol=1e-12)
+        assert [s.jumps for s in shown] == [False] * 20 + [changes]
+        assert shown[-1].blink == float(changes) and not any(s.home for s in shown)
+
+
+def test_held_for_a_second_all_begins_anew_once():
+    small = replace(START, scale=0.25)
+    down = frame(left=hand("left", secondary=True))
+    standing, _, shown = run([down] * 200 + [frame()] * 2, small)
+    [at_frame] = [i for i, s in enumerate(shown) if s.home]
+    assert at_frame == pytest.approx(HOME_S * HZ, abs=1)
+    assert standing.scale == 0.25  # it is the caller's now
+    assert [i for i, s in enumerate(shown) if s.jumps] == [at_frame]
+
+
+def test_a_lost_hand_did_not_let_go_of_its_button():
+    small = replace(START, scale=0.25)
+    standing, travel, _ = run([frame(right=hand(secondary=True)), frame(right=LOST)], small)
+    assert standing is small and travel.resets is None

@@ -12,7 +12,6 @@ from vr.stance import (
     LEAST_SCALE,
     MOST_SCALE,
     heading,
-    jump_between,
     moved,
     pinned,
     resized,
@@ -95,10 +94,3 @@ def test_one_starts_before_the_eye_on_the_floor():
         assert math.atan2(looks[0], looks[2]) == pytest.approx(2)
         assert standing.point(underfoot(head))[1] == pytest.approx(-0.7)
     assert np.allclose(standing_before(eye, head).point(head.position), [1, 5, 2])
-
-
-def test_a_jump_takes_the_world_of_before_along():
-    now = turned(moved(ANYWHERE, np.array([1.0, 2, 3])), 0.5, POINTS[1])
-    jump = jump_between(ANYWHERE, now)
-    for point in POINTS:
-        assert np.allclose(jump @ [*ANYWHERE.point(point), 1], [*now.point(point), 1])

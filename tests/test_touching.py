@@ -227,7 +227,7 @@ def test_a_snap_turn_takes_what_is_held_along():
     snap = frame(right=hand(squeeze=1.0, stick=(-1.0, 0)))
     touching, _ = touch(world, touching, snap, ROOM)
     room, _, comfort = move(ROOM, Travel(), at_rest(snap, touching), 1 / HZ)
-    assert room is not ROOM and comfort.jump is not None
+    assert room is not ROOM and comfort.jumps
     follow(world, snap, room, True)
     world.advance(1 / HZ)
     # The hand swept over the other box, and did not strike it.

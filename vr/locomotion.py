@@ -2,7 +2,8 @@
 
 One stick walks where the head looks; the other turns sideways and flies up and down.  A held A or
 X aims a jump that its release makes, unless the hand squeezes.  Empty hands that squeeze hold the
-world.  Callers put hands to rest that a panel or an object has.
+world.  B or Y brings the world back to its true size, held a second longer all is as at first.
+Callers put hands to rest that a panel or an object has.
 """
 
 import math
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vr.frame import SIDES, Frame
-from vr.stance import heading, jump_between, moved, pinned, turned, underfoot, yaw
+from vr.stance import heading, moved, pinned, resized, turned, underfoot, yaw
 from vr.standing import Standing
 from vr.teleport import Arc, Ground, level_ground, throw_arc
 from vr.world_grip import Grips, drawn_along, take
@@ -22,6 +23,7 @@ GRIPS_AT, LETS_GO_AT = 0.6, 0.4  # of a squeeze
 TURNS_AT, REARMS_AT = 0.6, 0.3  # of a stick pushed aside, for one snap
 RISES_S, FALLS_S = 0.12, 0.35  # time constants of the vignette
 BLINK_S = 0.2  # so long the dark after a jump fades
+HOME_S = 1.0  # so long B or Y is held to begin anew
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Travel:
     grips: Grips = ()  # of the world
     aims: str | None = None  # the hand that aims a jump
     pressed: frozenset[str] = frozenset()  # hands whose A or X is down
+    resets: tuple[str, float] | None = None  # the hand whose B or Y is down, and seconds of it
     vignette: float = 0.0
     blink: float = 0.0
 
@@ -64,7 +67,8 @@ class Comfort:
     vignette: float = 0.0  # 0..1, how far the edge of the picture is dark
     blink: float = 0.0  # 0..1, how dark all of it is
     arc: Arc | None = None
-    jump: np.ndarray | None = None  # (4, 4) world_now_from_before: what is held jumps along
+    jumps: bool = False  # the room is elsewhere at once: what is held jumps along
+    home: bool = False  # the room is to be where it was at first; the caller knows where
 
 
 RULES = Rules()
@@ -83,11 +87,10 @@ def move(
     travel = replace(travel, blink=max(travel.blink - seconds / BLINK_S, 0.0))
     standing, travel = hold_world(standing, travel, frame)
     if travel.grips:
-        travel = replace(travel, aims=None, pressed=pressing(frame))
+        travel = replace(travel, aims=None, resets=None, pressed=pressing(frame))
         travel = fade(travel, 0.0, seconds)
         return standing, travel, Comfort(travel.vignette, travel.blink)
     standing, pace = walk(standing, frame, seconds, rules)
-    before = standing
     travel, angle, pace_turned = turn(travel, frame, seconds, rules)
     if angle:
         standing = turned(standing, angle, frame.head.position)
@@ -95,11 +98,15 @@ def move(
     travel, arc, landing = aim(travel, frame, standing, ground)
     if landing is not None:
         standing = pinned(standing, underfoot(frame.head), standing.point(landing))
-        travel = replace(travel, blink=1.0)
-    jumps = landing is not None or (angle and rules.turning == "snap")
-    jump = jump_between(before, standing) if jumps else None
+    travel, true_size, home = reset(travel, frame, seconds)
+    true_size = true_size and standing.scale != 1.0
+    if true_size:
+        standing = resized(standing, frame.head, 1.0)
+    leaps = landing is not None or true_size or home
+    travel = replace(travel, blink=1.0 if leaps else travel.blink)
     travel = fade(travel, max(pace, pace_turned) * rules.vignette, seconds)
-    return standing, travel, Comfort(travel.vignette, travel.blink, arc, jump)
+    jumps = leaps or (rules.turning == "snap" and angle != 0)
+    return standing, travel, Comfort(travel.vignette, travel.blink, arc, jumps, home)
 
 
 def hold_world(standing: Standing, travel: Travel, frame: Frame) -> tuple[Standing, Travel]:
@@ -178,6 +185,19 @@ def aim(
     if aims in pressed:
         return travel, arc, None
     return replace(travel, aims=None), None, arc.landing if arc.fine else None
+
+
+def reset(travel: Travel, frame: Frame, seconds: float) -> tuple[Travel, bool, bool]:
+    """Whether the world is to have its true size, B or Y let go, and whether all begins anew."""
+    if travel.resets is None:
+        down = [side for side in SIDES if frame.hands[side].secondary]
+        return replace(travel, resets=(down[0], 0.0) if down else None), False, False
+    side, before = travel.resets
+    hand = frame.hands[side]
+    if not hand.secondary:  # a hand that was lost did not let go of it
+        return replace(travel, resets=None), hand.active and before < HOME_S, False
+    lasts = before + seconds
+    return replace(travel, resets=(side, lasts)), False, before < HOME_S <= lasts
 
 
 def beyond_rest(stick: tuple[float, float], dead: float) -> tuple[float, float]:

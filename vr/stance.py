@@ -81,8 +81,3 @@ def standing_before(
     if floor_y is None:
         return standing
     return moved(standing, UP * (floor_y - standing.point(underfoot(head))[1]))
-
-
-def jump_between(before: Standing, now: Standing) -> np.ndarray:
-    """(4, 4) world_now_from_world_before of two standings of one scale, for what is carried."""
-    return now.world_from_play.matrix() @ np.linalg.inv(before.world_from_play.matrix())
