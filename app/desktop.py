@@ -19,6 +19,7 @@ from app.export_panel import attach_export
 from app.files import Files, first_camera, home_of, named_cameras, opened_scene
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
+from app.objects_panel import attach_objects
 from app.opened import read_files
 from app.opening import ReadingOptions
 from app.outlines import draw_brush, draw_outlines
@@ -111,6 +112,7 @@ def run(options: Options) -> int:
     stage.take(found.sources, scene, home_of(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
+    stage.document.saved_regions = stage.regions.version
     with refiner, Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             viewer = Viewer(window, renderer, stage, options)
@@ -150,6 +152,7 @@ class Viewer:
         self.kept = KeptViews(options.pictures)
         self.files = Files(self)
         attach_bodies(self)
+        self.objects = attach_objects(self)
         attach_cameras(self)
         attach_export(self)
         self.touch = attach_touch(self)
@@ -168,7 +171,7 @@ class Viewer:
     def loop(self) -> None:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
         last = time.perf_counter()
-        while not self.window.closing:
+        while not (self.window.closing and self._may_close()):
             busy = self._busy()
             redraw = self.window.wait(0.0 if busy else POLL_S if self._polling else SLEEP_S)
             now = time.perf_counter()
@@ -182,6 +185,13 @@ class Viewer:
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
+
+    def _may_close(self) -> bool:
+        """Whether nothing would be lost; else the window stays, and a box asks."""
+        may = all([asked() for asked in self.hooks.closing])
+        if not may:
+            self.window.keep_open()
+        return may
 
     def frame(self, seconds: float) -> None:
         """One frame of the window: `seconds` have passed since the last one."""
@@ -365,8 +375,9 @@ class Viewer:
         self.set_title()
 
     def set_title(self) -> None:
-        names = ", ".join(thing.name for thing in self.stage.scene.objects)
-        self.window.set_title(f"{names} \u2013 Shapeshift" if names else "Shapeshift")
+        mark = "* " if self.objects.unsaved and self.stage.document.path else ""
+        name = self.stage.title
+        self.window.set_title(f"{mark}{name} \u2013 Shapeshift" if name else "Shapeshift")
 
     @property
     def _last_frame(self) -> bool:

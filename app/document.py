@@ -22,6 +22,7 @@ class Document:
     history: History
     path: Path | None = None  # of the scene file; None: it is none yet
     saved: SceneFile | None = None  # as it lies there; an edit gives another object
+    saved_regions: int = 0  # version of the regions then
     stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
     sources: dict[ModelKey, Source] = field(default_factory=dict)
 
@@ -45,12 +46,11 @@ class Document:
     def models_by_name(self) -> dict[str, Model]:
         return {item.name: self.model(item) for item in self.file.all_items}
 
-    def add(self, source: Source) -> str:
-        """One more object, of what was read from a path of its own; returns its name."""
+    def item(self, source: Source) -> SceneItem:
+        """An object for what was read from a path of its own, at its first stop."""
         item = replace(item_of(source), x=first_stop(source.model).x)
         self.sources[key_of(item)] = source
-        self.history = self.history.take(edits.add(self.file, item), f"add {item.name}")
-        return self.file.items[-1].name
+        return item
 
     def refine(self, index: int, model: Model) -> None:
         """A finer level of detail of one object's model."""
@@ -78,7 +78,8 @@ def key_of(item: SceneItem) -> ModelKey:
 def document_of(path: Path, file: SceneFile, sources: Sequence[Source]) -> Document:
     """A scene file that was opened, and the models of its objects in their order."""
     by_key = {key_of(item): source for item, source in zip(file.all_items, sources, strict=True)}
-    return Document(History.of(file), path, file, stamp_of(path), by_key)
+    stamp = stamp_of(path)
+    return Document(History.of(file), path, saved=file, stamp=stamp, sources=by_key)
 
 
 def document_from(scene: Scene, sources: Sequence[Source]) -> Document:

@@ -14,6 +14,7 @@ from app.recent import RecentFiles
 from app.recent_panel import RecentMenu
 from app.stage import scene_of
 from runtime_models.model import BadFile
+from scene import edits
 from scene.pose import View
 from scene.read_cameras import read_camera_list
 from scene.scene import Scene
@@ -151,8 +152,8 @@ def opened_scene(found: Found, x: float | None = None) -> tuple[Scene, Document]
     file, inside = found.file, len(found.file.all_items)
     document = document_of(found.path, file, found.sources[:inside])
     for source in found.sources[inside:]:
-        document.add(source)
-    file = document.file
+        file = edits.add(file, document.item(source))
+        document.history = document.history.take(file, f"add {file.items[-1].name}")
     return scene_of_file(file, document.models_by_name()), document
 
 

@@ -52,11 +52,12 @@ def read_files(
     reading: CameraReading,
     told: Told | None,
     plain: Reading | None = None,
+    beside: bool = True,
 ) -> Found:
     """Reads scenes and files of cameras, told apart by what is in them.  Raises BadFile, OSError.
 
     `plain` is how models are read.  Cameras that lie with the first scene are read too unless
-    others were named; what is wrong with those is a note.
+    others were named, unless not `beside`; what is wrong with those is a note.
     """
     plain = plain or Reading()
     scene_files = [path for path in paths if is_scene_file(path)]
@@ -75,13 +76,13 @@ def read_files(
     floors = [c for c in cameras if c.format == "splatapult floor"]
     lists = [c for c in cameras if c not in floors]
     notes = [note for found in cameras for note in found.notes]
-    if sources and file is None:
+    if sources and file is None and beside:
         first = sources[0].path
         for found, find in ((lists, find_cameras), (floors, find_floor)):
             path = None if found else find(first)
             if path is not None:
-                beside, note = read_beside(path, reading)
-                found += beside
+                more, note = read_beside(path, reading)
+                found += more
                 notes += note
     path = scene_files[0] if scene_files else None
     return Found(tuple(sources), file, path, last(lists), last(floors), tuple(notes))

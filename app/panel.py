@@ -81,17 +81,15 @@ def draw_panel(stage: Stage, dial: Dial, readings: Readings, ui_scale: float, ho
     for draw in hooks.top:
         draw(ui_scale)
     _frame(readings)
-    if section("Budget", open_first=True):
+    _others(hooks, True, ui_scale)
+    several = len(stage.scene.objects) > 1  # then there is more to see than frames
+    if section("Budget", open_first=not several):
         draw_budget(stage, dial, ui_scale)
-    if section("Quality", open_first=True):
+    if section("Quality", open_first=not several):
         draw_quality(stage, readings, ui_scale)
     if section("Regions", open_first=bool(stage.regions.items)):
         draw_regions(stage, ui_scale)
-    for other in hooks.sections:
-        if section(other.name, other.open_first):
-            imgui.push_id(other.name)
-            other.draw(ui_scale)
-            imgui.pop_id()
+    _others(hooks, False, ui_scale)
     if section("Play"):
         draw_play(stage, ui_scale)
     if section("Look"):
@@ -176,8 +174,20 @@ def draw_problem(stage: Stage, ui_scale: float) -> None:
         imgui.end_popup()
 
 
+def _others(hooks: Hooks, above: bool, ui_scale: float) -> None:
+    """The sections of other parts of the program that have their place there."""
+    for other in hooks.sections:
+        if other.above != above:
+            continue
+        unfold = other.opens is not None and other.opens()
+        if section(other.name, other.open_first, unfold):
+            imgui.push_id(other.name)
+            other.draw(ui_scale)
+            imgui.pop_id()
+
+
 def _title(stage: Stage) -> None:
-    names = ", ".join(thing.name for thing in stage.scene.objects)
+    names = stage.title
     imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Shapeshift")
     if names:
         imgui.same_line()

@@ -11,9 +11,11 @@ Vec = imgui.ImVec2
 TIP_WIDTH = 300.0  # logical pixels; longer explanations wrap
 
 
-def section(name: str, open_first: bool = False) -> bool:
-    """A heading that folds; returns whether it is open."""
+def section(name: str, open_first: bool = False, unfold: bool = False) -> bool:
+    """A heading that folds; returns whether it is open, as it is after `unfold`."""
     imgui.dummy(Vec(0, 1))
+    if unfold:
+        imgui.set_next_item_open(True)
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
     if open_first:
         flags |= imgui.TreeNodeFlags_.default_open

@@ -16,6 +16,8 @@ class Section:
     name: str
     draw: Callable[[float], None]  # called with ui_scale between imgui.begin and end
     open_first: bool = False
+    above: bool = False  # under the title, before what is about frames
+    opens: Callable[[], bool] | None = None  # True: unfold it now
 
 
 @dataclass
@@ -35,5 +37,7 @@ class Hooks:
     over: list[Callable[["Wish"], None]] = field(default_factory=list)
     # marks: called with ui_scale; over the picture, under the panel, not in saved pictures
     marks: list[Callable[[float], None]] = field(default_factory=list)
+    # closing: asked when the window is to be closed; False = not yet
+    closing: list[Callable[[], bool]] = field(default_factory=list)
     # takes: sees every event first; True = it was for this
     takes: list[Callable[["Event"], bool]] = field(default_factory=list)

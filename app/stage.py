@@ -94,6 +94,7 @@ class Stage:
         self.reframe()
         self.regions.clear()
         self.regions.radius = self.radius
+        self.document.saved_regions = self.regions.version
 
     def reframe(self) -> None:
         """Where the middle of all is now, and how far it reaches."""
@@ -138,6 +139,12 @@ class Stage:
     def origin(self) -> np.ndarray:
         """(3,) metres of the file where the scene has its zero: not 0 for one re-centred."""
         return origin_of(self.scene.objects[0].model) if self.scene.objects else np.zeros(3)
+
+    @property
+    def title(self) -> str:
+        """What is open: the scene file, else the names of the objects."""
+        path = self.document.path
+        return path.name if path else ", ".join(thing.name for thing in self.scene.objects)
 
     @property
     def findings(self) -> list[Finding]:

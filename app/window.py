@@ -152,6 +152,10 @@ class Window:
     def close(self) -> None:
         self._window.is_closing = True
 
+    def keep_open(self) -> None:
+        """Takes back that somebody has asked to close it."""
+        self._window.is_closing = False
+
     @property
     def cursor(self) -> tuple[float, float]:
         """Where the mouse is, logical pixels from the top left."""

@@ -11,6 +11,7 @@ from scene.selector import check_x
 
 LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
+DECIMALS, FINER = 6, 9  # of metres and of a quaternion: hands are no finer, files are short
 MOST_STEPS = 500  # that can be undone
 
 
@@ -63,10 +64,11 @@ def hide(file: SceneFile, name: str, hidden: bool = True) -> SceneFile:
 
 def place(file: SceneFile, name: str, pose: Pose) -> SceneFile:
     """With the object elsewhere.  ValueError for a place that the physics does not reach."""
-    position = tuple(float(metres) for metres in pose.position)
+    position = tuple(round(float(metres), DECIMALS) for metres in pose.position)
     if not all(-FAR_M <= metres <= FAR_M for metres in position):
         raise ValueError(f"'{name}' would stand farther away than {FAR_M:g} m.")
-    return change(file, name, position=position, wxyz=tuple(float(n) for n in pose.wxyz))
+    wxyz = tuple(round(float(n), FINER) for n in pose.wxyz)
+    return change(file, name, position=position, wxyz=wxyz)
 
 
 def set_x(file: SceneFile, name: str, x: float) -> SceneFile:

@@ -15,7 +15,7 @@ from scene.scene_file import BACKGROUND, SceneFile, SceneItem
 from scene.write_scene_file import write_scene_file
 
 ROOT = Path(__file__).resolve().parents[1]
-TURN = math.sqrt(0.5)
+TURN = round(math.sqrt(0.5), 9)
 
 
 @pytest.fixture

@@ -117,10 +117,10 @@ def test_the_panel_lists_its_keys(stand, monkeypatch):
 
     viewer, _, _ = stand
     listed = []
-    monkeypatch.setattr(app.panel, "section", lambda name, open_first=False: name == "Keys")
+    monkeypatch.setattr(app.panel, "section", lambda name, *_, **__: name == "Keys")
     monkeypatch.setattr(app.panel, "rows", lambda pairs, share: listed.append(tuple(pairs)))
     viewer.overlay = True
     run_frames(viewer, 1)
     (keys,) = listed
     assert keys[: len(app.panel.KEYS)] == app.panel.KEYS
-    assert keys[len(app.panel.KEYS) :] == KEYS and {k for k, _ in KEYS} == {", .", "C"}
+    assert keys[-len(KEYS) :] == KEYS and {k for k, _ in KEYS} == {", .", "C"}

@@ -1,0 +1,132 @@
+"""Adding an object to the scene that is open: the box that takes a path or a dropped file."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.arrange import edit, undo
+from app.camera_files import camera_reading
+from app.opened import Found, Opener, read_files
+from app.panel_rows import tip
+from app.paths import plain
+from app.saving import LONGEST_PATH, answer_row, box
+from runtime_models.model import BadFile
+from scene import edits
+
+if TYPE_CHECKING:
+    from app.desktop import Viewer
+
+Vec = imgui.ImVec2
+ADD = "Add to the scene"
+MOST_RECENT = 6
+
+
+class Adding:
+    """The box, and the reading that may be under way."""
+
+    def __init__(self, viewer: "Viewer", added: Callable[[], None]) -> None:
+        self._viewer, self._added = viewer, added
+        self._opener = Opener()
+        self.asking = False
+        self._path = ""
+
+    def ask(self) -> None:
+        self.asking, self._path = True, ""
+
+    def begin(self, paths: tuple[Path, ...]) -> None:
+        """Reads files and adds them when all are there."""
+        viewer = self._viewer
+        self.asking = False
+        reading, plain_reading = camera_reading(viewer.options), viewer.options.reading()
+        self._opener.start(
+            paths,
+            lambda paths, told: read_files(
+                paths, viewer.files.read, reading, told, plain_reading, beside=False
+            ),
+        )
+        viewer.say(self._opener.note)
+
+    def poll(self) -> bool:
+        """Takes over what has been read; True while something is being read."""
+        if not self._opener.busy:
+            return False
+        viewer, name = self._viewer, self._opener.paths[0].name
+        viewer.say(self._opener.note)
+        try:
+            found = self._opener.poll()
+        except (BadFile, OSError) as error:
+            viewer.stage.problem = str(error)
+            viewer.say("")
+        except MemoryError:
+            viewer.stage.problem = f"{name} needs more memory than there is."
+            viewer.say("")
+        else:
+            if found is not None:
+                viewer.say("")
+                self.take(found)
+        return self._opener.busy
+
+    def take(self, found: Found) -> None:
+        """One object more of each source; a scene that the device cannot hold stays without."""
+        viewer, stage = self._viewer, self._viewer.stage
+        if found.file is not None:
+            stage.problem = (
+                f"{found.path.name} is a scene file: open it instead, or add its models one by one."
+            )
+            return
+        if not found.sources:
+            stage.problem = "A file of cameras is no object; drop it on the window itself."
+            return
+        file = stage.document.file
+        for source in found.sources:
+            item = stage.document.item(source)
+            file = edits.add(file, item)
+        try:
+            edit(stage, file, f"add {file.items[-1].name}")
+        except (BadFile, ValueError) as error:
+            stage.problem = str(error)
+            return
+        try:
+            viewer.renderer.update(stage.scene)
+        except BadFile as error:
+            undo(stage)
+            viewer.shown.forget()
+            stage.problem = str(error)
+            return
+        stage.chosen = file.items[-1].name
+        self._added()
+
+    def draw(self, ui_scale: float) -> None:
+        """The box: a path, a recent file, or something that is dropped meanwhile."""
+        if not self.asking or not box(ADD, ui_scale):
+            return
+        imgui.push_text_wrap_pos(0)
+        imgui.text_unformatted("Drop a file or folder here, or name it:")
+        imgui.pop_text_wrap_pos()
+        imgui.push_item_width(-1)
+        flags = imgui.InputTextFlags_.enter_returns_true
+        entered, self._path = imgui.input_text("##path", self._path[:LONGEST_PATH], flags)
+        imgui.pop_item_width()
+        chosen = self._recent(ui_scale)
+        clicked = answer_row(("Add", "Cancel"), ui_scale)
+        if chosen is not None:
+            self.begin((chosen,))
+        elif (entered or clicked == "Add") and self._path.strip():
+            self.begin((plain(self._path.strip()),))
+        elif clicked == "Cancel":
+            self.asking = False
+        if not self.asking:
+            imgui.close_current_popup()
+        imgui.end_popup()
+
+    def _recent(self, ui_scale: float) -> Path | None:
+        """Files that were opened before; the one that was clicked."""
+        recent = self._viewer.files.recent
+        chosen = None
+        for row, path in enumerate(recent.paths[:MOST_RECENT] if recent else ()):
+            if imgui.selectable(f"{path.name or path}##{row}", False)[0]:
+                chosen = path
+            tip(str(path), ui_scale)
+        return chosen

@@ -1,0 +1,143 @@
+"""Handles on the chosen object that move and turn it: ImGuizmo, drawn over the picture."""
+
+from typing import TYPE_CHECKING
+
+import glfw
+import numpy as np
+from imgui_bundle import imgui, imguizmo
+
+from app.arrange import place
+from app.window import DoubleClick, Drag, Event, KeyDown, Press, Release
+from scene.framing import frame_points, model_points
+from scene.pose import Pose
+from scene.scene import SceneObject
+from scene.scene_file import FAR_M
+
+if TYPE_CHECKING:
+    from app.desktop import Viewer
+
+Matrix16 = imguizmo.im_guizmo.Matrix16
+OFF, MOVE, TURN = "", "move", "turn"
+MODES = (OFF, MOVE, TURN)
+OPERATIONS = {
+    MOVE: imguizmo.im_guizmo.OPERATION.translate,
+    TURN: imguizmo.im_guizmo.OPERATION.rotate,
+}
+KEYS = (("M", "handles: move, turn, none"),)
+
+
+def attach_gizmo(viewer: "Viewer") -> "Gizmo":
+    """Adds the handles to a viewer; they see the mouse before everything else does."""
+    gizmo = Gizmo(viewer)
+    viewer.hooks.takes.insert(0, gizmo.take)
+    viewer.hooks.marks.append(gizmo.draw)
+    viewer.hooks.keys += KEYS
+    return gizmo
+
+
+class Gizmo:
+    """Which handles are shown, and whether the mouse holds one."""
+
+    def __init__(self, viewer: "Viewer") -> None:
+        self._viewer = viewer
+        self.mode = OFF
+        self.holding = False
+        self._shown = False  # in the last frame: only then can a handle be under the mouse
+        self._pivot: tuple = (None, np.zeros(3))  # a model, and its middle in the object's frame
+
+    def take(self, event: Event) -> bool:
+        """True for what is meant for a handle, and for the key that goes through them."""
+        match event:
+            case KeyDown(key=glfw.KEY_M):
+                self.next_mode()
+            case Press(button="left") if self._under_mouse:
+                self.holding = True
+            case DoubleClick() if self.holding:
+                pass
+            case Drag(button="left") if self.holding:
+                pass  # ImGuizmo has seen it itself
+            case Release(button="left") if self.holding:
+                self.holding = False
+                self._viewer.stage.rest()
+            case _:
+                return False
+        return True
+
+    def next_mode(self) -> None:
+        """Moving, turning, none; of the only object where none is chosen."""
+        stage = self._viewer.stage
+        self.mode = MODES[(MODES.index(self.mode) + 1) % len(MODES)]
+        if self.mode and not stage.chosen:
+            if len(stage.scene.objects) == 1:
+                stage.chosen = stage.scene.objects[0].name
+            else:
+                self._viewer.say("Click a thing, or its name, to choose what to move.")
+
+    @property
+    def _under_mouse(self) -> bool:
+        return self._shown and imguizmo.im_guizmo.is_over()
+
+    def draw(self, ui_scale: float) -> None:
+        """Shows the handles and does what the mouse does with them."""
+        viewer = self._viewer
+        stage, gizmo = viewer.stage, imguizmo.im_guizmo
+        index = stage.chosen_index
+        self._shown = bool(self.mode) and index is not None and not viewer.stage.regions.placing
+        if not self._shown:
+            self.holding = False
+            return
+        thing, view = stage.scene.objects[index], viewer.view()
+        gizmo.begin_frame()
+        gizmo.set_drawlist(imgui.get_background_draw_list())
+        gizmo.set_rect(0, 0, *viewer.window.logical_size)
+        gizmo.set_gizmo_size_clip_space(0.12 * ui_scale)
+        world_from_pivot, pivot = self._frame(thing)
+        matrix = flat(world_from_pivot)
+        before = unflat(matrix)
+        gizmo.push_id(thing.name)
+        moved = gizmo.manipulate(
+            flat(view.eye_from_world()),
+            flat(view.clip_from_eye()),
+            OPERATIONS[self.mode],
+            gizmo.MODE.world if self.mode == MOVE else gizmo.MODE.local,
+            matrix,
+        )
+        gizmo.pop_id()
+        if moved and self.holding:
+            place(stage, index, pose_after(thing, before, unflat(matrix), pivot))
+
+    def _frame(self, thing: SceneObject) -> tuple[np.ndarray, np.ndarray]:
+        """(4, 4) world_from_pivot, and the pivot (3,) in the object: where its splats are."""
+        if self._pivot[0] is not thing.model:
+            self._pivot = (thing.model, frame_points(*model_points(thing.model))[0])
+        pivot, world_from_object = self._pivot[1], thing.world_from_object.matrix()
+        world_from_pivot = world_from_object.copy()
+        world_from_pivot[:3, 3] += world_from_object[:3, :3] @ pivot
+        return world_from_pivot, pivot
+
+
+def pose_after(
+    thing: SceneObject, before: np.ndarray, after: np.ndarray, pivot: np.ndarray
+) -> Pose:
+    """Where the object is once its pivot has gone from one (4, 4) to another, both float32.
+
+    Only the difference counts, so that rounding moves and turns nothing by itself.  Never farther
+    away than the physics reaches.
+    """
+    pose = thing.world_from_object
+    middle = pose.position + pose.matrix()[:3, :3] @ pivot + (after - before)[:3, 3]
+    turn = np.eye(4)
+    turn[:3, :3] = after[:3, :3] @ before[:3, :3].T @ pose.matrix()[:3, :3]
+    same = np.array_equal(after[:3, :3], before[:3, :3])
+    wxyz = pose.wxyz if same else Pose.from_matrix(turn).wxyz
+    position = middle - Pose(np.zeros(3), wxyz).matrix()[:3, :3] @ pivot
+    return Pose(np.clip(position, -FAR_M, FAR_M), wxyz)
+
+
+def flat(matrix: np.ndarray) -> Matrix16:
+    """A (4, 4) as ImGuizmo has it: column by column, float32."""
+    return Matrix16(np.asarray(matrix, np.float32).T.ravel().copy())
+
+
+def unflat(matrix: Matrix16) -> np.ndarray:
+    return np.array(matrix.values, np.float64).reshape(4, 4).T
