@@ -11,6 +11,8 @@ from scene.read_script import between
 from scene.scene import SceneObject
 from scene.scene_file import BACKGROUND, SceneItem, machine_of, object_of
 
+LEADS, FOLLOWS = 6, 18  # steps in which a thing that is taken, or let go, changes its lead
+
 
 @dataclass(frozen=True)
 class Thing:
@@ -24,6 +26,7 @@ class Thing:
     before: Pose  # at the step before, for pictures between two steps
     drawn: SceneObject  # as it was drawn last
     collider: object | None = None  # scene.collider.Collider
+    lead: float = 0.0  # of a step: drawn so much ahead of others, 1 in a hand, that it cannot lag
 
     @property
     def moves(self) -> bool:
@@ -52,13 +55,21 @@ def add_body(physics, item: SceneItem, collider) -> int | None:
         raise BadFile(f"object '{item.name}': {error}") from None
 
 
-def drawn_thing(thing: Thing, part: float) -> Thing:
-    """With what is drawn at a part 0..1 of the way from the step before to this one.
+def after_step(thing: Thing, pose: Pose, standing: Standing, held: bool) -> Thing:
+    """Where it stands now; what is taken gets ahead in LEADS steps, let go it falls back slowly."""
+    lead = thing.lead + (1 / LEADS if held else -1 / FOLLOWS)
+    return replace(
+        thing, standing=standing, pose=pose, before=thing.pose, lead=min(max(lead, 0.0), 1.0)
+    )
+
+
+def drawn_thing(thing: Thing, part: float | None) -> Thing:
+    """With what is drawn at a part 0..1 of the way from the step before to this one; None: now.
 
     The same thing, and the same SceneObject in it, where that is what was drawn last.
     """
-    still = part == 1.0 or same_pose(thing.before, thing.pose)
-    pose = thing.pose if still else between(thing.before, thing.pose, part)
+    still = part is None or same_pose(thing.before, thing.pose)
+    pose = thing.pose if still else between(thing.before, thing.pose, part + thing.lead)
     drawn, x = thing.drawn, thing.standing.x
     if drawn.x == x and same_pose(drawn.world_from_object, pose):
         return thing

@@ -19,7 +19,7 @@ from scene.read_script import between
 from scene.record import Record, event_row, rounded
 from scene.scene import Scene
 from scene.scene_file import SceneFile, SceneItem, labelled
-from scene.thing import Thing, drawn_thing, new_thing, same_pose
+from scene.thing import Thing, after_step, drawn_thing, new_thing, same_pose
 
 FLOOR_NAME = "floor"
 REACH_M = 0.05  # from a hand to what it grabs
@@ -81,7 +81,8 @@ class World:
         self._rays_told: list[dict] = []
         self._hands_before: dict[str, Pose] = {}  # at the end of the last `advance`
         self._behind_s = 0.0  # time that has passed and is no whole step yet
-        self._part = 1.0  # of the way from the step before to this one, in what is drawn
+        self._part: float | None = None  # of the way from the step before to this one, in what is
+        # drawn; None: this one as it is
         self._drawn = Scene(())
         for label, item in labelled(file):
             self.add(item, models[item.name], colliders.get(item.name), label)
@@ -269,10 +270,11 @@ class World:
         events, self._events = self._events, {}
         contacts = sorted(self.physics.step(), key=lambda contact: (contact.a, contact.b))
         self.steps += 1
-        self._part = 1.0
+        self._part = None
         self._collide(contacts, record, events)
+        held = {self.held(hand) for hand in self.holds}
         for name in self.things:
-            self._react(name, record, events.get(name, ()))
+            self._react(name, record, events.get(name, ()), name in held)
         return record
 
     def advance(self, seconds: float) -> list[Record]:
@@ -316,12 +318,12 @@ class World:
                 record.contacts.append({"between": names, "impulse_n_s": impulse, "point": point})
         self.impulses = now
 
-    def _react(self, name: str, record: Record, events: list[Event]) -> None:
+    def _react(self, name: str, record: Record, events: list[Event], held: bool) -> None:
         """The object's new pose and x; what has changed is told."""
         thing = self.things[name]
         pose = self.physics.pose(thing.body) if thing.moves else thing.pose
         standing, fired = advance(thing.machine, thing.standing, self.time_s, events, pose.position)
-        self.things[name] = replace(thing, standing=standing, pose=pose, before=thing.pose)
+        self.things[name] = after_step(thing, pose, standing, held)
         record.events += [event_row(name, answer) for answer in fired]
         told = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
         x = rounded(standing.x)
@@ -335,7 +337,11 @@ class World:
     # ---- what is seen of it
 
     def drawn(self) -> Scene:
-        """The scene as it stands now, for the renderer; the same object until something changes."""
+        """The scene as it stands now, for the renderer; the same object until something changes.
+
+        After `advance` what is free is drawn up to a step late, between two steps, and what a hand
+        holds where it will be, so that it does not lag behind the hand.
+        """
         self.things = {name: drawn_thing(t, self._part) for name, t in self.things.items()}
         objects = tuple(thing.drawn for thing in self.things.values())
         if list(map(id, objects)) != list(map(id, self._drawn.objects)):
@@ -358,4 +364,4 @@ class World:
         self.holds, self.impulses, self.steps = dict(saved.holds), dict(saved.impulses), saved.steps
         self.names = {t.body: name for name, t in self.things.items() if t.body is not None}
         self._events, self._hands_told, self._rays_told, self._told = {}, [], [], {}
-        self._hands_before, self._behind_s, self._part = dict(saved.hands), 0.0, 1.0
+        self._hands_before, self._behind_s, self._part = dict(saved.hands), 0.0, None

@@ -194,6 +194,26 @@ def test_drawn_never_goes_back():
         last = y
 
 
+@pytest.mark.parametrize("frame_hz", [60, 72, 90, 120])
+def test_what_a_hand_carries_is_drawn_where_the_hand_is(frame_hz):
+    """At 1 m/s at most 5 mm behind once it has been taken; let go it does not step back."""
+    world = real(item(position=(0, 1, 0)), floor_y=None, gravity_m_s2=0.0)
+    world.move_hand("right", at(0, 1, 0))
+    world.grab("right")
+    drawn = []
+    for number in range(1, frame_hz + 1):
+        if number < frame_hz // 2:
+            world.move_hand("right", at(number / frame_hz, 1, 0))
+        elif number == frame_hz // 2:
+            world.release("right")
+        world.advance(1 / frame_hz)
+        drawn.append(world.drawn().objects[0].world_from_object.position[0])
+        if 0.3 * frame_hz < number < frame_hz // 2:
+            assert abs(drawn[-1] - number / frame_hz) < 0.005
+    steps = np.diff(drawn[frame_hz // 4 :]) * frame_hz  # m/s
+    assert 0.85 < steps.min() and steps.max() < 1.15
+
+
 def test_at_rest_the_drawn_scene_is_the_same_object():
     world = real(item(position=(0, HALF, 0)))
     for _ in range(500):
