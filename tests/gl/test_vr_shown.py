@@ -1,0 +1,112 @@
+"""An eye's picture on its way into the runtime's image: known colours, encoded and linear."""
+
+import moderngl
+import numpy as np
+import pytest
+
+from vr.shown import WHOLE, Shown, middle
+from vr.swapchain import FORMATS, choose_format, read
+
+SIZE = (64, 48)
+GL_SRGB8_ALPHA8, GL_FRAMEBUFFER_SRGB = 0x8C43, 0x8DB9
+COVER = """#version 430
+const vec2 CORNERS[3] = vec2[](vec2(-1, -1), vec2(3, -1), vec2(-1, 3));
+void main() { gl_Position = vec4(CORNERS[gl_VertexID], 0, 1); }
+"""
+SAMPLE = """#version 430
+uniform sampler2D image; out vec4 seen;
+void main() { seen = texelFetch(image, ivec2(gl_FragCoord.xy), 0); }
+"""
+SAMPLES = np.array(
+    [[0, 0, 0], [1, 2, 3], [10, 11, 12], [127, 128, 129], [200, 100, 50], [254, 255, 255]],
+    np.uint8,
+)
+
+
+def light(display: np.ndarray) -> np.ndarray:
+    """The slow twin: IEC 61966-2-1, value by value, of 0..1."""
+    flat = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in display.ravel()]
+    return np.array(flat).reshape(display.shape)
+
+
+@pytest.fixture
+def shown(ctx):
+    made = Shown(ctx)
+    yield made
+    made.release()
+
+
+def picture(ctx) -> tuple[moderngl.Texture, np.ndarray]:
+    """A texture of all samples, row 0 at the bottom, and the same as (H, W, 3) display 0..1."""
+    rng = np.random.default_rng(0)
+    pixels = SAMPLES[rng.integers(0, len(SAMPLES), SIZE[::-1])]
+    rgba = np.dstack([pixels, np.full(SIZE[::-1], 255, np.uint8)])
+    return ctx.texture(SIZE, 4, rgba.tobytes()), pixels[::-1] / 255
+
+
+def sampled(ctx, texture: moderngl.Texture) -> np.ndarray:
+    """What the GPU takes the texture's values for, as a compositor does: (H, W, 3), row 0 on top.
+
+    moderngl says nothing of an internal format when it reads: this shader samples.
+    """
+    program = ctx.program(vertex_shader=COVER, fragment_shader=SAMPLE)
+    target = ctx.framebuffer([ctx.texture(SIZE, 4, dtype="f4")])
+    target.use()
+    texture.use(0)
+    ctx.vertex_array(program, []).render(moderngl.TRIANGLES, vertices=3)
+    return read(target)
+
+
+@pytest.mark.parametrize("left_on", [False, True])
+def test_an_srgb_image_holds_the_bytes_and_means_their_light(ctx, shown, left_on):
+    texture, display = picture(ctx)
+    image = ctx.texture(SIZE, 4, internal_format=GL_SRGB8_ALPHA8)
+    if left_on:  # a runtime may leave the conversion switched on
+        ctx.enable_direct(GL_FRAMEBUFFER_SRGB)
+    target = ctx.framebuffer([image])
+    shown.draw(texture, target)
+    ctx.disable_direct(GL_FRAMEBUFFER_SRGB)
+    data = target.read(components=3, alignment=1)
+    found = np.frombuffer(data, np.uint8).reshape(SIZE[1], SIZE[0], 3)[::-1]
+    np.testing.assert_array_equal(found, np.round(display * 255))
+    np.testing.assert_allclose(sampled(ctx, image), light(display), atol=2e-3)
+
+
+def test_a_linear_image_holds_light(ctx, shown):
+    texture, display = picture(ctx)
+    image = ctx.texture(SIZE, 4, dtype="f4")
+    target = ctx.framebuffer([image])
+    shown.draw(texture, target, linear=True)
+    np.testing.assert_allclose(read(target), light(display), atol=1e-5)
+    np.testing.assert_allclose(sampled(ctx, image), light(display), atol=1e-5)
+
+
+def test_a_part_is_what_the_mirror_shows(ctx, shown):
+    texture, display = picture(ctx)
+    into = (20, 48)
+    part = middle(SIZE, into)
+    target = ctx.framebuffer([ctx.texture(into, 4)])
+    shown.draw(texture, target, part)
+    np.testing.assert_allclose(read(target), display[:, 22:42], atol=1 / 255)
+
+
+def test_the_middle_has_the_shape_of_the_window():
+    assert middle((64, 48), (64, 48)) == WHOLE
+    for into in ((100, 10), (10, 100), (7, 7), (64, 47)):
+        left, bottom, width, height = middle((64, 48), into)
+        assert left + width / 2 == pytest.approx(0.5) and bottom + height / 2 == pytest.approx(0.5)
+        assert max(width, height) == 1 and min(width, height) > 0
+        assert 64 * width / (48 * height) == pytest.approx(into[0] / into[1])
+
+
+def test_display_values_are_wanted_first_and_light_only_with_enough_bits():
+    every = [each.gl for each in FORMATS]
+    assert choose_format(every).name == "SRGB8_ALPHA8"
+    assert choose_format([0x8058, 0x881A]).name == "RGBA16F"
+    assert choose_format([0x8058, 0x1234]).name == "RGBA8"
+    assert choose_format(every, "RGBA8").linear
+    assert not choose_format(every).linear
+    with pytest.raises(ValueError, match=r"no format of ours among the runtime's \(0x1234\)"):
+        choose_format([0x1234])
+    with pytest.raises(ValueError, match="no format of RGBA16 among"):
+        choose_format([0x8C43], "RGBA16")

@@ -1,0 +1,45 @@
+"""Known colours in the images of a real runtime: encoded where it takes them so, else as light."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from show_colour import PATCHES
+
+PROGRAM = Path(__file__).with_name("show_colour.py")
+WHITE = 255
+
+
+def light(display: np.ndarray) -> np.ndarray:
+    """IEC 61966-2-1 of 0..1."""
+    return np.where(display <= 0.04045, display / 12.92, ((display + 0.055) / 1.055) ** 2.4)
+
+
+@pytest.mark.parametrize(
+    ("name", "linear", "within"),
+    [
+        ("SRGB8_ALPHA8", False, 1e-6),  # the very bytes
+        ("RGBA16F", True, 1e-3),
+        ("RGBA16", True, 1e-4),
+        ("RGBA8", True, 0.5 / WHITE + 1e-6),
+    ],
+)
+def test_a_known_colour_arrives_in_both_eyes(stand, name, linear, within):
+    done = subprocess.run(
+        [sys.executable, PROGRAM, name, "3"],
+        env=stand.environment, capture_output=True, text=True, timeout=60,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith('{"format"')]
+    told = json.loads(line)
+    assert (told["format"], told["linear"]) == (name, linear)
+    assert told["states"][-3:] == ["STOPPING", "IDLE", "EXITING"] and told["shown"] >= 3
+    display = np.array(PATCHES) / WHITE
+    wanted = light(display) if linear else display
+    left, right = map(np.array, told["eyes"])
+    np.testing.assert_allclose(left, wanted, atol=within)
+    np.testing.assert_allclose(right, wanted[::-1], atol=within)
