@@ -47,8 +47,9 @@ def read_event(xr, told) -> Event | None:
     """An event buffer as one of ours; None for one that means nothing to us."""
     kinds, kind = xr.StructureType, int(told._type)
     if kind == int(kinds.EVENT_DATA_SESSION_STATE_CHANGED):
-        changed = _as(told, xr.EventDataSessionStateChanged)
-        return StateChanged(xr.SessionState(changed._state).name)
+        number = int(_as(told, xr.EventDataSessionStateChanged)._state)
+        names = {int(state): state.name for state in xr.SessionState}
+        return StateChanged(names[number]) if number in names else None
     if kind == int(kinds.EVENT_DATA_REFERENCE_SPACE_CHANGE_PENDING):
         pending = _as(told, xr.EventDataReferenceSpaceChangePending)
         names = {int(getattr(xr.ReferenceSpaceType, name)): name

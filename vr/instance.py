@@ -35,13 +35,17 @@ class Instance:
         self.xr = xr = load()
         self.runtime = "the active OpenXR runtime"
         self.extensions = self._choose_extensions()
-        with self.asked("open"):
-            self.handle = xr.create_instance(
-                xr.InstanceCreateInfo(
-                    application_info=xr.ApplicationInfo(NAME, 1, NAME, 0, xr.Version(*API)),
-                    enabled_extension_names=list(self.extensions),
-                )
-            )
+        info = xr.InstanceCreateInfo(
+            application_info=xr.ApplicationInfo(NAME, 1, NAME, 0, xr.Version(*API)),
+            enabled_extension_names=list(self.extensions),
+        )
+        try:
+            with self.asked("open"):
+                self.handle = xr.create_instance(info)
+        except xr.exception.ErrorResult as error:
+            raise NoHeadset(
+                f"{self.runtime} refuses us ({type(error).__name__}); update it, or {HOW_TO}."
+            ) from None
         try:
             self._name_runtime()
             self._find_headset()

@@ -1,0 +1,128 @@
+"""What a headset's frames are drawn with: exact where time allows, the floor never left."""
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from app.pacing import AUTO, FIXED, LATE, PART, QUALITIES, Pacing
+from app.quick_chart import QUICK, QuickRow
+from renderer.settings import RenderSettings
+from vr.panel_state import QUALITIES as ON_THE_PANEL
+
+BACKGROUND = (0.1, 0.2, 0.3)
+PERIOD = 0.010  # seconds
+TARGET = PART * PERIOD * 1e3  # ms
+
+
+@dataclass
+class FakeChart:
+    """Times that are known: name -> (ms, dB)."""
+
+    exact: float
+    priced: dict = field(default_factory=dict)
+    measured: int = 0
+
+    def exact_ms(self) -> float:
+        return self.exact
+
+    def rows(self) -> tuple[QuickRow, ...]:
+        self.measured += 1
+        settings = {"exact": RenderSettings()}
+        settings |= {name: RenderSettings(**changes) for name, changes in QUICK.items()}
+        priced = {"exact": (self.exact, 99.0), **self.priced}
+        return tuple(QuickRow(name, settings[name], *row) for name, row in priced.items())
+
+
+def test_what_is_far_from_the_period_is_exact_and_not_measured(capsys):
+    pacing, chart = Pacing(BACKGROUND), FakeChart(0.5 * TARGET)
+    assert pacing.wants_measure(PERIOD) and not pacing.wants_measure(0.0)
+    pacing.measure(chart, PERIOD)
+    assert pacing.settings() == RenderSettings(background=BACKGROUND)
+    assert chart.measured == 0 and capsys.readouterr().err == ""
+    assert not pacing.wants_measure(PERIOD) and not pacing.wants_measure(1.05 * PERIOD)
+    assert pacing.wants_measure(2 * PERIOD)
+
+
+def test_what_is_too_slow_is_the_best_that_is_fast_enough(capsys):
+    pacing = Pacing(BACKGROUND)
+    rows = {
+        "1 px footprint": (0.9 * TARGET, 41.0), "2 px footprint": (0.5 * TARGET, 36.0),
+        "16-bit keys": (1.9 * TARGET, 70.0), "50 % scale": (0.4 * TARGET, 30.0),
+    }  # fmt: skip
+    pacing.measure(FakeChart(2 * TARGET, rows), PERIOD)
+    assert pacing.chosen == "1 px footprint" and "41.0 dB" in capsys.readouterr().err
+    assert pacing.settings() == RenderSettings(background=BACKGROUND, min_pixels=1.0)
+    for _ in range(200):  # late however often: on top of it nothing is priced
+        pacing.seen(3 * TARGET)
+    assert pacing.settings().render_scale == 1.0
+
+
+def test_late_frames_have_fewer_pixels_but_never_below_what_the_floor_was_priced_at():
+    pacing = Pacing(BACKGROUND)
+    rows = {"75 % scale": (0.8 * TARGET, 38.0), "50 % scale": (0.5 * TARGET, 33.0)}
+    pacing.measure(FakeChart(0.95 * TARGET, rows), PERIOD)
+    assert pacing.chosen == "exact" and pacing.settings().render_scale == 1.0
+    for _ in range(200):
+        pacing.seen(2 * TARGET)
+    assert pacing.settings().render_scale == 0.75
+    for _ in range(2000):
+        pacing.seen(0.3 * TARGET)
+    assert pacing.settings().render_scale == 1.0
+
+
+def test_a_chosen_scale_is_where_fewer_pixels_begin():
+    pacing = Pacing(BACKGROUND)
+    rows = {"75 % scale": (1.2 * TARGET, 40.0), "50 % scale": (0.8 * TARGET, 36.0)}
+    pacing.measure(FakeChart(2 * TARGET, rows), PERIOD)
+    assert pacing.settings().render_scale == 0.5
+    for _ in range(200):
+        pacing.seen(2 * TARGET)
+    assert pacing.settings().render_scale == 0.5
+
+
+def test_what_proves_slow_later_is_measured_once_then():
+    pacing, chart = Pacing(BACKGROUND), FakeChart(0.5 * TARGET, {"75 % scale": (TARGET, 38.0)})
+    pacing.measure(chart, PERIOD)
+    for _ in range(LATE):
+        assert not pacing.wants_measure(PERIOD)
+        pacing.seen(2 * TARGET)
+    assert pacing.wants_measure(PERIOD)
+    pacing.measure(chart, PERIOD)
+    assert chart.measured == 1
+    for _ in range(2 * LATE):
+        pacing.seen(2 * TARGET)
+    assert not pacing.wants_measure(PERIOD)
+
+
+def test_another_period_chooses_again_from_what_was_measured():
+    pacing = Pacing(BACKGROUND)
+    chart = FakeChart(2 * TARGET, {"1 px footprint": (0.9 * TARGET, 41.0)})
+    pacing.measure(chart, PERIOD)
+    assert pacing.chosen == "1 px footprint" and pacing.wants_measure(3 * PERIOD)
+    pacing.measure(chart, 3 * PERIOD)
+    assert pacing.chosen == "exact" and chart.measured == 1
+
+
+def test_times_that_do_not_count_change_nothing():
+    pacing = Pacing(BACKGROUND)
+    pacing.measure(FakeChart(2 * TARGET, {"75 % scale": (TARGET, 38.0)}), PERIOD)
+    before = pacing.settings()
+    for ms in (0.0, -1.0, float("nan")):
+        for _ in range(100):
+            pacing.seen(ms)
+    assert pacing.settings() == before
+
+
+@pytest.mark.parametrize("quality", FIXED)
+def test_a_fixed_quality_stays_as_it_is(quality):
+    pacing = Pacing(BACKGROUND, quality)
+    assert not pacing.wants_measure(PERIOD)
+    before = pacing.settings()
+    for _ in range(100):
+        pacing.seen(1000.0)
+    assert pacing.settings() == before and before.background == BACKGROUND
+    assert (before.render_scale < 1) == (quality == "fast")
+
+
+def test_the_panel_offers_what_there_is():
+    assert set(ON_THE_PANEL) == set(QUALITIES) and QUALITIES[0] == AUTO
