@@ -203,7 +203,7 @@ def reset(travel: Travel, frame: Frame, seconds: float) -> tuple[Travel, bool, b
 def beyond_rest(stick: tuple[float, float], dead: float) -> tuple[float, float]:
     """What a stick says beyond its dead zone, finer near it; what is no number rests."""
     length = math.hypot(*stick)
-    if not length > dead:
+    if not dead < length < math.inf:
         return 0.0, 0.0
     pace = min((length - dead) / (1 - dead), 1.0) ** 2
     return stick[0] / length * pace, stick[1] / length * pace
