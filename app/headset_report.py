@@ -9,6 +9,7 @@ import numpy as np
 from app.drawing import save_png
 from runtime_models.whole_file import write_whole
 from scene.pose import Pose
+from vr.carried import panel_row
 from vr.frame import SIDES, Frame, Hand
 from vr.swapchain import read
 
@@ -69,6 +70,7 @@ def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> d
     return {
         "frame": number,
         "seen_s": rounded(frame.seen_s),
+        "time_s": rounded(world.time_s),  # of the physics
         "state": session.life.state,
         "drawn": frame.drawn,
         "focused": frame.focused,
@@ -85,7 +87,7 @@ def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> d
             thing.name: {**pose_row(thing.world_from_object), "x": rounded(thing.x)}
             for thing in world.drawn().objects
         },
-        "panel": None,
+        "panel": panel_row(wearing.panel.carried),
         "events": [event for record in records for event in record.events],
         "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in wearing.pulses],
         "own_ms": rounded(times[-1]) if times else None,
@@ -97,6 +99,7 @@ def hand_row(hand: Hand) -> dict:
     return {
         "active": hand.active,
         "grip": pose_row(hand.grip) if hand.grip is not None else None,
+        "aim": pose_row(hand.aim) if hand.aim is not None else None,
         "squeeze": rounded(hand.squeeze),
         "trigger": rounded(hand.trigger),
         "stick": numbers(hand.stick),

@@ -8,21 +8,28 @@ from app.headset_report import Report
 from app.mirror import Mirror, NoMirror
 from app.pacing import Pacing, StereoChart
 from app.person import Person
+from app.worn_panel import WornPanel
 from app.worn_scene import WornScene
 from renderer.renderer import Renderer
 from renderer.settings import FrameStats
 from scene.pose import View
+from vr.drawn import Drawn, drawn_of
 from vr.frame import Frame
 from vr.locomotion import RULES, Rules
+from vr.overlay import Overlay
 from vr.session import Session
 from vr.standing import Standing
 from vr.touching import strongest
 
 
 class Eyes:
-    """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`."""
+    """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`.
+
+    And what is drawn over it.
+    """
 
     def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
+        self.overlay = Overlay(ctx)
         self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
 
     @property
@@ -33,6 +40,7 @@ class Eyes:
         return self
 
     def __exit__(self, *failure) -> None:
+        self.overlay.release()
         for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
             framebuffer.release()
             texture.release()
@@ -56,21 +64,26 @@ class Wearing:
         self.scene, self.world = scene, scene.world
         self.pacing, self.report = pacing, report
         self.person = Person(scene.world, scene.eye, scene.floor_y, rules)
+        self.panel = WornPanel()
         self.standing = Standing()
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
+        self._leaving = False
 
     def loop(self, frames: int = 0) -> None:
         """Until the runtime, the person at the desk or `frames` (0: none) end it."""
-        leaving = False
         for frame in self.session.frames(self.mirror.rest):
             self.frame(frame)
             done = 0 < frames <= self.session.pace.frames
-            if (done or self.mirror.closing) and not leaving:
-                leaving = True
-                self.report.ended = "frames" if done else "closed at the desk"
-                self.session.leave()
+            if done or self.mirror.closing:
+                self.leave("frames" if done else "closed at the desk")
+
+    def leave(self, why: str) -> None:
+        """Asks the runtime for the end; a few frames later it comes."""
+        if not self._leaving:
+            self._leaving, self.report.ended = True, why
+            self.session.leave()
 
     def frame(self, frame: Frame) -> None:
         """One frame: the person, the world, the pictures of both eyes."""
@@ -79,26 +92,30 @@ class Wearing:
         if self._seen_s is None or frame.recentred:
             self.recentre(frame)
         self._seen_s = frame.seen_s
-        self.standing = self.person.act(frame, self.standing, seconds)
+        left_over = self.panel.act(self, frame, seconds)
+        self.standing = self.person.act(left_over, self.standing, seconds)
         records = self.world.advance(seconds)
         for pulse in strongest(self.person.felt(records)):
             self.pulse(pulse.side, pulse.strength, pulse.seconds)
         if frame.drawn:
             views = [self.standing.view(view) for view in frame.views]
             self._choose_quality(views)
-            self.draw(views)
+            person = self.person
+            over = drawn_of(frame.hands, self.panel.carried, person.comfort, person.touched)
+            self.draw(views, frame.views, over)
             self.session.submit(self.eyes.textures)
             self.pacing.seen(self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
         self.report.note(self, frame, records)
 
-    def draw(self, views: list[View]) -> None:
-        """Splats with one sort for both eyes."""
+    def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
+        """Splats with one sort for both eyes, and what is in the room over them."""
         self.renderer.settings = self.pacing.settings()
         self.renderer.update(self.world.drawn())
         self.stats = self.renderer.draw(views)
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
+            self.eyes.overlay.draw(framebuffer, play_views[i], over)
 
     def _choose_quality(self, views: list[View]) -> None:
         """What of the picture can be had within the display's period: once that is known, and

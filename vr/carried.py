@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from scene.pose import Pose
 from vr.frame import SIDES, Frame, Hand
 from vr.panel import press, push, taken
-from vr.panel_layout import lay_out
-from vr.panel_place import NOBODY, Pointing, hang, point_at
-from vr.panel_state import Facts, Panel, Place, Wish
+from vr.panel_layout import TRACK, knob_place, lay_out
+from vr.panel_place import NOBODY, Pointing, hang, play_point, point_at
+from vr.panel_state import Facts, Panel, Place, Wish, shown_stop
 
 
 @dataclass(frozen=True)
@@ -64,3 +64,29 @@ def _toggled(carried: Carried, hands: dict[str, Hand]) -> Panel:
             now = "" if panel.side == side else side
             panel = replace(panel, side=now, hovers={}, held={}, stick="", exit_s=0.0)
     return panel
+
+
+def panel_row(carried: Carried) -> dict:
+    """What a line of a report says of the panel: which stop is shown, and where in the room, (3,)
+    metres, its knob, the ends of its slider and the middles of its buttons are.
+    """
+    panel, pose, slider = carried.panel, carried.play_from_panel, carried.panel.slider
+    row = {"open": panel.open, "hand": panel.side, "shown": shown_stop(slider) if slider else ""}
+    if pose is None:
+        return row
+    layout = lay_out(panel)
+
+    def place(at: Place) -> list[float]:
+        return [round(float(number), 6) for number in play_point(pose, layout, at)]
+
+    row["object"] = slider.name if slider else ""
+    row["taken"] = sorted(taken(panel))
+    if slider is not None:
+        row["knob"] = place(knob_place(panel))
+        row["slider"] = [place((x, layout.track_y)) for x in TRACK]
+    row["buttons"] = {
+        item.name: place(((item.box[0] + item.box[2]) / 2, (item.box[1] + item.box[3]) / 2))
+        for item in layout.items
+        if item.name not in ("track", "size")
+    }
+    return row

@@ -17,6 +17,7 @@ from vr.locomotion import Comfort
 from vr.panel_layout import lay_out
 from vr.panel_place import play_point
 from vr.panel_state import Panel
+from vr.touching import Beam, Touched
 
 FINE, WRONG, PALE = (0.96, 0.66, 0.30), (0.90, 0.32, 0.26), (0.92, 0.93, 0.96)  # display sRGB
 RAY_M, RAY_FROM_M = 1.2, 0.06  # metres of a ray that meets nothing, and where it begins to show
@@ -24,6 +25,7 @@ RAY_THICK, ARC_THICK, RING_THICK = 0.0014, 0.006, 0.008  # radii
 RING_M, RING_PARTS = 0.22, 32  # of the ring where a jump lands
 DOT_M = 0.005  # radius of the dot where a ray meets something
 FINGER_DOT_M = 0.003
+CALM, NOTHING = Comfort(), Touched()
 
 
 @dataclass(frozen=True)
@@ -41,20 +43,17 @@ class Drawn:
 def drawn_of(
     hands: Mapping[str, Hand],
     carried: Carried,
-    comfort: Comfort | None = None,
-    holds: frozenset[str] = frozenset(),
-    ends_m: Mapping[str, float] | None = None,
+    comfort: Comfort = CALM,
+    touched: Touched = NOTHING,
 ) -> Drawn:
-    """What a frame shows.
-
-    hands as the runtime has them; holds: sides that hold an object; ends_m: how far, in metres of
-    the room, the ray of a hand is from what it meets in the world, where it meets anything.
-    """
-    comfort = comfort or Comfort()
+    """What a frame shows; `hands` as the runtime has them, before the panel takes its part."""
     lines: list[Capsule] = []
+    beams = {beam.side: beam for beam in touched.beams}
+    holds = {side for side, name in touched.held.items() if name is not None}
     for side in SIDES:
-        if side not in holds and not (comfort.arc is not None and hands[side].primary):
-            lines += ray(side, hands[side], carried, (ends_m or {}).get(side))
+        aims_jump = comfort.arc is not None and hands[side].primary
+        if side not in holds and not aims_jump:
+            lines += ray(side, hands[side], carried, beams.get(side))
     if comfort.arc is not None:
         lines += arc(comfort.arc.points, comfort.arc.landing, comfort.arc.fine)
     solid = [part for side in SIDES for part in glove(side, hands[side], side in holds)]
@@ -63,8 +62,10 @@ def drawn_of(
                  comfort.vignette, comfort.blink)  # fmt: skip
 
 
-def ray(side: str, hand: Hand, carried: Carried, end_m: float | None) -> list[Capsule]:
-    """A thin ray along the aim: to the panel where it points at it, to what it meets, or fading."""
+def ray(side: str, hand: Hand, carried: Carried, beam: Beam | None) -> list[Capsule]:
+    """A thin ray along the aim: to the panel where it points at it, to what the trigger acts on,
+    else it fades out.
+    """
     panel, pose = carried.panel, carried.play_from_panel
     if hand.aim is None or side == panel.side:
         return []
@@ -73,16 +74,15 @@ def ray(side: str, hand: Hand, carried: Carried, end_m: float | None) -> list[Ca
     at = carried.places.get(side)
     if side in panel.hovers and at is not None and pose is not None:
         dot = play_point(pose, lay_out(panel), at)
-        held = side in carried.pointing.down
+        color = FINE if side in carried.pointing.down else PALE
         if side in carried.pointing.near:
-            return [Capsule(dot, dot, (FINGER_DOT_M,) * 2, (*(FINE if held else PALE), 1.0))]
-        return _beam(start, dot, along, FINE if held else PALE)
-    if end_m is not None:
-        return _beam(start, start + along * end_m, along, FINE)
-    faint, gone = (*PALE, 0.35), (*PALE, 0.0)
-    return [
-        Capsule(start + along * RAY_FROM_M, start + along * RAY_M, (RAY_THICK,) * 2, faint, gone)
-    ]
+            return [Capsule(dot, dot, (FINGER_DOT_M, FINGER_DOT_M), (*color, 1.0))]
+        return _beam(start, dot, along, color, RAY_THICK)
+    if beam is not None:
+        thick = 3 * RAY_THICK if beam.acts else RAY_THICK
+        return _beam(beam.start, beam.end, along, FINE if beam.meets or beam.acts else PALE, thick)
+    ends = start + along * RAY_FROM_M, start + along * RAY_M
+    return [Capsule(*ends, (RAY_THICK, RAY_THICK), (*PALE, 0.35), (*PALE, 0.0))]
 
 
 def arc(points: np.ndarray, landing: np.ndarray | None, fine: bool) -> list[Capsule]:
@@ -98,11 +98,13 @@ def arc(points: np.ndarray, landing: np.ndarray | None, fine: bool) -> list[Caps
     return lines
 
 
-def _beam(start: np.ndarray, end: np.ndarray, along: np.ndarray, color: tuple) -> list[Capsule]:
+def _beam(
+    start: np.ndarray, end: np.ndarray, along: np.ndarray, color: tuple, thick: float
+) -> list[Capsule]:
     """A ray that comes out of the hand and ends in a dot."""
     length = float((end - start) @ along)
     dot = Capsule(end, end, (DOT_M, DOT_M), (*color, 1.0))
     if not length > RAY_FROM_M:
         return [dot]
     first = start + along * RAY_FROM_M
-    return [Capsule(first, end, (RAY_THICK,) * 2, (*color, 0.25), (*color, 0.9)), dot]
+    return [Capsule(first, end, (thick, thick), (*color, 0.25), (*color, 0.9)), dot]

@@ -20,6 +20,7 @@ REST, FIST = np.array([0.62, 0.85, 0.45]), np.array([1.30, 1.50, 0.95])  # radia
 THUMB_BASE = np.array([0.008, 0.030, -0.030])  # metres, right hand
 THUMB_OPEN = np.array([[-0.45, -0.55, -0.70], [-0.20, -0.90, -0.40]])  # where its bones point
 THUMB_SHUT = np.array([[-0.80, -0.55, -0.25], [-0.50, -0.60, 0.60]])
+MIRROR = {"right": np.array([1.0, 1.0, 1.0]), "left": np.array([-1.0, 1.0, 1.0])}
 MOST_ASIDE = 0.8  # radians from straight ahead that the pointing finger turns to the aim
 
 
@@ -38,8 +39,7 @@ def glove(side: str, hand: Hand, holds: bool = False) -> list[Capsule]:
     """The capsules of a hand in the room; none when it is lost."""
     if hand.grip is None:
         return []
-    mirror = np.array([1.0 if side == "right" else -1.0, 1.0, 1.0])
-    to_play = hand.grip.matrix()[:3, :3] * mirror  # columns: of the right hand's frame
+    to_play = hand.grip.matrix()[:3, :3] * MIRROR[side]  # columns: of the right hand's frame
 
     def put(a, b, radii, color) -> Capsule:
         at = hand.grip.position
@@ -69,10 +69,10 @@ def fingertip(side: str, hand: Hand) -> np.ndarray:
 
     As it is with the trigger at rest: pulling it shall not draw the finger off what it touches.
     """
-    still = Hand(True, hand.grip, hand.aim)
-    end = glove(side, still)[3]
-    along = end.b - end.a
-    return end.b + along / np.linalg.norm(along) * THICK[3]
+    joints = _finger(0, side, Hand(True, hand.grip, hand.aim))
+    along = _unit(joints[3] - joints[2])
+    tip = (joints[3] + along * THICK[3]) * MIRROR[side]
+    return hand.grip.matrix()[:3, :3] @ tip + hand.grip.position
 
 
 def _knuckle(across: float) -> np.ndarray:

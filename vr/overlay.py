@@ -162,6 +162,10 @@ class Overlay:
         return self
 
     def __exit__(self, *failure) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Gives all of it back; the context stays."""
         self._release_targets()
         if self._picture is not None:
             self._picture.release()

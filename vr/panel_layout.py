@@ -73,8 +73,7 @@ def lay_out(panel: Panel) -> Layout:
     items += _row(y, ["smaller", "size", "larger", "true"], ["\u2212", "", "+", "1 : 1"],
                   (0.8, 1.5, 0.8, 1.2))  # fmt: skip
     y += ROW + GAP
-    asking = "Really exit?" if panel.exit_s > 0 else "Exit"
-    items += _row(y, ["recentre", "put back", "exit"], ["Recentre", "Put back", asking],
+    items += _row(y, ["recentre", "put back", "exit"], ["Recentre", "Put back", "Exit"],
                   (1, 1, 1), MARGIN)  # fmt: skip
     y += ROW
     if panel.facts.note:

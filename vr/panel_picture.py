@@ -47,8 +47,11 @@ def panel_picture(panel: Panel) -> np.ndarray:
     from PIL import ImageDraw
 
     layout = lay_out(panel)
-    image = _plate(layout, _lit(panel), panel.facts.note).copy()
-    draw = ImageDraw.Draw(image)
+    image = _plate(layout, panel.facts.note).copy()
+    draw, lit = ImageDraw.Draw(image), _lit(panel)
+    for item in layout.items:
+        if _is_lit(item, lit):
+            _button(image, draw, lit, item)
     _head(draw, panel, layout)
     if panel.slider is not None:
         if layout.legend is not None:
@@ -75,6 +78,13 @@ class _Lit:
     hovered: frozenset[str]
     asks: bool  # Exit asks "really?"
 
+    @property
+    def true(self) -> bool:
+        return abs(self.scale - 1) < 1e-3
+
+
+UNLIT = _Lit("", 0.0, frozenset(), frozenset(), False)
+
 
 def _lit(panel: Panel) -> _Lit:
     held, hovered = (
@@ -89,9 +99,23 @@ def _knob_state(panel: Panel) -> str:
     return "hovered" if "track" in panel.hovers.values() else ""
 
 
+def _is_lit(item: Item, lit: _Lit) -> bool:
+    """Whether it looks otherwise than on the plate."""
+    name = item.name
+    return (
+        name in ("size", f"quality:{lit.quality}")
+        or name in lit.held | lit.hovered
+        or (name == "exit" and lit.asks)
+        or (name == "true" and lit.true)
+    )
+
+
 @lru_cache(maxsize=16)
-def _plate(layout: Layout, lit: _Lit, note: str) -> "Image.Image":
-    """All that stays while the knob moves, RGBA premultiplied: the plate, labels, buttons, note."""
+def _plate(layout: Layout, note: str) -> "Image.Image":
+    """All that stays, RGBA premultiplied: the plate, labels, the note, buttons that nobody touches.
+
+    It takes ten times as long as what is drawn over it: a panel in use must not cost a frame.
+    """
     from PIL import Image, ImageDraw
 
     width, height = layout.size
@@ -102,7 +126,7 @@ def _plate(layout: Layout, lit: _Lit, note: str) -> "Image.Image":
         _text(draw, (left, middle), text, BODY, MUTED, "lm")
     for item in layout.items:
         if item.name != "track":
-            _button(image, draw, lit, item)
+            _button(image, draw, UNLIT, item)
     if layout.foot is not None:
         text, em = _fitted(note, SMALL, width - 2 * MARGIN, LEAST)
         _text(draw, (width / 2, layout.foot), text, em, MUTED, "mm")
@@ -217,14 +241,16 @@ def _button(image: "Image.Image", draw: "ImageDraw.ImageDraw", lit: _Lit, item: 
     hovered = item.name in lit.hovered
     fill, ink, text = RAISED, TEXT, item.text
     if item.name == "size":
-        fill, text = SURFACE, size_text(lit.scale)
+        fill, text = SURFACE, size_text(lit.scale) if lit.scale > 0 else ""
     elif held or chosen:
         fill, ink = ACCENT, SURFACE
     elif hovered:
         fill = LIFTED
     if item.name == "exit" and lit.asks and not held:
         fill, ink = WARNING, TEXT
-    if item.name == "true" and abs(lit.scale - 1) < 1e-3 and not held:
+    if item.name == "exit" and lit.asks:
+        text = "Really exit?"
+    if item.name == "true" and lit.true and not held:
         ink = MUTED
     _fill(image, item.box, fill, 20)
     if hovered and item.name != "size":
