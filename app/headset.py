@@ -95,7 +95,7 @@ def wear(options: Options) -> int:
     from app.wearing import Eyes, Wearing
     from app.worn_scene import open_worn
     from renderer.renderer import Renderer
-    from vr.instance import Instance
+    from vr.instance import Instance, Lost
     from vr.locomotion import Rules
     from vr.session import Session
 
@@ -117,6 +117,9 @@ def wear(options: Options) -> int:
             wearing = Wearing(session, renderer, eyes, mirror, scene, pacing, report, rules)
             try:
                 wearing.loop(options.frames)
+            except (Lost, KeyboardInterrupt) as end:
+                report.ended = "runtime lost" if isinstance(end, Lost) else "interrupted"
+                raise
             finally:
                 report.write(describe(instance, session) | pacing.report())
     return 0
