@@ -85,6 +85,8 @@ class Options(ReadingOptions):
     """How many frames to draw before the --screenshot."""
     compare: str = ""
     """Another scene (or scene@stop, scene@x) to compare with: a line parts the two pictures."""
+    play: bool = False
+    """Let the things of a scene file fall and be carried from the start; T switches it."""
     panel: Annotated[bool, tyro.conf.arg(help="Show the overlay; H switches it.")] = True
 
 

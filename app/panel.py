@@ -177,7 +177,7 @@ def draw_problem(stage: Stage, ui_scale: float) -> None:
 def _others(hooks: Hooks, above: bool, ui_scale: float) -> None:
     """The sections of other parts of the program that have their place there."""
     for other in hooks.sections:
-        if other.above != above:
+        if other.above != above or (other.shown is not None and not other.shown()):
             continue
         unfold = other.opens is not None and other.opens()
         if section(other.name, other.open_first, unfold):

@@ -18,6 +18,7 @@ class Section:
     open_first: bool = False
     above: bool = False  # under the title, before what is about frames
     opens: Callable[[], bool] | None = None  # True: unfold it now
+    shown: Callable[[], bool] | None = None  # False: leave it out, there is nothing in it
 
 
 @dataclass

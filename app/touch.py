@@ -46,7 +46,15 @@ def attach_touch(viewer: "Viewer") -> "Touch":
     hooks.marks.append(touch.marks.draw)
     hooks.opened.append(touch.forget)
     hooks.status.append(touch.status)
-    hooks.sections.append(Section("Touch", lambda ui_scale: draw_touch(touch, ui_scale)))
+    hooks.sections.append(
+        Section(
+            "Touch",
+            lambda ui_scale: draw_touch(touch, ui_scale),
+            above=True,
+            opens=touch.opens,
+            shown=lambda: touch.world is not None,
+        )
+    )
     hooks.keys += KEYS
     return touch
 
@@ -60,6 +68,8 @@ class Touch:
         self.pads: dict[str, tuple[float, float]] = {}  # name -> balance, power as last put there
         self.told: deque[str] = deque(maxlen=REMEMBERED)  # the last reactions, newest first
         self.marks = Marks(self)
+        self._known: World | None = None
+        self._unfold = False
 
     @property
     def world(self) -> World | None:
@@ -77,7 +87,18 @@ class Touch:
         self.told.clear()
         self.marks.forget()
 
+    def opens(self) -> bool:
+        """Once for every world: its section unfolds."""
+        unfold, self._unfold = self._unfold, False
+        return unfold
+
+    def meet(self, world: World) -> None:
+        """The bodies of what was opened are there."""
+        self._known, self._unfold = world, True
+        world.paused = not self.viewer.options.play
+
     def status(self) -> str:
+        """Words for the status line."""
         if self.held:
             return f"carrying {self.held}"
         return "things hold still: T lets them move" if self.world and self.world.paused else ""
@@ -212,6 +233,8 @@ class Touch:
         if world is None:
             self.hand = None
             return False
+        if world is not self._known:
+            self.meet(world)
         if self.hand is not None and world.held(HAND) is None:
             self.hand = None  # what it held is gone
         if self.hand is not None:

@@ -18,11 +18,6 @@ PAD = 120.0  # logical pixels, of a pad's height
 def draw_touch(touch: "Touch", ui_scale: float) -> None:
     """Buttons for what the keys do, the pads, and the last reactions."""
     world = touch.world
-    if world is None:
-        imgui.push_text_wrap_pos(0)
-        imgui.text_disabled("Nothing here can be touched: no object has a collider.")
-        imgui.pop_text_wrap_pos()
-        return
     play = "Play" if world.paused else "Pause"
     clicked = button_row((f"{play}###play", "Step", "Put back"), ui_scale, 3)
     tip("T, Shift+T, R. While things move, drag one to carry it.", ui_scale)

@@ -289,6 +289,8 @@ class Window:
             return
         if self._over_overlay(x, y):
             return
+        if self._pressed is not None:  # one button at a time: who had the first one hears its end
+            self._note(Release(self._pressed))
         self._pressed = BUTTONS[button]
         self._note(Press(BUTTONS[button], x, y))
         if button == glfw.MOUSE_BUTTON_LEFT:

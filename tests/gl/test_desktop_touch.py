@@ -1,5 +1,6 @@
 """Touching in the real window: mouse and keys act on the world, the picture shows what happens."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import glfw
@@ -54,7 +55,7 @@ def viewer(window, tmp_path):
     stage = Stage(lambda path: model)
     document = Document(History.of(FILE), saved=FILE, sources={("a", "", "", False): source})
     stage.take([source, source], scene_of(FILE, models), None, document)
-    viewer = Viewer(window, PlainRenderer(window.ctx), stage, Options(pictures=tmp_path))
+    viewer = Viewer(window, PlainRenderer(window.ctx), stage, Options(pictures=tmp_path, play=True))
     stage.bodies.world = World(FILE, models, dict.fromkeys(models, BOX))
     stage.bodies._stale = False
     run_frames(viewer, 3)
@@ -162,6 +163,19 @@ def test_it_lets_go(viewer, event):
     run_frames(viewer, 2)
 
 
+def test_a_second_button_ends_what_the_first_one_held(viewer):
+    window = viewer.window
+    window._cursor = on_screen(viewer, place(viewer))
+    window._on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
+    run_frames(viewer, 2)
+    assert viewer.stage.world.held(HAND) == "cube"
+    window._on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.PRESS, 0)
+    window._on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
+    window._on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
+    run_frames(viewer, 2)
+    assert viewer.stage.world.held(HAND) is None and window._pressed is None
+
+
 def test_it_lets_go_of_what_is_gone(viewer):
     hold(viewer)
     viewer.stage.world.remove("cube")
@@ -259,6 +273,17 @@ def test_without_a_world_nothing_is_taken(viewer):
     for event in (KeyDown(glfw.KEY_T, False), Press("left", 450, 300), KeyDown(glfw.KEY_C, False)):
         assert not viewer.touch.take(event)
     run_frames(viewer, 2)
+    assert viewer.touch.status() == ""
+
+
+def test_a_new_world_waits_unless_it_is_to_play(viewer):
+    assert not viewer.stage.world.paused
+    viewer.options = replace(viewer.options, play=False)
+    models = {item.name: ball(20) for item in ITEMS}
+    viewer.stage.bodies.world = World(FILE, models, dict.fromkeys(models, BOX))
+    run_frames(viewer, 3)
+    assert viewer.stage.world.paused and viewer.stage.world.steps == 0
+    assert "T lets them move" in viewer.touch.status()
 
 
 def test_a_pad_moves_x(viewer, monkeypatch):
