@@ -73,11 +73,17 @@ class Wearing:
 
     def loop(self, frames: int = 0) -> None:
         """Until the runtime, the person at the desk or `frames` (0: none) end it."""
-        for frame in self.session.frames(self.mirror.rest):
+        for frame in self.session.frames(self._rest):
             self.frame(frame)
             done = 0 < frames <= self.session.pace.frames
             if done or self.mirror.closing:
                 self.leave("frames" if done else "closed at the desk")
+
+    def _rest(self) -> None:
+        """While the headset lies on the table: the window can be closed all the same."""
+        self.mirror.rest()
+        if self.mirror.closing:
+            self.leave("closed at the desk")
 
     def leave(self, why: str) -> None:
         """Asks the runtime for the end; a few frames later it comes."""
@@ -106,6 +112,8 @@ class Wearing:
             self.session.submit(self.eyes.textures)
             self.pacing.seen(self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
+        else:
+            self.mirror.rest()
         self.report.note(self, frame, records)
 
     def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
