@@ -167,12 +167,15 @@ def print_table(result: dict) -> None:
         "frame": result["frame_ms"],
         "stereo": result["stereo_ms"],
         "x sweep": result["sweep_ms"],
-        **result["passes"],
     }
+    if touch := result.get("touch"):
+        rows |= {"touch scene": touch["frame_ms"], "its physics": touch["physics_ms"]}
+    last = list(rows)[-1]
+    rows |= result["passes"]
     table = Table("ms", "p50", "p95", "p99")
     for name, row in rows.items():
         table.add_row(name, *(f"{row[p]:.2f}" for p in ("p50", "p95", "p99")))
-        if name == "x sweep":
+        if name == last:
             table.add_section()
     db = result["psnr_db"]
     quality = "NaN in a picture" if db is None else f"{db:.1f} dB"

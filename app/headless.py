@@ -1,4 +1,4 @@
-"""launch.py headless: the bundled demo as pictures and a frame-time table, without a window."""
+"""launch.py headless: the bundled demo and touch scene, pictures and frame times, no window."""
 
 import json
 import sys
@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 DEMO = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
+TOUCH = "touch.png"
 BACKGROUND = (0.075, 0.078, 0.085)  # as in the viewer, where the scene names none
 QUALITY_SIZE = (192, 128)  # of the pictures that are compared with the float64 reference
 TURN = 0.6  # radians between the viewpoints
@@ -14,10 +15,11 @@ TURN = 0.6  # radians between the viewpoints
 
 @dataclass(frozen=True)
 class Options:
-    """Draw a scene at its stops and between them, and time it."""
+    """Draw a scene at its stops and between them, and time it; without --scene the bundled demo,
+    and the touch scene while the hands of its script are at work."""
 
     scene: Path = DEMO
-    """What to draw; the bundled demo unless given."""
+    """What to draw, a scene file as it says; the bundled demo and touch scene unless given."""
     out: Path = Path("out/demo")
     """Folder for the pictures and bench.json; those of an earlier run are replaced."""
     size: str = "480x320"
@@ -33,55 +35,86 @@ def run(options: Options) -> int:
     from app.drawing import make_folder, open_renderer, parse_size
     from app.errors import UsageError
     from app.measure import Measure
-    from app.subject import Subject
-    from runtime_models.read_scene import read_model
-    from scene.framing import default_background
+    from app.opening import ReadingOptions
+    from app.subject import open_subject
 
     size = parse_size(options.size)
     check_counts(options)
     if options.scene == DEMO and not DEMO.exists():
         raise UsageError(f"the bundled demo {DEMO} is missing; `launch.py demo` makes one.")
-    model = read_model(options.scene)
+    subject = open_subject(options.scene, ReadingOptions())
     result_path = options.out / "bench.json"
     make_folder(options.out)
     check_result_path(result_path)
+    check_ours([options.out / TOUCH])
     with open_renderer("auto", "auto") as (renderer, ctx):
-        background = default_background(model, BACKGROUND)
-        renderer.settings = replace(renderer.settings, background=background)
-        draw_sheet(renderer, model, size, options.out)
-        work = Measure(renderer, ctx, Subject.of(model), None, size)
-        result = measure(work, options, QUALITY_SIZE)
+        renderer.settings = replace(renderer.settings, background=behind(subject))
+        draw_sheet(renderer, subject, size, options.out)
+        result = measure(Measure(renderer, ctx, subject, None, size), options, QUALITY_SIZE)
+        if options.scene == DEMO:
+            result["touch"] = play_touch(renderer, ctx, size, options.out)
     print_table(result)
     write_json(result_path, result)
     print(
-        f"Pictures (sheet.png shows all) and bench.json are in {options.out.resolve()}",
+        f"{told_pictures(result)} and bench.json are in {options.out.resolve()}",
         file=sys.stderr,
     )
     print(json.dumps({"out": str(options.out), "frame_ms": result["frame_ms"],
-                      "psnr_db": result["psnr_db"]}))  # fmt: skip
+                      "psnr_db": result["psnr_db"], "touch": result.get("touch")}))  # fmt: skip
     return 0
 
 
-def draw_sheet(renderer, model, size: tuple[int, int], out: Path) -> None:
-    """A row a viewpoint; columns are the stops and the middles between them."""
+def behind(subject) -> tuple[float, float, float]:
+    """The background: what the scene names, else the viewer's."""
+    from scene.framing import default_background
+
+    return BACKGROUND if subject.file else default_background(subject.models[0], BACKGROUND)
+
+
+def play_touch(renderer, ctx, size: tuple[int, int], out: Path) -> dict | None:
+    """The touch scene in motion; None, and why, where its bodies cannot be made here."""
+    from app.touch_film import film
+    from runtime_models.model import BadFile
+
+    try:
+        return film(renderer, ctx, size, out / TOUCH)
+    except BadFile as error:
+        print(f"The touch scene is left out: {error}", file=sys.stderr)
+        return None
+
+
+def told_pictures(result: dict) -> str:
+    """What pictures there are, in words."""
+    touch = f", {TOUCH} the touch scene" if result.get("touch") else ""
+    return f"Pictures (sheet.png shows all{touch})"
+
+
+def draw_sheet(renderer, subject, size: tuple[int, int], out: Path) -> None:
+    """A row a viewpoint; columns are the stops and the middles between them, of a scene file one:
+    its objects each at its own x.
+    """
     import numpy as np
 
     from app.drawing import save_png
-    from scene.scene import Scene, SceneObject
 
-    stops = sorted({stop.x for stop in model.stops})
+    stops = list(subject.stops)
     controls = sorted(stops + [(a + b) / 2 for a, b in pairwise(stops)])
-    views = viewpoints(model, size)
-    names = [[f"view{v}_x{x:.3f}.png" for x in controls] for v in range(len(views))]
+    controls = [None] if subject.file else controls
+    views = viewpoints(subject, size)
+    names = [[picture_name(v, x) for x in controls] for v in range(len(views))]
     check_ours([out / name for row in names for name in row] + [out / "sheet.png"])
     rows = [[None] * len(controls) for _ in views]
     for column, x in enumerate(controls):  # geometry is decoded once a column
-        renderer.update(Scene((SceneObject("scene", model, x=x),)))
+        renderer.update(subject.at(x))
         for row, view in enumerate(views):
             renderer.draw([view])
             rows[row][column] = renderer.resolved(0)
             save_png(rows[row][column], out / names[row][column])
     save_png(np.concatenate([np.concatenate(row, axis=1) for row in rows]), out / "sheet.png")
+
+
+def picture_name(view: int, x: float | None) -> str:
+    return f"view{view}.png" if x is None else f"view{view}_x{x:.3f}.png"
 
 
 def check_ours(paths: list[Path]) -> None:
@@ -94,15 +127,13 @@ def check_ours(paths: list[Path]) -> None:
             raise UsageError(f"{path} was not made by this program; choose another --out.")
 
 
-def viewpoints(model, size: tuple[int, int]) -> list:
-    """The first look at a model, and from TURN to the left and right of it."""
+def viewpoints(subject, size: tuple[int, int]) -> list:
+    """The first look at a scene, and from TURN to the left and right of it."""
     import numpy as np
 
-    from scene.framing import default_view, frame_points, model_points
     from scene.pose import Pose
 
-    first = default_view(model, size)
-    centre, _ = frame_points(*model_points(model))
+    first, (centre, _) = subject.view(size), subject.bounds()
     views = [first]
     for angle in (TURN, -TURN):
         about_y = np.array([np.cos(angle / 2), 0, np.sin(angle / 2), 0])

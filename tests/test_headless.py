@@ -1,12 +1,15 @@
 """headless: the sheet, its pictures and the result; what others wrote there stays."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli, headless
+from app import cli, headless, touch_film
+from app.subject import Subject
+from runtime_models.model import BadFile
 from runtime_models.write_package import write_package
 from scene.framing import default_view, frame_points, model_points
 from tests.models import make_random_model
@@ -63,9 +66,48 @@ def test_an_earlier_run_is_replaced_and_nothing_else(scene, tmp_path, capsys):
         (tmp_path / name).write_bytes(whole)
 
 
+def test_the_main_job_plays_the_touch_scene(scene, tmp_path, capsys, monkeypatch):
+    """Its hands carry, shoot and throw; the picture shows four moments, the table what it costs."""
+    monkeypatch.setattr(headless, "DEMO", scene)
+    monkeypatch.setattr(touch_film, "STEPS", 6)
+    assert run("--scene", scene, "--out", tmp_path, *QUICK) == 0
+    told = capsys.readouterr()
+    assert "touch scene" in told.err and "its physics" in told.err and "touch.png" in told.err
+    touch = json.loads(told.out)["touch"]
+    assert touch == json.loads((tmp_path / "bench.json").read_text())["touch"]
+    assert (touch["objects"], touch["splats"], touch["reactions"]) == (5, 32_000, 6)
+    assert 0 < touch["physics_ms"]["p50"] < touch["frame_ms"]["p50"]
+    moments = np.split(pixels(tmp_path / "touch.png"), 4, axis=1)
+    assert moments[0].shape == (32, 48, 3)
+    for before, after in pairwise(moments):
+        assert (np.abs(before - after).max(axis=2) > 25).sum() > 10
+    (tmp_path / "touch.png").write_bytes(b"mine")
+    assert run("--scene", scene, "--out", tmp_path, *QUICK) == 2
+    assert "touch.png was not made by this program" in capsys.readouterr().err
+
+
+def test_without_bodies_the_rest_of_the_job_goes_on(scene, tmp_path, capsys, monkeypatch):
+    def refuse(*_):
+        raise BadFile("object 'ring': 'collider': coacd is not here.")
+
+    monkeypatch.setattr(headless, "DEMO", scene)
+    monkeypatch.setattr(touch_film, "film", refuse)
+    assert run("--scene", scene, "--out", tmp_path, *QUICK) == 0
+    told = capsys.readouterr()
+    assert "The touch scene is left out: object 'ring'" in told.err
+    assert json.loads(told.out)["touch"] is None and not (tmp_path / "touch.png").exists()
+
+
+def test_a_scene_file_as_it_says(tmp_path, capsys):
+    assert run("--scene", touch_film.SCENE, "--out", tmp_path, *QUICK) == 0
+    names = {"view0.png", "view1.png", "view2.png", "sheet.png", "bench.json"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    assert json.loads((tmp_path / "bench.json").read_text())["objects"] == 5
+
+
 def test_viewpoints_look_at_the_same_place_from_as_far(scene):
     model = make_random_model(200)
-    first, left, right = headless.viewpoints(model, (60, 40))
+    first, left, right = headless.viewpoints(Subject.of(model), (60, 40))
     wanted = default_view(model, (60, 40))
     np.testing.assert_array_equal(first.world_from_eye.matrix(), wanted.world_from_eye.matrix())
     assert {(v.tangents, v.near, v.far, v.size) for v in (first, left, right)} == {
