@@ -24,6 +24,8 @@ def person_with(*items, floor_y=0.0, **file) -> Person:
 
 def run(person: Person, frames, standing=None):
     """The standing after these frames, and the buzzes of each."""
+    if not person.touching.seen:
+        person.act(frame(), standing or Standing(), 1 / HZ)  # with open hands first
     standing, felt = standing or Standing(), []
     for one in frames:
         standing = person.act(one, standing, 1 / HZ)

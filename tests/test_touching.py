@@ -12,7 +12,7 @@ from vr_frames import LOST, at, frame, hand, tilted, yawed
 
 from scene.pose import Pose
 from scene.world import FLOOR_NAME
-from vr.frame import Pulse
+from vr.frame import SIDES, Pulse
 from vr.locomotion import Travel, move
 from vr.stance import pinned, turned
 from vr.standing import Standing
@@ -51,7 +51,7 @@ def world_with(*places, standing=HOME, **named):
 
 def run(world, frames, touching=None, standing=HOME, seconds=1 / HZ):
     """As a headset's loop does it, without locomotion; all that was told."""
-    touching, told, records = touching or Touching(), [], []
+    touching, told, records = touching or Touching(seen=frozenset(SIDES)), [], []
     for one in frames:
         touching, touched = touch(world, touching, one, standing)
         follow(world, one, standing, False)
@@ -105,15 +105,25 @@ def test_what_is_let_go_flies_with_the_hand(rate, scale):
     assert np.linalg.norm(flew - wanted) <= 0.05 * np.linalg.norm(wanted) + 1e-3
 
 
-def test_a_lost_hand_lets_go_and_one_that_comes_back_squeezing_takes_again():
-    world = world_with(NEAR)
+def test_a_lost_hand_lets_go_and_one_that_comes_back_squeezing_waits_until_it_opens():
+    world = world_with(NEAR, reactions=(reaction("ray", "fire"),))
     touching, told = run(world, [SQUEEZE] * 5)
     assert told[-1].held["right"] == "a"
     touching, told = run(world, [frame(right=LOST)], touching)
     assert told[-1].held["right"] is None and "right" not in world.hands
-    assert touching == Touching()
-    _, told = run(world, [SQUEEZE], touching)
+    assert touching == Touching(seen=frozenset({"left"}))
+    both = aimed(squeeze=1.0, trigger=1.0)
+    touching, told = run(world, [both, both], touching)
+    assert told[-1].held["right"] is None and not any(t.beams for t in told)
+    assert at_rest(both, touching).hands["right"].squeeze == 0  # nor does it hold the world
+    touching, told = run(world, [OPEN, SQUEEZE], touching)
     assert told[-1].held["right"] == "a"
+
+
+def test_nobody_begins_with_a_hand_that_is_closed_already():
+    world = world_with(NEAR)
+    touching, told = run(world, [SQUEEZE, SQUEEZE], Touching())
+    assert told[-1].held["right"] is None and touching.busy == {"right"}
 
 
 def test_a_hand_whose_object_was_taken_away_does_not_hold_the_world():
@@ -241,7 +251,7 @@ def test_a_snap_turn_takes_what_is_held_along():
 
 def test_walking_takes_what_is_held_along():
     world = world_with(HERE, standing=ROOM)
-    touching, room, travel = Touching(), ROOM, Travel()
+    touching, room, travel = Touching(seen=frozenset(SIDES)), ROOM, Travel()
     walks = frame(left=hand("left", stick=(0, 1)), right=hand(squeeze=1.0))
     for _ in range(90):
         touching, touched = touch(world, touching, walks, room)

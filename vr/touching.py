@@ -39,6 +39,7 @@ class Beam:
 class Touching:
     """Between two frames."""
 
+    seen: frozenset[str] = frozenset()  # hands that were there
     squeezing: frozenset[str] = frozenset()
     pulling: frozenset[str] = frozenset()
     busy: frozenset[str] = frozenset()  # hands whose squeeze is for an object until they open
@@ -55,8 +56,13 @@ class Touched:
 
 
 def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[Touching, Touched]:
-    """Moves the hands in the world, takes, lets go and acts."""
+    """Moves the hands in the world, takes, lets go and acts.
+
+    A hand that comes back squeezing or pulling does nothing by that: it has to open first.
+    """
     pulses, beams, near, busy = [], [], [], set(touching.busy)
+    seen = frozenset(side for side in SIDES if frame.hands[side].active)
+    back = seen - touching.seen
     squeezing = pressed(frame, "squeeze", touching.squeezing, (GRIPS_AT, LETS_GO_AT))
     pulling = pressed(frame, "trigger", touching.pulling, (PULLS_AT, RELAXES_AT))
     for side, before in zip(SIDES, touching.near, strict=True):
@@ -66,8 +72,9 @@ def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[
             busy.discard(side)
             near.append(None)
             continue
-        begins = side in squeezing - touching.squeezing
-        acts = side in pulling - touching.pulling
+        begins = side in squeezing - touching.squeezing - back
+        acts = side in pulling - touching.pulling - back
+        busy |= {side} & back & squeezing
         if side not in squeezing:
             pulses += let_go(world, side)
             busy.discard(side)
@@ -75,17 +82,17 @@ def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[
             pulses.append(Pulse(side, *TAKEN))
             busy.add(side)
             acts = False  # of a controller with one button, taking is all it does
-        seen = beam(world, side, hand, standing, acts) if acts or shows(hand, busy, side) else None
-        if seen is not None:
-            beams.append(seen)
-            if acts and seen.meets is not None:
+        line = beam(world, side, hand, standing, acts) if acts or shows(hand, busy, side) else None
+        if line is not None:
+            beams.append(line)
+            if acts and line.meets is not None:
                 pulses.append(Pulse(side, *ACTED))
                 busy |= {side} if begins else set()
         near.append(touched(world, side, palm, standing))
         if near[-1] is not None and near[-1] != before and world.held(side) is None:
             pulses.append(Pulse(side, *TOUCHED))
     held = {side: world.held(side) for side in SIDES}
-    now = Touching(squeezing, pulling, frozenset(busy), tuple(near))
+    now = Touching(seen, squeezing, pulling, frozenset(busy), tuple(near))
     return now, Touched(strongest(pulses), tuple(beams), held)
 
 
