@@ -4,7 +4,6 @@ import sys
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import inf
 from statistics import median
 
 import numpy as np
@@ -26,6 +25,7 @@ FIXED = {  # quality of the panel -> row of the quick chart that it always is
 QUALITIES = (AUTO, *FIXED)
 PART = 0.85  # of the period may be ours: the runtime wants the rest
 SAME = 0.1  # of a period: how much another one may differ and ask for nothing new
+LEAST = 0.25  # of that is the splats', however long all else takes
 EASY = 0.6  # of that: what takes the exact picture no longer needs no chart
 OVER, LATE = 1.05, 24  # times that, as the median of so many frames, is late
 TRIES = 4  # exact frames that say whether shortcuts are needed at all; one before them warms up
@@ -47,12 +47,12 @@ class Pacing:
         self.quality, self.floor_db, self._fixed_ms = quality, floor_db, target_ms
         self.choice: Choice | None = None  # of AUTO, where the chart was measured
         self.exact_ms = 0.0  # that the exact picture of both eyes took at first
-        self.target_ms = inf
         self._period_s = 0.0  # that was chosen for
         self._exact = RenderSettings(background=background)
         self._rows: tuple[QuickRow, ...] = ()
         self._resolution: Resolution | None = None
-        self._times: deque[float] = deque(maxlen=LATE)  # ms, since something was chosen
+        self._times: deque[float] = deque(maxlen=LATE)  # ms of drawing, since that was chosen
+        self._rest: deque[float] = deque(maxlen=LATE)  # ms of all else: world, hands, panel
 
     def settings(self) -> RenderSettings:
         """Of the next frame."""
@@ -71,6 +71,12 @@ class Pacing:
             return FIXED[self.quality] or EXACT
         return self.choice.name if self.choice else EXACT
 
+    @property
+    def target_ms(self) -> float:
+        """What is left for drawing the splats: fewer of them make nothing else quicker."""
+        whole = self._fixed_ms or PART * self._period_s * 1e3
+        return max(whole - median(self._rest or (0.0,)), LEAST * whole)
+
     def wants_measure(self, period_s: float) -> bool:
         """Whether nothing was chosen yet for a period like this, or what was proves too slow."""
         if self.quality != AUTO or not period_s > 0:
@@ -87,12 +93,12 @@ class Pacing:
         late = bool(self.exact_ms)
         self._times.clear()
         self._period_s = period_s
-        self.target_ms = self._fixed_ms or PART * period_s * 1e3
+        target_ms = self.target_ms
         self.exact_ms = self.exact_ms or chart.exact_ms()
-        if not self._rows and not late and self.exact_ms <= EASY * self.target_ms:
+        if not self._rows and not late and self.exact_ms <= EASY * target_ms:
             return
         self._rows = self._rows or chart.rows()
-        self.choice = choose(self._rows, self.target_ms, self.floor_db)
+        self.choice = choose(self._rows, target_ms, self.floor_db)
         if self.choice.name != EXACT:
             print(self.choice.sentence, file=sys.stderr)
         # Fewer pixels are priced alone: on top of other shortcuts nobody knows what they cost.
@@ -101,15 +107,19 @@ class Pacing:
         alone = replace(chosen, render_scale=1.0, target="rgba16f", background=(0.0, 0.0, 0.0))
         scale = chosen.render_scale
         least = min(priced, scale) if alone == RenderSettings() else scale
-        self._resolution = Resolution(self.target_ms, least, scale)
+        self._resolution = Resolution(target_ms, least, scale)
 
-    def seen(self, own_ms: float) -> None:
-        """Takes the time of a frame that was drawn; 0: it does not count."""
-        if self.quality != AUTO or not own_ms > 0:
+    def seen(self, drawing_ms: float, own_ms: float) -> None:
+        """Takes the time of a frame, of its splats and of all of it; 0: it does not count."""
+        if not 0 < drawing_ms <= own_ms:
             return
-        self._times.append(own_ms)
+        self._rest.append(own_ms - drawing_ms)
+        if self.quality != AUTO:
+            return
+        self._times.append(drawing_ms)
         if self._resolution is not None:
-            self._resolution.seen(own_ms)
+            self._resolution.target_ms = self.target_ms
+            self._resolution.seen(drawing_ms)
 
     def report(self) -> dict:
         return {

@@ -1,5 +1,6 @@
 """The loop of a headset: what happens in a frame, in order."""
 
+import time
 from collections.abc import Sequence
 
 import moderngl
@@ -69,6 +70,7 @@ class Wearing:
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
+        self._drawing_ms = 0.0  # of the splats of both eyes, last
         self._leaving = False
 
     def loop(self, frames: int = 0) -> None:
@@ -110,7 +112,7 @@ class Wearing:
             over = drawn_of(frame.hands, self.panel.carried, person.comfort, person.touched)
             self.draw(views, frame.views, over)
             self.session.submit(self.eyes.textures)
-            self.pacing.seen(self.session.pace.last_ms)
+            self.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
         else:
             self.mirror.rest()
@@ -119,8 +121,10 @@ class Wearing:
     def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
         """Splats with one sort for both eyes, and what is in the room over them."""
         self.renderer.settings = self.pacing.settings()
+        start = time.perf_counter()
         self.renderer.update(self.world.drawn())
-        self.stats = self.renderer.draw(views)
+        self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
+        self._drawing_ms = (time.perf_counter() - start) * 1e3
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
             self.eyes.overlay.draw(framebuffer, play_views[i], over)

@@ -53,7 +53,7 @@ def test_what_is_too_slow_is_the_best_that_is_fast_enough(capsys):
     assert pacing.chosen == "1 px footprint" and "41.0 dB" in capsys.readouterr().err
     assert pacing.settings() == RenderSettings(background=BACKGROUND, min_pixels=1.0)
     for _ in range(200):  # late however often: on top of it nothing is priced
-        pacing.seen(3 * TARGET)
+        pacing.seen(3 * TARGET, 3 * TARGET)
     assert pacing.settings().render_scale == 1.0
 
 
@@ -63,10 +63,10 @@ def test_late_frames_have_fewer_pixels_but_never_below_what_the_floor_was_priced
     pacing.measure(FakeChart(0.95 * TARGET, rows), PERIOD)
     assert pacing.chosen == "exact" and pacing.settings().render_scale == 1.0
     for _ in range(200):
-        pacing.seen(2 * TARGET)
+        pacing.seen(2 * TARGET, 2 * TARGET)
     assert pacing.settings().render_scale == 0.75
     for _ in range(2000):
-        pacing.seen(0.3 * TARGET)
+        pacing.seen(0.3 * TARGET, 0.3 * TARGET)
     assert pacing.settings().render_scale == 1.0
 
 
@@ -76,7 +76,7 @@ def test_a_chosen_scale_is_where_fewer_pixels_begin():
     pacing.measure(FakeChart(2 * TARGET, rows), PERIOD)
     assert pacing.settings().render_scale == 0.5
     for _ in range(200):
-        pacing.seen(2 * TARGET)
+        pacing.seen(2 * TARGET, 2 * TARGET)
     assert pacing.settings().render_scale == 0.5
 
 
@@ -85,12 +85,12 @@ def test_what_proves_slow_later_is_measured_once_then():
     pacing.measure(chart, PERIOD)
     for _ in range(LATE):
         assert not pacing.wants_measure(PERIOD)
-        pacing.seen(2 * TARGET)
+        pacing.seen(2 * TARGET, 2 * TARGET)
     assert pacing.wants_measure(PERIOD)
     pacing.measure(chart, PERIOD)
     assert chart.measured == 1
     for _ in range(2 * LATE):
-        pacing.seen(2 * TARGET)
+        pacing.seen(2 * TARGET, 2 * TARGET)
     assert not pacing.wants_measure(PERIOD)
 
 
@@ -103,13 +103,29 @@ def test_another_period_chooses_again_from_what_was_measured():
     assert pacing.chosen == "exact" and chart.measured == 1
 
 
+def test_splats_have_what_all_else_leaves_and_are_not_blamed_for_it():
+    pacing = Pacing(BACKGROUND)
+    for _ in range(LATE):
+        pacing.seen(1.0, 1.0 + TARGET / 2)
+    pacing.measure(FakeChart(0.7 * TARGET, {"75 % scale": (0.4 * TARGET, 38.0)}), PERIOD)
+    assert pacing.chosen == "75 % scale"  # alone the exact picture would have been in time
+    pacing = Pacing(BACKGROUND)
+    rows = {"75 % scale": (0.8 * TARGET, 38.0), "50 % scale": (0.5 * TARGET, 36.0)}
+    pacing.measure(FakeChart(0.9 * TARGET, rows), PERIOD)
+    for _ in range(200):
+        pacing.seen(0.2 * TARGET, 5 * TARGET)
+    assert pacing.target_ms == pytest.approx(0.25 * TARGET)
+    assert pacing.settings().render_scale == 1.0
+
+
 def test_times_that_do_not_count_change_nothing():
     pacing = Pacing(BACKGROUND)
     pacing.measure(FakeChart(2 * TARGET, {"75 % scale": (TARGET, 38.0)}), PERIOD)
     before = pacing.settings()
     for ms in (0.0, -1.0, float("nan")):
         for _ in range(100):
-            pacing.seen(ms)
+            pacing.seen(ms, 1.0)
+            pacing.seen(ms, ms)
     assert pacing.settings() == before
 
 
@@ -119,7 +135,7 @@ def test_a_fixed_quality_stays_as_it_is(quality):
     assert not pacing.wants_measure(PERIOD)
     before = pacing.settings()
     for _ in range(100):
-        pacing.seen(1000.0)
+        pacing.seen(1000.0, 1000.0)
     assert pacing.settings() == before and before.background == BACKGROUND
     assert (before.render_scale < 1) == (quality == "fast")
 
