@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 LATE_S = 2.0  # so long it is said that frames were late
 LATE = 3  # frames within that time; fewer are nobody's business
-ADVICE = {True: "frames are late", False: "frames are late: try Auto or Fast"}  # by: is automatic
+ADVICE = {"best": ": try Auto", "balanced": ": try Auto or Fast"}  # by the quality that is chosen
 
 
 class WornPanel:
@@ -66,7 +66,7 @@ class WornPanel:
         while seen[0][0] < now_s - LATE_S:
             seen.popleft()
         late = seen[-1][1] - seen[0][1] >= LATE
-        return ADVICE[wearing.pacing.quality == "auto"] if late else ""
+        return f"frames are late{ADVICE.get(wearing.pacing.quality, '')}" if late else ""
 
 
 def facts_of(wearing: "Wearing", note: str = "") -> Facts:
