@@ -8,12 +8,14 @@ from imgui_bundle import imgui
 
 from app.arrange import edit, undo
 from app.camera_files import camera_reading
-from app.opened import Found, Opener, read_files
+from app.opened import Found, Opener, Told, read_files
+from app.opening import open_model
 from app.panel_rows import tip
 from app.paths import plain
 from app.saving import LONGEST_PATH, answer_row, box
 from runtime_models.model import BadFile
 from scene import edits
+from scene.scene_file import is_scene_file
 
 if TYPE_CHECKING:
     from app.desktop import Viewer
@@ -39,13 +41,19 @@ class Adding:
         """Reads files and adds them when all are there."""
         viewer = self._viewer
         self.asking = False
-        reading, plain_reading = camera_reading(viewer.options), viewer.options.reading()
-        self._opener.start(
-            paths,
-            lambda paths, told: read_files(
-                paths, viewer.files.read, reading, told, plain_reading, beside=False
-            ),
-        )
+        options = viewer.options
+
+        def read(paths: tuple[Path, ...], told: Told) -> Found:
+            return read_files(
+                paths,
+                lambda path, told: open_model(path, options, told),  # finest level at once
+                camera_reading(options),
+                told,
+                options.reading(),
+                beside=False,
+            )
+
+        self._opener.start(paths, read)
         viewer.say(self._opener.note)
 
     def poll(self) -> bool:
@@ -106,6 +114,8 @@ class Adding:
         imgui.text_unformatted("Drop a file or folder here, or name it:")
         imgui.pop_text_wrap_pos()
         imgui.push_item_width(-1)
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
         flags = imgui.InputTextFlags_.enter_returns_true
         entered, self._path = imgui.input_text("##path", self._path[:LONGEST_PATH], flags)
         imgui.pop_item_width()
@@ -124,8 +134,9 @@ class Adding:
     def _recent(self, ui_scale: float) -> Path | None:
         """Files that were opened before; the one that was clicked."""
         recent = self._viewer.files.recent
+        paths = [path for path in recent.paths if not is_scene_file(path)] if recent else []
         chosen = None
-        for row, path in enumerate(recent.paths[:MOST_RECENT] if recent else ()):
+        for row, path in enumerate(paths[:MOST_RECENT]):
             if imgui.selectable(f"{path.name or path}##{row}", False)[0]:
                 chosen = path
             tip(str(path), ui_scale)

@@ -125,9 +125,9 @@ def steer(stage: "Stage", index: int, x: float, together: str = "") -> None:
 def place(stage: "Stage", index: int, pose: Pose) -> None:
     """A hand moves an object: where it starts as well, unless the world is running."""
     name = stage.scene.objects[index].name
-    stage.move(index, pose)
+    file = edits.place(stage.document.file, name, pose)
+    stage.move(index, edits.wanted(file, name).pose)
     if not stage.running:
-        file = edits.place(stage.document.file, name, pose)
         history = stage.document.history
         stage.document.history = history.take(file, f"move {name}", f"place {name}")
         stage.bodies.follow(stage.document)

@@ -108,7 +108,7 @@ class Bodies:
         """Makes one collider in a thread that the program's end does not wait for."""
         future = self._future = Future()
         file, model = document.file, document.model(item)
-        beside = file.folder if document.path is not None else None
+        beside = document.path.absolute().parent if document.path is not None else None
 
         def work() -> None:
             try:

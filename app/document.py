@@ -5,12 +5,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from app.opened import Source
+from app.paths import file_name
 from runtime_models.model import Model, Stop
 from scene import edits
 from scene.edits import History
 from scene.scene import Scene
-from scene.scene_file import ENDING, SceneFile, SceneItem
+from scene.scene_file import ENDING, HULLS, SceneFile, SceneItem
 from scene.selector import Lens
+from scene.write_scene_file import moved
 
 ModelKey = tuple  # what makes two objects have the same model: path, mode, up, flip
 
@@ -31,14 +33,16 @@ class Document:
         return self.history.file
 
     @property
+    def edited(self) -> bool:
+        """Whether the file says something else than what lies on the disk."""
+        return self.file is not self.saved and bool(edits.changes(self.saved, self.file))
+
+    @property
     def unsaved(self) -> bool:
-        """Whether something would be lost; moving the slider of what was just opened is not."""
+        """Whether work would be lost; where a slider stands is none."""
         if self.file is self.saved:
             return False
-        changed = edits.changes(self.saved, self.file)
-        if self.path is None:
-            return any(change.fields != {"x"} for change in changed)
-        return bool(changed)
+        return any(change.fields != {"x"} for change in edits.changes(self.saved, self.file))
 
     def model(self, item: SceneItem) -> Model:
         return self.sources[key_of(item)].model
@@ -63,7 +67,7 @@ class Document:
         """For the title, and for saving."""
         if self.path is not None:
             return self.path.name
-        return self.file.all_items[0].name + ENDING if self.file.all_items else "scene" + ENDING
+        return file_name(self.file.all_items[0].name if self.file.all_items else "") + ENDING
 
 
 def first_stop(model: Model) -> Stop:
@@ -124,13 +128,16 @@ def stamp_of(path: Path) -> tuple:
 
 
 def beside(file: SceneFile, folder: Path) -> SceneFile:
-    """With models and colliders that lie below the folder named from there, so it can be moved."""
+    """The file as it is written into a folder: what lies below that is named from there, so that
+    both can be moved together; the rest keeps its place.
+    """
+    before = file.folder
     for item in file.all_items:
-        values = {"model": below(item.model, folder)}
-        if item.collider is not None:
-            values["collider"] = below(item.collider, folder)
+        values = {"model": below(moved(item.model, before, folder), folder)}
+        if item.collider not in (None, HULLS):
+            values["collider"] = below(moved(item.collider, before, folder), folder)
         file = edits.change(file, item.name, **values)
-    return file
+    return replace(file, folder=folder)
 
 
 def below(text: str, folder: Path) -> str:

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from app.errors import UsageError
 from app.exported import Look, Part, export
 from app.panel_rows import choice, number, tip
+from app.paths import file_name
 from app.sections import Section
 from runtime_models.evaluate import follows_eye
 from runtime_models.model import BadFile
@@ -157,7 +158,9 @@ def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
 
     make_folder(folder)
     thing = parts[0].thing
-    name = f"{thing.name}{f' and {len(parts) - 1} more' * (len(parts) > 1)}-x{thing.x:.2f}"
+    name = (
+        f"{file_name(thing.name)}{f' and {len(parts) - 1} more' * (len(parts) > 1)}-x{thing.x:.2f}"
+    )
     count = 1
     while True:
         path = folder / f"{name}{f'-{count}' * (count > 1)}{ending}"

@@ -79,7 +79,10 @@ class Files:
         else:
             if found is not None:
                 viewer.say("")
-                self.take(found)
+                if found.sources:
+                    viewer.objects.saving.before_losing(lambda: self.take(found))
+                else:
+                    self.take(found)
         if self._opener.busy:
             viewer.say(self._opener.note)
         return self._opener.busy

@@ -6,10 +6,12 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui, imguizmo
 
+from app import theme
 from app.arrange import place
+from app.outlines import moved, on_screen
 from app.window import DoubleClick, Drag, Event, KeyDown, Press, Release
-from scene.framing import frame_points, model_points
-from scene.pose import Pose
+from scene.framing import MIN_OPACITY, PERCENTILES, model_points
+from scene.pose import Pose, View
 from scene.scene import SceneObject
 from scene.scene_file import FAR_M
 
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from app.desktop import Viewer
 
 Matrix16 = imguizmo.im_guizmo.Matrix16
+Vec = imgui.ImVec2
+CORNER = 0.2  # of an edge of the box that shows what is chosen
 OFF, MOVE, TURN = "", "move", "turn"
 MODES = (OFF, MOVE, TURN)
 OPERATIONS = {
@@ -43,7 +47,7 @@ class Gizmo:
         self.mode = OFF
         self.holding = False
         self._shown = False  # in the last frame: only then can a handle be under the mouse
-        self._pivot: tuple = (None, np.zeros(3))  # a model, and its middle in the object's frame
+        self._box: tuple = (None, np.zeros((2, 3)))  # a model, and its corners, object frame
 
     def take(self, event: Event) -> bool:
         """True for what is meant for a handle, and for the key that goes through them."""
@@ -80,13 +84,21 @@ class Gizmo:
     def draw(self, ui_scale: float) -> None:
         """Shows the handles and does what the mouse does with them."""
         viewer = self._viewer
-        stage, gizmo = viewer.stage, imguizmo.im_guizmo
+        stage = viewer.stage
         index = stage.chosen_index
-        self._shown = bool(self.mode) and index is not None and not viewer.stage.regions.placing
+        self._shown = bool(self.mode) and index is not None and not stage.regions.placing
         if not self._shown:
             self.holding = False
+        if index is None:
             return
         thing, view = stage.scene.objects[index], viewer.view()
+        if not self.holding:
+            self._outline(thing, view, ui_scale)
+        if self._shown:
+            self._handles(index, thing, view, ui_scale)
+
+    def _handles(self, index: int, thing: SceneObject, view: View, ui_scale: float) -> None:
+        viewer, gizmo = self._viewer, imguizmo.im_guizmo
         gizmo.begin_frame()
         gizmo.set_drawlist(imgui.get_background_draw_list())
         gizmo.set_rect(0, 0, *viewer.window.logical_size)
@@ -95,7 +107,7 @@ class Gizmo:
         matrix = flat(world_from_pivot)
         before = unflat(matrix)
         gizmo.push_id(thing.name)
-        moved = gizmo.manipulate(
+        changed = gizmo.manipulate(
             flat(view.eye_from_world()),
             flat(view.clip_from_eye()),
             OPERATIONS[self.mode],
@@ -103,17 +115,51 @@ class Gizmo:
             matrix,
         )
         gizmo.pop_id()
-        if moved and self.holding:
-            place(stage, index, pose_after(thing, before, unflat(matrix), pivot))
+        if changed and self.holding:
+            place(viewer.stage, index, pose_after(thing, before, unflat(matrix), pivot))
 
     def _frame(self, thing: SceneObject) -> tuple[np.ndarray, np.ndarray]:
         """(4, 4) world_from_pivot, and the pivot (3,) in the object: where its splats are."""
-        if self._pivot[0] is not thing.model:
-            self._pivot = (thing.model, frame_points(*model_points(thing.model))[0])
-        pivot, world_from_object = self._pivot[1], thing.world_from_object.matrix()
+        pivot, world_from_object = (
+            self._corners(thing).mean(axis=0),
+            thing.world_from_object.matrix(),
+        )
         world_from_pivot = world_from_object.copy()
         world_from_pivot[:3, 3] += world_from_object[:3, :3] @ pivot
         return world_from_pivot, pivot
+
+    def _corners(self, thing: SceneObject) -> np.ndarray:
+        """(2, 3) metres, object frame: from where to where its splats are, a few floaters aside."""
+        if self._box[0] is not thing.model:
+            points, opacity = model_points(thing.model)
+            seen = points[opacity > MIN_OPACITY]
+            points = seen if len(seen) else points
+            corners = (
+                np.percentile(points, PERCENTILES, axis=0) if len(points) else np.zeros((2, 3))
+            )
+            self._box = (thing.model, corners)
+        return self._box[1]
+
+    def _outline(self, thing: SceneObject, view: View, ui_scale: float) -> None:
+        """The corners of the chosen object's box."""
+        low, high = self._corners(thing)
+        lines = moved(corner_lines(low, high), thing.world_from_object.matrix())
+        ink = theme.color(theme.ACCENT, 0.8)
+        draw = imgui.get_background_draw_list()
+        for (x0, y0), (x1, y1) in on_screen(view, lines, self._viewer.window.logical_size):
+            draw.add_line(Vec(x0, y0), Vec(x1, y1), ink, 1.5 * ui_scale)
+
+
+def corner_lines(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(24, 2, 3): three short edges from each corner of the box between low and high (3,)."""
+    lines = []
+    for bits in np.ndindex(2, 2, 2):
+        corner = np.where(bits, high, low)
+        for axis in range(3):
+            end = corner.copy()
+            end[axis] += CORNER * (low + high - 2 * corner)[axis]
+            lines.append((corner, end))
+    return np.array(lines)
 
 
 def pose_after(

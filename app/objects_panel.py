@@ -64,7 +64,7 @@ class Objects:
         self._name: tuple[str, str] = ("", "")  # the chosen object, and its name as it is typed
         self._opened = True  # another scene is there, and the section has not unfolded for it
         self._leaving = False  # the window may be closed, whatever is unsaved
-        self._title = False  # whether the window's title says that something is unsaved
+        self._title = ("", False)  # what the window's title says: a name, something is unsaved
 
     @property
     def stage(self):
@@ -72,7 +72,7 @@ class Objects:
 
     @property
     def unsaved(self) -> bool:
-        return unsaved(self.stage.document, self.stage.regions.version)
+        return unsaved(self.stage)
 
     def forget(self) -> None:
         """Another scene: nothing of the old one is asked or typed."""
@@ -97,12 +97,15 @@ class Objects:
         self.viewer.window.close()
 
     def status(self) -> str:
-        return "not saved" if self.unsaved and self.stage.document.path is not None else ""
+        document = self.stage.document
+        return "not saved" if document.path and (document.edited or self.unsaved) else ""
 
     # ---- input
 
     def take(self, event: Event) -> bool:
         """True for shortcuts, for a click that chooses, and for what is dropped to be added."""
+        if isinstance(event, KeyDown) and (self.saving.asking or self.adding.asking):
+            return True  # a box is open, and keys are for it
         match event:
             case KeyDown(shortcut="z", shift=False):
                 self.undo()
@@ -121,8 +124,6 @@ class Objects:
                 return False  # regions want it, too
             case Drop() if self.adding.asking:
                 self.adding.begin(event.paths)
-            case Drop() if self.unsaved:
-                self.saving.before_losing(lambda: self.viewer.open_soon(event.paths))
             case Press() | Drag() | Release():
                 self._see_click(event)
                 return False
@@ -158,8 +159,9 @@ class Objects:
         """The end of a drag, the title, what is being read; True while that goes on."""
         if not imgui.is_mouse_down(0):
             self.stage.rest()
-        if self.unsaved != self._title:
-            self._title = self.unsaved
+        title = (self.stage.title, self.unsaved)
+        if title != self._title:
+            self._title = title
             self.viewer.set_title()
         return self.adding.poll()
 
@@ -280,6 +282,7 @@ class Objects:
         item = edits.find(file, self.stage.chosen)
         if item is None:
             return
+        imgui.push_id(item.name)
         if item.name != BACKGROUND:
             self._rename(item)
         modes = {MOVE: "Move", TURN: "Turn"}
@@ -298,11 +301,15 @@ class Objects:
                 imgui.same_line()
         self._place()
         self._body(item, ui_scale)
+        imgui.pop_id()
 
     def _rename(self, item: SceneItem) -> None:
         """The name, taken over by Enter or by leaving the field."""
         if self._name[0] != item.name:
+            before, typed = self._name
             self._name = (item.name, item.name)
+            if typed != before and edits.find(self.stage.document.file, before) is not None:
+                self.edit(edits.rename, before, typed, what=f"rename {before}")
         _, text = imgui.input_text("##name", self._name[1])
         self._name = (item.name, text)
         if imgui.is_item_deactivated_after_edit():
@@ -351,8 +358,9 @@ class Objects:
 
     def draw_boxes(self, ui_scale: float) -> None:
         """The boxes that ask for a name, before something is lost, for what to add."""
-        self.saving.draw(ui_scale)
-        self.adding.draw(ui_scale)
+        if not self.stage.problem:  # which has a box of its own
+            self.saving.draw(ui_scale)
+            self.adding.draw(ui_scale)
 
 
 def stands_elsewhere(stage) -> bool:

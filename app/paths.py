@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 SCHEME = "file:"
+LONGEST_NAME = 100  # letters, of a file that is named after a thing
 
 
 def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
@@ -26,6 +27,12 @@ def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
 def plain(path: Path | str) -> Path:
     """The same as a Path; a Path of an address has lost one of its slashes."""
     return Path(plain_path(str(path)))
+
+
+def file_name(text: str) -> str:
+    """A name that is a file's on every system, of one that people or files have given a thing."""
+    plain = "".join(c if c.isalnum() or c in " -_.,()+" else "_" for c in text)
+    return plain.strip(" .")[:LONGEST_NAME] or "scene"
 
 
 def config_folder(environment: dict[str, str] | None = None, platform: str = sys.platform) -> Path:

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.document import Document, beside, stamp_of, with_regions
+from app.document import beside, stamp_of, with_regions
 from app.paths import plain
 from scene.scene_file import ENDING, FAR_M, SceneFile
 from scene.write_scene_file import write_scene_file
 
 if TYPE_CHECKING:
     from app.desktop import Viewer
+    from app.stage import Stage
 
 Vec = imgui.ImVec2
 FOLDER = "scenes"  # beside the folder of the pictures: where a first name is proposed
@@ -90,8 +91,7 @@ class Saving:
 
     def before_losing(self, then: Callable[[], None]) -> None:
         """Does it at once, or after a question where changes would be lost."""
-        stage = self._viewer.stage
-        if unsaved(stage.document, stage.regions.version):
+        if unsaved(self._viewer.stage):
             self._then = then
         else:
             then()
@@ -127,6 +127,8 @@ class Saving:
 
     def _draw_name(self, ui_scale: float) -> None:
         imgui.push_item_width(-1)
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
         flags = imgui.InputTextFlags_.enter_returns_true
         entered, name = imgui.input_text("##path", self._name, flags)
         imgui.pop_item_width()
@@ -180,13 +182,15 @@ def answer_row(words: tuple[str, ...], ui_scale: float) -> str:
     return words[-1] if imgui.is_key_pressed(imgui.Key.escape) else clicked
 
 
-def unsaved(document: Document, regions_version: int) -> bool:
+def unsaved(stage: "Stage") -> bool:
     """Whether something would be lost; a scene that is no file yet has no regions to lose."""
-    painted = document.path is not None and regions_version != document.saved_regions
-    return document.unsaved or painted
+    regions = stage.regions
+    painted = any(region.kind != "lens" for region in regions.items)
+    changed = painted and regions.version != stage.document.saved_regions
+    return stage.document.unsaved or (changed and stage.document.path is not None)
 
 
-def filed(file: SceneFile, stage, path: Path) -> SceneFile:
+def filed(file: SceneFile, stage: "Stage", path: Path) -> SceneFile:
     """What is written: with the regions, and with paths from the folder that it goes to.
 
     ValueError for what could not be read again.
