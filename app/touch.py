@@ -221,6 +221,8 @@ class Touch:
     def shoot(self) -> None:
         """A ray from the eye through the mouse: what it meets answers."""
         viewer = self.viewer
+        if not viewer.window.on_scene:
+            return
         hit = self.world.ray(*ray(viewer.view(), viewer.window.cursor, viewer.window.logical_size))
         if hit is not None:
             self.marks.flashes.append(Flash(hit.point))

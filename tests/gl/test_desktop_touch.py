@@ -7,14 +7,13 @@ import glfw
 import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
-from imgui_bundle import imgui
 
 from app.desktop import Options, Viewer
 from app.document import Document
 from app.opened import Source
 from app.stage import Stage
 from app.touch import HAND
-from app.touch_panel import pad_of
+from app.touch_panel import pad_object, pad_of, side_names
 from app.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
 from scene.collider import Collider, box_around
 from scene.edits import History
@@ -254,10 +253,8 @@ def test_colliders_are_seen_where_they_are(viewer):
 
 
 def test_at_rest_the_loop_sleeps_though_things_may_move(viewer):
-    for _ in range(60):
-        run_frames(viewer, 10)
-        if viewer.stage.world.resting:
-            break
+    for _ in range(400):
+        viewer.stage.world.step()
     run_frames(viewer, 3)
     assert viewer.stage.world.resting and not viewer._busy() and not viewer._polling
     drawn = viewer.renderer.draws
@@ -286,12 +283,18 @@ def test_a_new_world_waits_unless_it_is_to_play(viewer):
     assert "T lets them move" in viewer.touch.status()
 
 
-def test_a_pad_moves_x(viewer, monkeypatch):
-    touch = viewer.touch
+def test_a_pad_is_of_the_chosen_object_and_moves_its_x(viewer):
+    stage, touch = viewer.stage, viewer.touch
+    assert pad_object(touch) == "post"
+    stage.chosen = "cube"  # which has none
+    assert pad_object(touch) == "post"
     touch.control("post", TwoAxes().x(-0.5, 0.8))
     run_frames(viewer, 2)
-    assert viewer.stage.scene.objects[1].x == pytest.approx(0.3)
-    assert imgui.get_io() is not None
+    assert stage.scene.objects[1].x == pytest.approx(0.3)
+    balance, power = touch.pads["post"]
+    assert TwoAxes().x(balance, power) == pytest.approx(0.3)
+    assert side_names(touch.world.things["cube"], TwoAxes()) == ("cold", "hot")
+    assert side_names(touch.world.things["post"], TwoAxes(0.0, 0.2, 0.7)) == ("photo", "")
 
 
 # The pad, without a window
