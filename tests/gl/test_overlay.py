@@ -14,7 +14,7 @@ from vr.drawn import FINE, WRONG, Drawn, arc, drawn_of
 from vr.frame import LOST
 from vr.glove import LIT, Capsule
 from vr.locomotion import Comfort
-from vr.overlay import Overlay, capsule_mesh
+from vr.overlay import Overlay, box_of, capsule_mesh
 from vr.panel_layout import knob_place, lay_out
 from vr.panel_picture import ACCENT, SURFACE, TEXT
 from vr.panel_place import play_point
@@ -250,6 +250,29 @@ def test_many_capsules_grow_the_buffer(overlay, target):
     image = picture(overlay, target, Drawn(hands=balls))
     few = picture(overlay, target, Drawn(hands=balls[:40]))
     assert (image != GROUND).any(axis=2).sum() > 2 * (few != GROUND).any(axis=2).sum()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_box_around_it_cuts_nothing_off(overlay, target, monkeypatch, seed):
+    rng = np.random.default_rng(seed)
+    ends = rng.normal(size=(9, 2, 3)) * (2.0, 1.0, 0.6 + 2 * (seed % 2)) + (0, 1.6, -2.2)
+    radii = rng.uniform(0.0005, 0.2, size=(9, 2))
+    parts = tuple(
+        Capsule(a, b, tuple(r), (1.0, 0.9, 0.1)) for (a, b), r in zip(ends, radii, strict=True)
+    )
+    cases = [Drawn(hands=(part,)) for part in parts]
+    cases += [Drawn(lines=(part,), vignette=0.6) for part in parts]
+    cases += [Drawn(hands=parts[:4], lines=parts[4:]), replace(only_panel(shown()), vignette=0.5)]
+    boxed = [picture(overlay, target, drawn) for drawn in cases]
+    monkeypatch.setattr("vr.overlay.box_of", lambda *_: (0, 0, *SIZE))
+    for drawn, cut in zip(cases, boxed, strict=True):
+        np.testing.assert_array_equal(cut, picture(overlay, target, drawn))
+
+
+def test_what_is_behind_the_eye_costs_nothing():
+    behind = np.array([0.0, 1.6, 3.0])
+    drawn = Drawn(hands=(Capsule(behind, behind, (0.1, 0.1), LIT),))
+    assert box_of(drawn, EYES[0], SIZE) is None and box_of(Drawn(), EYES[0], SIZE) is None
 
 
 def test_the_capsules_mesh_is_a_closed_ball_seen_from_outside():

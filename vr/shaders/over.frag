@@ -2,7 +2,7 @@
 // and over that hands, lines and the panel.  Blended by ONE, ONE_MINUS_SRC_ALPHA.
 in vec2 place;
 uniform sampler2D drawn;   // premultiplied, as large as the target
-uniform bool is_drawn;     // anything at all
+uniform ivec4 box;         // the pixels of it that hold anything: left, bottom, width, height
 uniform vec4 tangents;     // of the eye: left, right, down, up
 uniform float vignette;    // 0..1
 uniform float blink;       // 0..1
@@ -17,6 +17,8 @@ void main() {
     vec2 edge = mix(WIDE, NARROW, vignette);
     float dark = smoothstep(edge.x, edge.y, length(tangent)) * smoothstep(0.0, 0.15, vignette);
     dark = max(dark, blink);
-    vec4 above = is_drawn ? texelFetch(drawn, ivec2(gl_FragCoord.xy), 0) : vec4(0.0);
+    ivec2 pixel = ivec2(gl_FragCoord.xy), inside = pixel - box.xy;
+    bool holds = all(greaterThanEqual(inside, ivec2(0))) && all(lessThan(inside, box.zw));
+    vec4 above = holds ? texelFetch(drawn, pixel, 0) : vec4(0.0);
     shown = vec4(above.rgb, 1.0 - (1.0 - dark) * (1.0 - above.a));
 }
