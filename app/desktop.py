@@ -107,9 +107,8 @@ def run(options: Options) -> int:
     found = named_cameras(options, read)
     if not found.sources:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
-    if found.file is not None and (options.x is not None or options.compare):
-        name = "--x" if options.x is not None else "--compare"
-        raise UsageError(f"{name} is for one model; {found.path.name} is a scene of objects.")
+    if found.file is not None and options.x is not None:
+        raise UsageError(f"--x is for one model; {found.path.name} is a scene of objects.")
     scene, document = opened_scene(found, options.x)
     stage.take(found.sources, scene, home_of(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)
@@ -377,7 +376,7 @@ class Viewer:
         self.set_title()
 
     def set_title(self) -> None:
-        mark = "* " if self.objects.unsaved and self.stage.document.path else ""
+        mark = "* " if self.objects.unsaved else ""
         name = self.stage.title
         self.window.set_title(f"{mark}{name} \u2013 Shapeshift" if name else "Shapeshift")
 

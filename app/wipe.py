@@ -69,6 +69,7 @@ class Wipe:
         self._resolve = Resolve(Gpu(viewer.window.ctx))
         self._target: moderngl.Framebuffer | None = None  # B's picture, as large as the window
         self._scene = side.subject.scene
+        self._scene_file = viewer.stage.document.path  # that A is; None: models
         self._comparison = Comparison()
         self._waiting = False  # the picture has not rested long enough to be measured
         self._holding = False  # the mouse has the line
@@ -108,7 +109,8 @@ class Wipe:
 
     def _offset(self, scene: Scene) -> np.ndarray:
         """(3,) metres from A's own coordinates to B's: both say where their zero lies."""
-        of_a = np.array(getattr(scene.objects[0].model, "origin", (0.0, 0.0, 0.0)))
+        model = None if self._scene_file else scene.objects[0].model
+        of_a = np.array(getattr(model, "origin", (0.0, 0.0, 0.0)))
         return of_a - self._side.subject.origin
 
     def _scene_at(self, scene: Scene) -> Scene:
@@ -175,7 +177,9 @@ class Wipe:
         draw.add_line(Vec(x, 0), Vec(x, height), theme.color(theme.TEXT, 0.9), 1.5 * ui_scale)
         draw.add_circle_filled(Vec(x, height / 2), 5 * ui_scale, theme.color(theme.TEXT, 0.9))
         scene = self._viewer.stage.scene
-        names = (f"A  {scene.objects[0].name}" if scene.objects else "A", f"B  {self._side.name}")
+        of_a = scene.objects[0].name if scene.objects else ""
+        of_a = self._scene_file.name if self._scene_file else of_a
+        names = (f"A  {of_a}".rstrip(), f"B  {self._side.name}")
         for name, side in zip(names, (-1, 1), strict=True):
             size = imgui.calc_text_size(name)
             left = x + margin if side > 0 else x - margin - size.x

@@ -8,7 +8,8 @@ Both are drawn in turns in one run: CPU ms are those of this process with all it
 over_merged is their ratio.  What changes from frame to frame: "eye" - the eye goes around, all
 colours run; "poses" - every object moves a little, the merged model as a whole; "x of one" - one
 object changes x a little, for which the merged model has to decode all.  equal: whether both
-pictures are the same to the bit (dB where they are not).
+pictures are the same to the bit (dB where they are not).  decode_ms and project_ms are wall ms of
+the objects.
 """
 
 import argparse

@@ -107,9 +107,25 @@ def test_at_rest_the_likeness_is_told_once(stand, monkeypatch):
 
 def test_zeros_that_lie_elsewhere_are_respected(stand):
     viewer, wipe, b = stand
-    wipe._side = replace(wipe._side, model=replace(b, origin=(100.0, 0.0, 0.0)))
+    far = Subject.of(replace(b, origin=(100.0, 0.0, 0.0)))
+    wipe._side = replace(wipe._side, subject=far)
     offset = wipe._offset(viewer.stage.scene)
     np.testing.assert_array_equal(offset, [-100.0, 0.0, 0.0])
+
+
+def test_a_scene_file_is_drawn_where_it_says_beside_itself_at_another_x(window, tmp_path):
+    """Its zero is the world's, whatever was taken off a model of it; its own name stands there."""
+    far = replace(ball(50), origin=(100.0, 0.0, 0.0))
+    stage = Stage(lambda path: far)
+    stage.open([Path("a.ply")])
+    stage.document.path = tmp_path / "a.scene.json"
+    options = Options(pictures=tmp_path, panel=False, drawing="quads")
+    with Renderer(window.ctx, "quads") as one, Renderer(window.ctx, "quads") as other:
+        viewer = Viewer(window, one, stage, options)
+        wipe = Wipe(viewer, other, SceneSide("b", Subject.of(ball(50), 0.0)))
+        run_frames(viewer, 2)
+        assert not wipe._offset(stage.scene).any()
+        wipe.release()
 
 
 def test_the_panel_lists_its_keys(stand, monkeypatch):
