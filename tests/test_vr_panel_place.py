@@ -139,12 +139,37 @@ def test_a_near_squeeze_grabs_the_knob_and_is_not_the_worlds():
     assert carried.panel.held == {} and carried.pointing.down == frozenset()
 
 
-def test_a_hand_that_carries_something_over_the_panel_keeps_it():
+def test_a_hand_that_comes_back_pulling_presses_nothing_until_it_opens():
     carried = settled()
-    far = replace(ray_at(carried, "knob", squeeze=1.0, trigger=1.0), aim=hand_at((0, 0, 0)).aim)
+    pulling, open_ = (ray_at(carried, "recentre", trigger=trigger) for trigger in (1.0, 0.0))
+    for closes in (False, True):
+        carried, _, _ = step(carried, open_)
+        if closes:
+            carried, _, _ = step(carried, pulling, replace(LEFT, menu=True))
+            carried, _, _ = step(carried, pulling)
+            carried, wishes, _ = step(carried, pulling, replace(LEFT, menu=True))
+        else:
+            carried, _, _ = step(carried, LOST)
+            carried, wishes, _ = step(carried, pulling)
+        assert Recentre() not in wishes and carried.panel.held == {}
+        carried, wishes, _ = step(carried, pulling)
+        assert Recentre() not in wishes
+        carried, _, _ = step(carried, open_)
+        carried, wishes, _ = step(carried, pulling)
+        assert Recentre() in wishes
+
+
+@pytest.mark.parametrize("seen", [True, False])
+@pytest.mark.parametrize("trigger", [0.0, 1.0])
+def test_a_hand_that_carries_something_over_the_panel_keeps_it(trigger, seen):
+    carried = settled()
+    aside = hand_at((0, 0, 0)).aim
+    if seen:
+        carried, _, _ = step(carried, replace(ray_at(carried, "knob"), aim=aside))
+    far = replace(ray_at(carried, "knob", squeeze=1.0, trigger=trigger), aim=aside)
     carried, _, _ = step(carried, far)
     carried, wishes, hands = step(
-        carried, reaching(carried, "knob", 0.03, squeeze=1.0, trigger=1.0)
+        carried, reaching(carried, "knob", 0.03, squeeze=1.0, trigger=trigger)
     )
     assert carried.panel.held == {} and hands["right"].squeeze == 1.0
     assert not any(isinstance(wish, SetX) for wish in wishes)

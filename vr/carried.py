@@ -33,7 +33,8 @@ def carry(
     carried = replace(carried, panel=panel, menus=menus)
     if not panel.open:
         panel, _ = press(panel, [])
-        return replace(carried, panel=panel, play_from_panel=None, places={}), [], dict(frame.hands)
+        carried = replace(carried, play_from_panel=None, pointing=NOBODY, places={})
+        return replace(carried, panel=panel), [], dict(frame.hands)
     layout = lay_out(panel)
     before = None if frame.recentred else carried.play_from_panel
     pose = hang(before, frame.hands[panel.side], frame.head, layout.size_m, seconds)
@@ -49,7 +50,8 @@ def left_over(carried: Carried, hands: dict[str, Hand]) -> dict[str, Hand]:
     """The hands with what the panel takes of them at rest."""
     panel, left = carried.panel, dict(hands)
     for side in taken(panel):
-        squeeze = 0.0 if side in carried.pointing.near else hands[side].squeeze
+        grasps = side in carried.pointing.near - carried.pointing.full
+        squeeze = 0.0 if grasps else hands[side].squeeze
         left[side] = replace(hands[side], trigger=0.0, squeeze=squeeze)
     if panel.open and panel.stick in ("slides", "rests"):
         left[panel.side] = replace(left[panel.side], stick=(0.0, 0.0))

@@ -38,6 +38,7 @@ class Pointer:
     side: str  # of vr.frame.SIDES
     at: Place | None  # None: away from the plane
     down: bool = False  # presses: trigger, a squeeze at close range, a finger that touches
+    unsure: bool = False  # it was away: where it began to press is not known
 
 
 def press(
@@ -96,7 +97,7 @@ def _pointed(panel: Panel, pointer: Pointer) -> tuple[Panel, list[Wish]]:
     item = item_at(panel, pointer.at) if pointer.at is not None else ""
     if not pointer.down:
         panel = replace(panel, elsewhere=panel.elsewhere - {side})
-    elif not item:
+    elif not item or pointer.unsure:
         panel = replace(panel, elsewhere=panel.elsewhere | {side})
     hovers = {other: name for other, name in panel.hovers.items() if other != side}
     wishes: list[Wish] = []

@@ -27,16 +27,28 @@ PRESS, RELEASE = 0.6, 0.4  # of trigger and squeeze
 
 @dataclass(frozen=True)
 class Pointing:
-    """What is remembered of the hands between frames."""
+    """What is remembered of the hands between frames; sides."""
 
-    near: frozenset[str] = frozenset()  # sides whose finger points, not their ray
-    down: frozenset[str] = frozenset()  # sides that press
+    near: frozenset[str] = frozenset()  # their finger points, not their ray
+    down: frozenset[str] = frozenset()  # they press
+    full: frozenset[str] = frozenset()  # they squeezed before they came near: something else
+    unsure: frozenset[str] = frozenset()  # they were away and have not been seen open since
 
     def without(self, side: str) -> "Pointing":
-        return Pointing(self.near - {side}, self.down - {side})
+        """That of a hand that is gone."""
+        near, down, full = (sides - {side} for sides in (self.near, self.down, self.full))
+        return Pointing(near, down, full, self.unsure | {side})
+
+    def of(self, side: str, near: bool, down: bool, full: bool) -> "Pointing":
+        return Pointing(
+            _with(self.near, side, near),
+            _with(self.down, side, down),
+            _with(self.full, side, full),
+            _with(self.unsure, side, down and side in self.unsure),
+        )
 
 
-NOBODY = Pointing()
+NOBODY = Pointing(unsure=frozenset(SIDES))
 
 
 def hang(
@@ -64,20 +76,17 @@ def point_at(
             pointing = pointing.without(side)
             continue
         near = _near(panel_from_play, fingertip(side, hand), layout, side in pointing.near)
+        full = hand.squeeze >= RELEASE and (near is None or side in pointing.full)
         if near is None:
-            at, down = (
-                _ray_place(panel_from_play, hand, layout),
-                _firm(hand.trigger, side, pointing),
-            )
+            at = _ray_place(panel_from_play, hand, layout)
+            down = _firm(hand.trigger, side, pointing)
         else:
-            at, depth = near
-            firm = _firm(max(hand.trigger, hand.squeeze), side, pointing)
-            touches = depth < (LEAVE_M if side in pointing.down else TOUCH_M)
-            down = firm or touches
-        pointing = Pointing(
-            _with(pointing.near, side, near is not None), _with(pointing.down, side, down)
-        )
-        pointers.append(Pointer(side, at, down))
+            at, height = near
+            squeeze = 0.0 if full else hand.squeeze
+            touches = height < (LEAVE_M if side in pointing.down else TOUCH_M)
+            down = touches or _firm(max(hand.trigger, squeeze), side, pointing)
+        pointing = pointing.of(side, near is not None, down, full)
+        pointers.append(Pointer(side, at, down, side in pointing.unsure))
     return pointing, pointers
 
 
