@@ -5,7 +5,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from person import Person
+from validation import complaints, switched_on
 from xr_stand import Program, Runtime, Stand, find_runtime, start_program
+
+INTERRUPTED = 130  # exit code after Ctrl-C
 
 
 @pytest.fixture(scope="session")
@@ -44,3 +48,17 @@ def start() -> Iterator[Callable[..., Program]]:
             return program
 
         yield run
+
+
+@pytest.fixture
+def person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+    """Somebody before the three things on the table; at the end all must have been in order."""
+    program = start(stand, "--quality", "best", **switched_on(stand.folder))
+    with program.headset(stand.port) as remote:
+        made = Person(program, remote)
+        made.until(lambda line: line["focused"], "focused")
+        yield made
+        if program.process.poll() is None:
+            assert program.interrupt() == INTERRUPTED, program.told()[-800:]
+    assert not complaints(stand.folder)
+    assert "Traceback" not in program.told()

@@ -8,6 +8,7 @@ import math
 import socket
 import struct
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,11 +61,13 @@ class Controller:
 class Remote:
     """Head, eyes and hands of the runtime that listens at `port`; nothing moves before `send`."""
 
-    def __init__(self, port: int, patience_s: float = 20.0) -> None:
+    def __init__(
+        self, port: int, patience_s: float = 20.0, alive: Callable[[], bool] = lambda: True
+    ) -> None:
         self.head = Pose(np.array([0.0, 1.6, 0.0]), np.array(NO_TURN))
         self.eye_degrees = EYE_DEGREES
         self.left, self.right = Controller((-0.2, 1.3, -0.5)), Controller((0.2, 1.3, -0.5))
-        self._socket = connect(port, patience_s)
+        self._socket = connect(port, patience_s, alive)
         greeting = b""
         while len(greeting) < 2 * SIZE:
             got = self._socket.recv(2 * SIZE - len(greeting))
@@ -90,14 +93,14 @@ class Remote:
         self._socket.close()
 
 
-def connect(port: int, patience_s: float) -> socket.socket:
-    """The runtime listens once the program has made its instance: until then it refuses."""
+def connect(port: int, patience_s: float, alive: Callable[[], bool]) -> socket.socket:
+    """The runtime listens once the program, which has to live, has made its instance."""
     until = time.monotonic() + patience_s
     while True:
         try:
             made = socket.create_connection(("127.0.0.1", port), 5.0)
         except ConnectionRefusedError:
-            if time.monotonic() > until:
+            if time.monotonic() > until or not alive():
                 raise
             time.sleep(0.05)
             continue

@@ -1,13 +1,12 @@
 """`launch.py vr` on a real runtime: its life from READY to EXITING, and what ends it before."""
 
-import importlib.util
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
-from remote import EYE_DEGREES, EYES_APART_M, Remote
+from remote import EYE_DEGREES, EYES_APART_M
+from validation import complaints, switched_on
 from xr_stand import start_program
 
 from scene.pose import Pose
@@ -20,28 +19,9 @@ NO_HEADSET, INTERRUPTED = 4, 130  # exit codes
 PERIOD_S = 0.05  # of the null compositor
 
 
-def validation(folder: Path) -> dict[str, str]:
-    """Variables that switch on the core validation layer, which pyopenxr brings along."""
-    layers = Path(importlib.util.find_spec("xr").origin).parent / "api_layer" / "linux_x86_64"
-    return {
-        "XR_API_LAYER_PATH": str(layers),
-        "XR_ENABLE_API_LAYERS": "XR_APILAYER_LUNARG_core_validation",
-        "XR_CORE_VALIDATION_EXPORT_TYPE": "text",
-        "XR_CORE_VALIDATION_FILE_NAME": str(folder / "validation.txt"),
-    }
-
-
-def complaints(folder: Path) -> list[str]:
-    """What the layer told, but for its own beginning and end, which prove that it ran."""
-    told = (folder / "validation.txt").read_text().splitlines()
-    own = [line for line in told if "Core Validation Layer " in line]
-    assert len(own) == 2, told
-    return [line for line in told if line and line not in own]
-
-
 def test_a_session_lives_from_ready_to_exiting(stand, start):
-    program = start(stand, "--frames", "25", **validation(stand.folder))
-    with Remote(stand.port) as remote:
+    program = start(stand, "--frames", "25", **switched_on(stand.folder))
+    with program.headset(stand.port) as remote:
         remote.head = Pose(
             np.array([0.1, 1.7, 0.2]), np.array([math.cos(0.1), 0, math.sin(0.1), 0])
         )
@@ -93,8 +73,8 @@ def check_times(seen_s: list[float]) -> None:
 
 
 def test_recentring_brings_the_person_back_before_the_scene(served, start):
-    program = start(served, "--frames", "1000000", **validation(served.folder))
-    with Remote(served.port) as remote:
+    program = start(served, "--frames", "1000000", **switched_on(served.folder))
+    with program.headset(served.port) as remote:
         remote.send()
         before = program.until(lambda line: line["focused"], "focused")
         remote.head = Pose(
@@ -104,7 +84,7 @@ def test_recentring_brings_the_person_back_before_the_scene(served, start):
         away = program.until(lambda line: line["head"]["position"][0] > 0.5, "away")
         served.recentre()
         after = program.until(lambda line: line["recentred"], "recentred")
-        later = program.frames(4)
+        later = program.until(lambda line: line["frame"] > after["frame"] + 2, "later")
     for line in (after, later):
         np.testing.assert_allclose(eye_in_world(line), eye_in_world(before), atol=1e-4)
     assert np.linalg.norm(eye_in_world(away)[:3, 3] - eye_in_world(before)[:3, 3]) > 0.6
@@ -125,7 +105,7 @@ def eye_in_world(line: dict) -> np.ndarray:
 
 def test_a_runtime_that_goes_away_is_one_sentence(served, start):
     program = start(served, "--frames", "1000000")
-    with Remote(served.port) as remote:
+    with program.headset(served.port) as remote:
         remote.send()
         program.until(lambda line: line["focused"], "focused")
         served.kill_runtime()

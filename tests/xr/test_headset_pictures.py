@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from remote import Remote
 
 from app.worn_scene import BACKGROUND
 from renderer.reference import reference_image
@@ -71,7 +70,7 @@ def seen(stand, start) -> tuple[dict, list[np.ndarray]]:
     """A frame's line and the pictures of both eyes, (H, W, 3) 0..1, from near the cube."""
     pictures = stand.folder / "pictures"
     program = start(stand, "--frames", "12", "--quality", "best", "--pictures", str(pictures))
-    with Remote(stand.port) as remote:
+    with program.headset(stand.port) as remote:
         tilt = 0.35  # half of the angle, downwards
         remote.head = Pose(
             np.array([-0.2, 1.2, -0.2]), np.array([np.cos(tilt), -np.sin(tilt), 0, 0])
