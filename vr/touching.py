@@ -60,39 +60,36 @@ def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[
 
     A hand that comes back squeezing or pulling does nothing by that: it has to open first.
     """
-    pulses, beams, near, busy = [], [], [], set(touching.busy)
-    seen = frozenset(side for side in SIDES if frame.hands[side].active)
-    back = seen - touching.seen
-    squeezing = pressed(frame, "squeeze", touching.squeezing, (GRIPS_AT, LETS_GO_AT))
-    pulling = pressed(frame, "trigger", touching.pulling, (PULLS_AT, RELAXES_AT))
-    for side, before in zip(SIDES, touching.near, strict=True):
-        hand = frame.hands[side]
-        palm = place(world, side, hand, standing, frame.recentred)
-        if palm is None:
-            busy.discard(side)
-            near.append(None)
-            continue
-        begins = side in squeezing - touching.squeezing - back
-        acts = side in pulling - touching.pulling - back
-        busy |= {side} & back & squeezing
-        if side not in squeezing:
-            pulses += let_go(world, side)
-            busy.discard(side)
-        if begins and take(world, side, palm, standing):
-            pulses.append(Pulse(side, *TAKEN))
-            busy.add(side)
-            acts = False  # of a controller with one button, taking is all it does
-        line = beam(world, side, hand, standing, acts) if acts or shows(hand, busy, side) else None
-        if line is not None:
-            beams.append(line)
-            if acts and line.meets is not None:
-                pulses.append(Pulse(side, *ACTED))
-                busy |= {side} if begins else set()
-        near.append(touched(world, side, palm, standing))
-        if near[-1] is not None and near[-1] != before and world.held(side) is None:
-            pulses.append(Pulse(side, *TOUCHED))
+    now = replace(
+        touching,
+        seen=frozenset(side for side in SIDES if frame.hands[side].active),
+        squeezing=pressed(frame, "squeeze", touching.squeezing, (GRIPS_AT, LETS_GO_AT)),
+        pulling=pressed(frame, "trigger", touching.pulling, (PULLS_AT, RELAXES_AT)),
+    )
+    # What begins in this frame; of hands that are back nothing does.
+    squeezes = (now.squeezing - touching.squeezing) & touching.seen
+    pulls = (now.pulling - touching.pulling) & touching.seen
+    pulls = {side for side in pulls if frame.hands[side].aim is not None}
+    busy = now.squeezing & (touching.busy | (now.seen - touching.seen))
+    palms = {s: place(world, s, frame.hands[s], standing, frame.recentred) for s in SIDES}
+    let_go = [s for s in SIDES if s not in now.squeezing and world.held(s) is not None]
+    for side in let_go:
+        world.release(side)
+    taken = [s for s in SIDES if s in squeezes and take(world, s, palms[s], standing)]
+    busy |= set(taken)
+    # Of a controller with one button taking is all it does, and what it acted on is all it has.
+    acting = pulls - set(taken)
+    beams = [beam(world, s, frame.hands[s], standing, s in acting) for s in SIDES
+             if s in acting or (s not in busy and shows(frame.hands[s]))]  # fmt: skip
+    hits = {line.side for line in beams if line.acts and line.meets is not None}
+    near = tuple(touched(world, palms[side], standing) for side in SIDES)
+    brushed = [s for s, name, before in zip(SIDES, near, touching.near, strict=True)
+               if name not in (None, before) and world.held(s) is None]  # fmt: skip
+    felt = ((let_go, LEFT), (taken, TAKEN), (hits, ACTED), (brushed, TOUCHED))
+    pulses = [Pulse(side, *how) for sides, how in felt for side in sides]
+    busy |= hits & squeezes
     held = {side: world.held(side) for side in SIDES}
-    now = Touching(seen, squeezing, pulling, frozenset(busy), tuple(near))
+    now = replace(now, busy=busy, near=near)
     return now, Touched(strongest(pulses), tuple(beams), held)
 
 
@@ -132,29 +129,19 @@ def take(world, side: str, palm: Pose, standing: Standing) -> bool:
     return world.nearest(palm.position, reach) is not None and bool(world.grab(side, reach))
 
 
-def let_go(world, side: str) -> list[Pulse]:
-    """Opens a hand that holds something."""
-    if world.held(side) is None:
-        return []
-    world.release(side)
-    return [Pulse(side, *LEFT)]
-
-
-def touched(world, side: str, palm: Pose, standing: Standing) -> str | None:
-    """The object at the palm."""
-    found = world.nearest(palm.position, SKIN_M * standing.scale)
+def touched(world, palm: Pose | None, standing: Standing) -> str | None:
+    """The object at a palm."""
+    found = world.nearest(palm.position, SKIN_M * standing.scale) if palm is not None else None
     return found[0] if found else None
 
 
-def shows(hand: Hand, busy: set[str], side: str) -> bool:
+def shows(hand: Hand) -> bool:
     """A trigger pulled lightly shows where it would act."""
-    return hand.trigger >= SHOWS_AT and side not in busy
+    return hand.aim is not None and hand.trigger >= SHOWS_AT
 
 
-def beam(world, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam | None:
+def beam(world, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam:
     """Along the hand's aim; it acts on what it meets first."""
-    if hand.aim is None:
-        return None
     aim = standing.pose(hand.aim)
     along = -aim.matrix()[:3, 2]
     hit = (world.ray if acts else world.aim)(aim.position, along)
