@@ -1,5 +1,6 @@
 """Edits of what the stage shows: the file, its history, the world and the scene change together."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from app.stage import Stage
 
 LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
+MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told
 COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
 
@@ -45,12 +47,15 @@ def turn_to(stage: "Stage", history: History) -> None:
     """Goes to another step of the history: only what differs is touched."""
     before = stage.document.history
     stage.document.history = history
-    changed = edits.changes(before.file, history.file)
-    if not changed and len(before.file.all_items) == len(stage.scene.objects):
+    if history.file is before.file:
         return
+    changed = edits.changes(before.file, history.file)
     try:
+        world = stage.world
         stage.bodies.follow(stage.document)
         arrange(stage, changed)
+        if stage.world is not world:  # a new one stands at its start
+            stage.follow_world()
     except BadFile:
         stage.document.history = before
         stage.bodies.follow(stage.document)
@@ -133,13 +138,13 @@ def place(stage: "Stage", index: int, pose: Pose) -> None:
         stage.bodies.follow(stage.document)
 
 
-def keep_standing(stage: "Stage") -> None:
-    """Where everything is now, and its x, is where it starts: one edit."""
+def as_it_stands(stage: "Stage") -> SceneFile:
+    """The file with everything where it is now, at its x.  ValueError for what has flown off."""
     file = stage.document.file
     for thing in stage.scene.objects:
         file = edits.place(file, thing.name, thing.world_from_object)
         file = edits.set_x(file, thing.name, thing.x)
-    edit(stage, file, "keep as it stands")
+    return file
 
 
 def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, float]:
@@ -149,3 +154,15 @@ def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, f
     along = points @ thing.world_from_object.matrix()[0, :3]
     low, high = np.percentile(along, (2, 98))
     return (float(COPY_BESIDE * (high - low)), 0.0, 0.0)
+
+
+def stands_elsewhere(stage: "Stage") -> bool:
+    """Whether anything is not where it starts, or at another x."""
+    items = {item.name: item for item in stage.document.file.all_items}
+    for thing in stage.scene.objects:
+        item, pose = items[thing.name], thing.world_from_object
+        if thing.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
+            return True
+        if abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True))) < 1 - TURNED:
+            return True
+    return False

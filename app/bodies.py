@@ -30,6 +30,7 @@ class Bodies:
         self.notes: list[str] = []  # what the physics has changed on the way in
         self._of: dict[str, tuple[tuple, Collider]] = {}  # name -> what it was made of, and it
         self._made: dict[tuple, Collider | None] = {}  # of a mesh or model; None: there is none
+        self._ground: tuple = ()  # floor and gravity of the world
         self._future: Future | None = None
         self._stale = True  # the world does not know of the last edits yet
 
@@ -87,10 +88,11 @@ class Bodies:
         from scene.follow import follow
         from scene.world import World
 
-        models = document.models_by_name()
-        if self.world is None:
-            self.world = World(file, models, colliders, hz=HZ)
-            self.world.paused = True
+        models, ground = document.models_by_name(), (file.floor_y, file.gravity_m_s2)
+        if self.world is None or self._ground != ground:  # a floor is no thing that comes or goes
+            paused = self.world is None or self.world.paused
+            self.world, self._ground = World(file, models, colliders, hz=HZ), ground
+            self.world.paused = paused
             known = 0
         else:
             known = len(self.world.findings)
@@ -144,8 +146,10 @@ def attach_bodies(viewer: "Viewer") -> None:
     stage = viewer.stage
 
     def poll() -> bool:
-        bodies = stage.bodies
+        bodies, before = stage.bodies, stage.world
         busy = bodies.poll(stage.document)
+        if stage.world is not before:
+            stage.follow_world()
         if bodies.problem:
             stage.problem, bodies.problem = bodies.problem, ""
         if bodies.notes:

@@ -19,7 +19,7 @@ from app.export_panel import attach_export
 from app.files import Files, first_camera, home_of, named_cameras, opened_scene
 from app.hands import is_erasing, is_painting, push, take
 from app.legend_panel import draw_legend
-from app.objects_panel import attach_objects
+from app.objects import attach_objects
 from app.opened import read_files
 from app.opening import ReadingOptions
 from app.outlines import draw_brush, draw_outlines

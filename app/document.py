@@ -27,6 +27,7 @@ class Document:
     saved_regions: int = 0  # version of the regions then
     stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
     sources: dict[ModelKey, Source] = field(default_factory=dict)
+    _compared: tuple | None = None  # two files, and how they differ
 
     @property
     def file(self) -> SceneFile:
@@ -35,14 +36,20 @@ class Document:
     @property
     def edited(self) -> bool:
         """Whether the file says something else than what lies on the disk."""
-        return self.file is not self.saved and bool(edits.changes(self.saved, self.file))
+        return self._told[0]
 
     @property
     def unsaved(self) -> bool:
         """Whether work would be lost; where a slider stands is none."""
-        if self.file is self.saved:
-            return False
-        return any(change.fields != {"x"} for change in edits.changes(self.saved, self.file))
+        return self._told[1]
+
+    @property
+    def _told(self) -> tuple[bool, bool]:
+        """Edited and unsaved; found once for each edit, however often it is asked."""
+        known = self._compared
+        if known is None or known[0] is not self.file or known[1] is not self.saved:
+            known = self._compared = (self.file, self.saved, compared(self.saved, self.file))
+        return known[2]
 
     def model(self, item: SceneItem) -> Model:
         return self.sources[key_of(item)].model
@@ -68,6 +75,17 @@ class Document:
         if self.path is not None:
             return self.path.name
         return file_name(self.file.all_items[0].name if self.file.all_items else "") + ENDING
+
+
+def compared(saved: SceneFile, file: SceneFile) -> tuple[bool, bool]:
+    """Whether they differ, and whether by more than where sliders stand."""
+    if saved is file:
+        return False, False
+    changed = edits.changes(saved, file)
+    scene = (file.floor_y, file.view, file.gravity_m_s2) != (
+        saved.floor_y, saved.view, saved.gravity_m_s2,
+    )  # fmt: skip
+    return bool(changed) or scene, scene or any(change.fields != {"x"} for change in changed)
 
 
 def first_stop(model: Model) -> Stop:

@@ -2,11 +2,14 @@
 one can be undone.  Items that an edit does not touch stay the very same objects.
 """
 
+import math
 import re
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from scene.pose import Pose
-from scene.scene_file import BACKGROUND, FAR_M, SceneFile, SceneItem
+from scene.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
 from scene.selector import check_x
 
 LONGEST_NAME = 100  # letters, as the reader takes them
@@ -102,6 +105,23 @@ def change(file: SceneFile, name: str, /, **values: object) -> SceneFile:
     if before is file.background:
         return replace(file, background=after)
     return replace(file, items=tuple(after if item is before else item for item in file.items))
+
+
+def ground(file: SceneFile, floor_y: float | None) -> SceneFile:
+    """With an endless floor at that height, metres, or without one."""
+    if floor_y is not None:
+        if not -FAR_M <= floor_y <= FAR_M:
+            raise ValueError(f"A floor lies within {FAR_M:g} m.")
+        floor_y = round(float(floor_y), DECIMALS)
+    return file if floor_y == file.floor_y else replace(file, floor_y=floor_y)
+
+
+def look_from(file: SceneFile, eye: np.ndarray, target: np.ndarray, fov_y: float) -> SceneFile:
+    """With the first look from eye (3,) to target (3,).  ValueError for one straight up or down."""
+    view = FirstView(*(tuple(round(float(n), DECIMALS) for n in p) for p in (eye, target)), fov_y)
+    if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
+        raise ValueError("The first look goes not straight up or down; tilt it a little.")
+    return file if view == file.view else replace(file, view=view)
 
 
 def wanted(file: SceneFile, name: str) -> SceneItem:

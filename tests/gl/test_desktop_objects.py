@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames, until_opened
 
+from app.arrange import place, steer
 from app.desktop import Options, Viewer
 from app.files import opened_scene
 from app.gizmo import MOVE, OFF, TURN
@@ -19,7 +20,9 @@ from app.window import Drop
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_ply import write_ply
+from scene import edits
 from scene.camera_list import CameraReading
+from scene.pose import Pose
 from scene.read_scene_file import read_scene_file
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
@@ -202,22 +205,16 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     assert copy.model is thing(viewer, "ball").model
     assert copy.world_from_object.position[0] > 0.05  # beside it, not in it
     assert "ball 2" in viewer.stage.world.things
-    assert objects.edit(_rename, "ball 2", "globe", what="rename")
+    assert objects.edit(edits.rename, "ball 2", "globe", what="rename")
     key(viewer, glfw.KEY_DELETE)
     assert names(viewer) == [*NAMES[:2], "ball", "ring", "plate"] or viewer.stage.chosen == ""
-    assert not objects.edit(_rename, "ball", "cube", what="rename")
+    assert not objects.edit(edits.rename, "ball", "cube", what="rename")
     assert "taken" in viewer.readings.note
     while viewer.stage.document.history.undoes:
         key(viewer, glfw.KEY_Z, CTRL)
     assert names(viewer) == NAMES and list(viewer.stage.world.things) == NAMES
     key(viewer, glfw.KEY_Z, CTRL)
     assert "Nothing" in viewer.readings.note
-
-
-def _rename(file, before, after):
-    from scene import edits
-
-    return edits.rename(file, before, after)
 
 
 def test_ctrl_s_does_not_move_the_camera_and_asks_nothing_for_an_opened_file(viewer, tmp_path):
@@ -344,8 +341,6 @@ def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
 
 
 def test_a_slider_alone_asks_nothing(viewer):
-    from app.arrange import steer
-
     steer(viewer.stage, 1, 0.5)
     run_frames(viewer, 1)
     assert viewer.objects.status() == "not saved" and viewer._may_close()
@@ -360,6 +355,75 @@ def test_a_scene_file_is_dropped_on_the_window(plain):
     until_opened(plain)
     assert "two scene files" in plain.stage.problem
     plain.stage.problem = ""
+
+
+def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
+    objects, stage = viewer.objects, viewer.stage
+    first = stage.world
+    assert objects.edit(edits.ground, -0.2, what="floor")
+    assert stage.document.file.floor_y == -0.2 and stage.world is not first
+    assert stage.world.paused and list(stage.world.things) == NAMES
+    viewer.camera.turn(0.3, -0.1)
+    run_frames(viewer, 60)
+    objects.look_from_here()
+    eye = viewer.view().world_from_eye.position
+    assert stage.document.file.view.eye == pytest.approx(eye, abs=1e-6)
+    assert objects.saving.named(str(tmp_path / "a"))
+    again = stage.first_view((900, 640))
+    np.testing.assert_allclose(
+        again.world_from_eye.matrix(), viewer.view().world_from_eye.matrix(), atol=1e-4
+    )
+    key(viewer, glfw.KEY_Z, CTRL)
+    key(viewer, glfw.KEY_Z, CTRL)
+    assert stage.document.file.floor_y == -0.7 and objects.unsaved
+
+
+def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
+    objects, stage = viewer.objects, viewer.stage
+    stage.world.paused = False
+    index = names(viewer).index("ball")
+    place(stage, index, Pose(np.array([0.0, 0.5, -0.12]), np.array([1.0, 0, 0, 0])))
+    steer(stage, index, 0.25)
+    for _ in range(40):
+        run_frames(viewer, 1, seconds=0.02)
+    fallen = thing(viewer, "ball")
+    assert 0.0 < fallen.world_from_object.position[1] < 0.45 and fallen.x == 0.25
+    assert not stage.document.edited and not objects.unsaved
+    stage.world.paused = True
+    run_frames(viewer, 2)
+    objects.keep_standing()
+    item = edits.find(stage.document.file, "ball")
+    assert item.x == 0.25
+    assert item.position == pytest.approx(fallen.world_from_object.position, abs=1e-5)
+    key(viewer, glfw.KEY_Z, CTRL)
+    assert tuple(thing(viewer, "ball").world_from_object.position) == (0, 0.061, -0.12)
+
+
+def test_a_body_is_given_taken_and_weighed(viewer):
+    objects, world = viewer.objects, viewer.stage.world
+    item = edits.find(viewer.stage.document.file, "ball")
+    assert objects.change(item, "body", collider=None)
+    assert world.things["ball"].body is None
+    key(viewer, glfw.KEY_Z, CTRL)
+    assert world.things["ball"].body is not None
+    item = edits.find(viewer.stage.document.file, "ball")
+    assert objects.change(item, "mass", mass_kg=2.0)
+    assert world.physics.mass(world.things["ball"].body) == pytest.approx(2.0)
+    assert objects.change(item, "body", static=True) and not world.things["ball"].moves
+
+
+def test_a_collider_that_cannot_be_made_is_a_sentence(viewer):
+    objects, stage = viewer.objects, viewer.stage
+    item = edits.find(stage.document.file, "ball")
+    assert objects.change(item, "body", collider="touch/none.obj")
+    end = time.monotonic() + 20
+    while stage.bodies.busy and time.monotonic() < end:
+        run_frames(viewer, 1)
+        time.sleep(0.005)
+    run_frames(viewer, 2)
+    assert "ball" in stage.problem and "touched" in stage.problem
+    assert stage.world.things["ball"].body is None
+    stage.problem = ""
 
 
 def test_an_empty_scene_is_shown_and_undone(plain):
@@ -383,7 +447,5 @@ def test_a_long_list_and_every_part_of_the_panel_is_drawn(viewer):
     run_frames(viewer, 2)
     viewer.stage.move(1, thing(viewer, "plate").world_from_object)
     run_frames(viewer, 2)
-    from app.arrange import keep_standing
-
-    keep_standing(viewer.stage)
+    viewer.objects.keep_standing()
     assert viewer.stage.document.file.items[0].position == (0.28, 0.005, 0.1)
