@@ -102,7 +102,8 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     walk = QUICK if options.quick else Walk()
     walk = replace(walk, frames=options.frames or walk.frames)
     stage = make_stage(subjects, x, size, walk, cameras)
-    told = scene_line(options, stage, digest([subject.scene for subject in subjects], cameras))
+    contents = [s.scene if s.file else s.scene.objects[0].model for s in subjects]
+    told = scene_line(options, stage, digest(contents, cameras))
     with open_pair(options.context, options.drawing) as (renderers, ctx):
         pricing = Pricing(renderers, ctx, stage, subjects[0].background)
         on_cpu = draws_on_cpu(pricing.drawing, ctx)
