@@ -149,7 +149,7 @@ class Wearing:
     def pulse(self, side: str, strength: float, seconds: float) -> None:
         """Buzzes a hand."""
         self.pulses.append((side, strength, seconds))
-        self.session.hands.pulse(side, strength, seconds)
+        self.session.pulse(side, strength, seconds)
 
     def _time_passed(self, frame: Frame) -> float:
         """Seconds since the frame before, by the runtime's clock."""

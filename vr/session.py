@@ -237,6 +237,11 @@ class Session:
             xr.end_frame(self._handle, info)
         self._drain()
 
+    def pulse(self, side: str, strength: float, seconds: float) -> None:
+        """Buzzes a hand, 0 to 1.  Raises Lost."""
+        with self._instance.asked("buzz a hand"):
+            self.hands.pulse(side, strength, seconds)
+
     def _drain(self) -> None:
         """Forgets GL errors: SteamVR leaves some, and runtimes fail over older ones."""
         for _ in range(MOST_ERRORS):
