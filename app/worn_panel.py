@@ -84,15 +84,16 @@ def sliders_of(world: World) -> tuple[Slider, ...]:
 
 
 def stops_of(thing: Thing) -> tuple[Stop, ...]:
-    """The states that the scene names, else the model's stops; thermal ones keep their legend."""
-    own = {stop.x: stop for stop in thing.drawn.model.stops}
-    states = thing.item.states
-    if not states:
-        return tuple(own.values())
-    named = {state.x: replace(own.get(state.x, Stop("", state.x)), name=state.name)
-             for state in states}  # fmt: skip
-    thermal = {x: stop for x, stop in own.items() if stop.kind == "thermal"}
-    return tuple((thermal | named)[x] for x in sorted(thermal | named))
+    """The model's stops, under the names of the states that the scene has there, and these; the end
+    of a ring is its beginning.
+    """
+    stops = {stop.x: stop for stop in thing.drawn.model.stops}
+    named = [(state.x, state.name) for state in thing.item.states]
+    if thing.item.ring and named:
+        named.append((1.0, min(named)[1]))
+    for x, name in named:
+        stops[x] = replace(stops.get(x, Stop("", x)), name=name)
+    return tuple(stops[x] for x in sorted(stops))
 
 
 def grant(wish: Wish, wearing: "Wearing", frame: Frame) -> None:

@@ -10,7 +10,7 @@ from vr_hands import a_frame, hand_at
 
 from app.pacing import Pacing
 from app.person import Person
-from app.worn_panel import WornPanel, grant, sliders_of
+from app.worn_panel import WornPanel, grant, sliders_of, stops_of
 from runtime_models.model import Stop
 from scene.reactions import State
 from scene.scene_file import SceneFile, SceneItem
@@ -75,7 +75,15 @@ def test_sliders_are_of_what_is_seen_and_goes_somewhere():
     assert [slider.name for slider in sliders] == ["lamp", "leg"]
     assert [stop.name for stop in sliders[0].stops] == ["layer 0", "layer 1", "layer 2"]
     assert [(stop.name, stop.x, stop.palette) for stop in sliders[1].stops] == [
-        ("cold", 0.0, ""), ("warm", 0.25, ""), ("heat", 1.0, "ironbow")
+        ("cold", 0.0, ""), ("warm", 0.25, ""), ("half", 0.5, ""), ("heat", 1.0, "ironbow")
+    ]  # fmt: skip
+
+
+def test_a_ring_ends_where_it_begins():
+    states = (State("normal", 0.0), State("fire", 0.5))
+    ring = replace(a_world().things["leg"], item=item("leg", states=states, ring=True))
+    assert [(stop.name, stop.x) for stop in stops_of(ring)] == [
+        ("normal", 0.0), ("fire", 0.5), ("normal", 1.0)
     ]  # fmt: skip
 
 
