@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from runtime_models.model import BadFile, Model
 from scene.pose import Pose
 from scene.reactions import Machine, Standing, start
@@ -32,6 +30,11 @@ class Thing:
     def moves(self) -> bool:
         """Whether the physics moves it and a hand can hold it."""
         return self.body is not None and not self.item.static
+
+    @property
+    def waits(self) -> bool:
+        """Whether a step in which nothing happens to it leaves it as it is."""
+        return self.standing.motion is None and self.before is self.pose and self.lead == 0
 
 
 def new_thing(item: SceneItem, model: Model, collider, label: int, physics) -> Thing:
@@ -68,7 +71,7 @@ def drawn_thing(thing: Thing, part: float | None) -> Thing:
 
     The same thing, and the same SceneObject in it, where that is what was drawn last.
     """
-    still = part is None or same_pose(thing.before, thing.pose)
+    still = part is None or thing.before is thing.pose
     pose = thing.pose if still else between(thing.before, thing.pose, part + thing.lead)
     drawn, x = thing.drawn, thing.standing.x
     if drawn.x == x and same_pose(drawn.world_from_object, pose):
@@ -78,4 +81,6 @@ def drawn_thing(thing: Thing, part: float | None) -> Thing:
 
 def same_pose(a: Pose, b: Pose) -> bool:
     """To the last bit."""
-    return np.array_equal(a.position, b.position) and np.array_equal(a.wxyz, b.wxyz)
+    return a is b or (
+        a.position.tobytes() == b.position.tobytes() and a.wxyz.tobytes() == b.wxyz.tobytes()
+    )

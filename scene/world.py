@@ -76,6 +76,7 @@ class World:
         self.impulses: dict[tuple[int, int], float] = {}  # N s of each pair in the step before
         self.steps = 0
         self._told: dict[tuple, tuple] = {}  # (what, name) -> as it was told last
+        self._stirred: set[str] = set()  # came, were placed or controlled since the last step
         self._events: dict[str, list[Event]] = {}  # of hands and rays since the last step
         self._hands_told: list[dict] = []
         self._rays_told: list[dict] = []
@@ -105,6 +106,7 @@ class World:
         of = f"object '{item.name}'"
         self.findings += [replace(new, file=of) for new in self.physics.findings[known:]]
         self.things[item.name] = thing
+        self._stirred.add(item.name)
         if thing.body is not None:
             self.names[thing.body] = item.name
 
@@ -127,11 +129,13 @@ class World:
         if thing.body is not None:
             self.physics.place(thing.body, pose)
         self.things[name] = replace(thing, pose=pose, before=pose)
+        self._stirred.add(name)
 
     def control(self, name: str, x: float) -> None:
         """Puts an object's x there at once; no reaction under way goes on."""
         thing = self.thing(name)
         self.things[name] = replace(thing, standing=steer(thing.machine, thing.standing, x))
+        self._stirred.add(name)
 
     def show(self, name: str, visible: bool) -> None:
         """Draws an object or does not; a hidden one is touched as before."""
@@ -275,6 +279,7 @@ class World:
         held = {self.held(hand) for hand in self.holds}
         for name in self.things:
             self._react(name, record, events.get(name, ()), name in held)
+        self._stirred.clear()
         return record
 
     def advance(self, seconds: float) -> list[Record]:
@@ -322,8 +327,11 @@ class World:
         """The object's new pose and x; what has changed is told."""
         thing = self.things[name]
         pose = self.physics.pose(thing.body) if thing.moves else thing.pose
+        still = same_pose(pose, thing.pose)
+        if still and not events and thing.waits and name not in self._stirred:
+            return
         standing, fired = advance(thing.machine, thing.standing, self.time_s, events, pose.position)
-        self.things[name] = after_step(thing, pose, standing, held)
+        self.things[name] = after_step(thing, thing.pose if still else pose, standing, held)
         record.events += [event_row(name, answer) for answer in fired]
         told = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
         x = rounded(standing.x)
@@ -364,4 +372,5 @@ class World:
         self.holds, self.impulses, self.steps = dict(saved.holds), dict(saved.impulses), saved.steps
         self.names = {t.body: name for name, t in self.things.items() if t.body is not None}
         self._events, self._hands_told, self._rays_told, self._told = {}, [], [], {}
+        self._stirred = set(self.things)
         self._hands_before, self._behind_s, self._part = dict(saved.hands), 0.0, None

@@ -264,6 +264,20 @@ def test_a_control_ends_what_a_reaction_began():
     assert world.things["a"].standing.x == 0.25 and world.things["a"].standing.state == "normal"
 
 
+def test_what_is_put_elsewhere_by_hand_is_told_though_it_lies_still():
+    world = real(item("a", position=(0, HALF, 0)), item("post", static=True, position=(1, 1, 0)))
+    while not world.resting:
+        world.step()
+    assert not world.step().is_news
+    world.control("a", 0.25)
+    world.place("post", at(2, 1, 0))
+    record = world.step()
+    assert record.x == {"a": 0.25} and record.poses["post"][:3] == [2, 1, 0]
+    saved = world.snapshot()
+    world.restore(saved)
+    assert set(world.step().x) == {"a", "post"}  # who restores is told all anew
+
+
 def test_a_snapshot_brings_all_of_it_back():
     world = real(item("a", states=STATES, reactions=(reaction("collision", "next"),)))
     world.move_hand("right", at(0, 1, 0))
