@@ -1,7 +1,7 @@
 """A chart in seconds, in the window: named settings timed and compared frame by frame."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -61,6 +61,11 @@ def turned(view: View, centre: np.ndarray, angle: float) -> View:
     return replace(view, world_from_eye=Pose.from_matrix(about @ view.world_from_eye.matrix()))
 
 
+def frames_for(settings: Mapping) -> int:
+    """How many frames a chart of these takes."""
+    return (FRAMES + 1) + len(settings) * (FRAMES + BETWEEN + 2)
+
+
 class QuickChart:
     """Measures exact and every quick setting on a small turn around what is seen now.
 
@@ -85,9 +90,14 @@ class QuickChart:
         self._pictures: list[np.ndarray] = []
         self._exact_ms: list[float] = []
         self.rows: list[QuickRow] = []
-        self.frame, self.frames = 0, (FRAMES + 1) + len(self._settings) * (FRAMES + BETWEEN + 2)
+        self.frame, self.frames = 0, frames_for(self._settings)
         self._work = self._measure()
         self.done = False
+
+    def only(self, names: Sequence[str]) -> None:
+        """Leaves the others out, and takes these in their order; before the first step."""
+        self._settings = {name: self._settings[name] for name in names if name in self._settings}
+        self.frames = frames_for(self._settings)
 
     def time_exact(self, number: int) -> float:
         """Milliseconds of one exact frame of the turn, beside the chart."""

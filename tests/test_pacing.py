@@ -1,12 +1,17 @@
 """What a headset's frames are drawn with: exact where time allows, the floor never left."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import ClassVar
 
+import numpy as np
 import pytest
 
-from app.pacing import AUTO, FIXED, LATE, PART, QUALITIES, Pacing
+from app.pacing import AUTO, FIXED, LATE, PART, PRICED, QUALITIES, Pacing, StereoChart
 from app.quick_chart import QUICK, QuickRow
 from renderer.settings import RenderSettings
+from scene.pose import Pose, View, look_at
+from scene.scene import Scene
 from vr.panel_state import QUALITIES as ON_THE_PANEL
 
 BACKGROUND = (0.1, 0.2, 0.3)
@@ -138,6 +143,48 @@ def test_a_fixed_quality_stays_as_it_is(quality):
         pacing.seen(1000.0, 1000.0)
     assert pacing.settings() == before and before.background == BACKGROUND
     assert (before.render_scale < 1) == (quality == "fast")
+
+
+def test_what_is_priced_and_what_is_fixed_are_rows_of_the_quick_chart():
+    assert set(PRICED) <= set(QUICK)
+    assert {name for name in FIXED.values() if name} <= set(QUICK)
+
+
+class SlowRenderer:
+    """Draws nothing, `seconds` a frame, and keeps what it was asked for."""
+
+    backends: ClassVar = {"drawing": "tiles"}
+
+    def __init__(self, clock) -> None:
+        self.clock, self.settings, self.eyes = clock, RenderSettings(background=BACKGROUND), []
+
+    def update(self, scene) -> None:
+        self.clock.now += self.clock.each
+
+    def draw(self, views) -> None:
+        self.eyes.append([view.world_from_eye.position for view in views])
+
+    def resolved(self, i):
+        return np.zeros((4, 4, 3), np.float32)
+
+
+@pytest.mark.parametrize(("each", "most"), [(0.01, len(PRICED)), (0.2, 2), (10.0, 0)])
+def test_a_chart_ends_with_its_patience_and_draws_both_eyes(monkeypatch, each, most):
+    clock = SimpleNamespace(now=0.0, each=each)
+    monkeypatch.setattr("time.perf_counter", lambda: clock.now)
+    renderer = SlowRenderer(clock)
+    eye = look_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0))
+    other = Pose(eye.position + np.array([0.06, 0, 0]), eye.wxyz)
+    views = [View(at, (-1, 1, -1, 1), 0.1, 10.0, (8, 8)) for at in (eye, other)]
+    chart = StereoChart(renderer, Scene(()), views, np.zeros(3), lambda: None)
+    rows = chart.rows()
+    names = [row.name for row in rows]
+    assert names == ["exact", *PRICED[: len(rows) - 1]] and len(rows) - 1 <= most
+    assert len(rows) - 1 == most or each == 0.2
+    assert renderer.settings == RenderSettings(background=BACKGROUND)
+    for left, right in renderer.eyes:  # turned about the middle, as far apart as ever
+        assert np.linalg.norm(left - right) == pytest.approx(0.06)
+        assert np.linalg.norm(left) == pytest.approx(2.0)
 
 
 def test_the_panel_offers_what_there_is():
