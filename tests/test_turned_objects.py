@@ -128,6 +128,23 @@ def test_networks_that_look_along_a_direction_turn_with_the_object(renderer):
     assert psnr_db(draw(renderer, alone(model, x=0.3), [VIEW])[0], turned) < APART
 
 
+def test_what_swings_about_the_eye_into_the_view_has_its_colours(renderer):
+    """As the object sees it the eye rests, yet anchors that were out of view want colours now."""
+    model, eye = random_model(150), VIEW.world_from_eye.position
+    renderer.settings = RenderSettings(skip_unseen=True)
+    runs = []
+    for degrees in (60, 25, 12, 0):
+        half = np.radians(degrees) / 2
+        turn = Pose(np.zeros(3), np.array([cos(half), 0, sin(half), 0])).matrix()
+        turn[:3, 3] = eye - turn[:3, :3] @ eye
+        scene = alone(model, world_from_object=Pose.from_matrix(turn), x=0.3)
+        renderer.update(scene)
+        runs.append(renderer.draw([VIEW]).color_runs)
+        picture = reference_image(scene, VIEW)
+        assert psnr_db(renderer.image(), picture) > 60
+    assert runs[0] <= 1 and sum(runs) >= 2 and picture[..., 3].max() > 0.5
+
+
 SHAPES = [
     Sphere(centre=(0.3, 0.2, -0.4), radius=0.6, x=1, border=0.3),
     Box(centre=(-0.2, 0.1, 0.2), half=(0.7, 0.3, 0.5), wxyz=(0.8, 0, 0.6, 0), x=1, border=0.1),

@@ -12,6 +12,7 @@ from tests.test_turned_objects import (  # noqa: F401  collected here with this 
     test_one_object_turns_beside_one_that_does_not,
     test_selectors_in_the_objects_space_turn_with_it,
     test_selectors_in_the_world_stay_while_an_object_turns_through_them,
+    test_what_swings_about_the_eye_into_the_view_has_its_colours,
 )
 
 
