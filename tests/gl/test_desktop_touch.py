@@ -90,7 +90,7 @@ def test_a_drag_carries_what_lies_under_the_mouse(viewer):
     for _ in range(30):
         viewer.take(Drag("left", 2.0, -4.0))
         run_frames(viewer, 1)
-    run_frames(viewer, 20)
+    run_frames(viewer, 10, seconds=0.05)
     x, y = on_screen(viewer, place(viewer))
     assert x - at[0] == pytest.approx(60, abs=6) and y - at[1] == pytest.approx(-120, abs=8)
     drawn = viewer.stage.scene.objects[0].world_from_object.position
@@ -98,7 +98,7 @@ def test_a_drag_carries_what_lies_under_the_mouse(viewer):
     np.testing.assert_array_equal(viewer.view().eye_from_world(), before.eye_from_world())
     viewer.take(Release("left"))
     assert viewer.stage.world.held(HAND) is None
-    run_frames(viewer, 100)
+    run_frames(viewer, 25, seconds=0.08)
     assert place(viewer)[1] == pytest.approx(HALF, abs=0.005)  # it fell back to the floor
 
 
@@ -118,13 +118,13 @@ def test_the_wheel_pushes_and_shift_turns(viewer, monkeypatch):
     zoom = viewer.camera.distance
     viewer.take(Drag("left", 0.0, -60.0))
     viewer.take(Wheel(4))
-    run_frames(viewer, 40)
+    run_frames(viewer, 12, seconds=0.08)
     assert viewer.camera.distance == zoom
     assert np.linalg.norm(place(viewer) - viewer.camera.position) > distance + 0.3
     monkeypatch.setattr(viewer.window, "held", lambda key: key == glfw.KEY_LEFT_SHIFT)
     where = place(viewer).copy()
     viewer.take(Drag("left", 100.0, 0.0))
-    run_frames(viewer, 40)
+    run_frames(viewer, 12, seconds=0.08)
     np.testing.assert_allclose(place(viewer), where, atol=0.02)
     w, _, y, _ = viewer.stage.world.things["cube"].pose.wxyz
     assert 2 * np.arctan2(y, w) == pytest.approx(0.8, abs=0.05)  # 100 pixels of 0.008
@@ -220,7 +220,7 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
     assert viewer.stage.scene.objects[0].x == 1.0
     assert list(viewer.touch.told) == ["cube: ray \u2192 hot"]
     assert [label.text for label in viewer.touch.marks.labels] == ["hot"]
-    run_frames(viewer, 120)
+    run_frames(viewer, 20, seconds=0.1)
     assert not viewer.touch.marks.fading
     viewer.window._cursor = (450.0, 5.0)  # the sky
     press_key(viewer, glfw.KEY_X)
