@@ -100,5 +100,8 @@ def _wgl(xr):
 
 
 def _set_pointer(binding, name: str, value: int | None) -> None:
-    """Sets a field of any pointer type."""
-    setattr(binding, name, ctypes.cast(c_void_p(value), type(getattr(binding, name))))
+    """Sets a field of any pointer type; c_void_p takes the number as it is."""
+    kinds = {field: kind for each in type(binding).__mro__ for field, kind, *_ in
+             getattr(each, "_fields_", ())}  # fmt: skip
+    kind = kinds[name]
+    setattr(binding, name, value if kind is c_void_p else ctypes.cast(c_void_p(value), kind))
