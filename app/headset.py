@@ -35,6 +35,8 @@ class Options(ReadingOptions):
     """By the stick that does not walk: 30 degrees at a time, evenly, or by the body alone."""
     walking_hand: Literal["left", "right"] = "left"
     """The hand whose stick walks; the other turns and flies."""
+    panel_hand: Literal["left", "right"] = "left"
+    """The hand that carries the panel; the other points at it."""
     vignette: float = 0.8
     """How dark the edge of the picture gets while a stick moves one; 0: not at all, 1: black."""
     mirror: bool = True
@@ -114,7 +116,11 @@ def wear(options: Options) -> int:
             Eyes(mirror.ctx, session.sizes) as eyes,
         ):
             rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
-            wearing = Wearing(session, renderer, eyes, mirror, scene, pacing, report, rules)
+            for profile in session.hands.refused:
+                print(f"{instance.runtime} does not know {profile}.", file=sys.stderr)
+            wearing = Wearing(
+                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand
+            )
             try:
                 wearing.loop(options.frames)
             except (Lost, KeyboardInterrupt) as end:
