@@ -191,9 +191,10 @@ def test_a_controller_with_one_button_takes_acts_or_holds_the_world():
     touching, told = run(world, [one_button])
     assert told[0].held["right"] is None and told[0].beams[0].meets == "a"
     assert at_rest(one_button, touching).hands["right"].squeeze == 0
-    world = world_with((5, 5, 5))
-    touching, told = run(world, [one_button])
-    assert at_rest(one_button, touching).hands["right"].squeeze == 1
+    for world in (world_with((5, 5, 5)), world_with(AHEAD)):  # nothing, or nothing that answers
+        touching, told = run(world, [one_button])
+        assert at_rest(one_button, touching).hands["right"].squeeze == 1
+        assert told[0].pulses == ()
 
 
 def test_touch_is_felt_once_and_taking_too():

@@ -81,7 +81,7 @@ def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[
     acting = pulls - set(taken)
     beams = [beam(world, s, frame.hands[s], standing, s in acting) for s in SIDES
              if s in acting or (s not in busy and shows(frame.hands[s]))]  # fmt: skip
-    hits = {line.side for line in beams if line.acts and line.meets is not None}
+    hits = {line.side for line in beams if line.acts and answers(world, line.meets)}
     near = tuple(touched(world, palms[side], standing) for side in SIDES)
     brushed = [s for s, name, before in zip(SIDES, near, touching.near, strict=True)
                if name not in (None, before) and world.held(s) is None]  # fmt: skip
@@ -150,6 +150,11 @@ def beam(world, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam:
     end = start - hand.aim.matrix()[:3, 2] * min(length, BEAM_M)
     meets = hit.object if hit is not None and hit.object in world.things else None
     return Beam(side, start, end, meets, acts)
+
+
+def answers(world, name: str | None) -> bool:
+    """Whether an object has something to do when a ray hits it."""
+    return name is not None and any(r.on == "ray" for r in world.things[name].machine.reactions)
 
 
 def at_rest(frame: Frame, touching: Touching) -> Frame:
