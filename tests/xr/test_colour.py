@@ -1,6 +1,7 @@
 """Known colours in the images of a real runtime: encoded where it takes them so, else as light."""
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -43,3 +44,20 @@ def test_a_known_colour_arrives_in_both_eyes(stand, name, linear, within):
     left, right = map(np.array, told["eyes"])
     np.testing.assert_allclose(left, wanted, atol=within)
     np.testing.assert_allclose(right, wanted[::-1], atol=within)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SRGB8_ALPHA8", "RGBA16F"])
+def test_the_runtimes_own_compositor_shows_the_same_colour(stand, name):
+    """Whatever the format, its window has the very bytes: the whole way to the display is right."""
+    if shutil.which("xvfb-run") is None:
+        pytest.skip("no xvfb-run: apt install xvfb")
+    environment = {**stand.environment, "XRT_COMPOSITOR_FORCE_XCB": "1"}
+    del environment["XRT_COMPOSITOR_NULL"]
+    screen = ["xvfb-run", "-a", "-s", "-screen 0 1400x1000x24"]
+    done = subprocess.run(
+        [*screen, sys.executable, PROGRAM.with_name("look_at_window.py"), name],
+        env=environment, capture_output=True, text=True, timeout=90, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert set(PATCHES) <= {tuple(each) for each in json.loads(done.stdout)}, done.stdout
