@@ -60,12 +60,13 @@ class Wearing:
         pacing: Pacing,
         report: Report,
         rules: Rules = RULES,
+        panel_hand: str = "left",
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.scene, self.world = scene, scene.world
         self.pacing, self.report = pacing, report
         self.person = Person(scene.world, scene.eye, scene.floor_y, rules)
-        self.panel = WornPanel()
+        self.panel = WornPanel(panel_hand)
         self.standing = Standing()
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()

@@ -13,6 +13,7 @@ from vr.frame import Frame
 from vr.panel_state import (
     Exit,
     Facts,
+    Panel,
     Pulse,
     PutBack,
     Recentre,
@@ -35,8 +36,8 @@ ADVICE = {"best": ": try Auto", "balanced": ": try Auto or Fast"}  # by the qual
 class WornPanel:
     """Keeps the panel between frames; `carried` is what is drawn."""
 
-    def __init__(self) -> None:
-        self.carried = Carried()
+    def __init__(self, hand: str = "left") -> None:
+        self.carried = Carried(Panel(side=hand), hand)
         self._dropped: deque[tuple[float, int]] = deque()  # when, and how many until then
         self._held: dict[str, str | None] = {}
 

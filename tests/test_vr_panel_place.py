@@ -82,7 +82,7 @@ def test_straight_below_the_head_it_still_has_a_pose():
     np.testing.assert_allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-9)
 
 
-def test_the_menu_button_closes_opens_and_takes_it_over():
+def test_a_menu_button_of_either_hand_closes_and_opens_it():
     carried = settled()
     carried, _, _ = step(carried, LOST, replace(LEFT, menu=True))
     assert not carried.panel.open and carried.play_from_panel is None
@@ -92,7 +92,10 @@ def test_the_menu_button_closes_opens_and_takes_it_over():
     carried, _, _ = step(carried, LOST, replace(LEFT, menu=True))
     assert carried.panel.side == "left"
     carried, _, _ = step(carried, hand_at((0.2, 1.2, -0.4), menu=True))
-    assert carried.panel.side == "right"
+    assert not carried.panel.open
+    other = Carried(replace(carried.panel), home="right")
+    other, _, _ = step(other, hand_at((0.2, 1.2, -0.4), menu=True))
+    assert other.panel.side == "right"
 
 
 def test_a_ray_drags_the_knob_and_the_world_gets_nothing_of_it():

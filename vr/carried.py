@@ -12,9 +12,10 @@ from vr.panel_state import Facts, Panel, Place, Wish, shown_stop
 
 @dataclass(frozen=True)
 class Carried:
-    """A panel and where it is; at first it hangs on the left hand, so that everybody finds it."""
+    """A panel and where it is; open at first, so that everybody finds it."""
 
     panel: Panel = field(default_factory=lambda: Panel(side="left"))
+    home: str = "left"  # the hand that carries it
     play_from_panel: Pose | None = None
     pointing: Pointing = NOBODY
     places: dict[str, Place] = field(default_factory=dict)  # side -> where it points, pixels
@@ -59,12 +60,11 @@ def left_over(carried: Carried, hands: dict[str, Hand]) -> dict[str, Hand]:
 
 
 def _toggled(carried: Carried, hands: dict[str, Hand]) -> Panel:
-    """A menu button opens it on its hand, takes it over to that hand, or closes it there."""
+    """A menu button, of whichever hand has one, closes it and opens it on its hand."""
     panel = carried.panel
-    for side in SIDES:
-        if hands[side].menu and side not in carried.menus:
-            now = "" if panel.side == side else side
-            panel = replace(panel, side=now, hovers={}, held={}, stick="", exit_s=0.0)
+    if any(hands[side].menu and side not in carried.menus for side in SIDES):
+        side = "" if panel.open else carried.home
+        panel = replace(panel, side=side, hovers={}, held={}, stick="", exit_s=0.0)
     return panel
 
 
