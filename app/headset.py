@@ -1,7 +1,7 @@
 """launch.py vr: a scene in a headset; without one a sentence, and the viewer where it can open."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
@@ -85,6 +85,11 @@ def check(options: Options) -> None:
         raise UsageError(f"--every is {options.every}, expected 1 or more.")
     if options.scene is not None and not options.scene.exists():
         raise UsageError(f"there is no {options.scene}.")
+    for path in (options.report, options.lines):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise UsageError(f"there is no folder {path.parent} for {path.name}.")
+        if path is not None and path.resolve() == (options.scene or DEMO).resolve():
+            raise UsageError(f"{path} is the scene; choose another file.")
 
 
 def wear(options: Options) -> int:
@@ -156,4 +161,5 @@ def without_headset(reason: str, options: Options) -> int:
     from app import desktop
 
     print("Opening the scene in a window instead.", file=sys.stderr)
-    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,)))
+    reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}
+    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), **reading))
