@@ -18,7 +18,7 @@ from scene import edits
 from scene.scene_file import is_scene_file
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
+    from app.viewer import Viewer
 
 Vec = imgui.ImVec2
 ADD = "Add to the scene"

@@ -14,7 +14,7 @@ from runtime_models.model import BadFile
 from scene.scene_file import SceneFile, SceneItem
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
+    from app.viewer import Viewer
     from scene.collider import Collider
     from scene.world import World
 

@@ -16,7 +16,7 @@ from scene.pose import View
 from scene.write_cameras import COLMAP_FORMS, FORMS, write_cameras
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
+    from app.viewer import Viewer
 
 Vec = imgui.ImVec2
 FORM_NAMES = {

@@ -17,7 +17,7 @@ from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_plain import WRITERS, writer_of
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
+    from app.viewer import Viewer
 
 FOLDER = "exports"  # beside the folder of the pictures
 EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index

@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imgui_bundle import imgui
+
 from app.camera_files import camera_reading, in_scene
 from app.controls import Camera
 from app.document import Document, document_from, document_of
@@ -21,8 +23,10 @@ from scene.scene import Scene
 from scene.scene_file import scene_of as scene_of_file
 
 if TYPE_CHECKING:
-    from app.desktop import Options, Viewer
+    from app.desktop import Options
+    from app.viewer import Viewer
 
+TOUCH = Path(__file__).resolve().parents[1] / "assets" / "touch.scene.json"
 MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
 
 
@@ -122,7 +126,11 @@ class Files:
             viewer.steps.untold = ()  # said with the file's other notes
 
     def draw_recent(self, ui_scale: float) -> None:
-        """The button under the panel's title."""
+        """The buttons under the panel's title."""
+        viewer = self._viewer
+        at_demo = not viewer.options.scenes and viewer.stage.document.path is None
+        if at_demo and imgui.button("Things to touch", imgui.ImVec2(-1, 0)):
+            self.open_soon((TOUCH,))
         chosen = self._menu.draw(self.recent, ui_scale)
         if chosen is not None:
             self.open_soon((chosen,))

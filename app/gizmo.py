@@ -16,7 +16,7 @@ from scene.scene import SceneObject
 from scene.scene_file import FAR_M
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
+    from app.viewer import Viewer
 
 Matrix16 = imguizmo.im_guizmo.Matrix16
 Vec = imgui.ImVec2

@@ -11,7 +11,7 @@ from app.window import DoubleClick, Drag, Drop, Event, KeyDown, Press, Release, 
 from scene.pick import Hit
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
+    from app.viewer import Viewer
 
 TURN = 0.006  # radians a logical pixel of mouse movement
 LOOK = 0.003

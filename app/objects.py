@@ -21,8 +21,8 @@ from scene.framing import model_points
 from scene.scene_file import SceneFile, SceneItem
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
     from app.stage import Stage
+    from app.viewer import Viewer
 
 KEYS = (
     ("click", "choose a thing"),

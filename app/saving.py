@@ -12,8 +12,8 @@ from scene.scene_file import ENDING, FAR_M, SceneFile
 from scene.write_scene_file import write_scene_file
 
 if TYPE_CHECKING:
-    from app.desktop import Viewer
     from app.stage import Stage
+    from app.viewer import Viewer
 
 Vec = imgui.ImVec2
 FOLDER = "scenes"  # beside the folder of the pictures: where a first name is proposed

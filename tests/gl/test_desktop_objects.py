@@ -1,126 +1,37 @@
-"""Objects in the real window under Xvfb: chosen, moved, copied, undone, added and saved by hand."""
+"""Objects in the real window under Xvfb: chosen, moved, copied, undone, added by scripted hands."""
 
-import json
 import time
 from pathlib import Path
 
 import glfw
 import numpy as np
 import pytest
-from desktop_stand import PlainRenderer, ball, run_frames, until_opened
+from desktop_stand import ball, run_frames, until_opened
+from objects_stand import (
+    CTRL,
+    NAMES,
+    TOUCH,
+    click,
+    drag,
+    key,
+    names,
+    place_of,
+    thing,
+    until_added,
+    viewer_is_over,
+)
 
 from app.arrange import place, steer
-from app.desktop import Options, Viewer
-from app.files import opened_scene
 from app.gizmo import MOVE, OFF, TURN
-from app.opened import Found, Source, read_files
-from app.outlines import pixels
-from app.stage import Stage
+from app.opened import Found, Source
 from app.window import Drop
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_ply import write_ply
 from scene import edits
-from scene.camera_list import CameraReading
 from scene.pose import Pose
-from scene.read_scene_file import read_scene_file
 
-pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
-TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
-NAMES = ["background", "cube", "ball", "ring", "plate"]
-
-
-@pytest.fixture(scope="module")
-def found() -> Found:
-    return read_files([TOUCH], None, CameraReading(), lambda *_: None)
-
-
-def viewer_of(window, found: Found, folder: Path) -> Viewer:
-    stage = Stage(lambda path: ball())
-    scene, document = opened_scene(found)
-    stage.take(found.sources, scene, None, document)
-    viewer = Viewer(window, PlainRenderer(window.ctx), stage, Options(pictures=folder / "pictures"))
-    viewer.files.read = lambda path, told: ball()
-    viewer.set_title()
-    run_frames(viewer, 4)
-    end = time.monotonic() + 30
-    while viewer.stage.bodies.busy and time.monotonic() < end:
-        run_frames(viewer, 1)
-        time.sleep(0.005)
-    run_frames(viewer, 2)
-    return viewer
-
-
-@pytest.fixture
-def viewer(window, found, tmp_path):
-    viewer = viewer_of(window, found, tmp_path)
-    yield viewer
-    release(viewer)
-
-
-@pytest.fixture
-def plain(window, tmp_path):
-    """A file of splats that was opened without a scene file."""
-    b = ball(50)
-    path = tmp_path / "models" / "ball.ply"
-    path.parent.mkdir()
-    write_ply(PlainSplats(b.means, b.scales, b.wxyz, b.opacity, b.sh), path)
-    viewer = viewer_of(window, Found((Source(path, b),)), tmp_path)
-    yield viewer
-    release(viewer)
-
-
-def names(viewer) -> list[str]:
-    return [thing.name for thing in viewer.stage.scene.objects]
-
-
-def thing(viewer, name: str):
-    return viewer.stage.scene.objects[names(viewer).index(name)]
-
-
-def place_of(viewer, point) -> tuple[float, float]:
-    """Logical pixels of a point (3,) of the world."""
-    view = viewer.view()
-    in_eye = (view.eye_from_world() @ np.append(point, 1.0))[:3]
-    return tuple(pixels(view, in_eye, viewer.window.logical_size))
-
-
-def mouse(viewer, x: float, y: float) -> None:
-    viewer.window._on_cursor(None, x, y)
-    run_frames(viewer, 2)
-
-
-def button(viewer, down: bool) -> None:
-    viewer.window._on_button(None, 0, glfw.PRESS if down else glfw.RELEASE, 0)
-    run_frames(viewer, 2)
-
-
-def release(viewer) -> None:
-    button(viewer, False)
-    mouse(viewer, 1.0, 1.0)
-
-
-def click(viewer, point) -> None:
-    mouse(viewer, *place_of(viewer, point))
-    button(viewer, True)
-    button(viewer, False)
-
-
-def drag(viewer, start, end, steps: int = 8) -> None:
-    mouse(viewer, *start)
-    button(viewer, True)
-    for part in np.linspace(0, 1, steps + 1)[1:]:
-        mouse(viewer, *(np.array(start) + part * (np.array(end) - start)))
-    button(viewer, False)
-
-
-def key(viewer, key: int, mods: int = 0) -> None:
-    for action in (glfw.PRESS, glfw.RELEASE):
-        viewer.window._on_key(None, key, 0, action, mods)
-        run_frames(viewer, 2)
-
-
-CTRL, SHIFT = glfw.MOD_CONTROL, glfw.MOD_SHIFT
+pytest_plugins = ["desktop_fixtures", "objects_stand"]  # fixtures: window, viewer, plain
 
 
 def test_a_scene_file_is_open_with_its_world(viewer):
@@ -176,11 +87,6 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     assert viewer.objects.gizmo.mode == OFF
 
 
-def viewer_is_over(viewer, place) -> bool:
-    mouse(viewer, *place)
-    return viewer.objects.gizmo._under_mouse
-
-
 def test_handles_turn_it_in_its_place(viewer):
     stage = viewer.stage
     click(viewer, (-0.22, 0.06, 0.05))
@@ -217,70 +123,6 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     assert "Nothing" in viewer.readings.note
 
 
-def test_ctrl_s_does_not_move_the_camera_and_asks_nothing_for_an_opened_file(viewer, tmp_path):
-    before = TOUCH.read_bytes()
-    viewer.stage.document.path = tmp_path / "own.scene.json"
-    viewer.stage.document.stamp = ()
-    view = viewer.view().eye_from_world()
-    key(viewer, glfw.KEY_S, CTRL)
-    run_frames(viewer, 30)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), view)
-    assert [item.name for item in read_scene_file(tmp_path / "own.scene.json").items] == NAMES[1:]
-    assert TOUCH.read_bytes() == before
-
-
-def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_path):
-    objects, document = viewer.objects, viewer.stage.document
-    path = tmp_path / "a.scene.json"
-    assert objects.saving.named(str(path))
-    path.write_text("{}")  # by somebody else
-    assert not objects.saving.save() and objects.saving.asking and path.read_text() == "{}"
-    run_frames(viewer, 3)
-    key(viewer, glfw.KEY_DELETE)  # the box is open: not for the scene
-    key(viewer, glfw.KEY_ESCAPE)
-    run_frames(viewer, 2)
-    assert not objects.saving.asking and path.read_text() == "{}" and names(viewer) == NAMES
-    objects.saving.save()
-    assert objects.saving.named(str(path), replace=True) and not objects.saving.asking
-    assert json.loads(path.read_text())["objects"] and document.path == path
-
-
-def test_nothing_is_replaced_unasked(viewer, tmp_path):
-    path = tmp_path / "taken.scene.json"
-    path.write_text("mine")
-    saving = viewer.objects.saving
-    assert not saving.named(str(tmp_path / "taken")) and path.read_text() == "mine"
-    saving.cancel_name()
-    assert not saving.named("  ") and not saving.asking
-
-
-def test_a_folder_that_cannot_be_written_is_a_sentence(viewer, tmp_path):
-    (tmp_path / "file").write_text("")
-    assert not viewer.objects.saving.named(str(tmp_path / "file" / "x"))
-    assert "cannot be saved" in viewer.stage.problem and "\n" not in viewer.stage.problem
-
-
-def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
-    stage = plain.stage
-    assert not plain.objects.unsaved and stage.world is None
-    stage.add_region("sphere")
-    stage.regions.edit(0, x=1.0)
-    stage.toggle_lens()  # of the eye, not of the file
-    key(plain, glfw.KEY_S, CTRL)
-    assert plain.objects.saving.asking
-    plain.objects.saving.cancel_name()
-    run_frames(plain, 2)
-    assert plain.objects.saving.named(str(tmp_path / "mine"))
-    file = read_scene_file(tmp_path / "mine.scene.json")
-    (item,) = file.items
-    assert item.model == "models/ball.ply"  # it can be moved with the folder
-    assert [type(selector).__name__ for selector in item.selectors] == ["Sphere"]
-    run_frames(plain, 1)
-    assert "mine.scene.json" in plain.window._window.title
-    again = read_files([tmp_path / "mine.scene.json"], None, CameraReading(), lambda *_: None)
-    np.testing.assert_allclose(again.sources[0].model.means, ball(50).means, atol=1e-6)
-
-
 def test_objects_are_added_by_dropping_while_the_box_is_open(viewer, tmp_path):
     objects = viewer.objects
     objects.adding.ask()
@@ -300,14 +142,6 @@ def test_objects_are_added_by_dropping_while_the_box_is_open(viewer, tmp_path):
         viewer.stage.problem = ""
 
 
-def until_added(viewer) -> None:
-    end = time.monotonic() + 20
-    while viewer.objects.adding._opener.busy and time.monotonic() < end:
-        run_frames(viewer, 1)
-        time.sleep(0.005)
-    run_frames(viewer, 2)
-
-
 def test_what_the_device_cannot_hold_is_not_added(viewer, monkeypatch):
     def refuse(scene):
         if len(scene.objects) > len(NAMES):
@@ -319,33 +153,6 @@ def test_what_the_device_cannot_hold_is_not_added(viewer, monkeypatch):
     assert viewer.stage.document.history.undoes == ""
 
 
-def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
-    assert viewer._may_close()
-    viewer.stage.chosen = "ball"
-    viewer.objects.delete()
-    run_frames(viewer, 1)
-    assert viewer.window._window.title.startswith("* touch.scene.json")
-    assert viewer.objects.status() == "not saved"
-    assert not viewer._may_close() and not viewer.window.closing
-    run_frames(viewer, 3)
-    key(viewer, glfw.KEY_ESCAPE)
-    run_frames(viewer, 2)
-    assert not viewer.objects.saving.asking
-    (tmp_path / "ball.shift").write_bytes(b"")
-    viewer.open_soon((tmp_path / "ball.shift",))
-    until_opened(viewer)
-    assert viewer.objects.saving.asking and "cube" in names(viewer)
-    viewer.objects.saving.answer("Discard")
-    run_frames(viewer, 2)
-    assert names(viewer) == ["ball"] and not viewer.objects.unsaved
-
-
-def test_a_slider_alone_asks_nothing(viewer):
-    steer(viewer.stage, 1, 0.5)
-    run_frames(viewer, 1)
-    assert viewer.objects.status() == "not saved" and viewer._may_close()
-
-
 def test_a_scene_file_is_dropped_on_the_window(plain):
     plain.take(Drop((TOUCH,)))
     until_opened(plain)
@@ -355,27 +162,6 @@ def test_a_scene_file_is_dropped_on_the_window(plain):
     until_opened(plain)
     assert "two scene files" in plain.stage.problem
     plain.stage.problem = ""
-
-
-def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
-    objects, stage = viewer.objects, viewer.stage
-    first = stage.world
-    assert objects.edit(edits.ground, -0.2, what="floor")
-    assert stage.document.file.floor_y == -0.2 and stage.world is not first
-    assert stage.world.paused and list(stage.world.things) == NAMES
-    viewer.camera.turn(0.3, -0.1)
-    run_frames(viewer, 60)
-    objects.look_from_here()
-    eye = viewer.view().world_from_eye.position
-    assert stage.document.file.view.eye == pytest.approx(eye, abs=1e-6)
-    assert objects.saving.named(str(tmp_path / "a"))
-    again = stage.first_view((900, 640))
-    np.testing.assert_allclose(
-        again.world_from_eye.matrix(), viewer.view().world_from_eye.matrix(), atol=1e-4
-    )
-    key(viewer, glfw.KEY_Z, CTRL)
-    key(viewer, glfw.KEY_Z, CTRL)
-    assert stage.document.file.floor_y == -0.7 and objects.unsaved
 
 
 def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):

@@ -1,0 +1,127 @@
+"""What the tests of objects in the window share: a viewer on the touch scene, scripted hands."""
+
+import time
+from pathlib import Path
+
+import glfw
+import numpy as np
+import pytest
+from desktop_stand import PlainRenderer, ball, run_frames
+
+from app.desktop import Options, Viewer
+from app.files import opened_scene
+from app.opened import Found, Source, read_files
+from app.outlines import pixels
+from app.stage import Stage
+from runtime_models.plain_splats import PlainSplats
+from runtime_models.write_ply import write_ply
+from scene.camera_list import CameraReading
+
+TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
+NAMES = ["background", "cube", "ball", "ring", "plate"]
+
+
+@pytest.fixture(scope="module")
+def found() -> Found:
+    return read_files([TOUCH], None, CameraReading(), lambda *_: None)
+
+
+def viewer_of(window, found: Found, folder: Path) -> Viewer:
+    stage = Stage(lambda path: ball())
+    scene, document = opened_scene(found)
+    stage.take(found.sources, scene, None, document)
+    viewer = Viewer(window, PlainRenderer(window.ctx), stage, Options(pictures=folder / "pictures"))
+    viewer.files.read = lambda path, told: ball()
+    viewer.set_title()
+    run_frames(viewer, 4)
+    end = time.monotonic() + 30
+    while viewer.stage.bodies.busy and time.monotonic() < end:
+        run_frames(viewer, 1)
+        time.sleep(0.005)
+    run_frames(viewer, 2)
+    return viewer
+
+
+@pytest.fixture
+def viewer(window, found, tmp_path):
+    viewer = viewer_of(window, found, tmp_path)
+    yield viewer
+    release(viewer)
+
+
+@pytest.fixture
+def plain(window, tmp_path):
+    """A file of splats that was opened without a scene file."""
+    b = ball(50)
+    path = tmp_path / "models" / "ball.ply"
+    path.parent.mkdir()
+    write_ply(PlainSplats(b.means, b.scales, b.wxyz, b.opacity, b.sh), path)
+    viewer = viewer_of(window, Found((Source(path, b),)), tmp_path)
+    yield viewer
+    release(viewer)
+
+
+def names(viewer) -> list[str]:
+    return [thing.name for thing in viewer.stage.scene.objects]
+
+
+def thing(viewer, name: str):
+    return viewer.stage.scene.objects[names(viewer).index(name)]
+
+
+def place_of(viewer, point) -> tuple[float, float]:
+    """Logical pixels of a point (3,) of the world."""
+    view = viewer.view()
+    in_eye = (view.eye_from_world() @ np.append(point, 1.0))[:3]
+    return tuple(pixels(view, in_eye, viewer.window.logical_size))
+
+
+def mouse(viewer, x: float, y: float) -> None:
+    viewer.window._on_cursor(None, x, y)
+    run_frames(viewer, 2)
+
+
+def button(viewer, down: bool) -> None:
+    viewer.window._on_button(None, 0, glfw.PRESS if down else glfw.RELEASE, 0)
+    run_frames(viewer, 2)
+
+
+def release(viewer) -> None:
+    button(viewer, False)
+    mouse(viewer, 1.0, 1.0)
+
+
+def click(viewer, point) -> None:
+    mouse(viewer, *place_of(viewer, point))
+    button(viewer, True)
+    button(viewer, False)
+
+
+def drag(viewer, start, end, steps: int = 8) -> None:
+    mouse(viewer, *start)
+    button(viewer, True)
+    for part in np.linspace(0, 1, steps + 1)[1:]:
+        mouse(viewer, *(np.array(start) + part * (np.array(end) - start)))
+    button(viewer, False)
+
+
+def key(viewer, key: int, mods: int = 0) -> None:
+    for action in (glfw.PRESS, glfw.RELEASE):
+        viewer.window._on_key(None, key, 0, action, mods)
+        run_frames(viewer, 2)
+
+
+CTRL, SHIFT = glfw.MOD_CONTROL, glfw.MOD_SHIFT
+
+
+def viewer_is_over(viewer, place) -> bool:
+    mouse(viewer, *place)
+    return viewer.objects.gizmo._under_mouse
+
+
+def until_added(viewer) -> None:
+    end = time.monotonic() + 20
+    while viewer.objects.adding._opener.busy and time.monotonic() < end:
+        run_frames(viewer, 1)
+        time.sleep(0.005)
+    run_frames(viewer, 2)

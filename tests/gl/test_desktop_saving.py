@@ -1,0 +1,129 @@
+"""Scenes are saved from the real window, and nothing is lost or replaced unasked."""
+
+import json
+
+import glfw
+import numpy as np
+import pytest
+from desktop_stand import ball, run_frames, until_opened
+from objects_stand import CTRL, NAMES, TOUCH, key, names
+
+from app.arrange import steer
+from app.opened import read_files
+from scene import edits
+from scene.camera_list import CameraReading
+from scene.read_scene_file import read_scene_file
+
+pytest_plugins = ["desktop_fixtures", "objects_stand"]  # fixtures: window, viewer, plain
+
+
+def test_ctrl_s_does_not_move_the_camera_and_asks_nothing_for_an_opened_file(viewer, tmp_path):
+    before = TOUCH.read_bytes()
+    viewer.stage.document.path = tmp_path / "own.scene.json"
+    viewer.stage.document.stamp = ()
+    view = viewer.view().eye_from_world()
+    key(viewer, glfw.KEY_S, CTRL)
+    run_frames(viewer, 30)
+    np.testing.assert_array_equal(viewer.view().eye_from_world(), view)
+    assert [item.name for item in read_scene_file(tmp_path / "own.scene.json").items] == NAMES[1:]
+    assert TOUCH.read_bytes() == before
+
+
+def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_path):
+    objects, document = viewer.objects, viewer.stage.document
+    path = tmp_path / "a.scene.json"
+    assert objects.saving.named(str(path))
+    path.write_text("{}")  # by somebody else
+    assert not objects.saving.save() and objects.saving.asking and path.read_text() == "{}"
+    run_frames(viewer, 3)
+    key(viewer, glfw.KEY_DELETE)  # the box is open: not for the scene
+    key(viewer, glfw.KEY_ESCAPE)
+    run_frames(viewer, 2)
+    assert not objects.saving.asking and path.read_text() == "{}" and names(viewer) == NAMES
+    objects.saving.save()
+    assert objects.saving.named(str(path), replace=True) and not objects.saving.asking
+    assert json.loads(path.read_text())["objects"] and document.path == path
+
+
+def test_nothing_is_replaced_unasked(viewer, tmp_path):
+    path = tmp_path / "taken.scene.json"
+    path.write_text("mine")
+    saving = viewer.objects.saving
+    assert not saving.named(str(tmp_path / "taken")) and path.read_text() == "mine"
+    saving.cancel_name()
+    assert not saving.named("  ") and not saving.asking
+
+
+def test_a_folder_that_cannot_be_written_is_a_sentence(viewer, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert not viewer.objects.saving.named(str(tmp_path / "file" / "x"))
+    assert "cannot be saved" in viewer.stage.problem and "\n" not in viewer.stage.problem
+
+
+def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
+    stage = plain.stage
+    assert not plain.objects.unsaved and stage.world is None
+    stage.add_region("sphere")
+    stage.regions.edit(0, x=1.0)
+    stage.toggle_lens()  # of the eye, not of the file
+    key(plain, glfw.KEY_S, CTRL)
+    assert plain.objects.saving.asking
+    plain.objects.saving.cancel_name()
+    run_frames(plain, 2)
+    assert plain.objects.saving.named(str(tmp_path / "mine"))
+    file = read_scene_file(tmp_path / "mine.scene.json")
+    (item,) = file.items
+    assert item.model == "models/ball.ply"  # it can be moved with the folder
+    assert [type(selector).__name__ for selector in item.selectors] == ["Sphere"]
+    run_frames(plain, 1)
+    assert "mine.scene.json" in plain.window._window.title
+    again = read_files([tmp_path / "mine.scene.json"], None, CameraReading(), lambda *_: None)
+    np.testing.assert_allclose(again.sources[0].model.means, ball(50).means, atol=1e-6)
+
+
+def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
+    assert viewer._may_close()
+    viewer.stage.chosen = "ball"
+    viewer.objects.delete()
+    run_frames(viewer, 1)
+    assert viewer.window._window.title.startswith("* touch.scene.json")
+    assert viewer.objects.status() == "not saved"
+    assert not viewer._may_close() and not viewer.window.closing
+    run_frames(viewer, 3)
+    key(viewer, glfw.KEY_ESCAPE)
+    run_frames(viewer, 2)
+    assert not viewer.objects.saving.asking
+    (tmp_path / "ball.shift").write_bytes(b"")
+    viewer.open_soon((tmp_path / "ball.shift",))
+    until_opened(viewer)
+    assert viewer.objects.saving.asking and "cube" in names(viewer)
+    viewer.objects.saving.answer("Discard")
+    run_frames(viewer, 2)
+    assert names(viewer) == ["ball"] and not viewer.objects.unsaved
+
+
+def test_a_slider_alone_asks_nothing(viewer):
+    steer(viewer.stage, 1, 0.5)
+    run_frames(viewer, 1)
+    assert viewer.objects.status() == "not saved" and viewer._may_close()
+
+
+def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
+    objects, stage = viewer.objects, viewer.stage
+    first = stage.world
+    assert objects.edit(edits.ground, -0.2, what="floor")
+    assert stage.document.file.floor_y == -0.2 and stage.world is not first
+    assert stage.world.paused and list(stage.world.things) == NAMES
+    viewer.camera.turn(0.3, -0.1)
+    run_frames(viewer, 60)
+    objects.look_from_here()
+    eye = viewer.view().world_from_eye.position
+    assert stage.document.file.view.eye == pytest.approx(eye, abs=1e-6)
+    assert objects.saving.named(str(tmp_path / "a"))
+    again = stage.first_view((900, 640))
+    np.testing.assert_allclose(
+        again.world_from_eye.matrix(), viewer.view().world_from_eye.matrix(), atol=1e-4
+    )
+    key(viewer, glfw.KEY_Z, CTRL)
+    key(viewer, glfw.KEY_Z, CTRL)
+    assert stage.document.file.floor_y == -0.7 and objects.unsaved
