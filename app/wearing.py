@@ -22,6 +22,8 @@ from vr.session import Session
 from vr.standing import Standing
 from vr.touching import strongest
 
+LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
+
 
 class Eyes:
     """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`.
@@ -72,6 +74,7 @@ class Wearing:
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
         self._drawing_ms = 0.0  # of the splats of both eyes, last
+        self._stood = False  # whether the person has been put before the scene
         self._leaving = False
 
     def loop(self, frames: int = 0) -> None:
@@ -98,8 +101,9 @@ class Wearing:
         """One frame: the person, the world, the pictures of both eyes."""
         seconds = self._time_passed(frame)
         self.pulses.clear()
-        if self._seen_s is None or frame.recentred:
+        if not self._stood or frame.recentred:
             self.recentre(frame)
+        self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
         left_over = self.panel.act(self, frame, seconds)
         self.standing = self.person.act(left_over, self.standing, seconds)
@@ -153,5 +157,7 @@ class Wearing:
         self.session.pulse(side, strength, seconds)
 
     def _time_passed(self, frame: Frame) -> float:
-        """Seconds since the frame before, by the runtime's clock."""
-        return 0.0 if self._seen_s is None else max(frame.seen_s - self._seen_s, 0.0)
+        """Seconds since the frame before, by the runtime's clock; not those of a long rest."""
+        if self._seen_s is None:
+            return 0.0
+        return min(max(frame.seen_s - self._seen_s, 0.0), LONGEST_STEP_S)

@@ -1,0 +1,168 @@
+"""The order of a headset's frame with everything around it played: no runtime, no GL."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from app.headset import DEMO, Options
+from app.headset_report import Report
+from app.pacing import Pacing
+from app.wearing import LONGEST_STEP_S, Wearing
+from app.worn_scene import open_worn
+from renderer.settings import FrameStats, RenderSettings
+from scene.pose import Pose, View
+from scene.scene import IDENTITY
+from vr.frame import LOST, SIDES, Frame
+from vr.life import Life
+from vr.pace import Pace
+
+PERIOD = 1 / 90
+HEAD = Pose(np.array([0.3, 1.6, -0.2]), np.array([np.cos(0.4), 0.0, np.sin(0.4), 0.0]))
+
+
+def frame_at(seen_s: float, head: Pose = HEAD, **changes) -> Frame:
+    views = tuple(View(head, (-1.0, 1.0, -1.0, 1.0), 0.05, 1000.0, (8, 8)) for _ in SIDES)
+    frame = Frame(views, head, dict.fromkeys(SIDES, LOST), seen_s, PERIOD, True, True)
+    return replace(frame, **changes)
+
+
+class Played:
+    """A session, mirror, renderer and eyes in one, that note what is asked of them in order."""
+
+    def __init__(self, frames: list[Frame]) -> None:
+        self.life, self.pace, self.play = Life(), Pace(display_s=PERIOD), None
+        self.asked: list[str] = []
+        self.queue, self.closing, self.left = frames, False, 0
+        self.settings = RenderSettings()
+        self.overlay = SimpleNamespace(draw=lambda *given: self.asked.append("overlay"))
+        self.framebuffers, self.textures = ["left", "right"], ["left", "right"]
+        self.ctx, self.scenes, self.views = None, [], []
+
+    def frames(self, resting):
+        for frame in self.queue:
+            if self.left > 2:
+                return
+            self.pace.start(frame.seen_s, PERIOD, 0.0)
+            yield frame
+            self.left += self.left > 0
+
+    def submit(self, textures) -> None:
+        assert textures == ["left", "right"]
+        self.asked.append("submit")
+        self.pace.end(0.004)
+
+    def leave(self) -> None:
+        self.left = 1
+
+    def pulse(self, side, strength, seconds) -> None:
+        self.asked.append(f"pulse {side}")
+
+    def show(self, texture) -> None:
+        self.asked.append("mirror")
+
+    def rest(self) -> None:
+        self.asked.append("rest")
+
+    def update(self, scene) -> None:
+        self.scenes.append(scene)
+
+    def draw(self, views) -> FrameStats:
+        self.asked.append("draw")
+        self.views.append(views)
+        return FrameStats()
+
+    def present(self, framebuffer, i) -> None:
+        self.asked.append(f"present {framebuffer}")
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return open_worn(DEMO, Options())
+
+
+@pytest.fixture
+def wear(scene):
+    def worn(frames: list[Frame], quality: str = "best") -> tuple[Wearing, Played]:
+        played = Played(frames)
+        pacing, report = Pacing(scene.background, quality), Report()
+        return Wearing(played, played, played, played, scene, pacing, report), played
+
+    return worn
+
+
+def head_in_world(wearing: Wearing, frame: Frame) -> np.ndarray:
+    return wearing.standing.pose(frame.head).matrix()
+
+
+def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
+    wearing, played = wear([frame_at(0.0), frame_at(PERIOD)])
+    wearing.loop()
+    once = ["draw", "present left", "overlay", "present right", "overlay", "submit", "mirror"]
+    assert played.asked == once * 2
+    assert [len(views) for views in played.views] == [2, 2]
+    assert played.settings.background == wearing.scene.background
+    left = played.views[0][0].world_from_eye
+    np.testing.assert_allclose(left.matrix(), head_in_world(wearing, frame_at(0.0)), atol=1e-9)
+
+
+def test_what_is_not_shown_is_not_drawn_and_the_world_goes_on(wear):
+    wearing, played = wear([frame_at(i * PERIOD, drawn=False) for i in range(5)])
+    before = wearing.world.time_s
+    wearing.loop()
+    assert played.asked == ["rest"] * 5
+    assert wearing.world.time_s - before == pytest.approx(4 * PERIOD)
+
+
+def test_the_person_is_put_before_the_scene_once_the_head_is_known(wear):
+    unknown = frame_at(0.0, IDENTITY, drawn=False)
+    wearing, _ = wear([unknown, frame_at(PERIOD)])
+    wearing.loop()
+    found = head_in_world(wearing, frame_at(PERIOD))
+    eye = wearing.scene.eye.matrix()
+    np.testing.assert_allclose(found[[0, 2], 3], eye[[0, 2], 3], atol=1e-9)
+    assert found[1, 3] == pytest.approx(1.6 + wearing.scene.floor_y)
+    ahead = -found[:3, 2]
+    level = -eye[:3, 2] * (1, 0, 1)
+    np.testing.assert_allclose(ahead, level / np.linalg.norm(level), atol=1e-9)
+
+
+def test_who_walks_on_stays_there_and_recentring_brings_them_back(wear):
+    walked = Pose(HEAD.position + np.array([1.0, 0.0, 0.5]), HEAD.wxyz)
+    frames = [frame_at(0.0), frame_at(PERIOD, walked)]
+    wearing, _ = wear(frames)
+    wearing.loop()
+    start = head_in_world(wearing, frame_at(0.0))
+    away = head_in_world(wearing, frames[1])
+    assert np.linalg.norm(away[:3, 3] - start[:3, 3]) == pytest.approx(np.hypot(1.0, 0.5))
+    again = frame_at(2 * PERIOD, walked, recentred=True)
+    wearing.frame(again)
+    np.testing.assert_allclose(head_in_world(wearing, again), start, atol=1e-9)
+
+
+def test_a_long_rest_is_no_long_step(wear):
+    wearing, _ = wear([frame_at(0.0), frame_at(600.0)])
+    passed = []
+    act = wearing.person.act
+    wearing.person.act = lambda frame, standing, seconds: (
+        passed.append(seconds) or act(frame, standing, seconds)
+    )
+    wearing.loop()
+    assert passed == [0.0, LONGEST_STEP_S]
+
+
+@pytest.mark.parametrize("why", ["frames", "closed at the desk"])
+def test_the_end_is_asked_for_once_and_frames_go_on_until_it_comes(wear, why):
+    wearing, played = wear([frame_at(i * PERIOD) for i in range(20)])
+    played.closing = why != "frames"
+    wearing.loop(3 if why == "frames" else 0)
+    assert wearing.report.ended == why
+    assert played.asked.count("submit") == (4 if why == "frames" else 2)  # one more comes
+
+
+def test_the_window_can_be_closed_while_the_headset_rests(wear):
+    wearing, played = wear([])
+    played.closing = True
+    wearing._rest()
+    assert played.left and wearing.report.ended == "closed at the desk"
