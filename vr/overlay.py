@@ -1,8 +1,11 @@
 """Draws hands, lines, the panel and the vignette over the splats' picture of an eye."""
 
+from dataclasses import dataclass
+
 import moderngl
 import numpy as np
 
+from renderer.context import is_software
 from renderer.shader import compile_program
 from scene.pose import View
 from vr.drawn import Drawn
@@ -13,8 +16,19 @@ from vr.panel_place import play_point
 from vr.panel_state import Panel
 from vr.shown import SHADERS
 
-SAMPLES = 4  # a pixel: edges of hands and thin lines crawl without
-AROUND, BELOW = 12, 3  # facets of a capsule: around it, and from its equator to its tip
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely it is drawn."""
+
+    samples: int = 4  # a pixel: edges of hands and thin lines crawl without; 0: one
+    taps: int = 4  # of the panel's picture, a pixel: small letters crawl without
+    around: int = 12  # facets of a capsule around it
+    below: int = 3  # and from its equator to its tip
+
+
+FINE = Detail()
+PLAIN = Detail(0, 1, 8, 2)  # software GL: under half of the time, and no headset hangs on it
 INSTANCE = "3f 3f 2f 4f 4f/i"
 NAMES = ("a", "b", "radii", "color_a", "color_b")
 ROOM = 256  # capsules that the buffer has room for at first
@@ -30,12 +44,15 @@ class Overlay:
     The context may be anybody's: nothing is enabled afterwards, and bound is what was bound.
     """
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    def __init__(self, ctx: moderngl.Context, detail: Detail | None = None) -> None:
         self._ctx = ctx
+        self.detail = detail or (PLAIN if is_software(ctx) else FINE)
         self._capsule = compile_program(ctx, "capsule.vert", "capsule.frag", SHADERS)
-        self._panel = compile_program(ctx, "panel.vert", "panel.frag", SHADERS)
+        self._panel = compile_program(
+            ctx, "panel.vert", "panel.frag", SHADERS, TAPS=self.detail.taps
+        )
         self._over = compile_program(ctx, "full.vert", "over.frag", SHADERS)
-        mesh, faces = capsule_mesh()
+        mesh, faces = capsule_mesh(self.detail.around, self.detail.below)
         self._mesh, self._faces = ctx.buffer(mesh), ctx.buffer(faces)
         self._instances = ctx.buffer(reserve=ROOM * 16 * 4)
         self._capsules = self._vertices()
@@ -79,8 +96,9 @@ class Overlay:
         target.depth_mask = False
         self._draw_capsules(drawn.lines, view, clip_from_play, False)
         target.depth_mask = True
-        self._resolved.use()  # its scissor bounds the copy
-        ctx.copy_framebuffer(self._resolved, target)
+        if self._resolved is not target:
+            self._resolved.use()  # its scissor bounds the copy
+            ctx.copy_framebuffer(self._resolved, target)
 
     def _draw_capsules(
         self, capsules: tuple[Capsule, ...], view: View, clip_from_play: np.ndarray, lit: bool
@@ -147,12 +165,13 @@ class Overlay:
         """Made anew only when the size of the eyes changes."""
         if self._target is None or self._target.size != tuple(size):
             self._release_targets()
-            ctx, samples = self._ctx, min(SAMPLES, self._ctx.max_samples)
-            self._target = ctx.framebuffer(
-                [ctx.renderbuffer(size, 4, samples=samples)],
-                ctx.depth_renderbuffer(size, samples=samples),
-            )
-            self._resolved = ctx.framebuffer([ctx.texture(size, 4)])
+            ctx, samples = self._ctx, min(self.detail.samples, self._ctx.max_samples)
+            depth = ctx.depth_renderbuffer(size, samples=samples)
+            self._resolved = ctx.framebuffer([ctx.texture(size, 4)], None if samples else depth)
+            self._target = self._resolved
+            if samples:
+                colors = ctx.renderbuffer(size, 4, samples=samples)
+                self._target = ctx.framebuffer([colors], depth)
         return self._target
 
     def _vertices(self) -> moderngl.VertexArray:
@@ -160,12 +179,11 @@ class Overlay:
         return self._ctx.vertex_array(self._capsule, parts, self._faces)
 
     def _release_targets(self) -> None:
-        for framebuffer in (self._target, self._resolved):
-            if framebuffer is not None:
-                for part in (*framebuffer.color_attachments, framebuffer.depth_attachment):
-                    if part is not None:
-                        part.release()
-                framebuffer.release()
+        for framebuffer in {self._target, self._resolved} - {None}:
+            for part in (*framebuffer.color_attachments, framebuffer.depth_attachment):
+                if part is not None:
+                    part.release()
+            framebuffer.release()
         self._target = self._resolved = None
 
     def __enter__(self) -> "Overlay":
@@ -235,21 +253,21 @@ def capsule_rows(capsules: tuple[Capsule, ...]) -> np.ndarray:
     return rows
 
 
-def capsule_mesh() -> tuple[np.ndarray, np.ndarray]:
+def capsule_mesh(around: int, below: int) -> tuple[np.ndarray, np.ndarray]:
     """(n, 4) float32: direction of a unit ball and which end it belongs to; (m, 3) int32 facets,
     anticlockwise from outside.  The equator is there twice, once for either end.
     """
-    heights = np.linspace(-np.pi / 2, 0, BELOW + 1)
+    heights = np.linspace(-np.pi / 2, 0, below + 1)
     heights = np.concatenate([heights, -heights[::-1]])  # radians over the equator
-    turns = np.arange(AROUND) * 2 * np.pi / AROUND
+    turns = np.arange(around) * 2 * np.pi / around
     height, turn = np.meshgrid(heights, turns, indexing="ij")
-    upper = np.repeat(np.arange(len(heights)) > BELOW, AROUND).reshape(height.shape)
+    upper = np.repeat(np.arange(len(heights)) > below, around).reshape(height.shape)
     ball = np.stack(
         [np.cos(height) * np.cos(turn), np.cos(height) * np.sin(turn), np.sin(height), upper], -1
     )
-    ring, step = np.meshgrid(np.arange(len(heights) - 1), np.arange(AROUND), indexing="ij")
-    here, beside = ring * AROUND + step, ring * AROUND + (step + 1) % AROUND
-    over = AROUND  # one ring up
+    ring, step = np.meshgrid(np.arange(len(heights) - 1), np.arange(around), indexing="ij")
+    here, beside = ring * around + step, ring * around + (step + 1) % around
+    over = around  # one ring up
     faces = np.concatenate(
         [
             np.stack([here, beside, beside + over], -1),

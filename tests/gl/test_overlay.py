@@ -10,11 +10,12 @@ from vr_hands import HEAD, a_frame, eyes, hand_at, pixel_of
 from runtime_models.model import Stop
 from scene.pose import Pose
 from vr.carried import Carried, carry, panel_row
-from vr.drawn import FINE, WRONG, Drawn, arc, drawn_of
+from vr.drawn import FINE as FINE_INK
+from vr.drawn import WRONG, Drawn, arc, drawn_of
 from vr.frame import LOST
 from vr.glove import LIT, Capsule
 from vr.locomotion import Comfort
-from vr.overlay import Overlay, box_of, capsule_mesh
+from vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
 from vr.panel_layout import knob_place, lay_out
 from vr.panel_picture import ACCENT, SURFACE, TEXT
 from vr.panel_place import play_point
@@ -30,9 +31,9 @@ LEFT, RIGHT = hand_at((-0.10, 1.22, -0.45)), hand_at((0.2, 1.2, -0.5))
 GROUND = (40, 90, 160)  # of the picture below
 
 
-@pytest.fixture
-def overlay(ctx):
-    with Overlay(ctx) as made:
+@pytest.fixture(params=[FINE, PLAIN], ids=["fine", "plain"])
+def overlay(ctx, request):
+    with Overlay(ctx, request.param) as made:
         yield made
 
 
@@ -205,7 +206,7 @@ def test_the_arc_has_a_ring_where_it_lands(overlay, target, fine):
     landing = np.array([0.1, 0.0, -3.4])
     comfort = Comfort(arc=Arc(points, landing, fine))
     drawn = drawn_of({"left": LOST, "right": LOST}, Carried(), comfort)
-    color = np.array(FINE if fine else WRONG) * 255
+    color = np.array(FINE_INK if fine else WRONG) * 255
     for eye in (0, 1):
         image = picture(overlay, target, drawn, eye)
         assert np.abs(at(image, eye, points[3]) - color).max() < 60
@@ -275,8 +276,9 @@ def test_what_is_behind_the_eye_costs_nothing():
     assert box_of(drawn, EYES[0], SIZE) is None and box_of(Drawn(), EYES[0], SIZE) is None
 
 
-def test_the_capsules_mesh_is_a_closed_ball_seen_from_outside():
-    mesh, faces = capsule_mesh()
+@pytest.mark.parametrize("detail", [FINE, PLAIN])
+def test_the_capsules_mesh_is_a_closed_ball_seen_from_outside(detail):
+    mesh, faces = capsule_mesh(detail.around, detail.below)
     places = mesh[:, :3] + mesh[:, 3:] * (0, 0, 1.0)  # stretched: the equator is there twice
     corners = places[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -284,5 +286,5 @@ def test_the_capsules_mesh_is_a_closed_ball_seen_from_outside():
     solid = np.linalg.norm(normal, axis=1) > 1e-9  # at the poles facets have no area
     assert ((normal * outward).sum(axis=1)[solid] > 0).all()
     volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
-    assert volume == pytest.approx(4 / 3 * np.pi + np.pi, rel=0.12)
+    assert volume == pytest.approx(4 / 3 * np.pi + np.pi, rel=0.24)
     np.testing.assert_allclose(np.linalg.norm(mesh[:, :3], axis=1), 1, atol=1e-6)
