@@ -7,6 +7,8 @@ from remote import Controller, Remote
 from xr_stand import Program
 
 from scene.pose import Pose
+from vr.frame import Hand
+from vr.glove import fingertip
 from vr.standing import Standing
 
 TRIES = 8  # of a swing whose frames have to be even
@@ -69,7 +71,17 @@ class Person:
 
     def reach(self, side: str, world: np.ndarray, step_m: float = GLIDE_M) -> dict:
         """The hand goes there in a line, `step_m` a frame."""
-        start, end = np.array(self.controller(side).position), self.in_room(world)
+        return self.move(side, self.in_room(world), step_m)
+
+    def touch(self, side: str, room: np.ndarray, step_m: float = GLIDE_M) -> dict:
+        """The tip of the hand's finger goes to a place (3,) of the room."""
+        row = self.line["hands"][side]
+        tip = fingertip(side, Hand(True, pose_of(row["grip"]), pose_of(row["aim"])))
+        return self.move(side, row["grip"]["position"] + room - tip, step_m)
+
+    def move(self, side: str, room: np.ndarray, step_m: float = GLIDE_M) -> dict:
+        """The hand goes to a place (3,) of the room in a line, `step_m` a frame."""
+        start, end = np.array(self.controller(side).position), np.asarray(room)
         steps = max(1, round(float(np.linalg.norm(end - start)) / step_m))
         for step in range(1, steps + 1):
             self.controller(side).position = tuple(start + step / steps * (end - start))
@@ -83,14 +95,18 @@ class Person:
         )
 
     def aim(self, side: str, world: np.ndarray) -> dict:
-        """Turns the hand so that what it points at, which leans against its grip, is that place.
+        """Points at a place (3,) of the world."""
+        return self.point(side, self.in_room(world))
 
-        A few steps: the pointer starts beside the palm and moves with the turn.
+    def point(self, side: str, room: np.ndarray) -> dict:
+        """Turns the hand so that its pointer, which leans against its grip, meets that place.
+
+        In a few steps: it starts beside the palm and moves with the turn.
         """
         for _ in range(3):
             hand = self.line["hands"][side]
             grip, aim = pose_of(hand["grip"]).matrix(), pose_of(hand["aim"]).matrix()
-            wanted = self.in_room(world) - aim[:3, 3]
+            wanted = room - aim[:3, 3]
             turn = turn_between(-aim[:3, 2], wanted / np.linalg.norm(wanted))
             grip[:3, :3] = turn @ grip[:3, :3]
             self.controller(side).wxyz = tuple(Pose.from_matrix(grip).wxyz)

@@ -43,6 +43,7 @@ def test_reach_squeeze_carry_and_let_go(person):
     person.until(lambda line: place(line, "ring")[1] < 0.1, "fallen")
 
 
+@pytest.mark.slow
 def test_a_throw_flies_as_the_hand_did_and_what_it_strikes_changes_x(person):
     swing, flight = person.throw("right", "cube", CUBE_TOP_M, STEP)
     hand = STEP / np.mean(np.diff([line["seen_s"] for line in swing]))
@@ -65,6 +66,7 @@ def in_world(line: dict, room: np.ndarray) -> np.ndarray:
     return matrix[:3, :3] @ room + matrix[:3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["tracking", "controller"])
 def test_a_lost_hand_lets_go_and_does_not_take_again_by_itself(person, how):
     person.take("right", "cube", CUBE_TOP_M)
@@ -84,6 +86,7 @@ def test_a_lost_hand_lets_go_and_does_not_take_again_by_itself(person, how):
     assert abs(place(back, "cube")[1] - place(fallen, "cube")[1]) < 0.05
 
 
+@pytest.mark.slow
 def test_the_trigger_shoots_what_the_hand_points_at(person):
     person.put("right", np.add(place(person.line, "ball"), (0.1, 0.2, 0.5)))
     person.aim("right", place(person.line, "ball"))
@@ -96,6 +99,7 @@ def test_the_trigger_shoots_what_the_hand_points_at(person):
     assert len(events(person.program.lines, "ball")) == 1, "a trigger that is held acts once"
 
 
+@pytest.mark.slow
 def test_snap_turns_are_thirty_degrees_about_the_head_and_take_what_is_held_along(person):
     person.take("left", "cube", CUBE_TOP_M)
     person.reach("left", np.add(person.palm("left"), (0, 0.3, 0.1)))
@@ -117,6 +121,7 @@ def test_snap_turns_are_thirty_degrees_about_the_head_and_take_what_is_held_alon
     assert not struck, "a turn is no blow"
 
 
+@pytest.mark.slow
 def test_walking_goes_where_the_head_looks(person):
     before = person.frame()
     person.controller("left").stick = (0.0, 1.0)
