@@ -115,6 +115,15 @@ def touch_point(world: object, event: object, before: np.ndarray | None) -> np.n
     return np.array([at.x, at.y, at.z])
 
 
+def any_near(world: object, pairs: list[tuple[object, object]]) -> bool:
+    """Whether one of these pairs of colliders touches or is about to: then faces are not merged.
+
+    Merged contacts halve the cost, but let a hand push a cup 25 mm into a mesh.
+    """
+    found = (world.narrow_phase.contact_pair(*pair) for pair in pairs)
+    return any(pair is not None and pair.find_deepest_contact() is not None for pair in found)
+
+
 def velocities(bodies: dict[int, object]) -> dict[int, tuple[float, float, float]]:
     """m/s of the engine's bodies, by id."""
     return {n: (v.x, v.y, v.z) for n, v in ((n, body.linvel) for n, body in bodies.items())}

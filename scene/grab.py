@@ -97,6 +97,13 @@ def jumped(pose: Pose, moved: np.ndarray) -> Pose:
     return Pose.from_matrix(moved @ pose.matrix())
 
 
+def lead_hands(world: object, starts: list[tuple[Hold, object]], part: float) -> None:
+    """Puts every hand a part 0..1 of the way from where it was at the start of a step."""
+    for hold, start in starts:
+        now = start.lerp_slerp(isometry(hold.target), part)
+        world.rigid_bodies[hold.hand].set_next_kinematic_position(now)
+
+
 def lag(hold: Hold, hand: object, body: object) -> float:
     """Metres by which the point held is behind where its hand wants it."""
     ends = (hand.position, hold.grip), (body.position, hold.body_grip)

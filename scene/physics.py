@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from runtime_models.model import Finding
-from scene.contacts import Contact, Tally, velocities
+from scene.contacts import Contact, Tally, any_near, velocities
 from scene.grab import (
     WITH_HAND,
     Hold,
@@ -18,6 +18,7 @@ from scene.grab import (
     hold_from_json,
     hold_to_json,
     lag,
+    lead_hands,
     take_hold,
     throw,
 )
@@ -96,7 +97,7 @@ class Physics:
         friction: float = 0.6,
         restitution: float = 0.0,
     ) -> int:
-        """A thing that never moves: a triangle mesh, or hulls (V, 3) metres, object frame."""
+        """A thing that never moves: a mesh (an open one gets a back), or hulls (V, 3) metres."""
         from rapier3d import RigidBody
 
         at = isometry(checked_pose(pose, "a static thing"))
@@ -162,8 +163,7 @@ class Physics:
     def _note_collider(self, number: int) -> None:
         from rapier3d import ShapeType
 
-        body = self._world.rigid_bodies[self._handles[number]]
-        collider = body.colliders[0]  # each has one
+        collider = self._collider(number)
         self._ids[collider] = number
         if self._world.colliders[collider].shape.shape_type == ShapeType.TRIMESH:
             self._meshes.add(number)
@@ -173,7 +173,7 @@ class Physics:
         handle = self._handle(number)
         for grab in [g for g, hold in self._holds.items() if hold.body == number]:
             self._let_go(grab)
-        del self._ids[self._world.rigid_bodies[handle].colliders[0]], self._handles[number]
+        del self._ids[self._collider(number)], self._handles[number]
         self._world.remove_body(handle)
         self._masses.pop(number, None)
         self._meshes.discard(number)
@@ -265,6 +265,9 @@ class Physics:
             raise ValueError(f"there is no thing {number}; it was removed, or never added.")
         return self._handles[number]
 
+    def _collider(self, number: int) -> object:
+        return self._world.rigid_bodies[self._handles[number]].colliders[0]  # each has one
+
     def _body(self, number: int) -> object:
         handle = self._handle(number)
         if number not in self._masses:
@@ -279,18 +282,15 @@ class Physics:
         held = {hold.body for hold in self._holds.values()}
         free = {n: (self._masses[n], body) for n, body in bodies.items() if n not in held}
         speeds = velocities(bodies)
-        substeps = self.substeps * more_substeps(speeds)
+        at_meshes = [(self._collider(a), self._collider(b)) for a in held for b in self._meshes]
+        substeps = self.substeps * more_substeps(speeds, any_near(self._world, at_meshes))
         rules = self._world.integration_parameters
         rules.dt = 1 / self.hz / substeps
-        # Merged contacts halve the cost, but let a hand push a cup 25 mm into a mesh.
-        rules.contact_clustering = not (self._meshes and self._holds)
-        starts = {grab: self._hand(hold).position for grab, hold in self._holds.items()}
+        starts = [(hold, self._hand(hold).position) for hold in self._holds.values()]
         tally = Tally(self._world, self._ids, -self._world.gravity.y)
         for k in range(substeps):
-            for grab, start in starts.items():
-                hold = self._holds[grab]
-                now = start.lerp_slerp(isometry(hold.target), (k + 1) / substeps)
-                self._hand(hold).set_next_kinematic_position(now)
+            lead_hands(self._world, starts, (k + 1) / substeps)
+            rules.contact_clustering = not any_near(self._world, at_meshes)
             self._world.step()
             events = self._events.drain_contact_force_events()
             if events:

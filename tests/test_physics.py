@@ -12,6 +12,7 @@ from physics_things import at, box, cup, run, sheet, table
 from scene.grab import hand_velocity, turn_between
 from scene.physics import FLOOR, Physics
 from scene.pose import Pose
+from scene.thicken import THICKNESS
 from scene.triangle_mesh import TriangleMesh
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
@@ -226,12 +227,13 @@ def test_rays_and_hands_find_the_nearest():
     physics = Physics(floor_y=0)
     near = physics.add_body(CUBE, at(0, 1, -1), 0.3)
     far = physics.add_body(CUBE, at(0, 1, -2), 0.3)
-    wall = physics.add_static(
-        TriangleMesh(sheet().vertices[:, [0, 2, 1]], sheet().faces), at(0, 1, -3)
-    )
+    upright, faces = sheet().vertices[:, [0, 2, 1]], sheet().faces[:, ::-1]  # it looks to +Z
+    wall = physics.add_static(TriangleMesh(upright, np.ascontiguousarray(faces)), at(0, 1, -3))
     assert physics.cast_ray((0, 1, 0), (0, 0, -7)) == (near, pytest.approx(0.95, abs=1e-5))
     assert physics.cast_ray((0, 1, -1.5), (0, 0, -1)) == (far, pytest.approx(0.45, abs=1e-5))
     assert physics.cast_ray((0.5, 1, 0), (0, 0, -1)) == (wall, pytest.approx(3, abs=1e-5))
+    behind = physics.cast_ray((0.5, 1, -5), (0, 0, 1))  # the back that an open mesh is given
+    assert behind == (wall, pytest.approx(2 - THICKNESS, abs=1e-5))
     assert physics.cast_ray((0.5, 1, 0), (0, -1, 0)) == (FLOOR, pytest.approx(1, abs=1e-5))
     assert physics.cast_ray((0.5, 1, 0), (0, 1, 0)) is None
     assert physics.cast_ray((0, 1, -1), (0, 1, 0)) == (near, 0)  # from inside
