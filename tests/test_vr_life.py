@@ -1,7 +1,9 @@
 """What of a session needs no runtime: its life, its pace, what it makes of what it is told."""
 
 import math
+import sys
 from dataclasses import dataclass
+from enum import IntEnum
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +14,7 @@ from scene.scene import IDENTITY
 from vr.instance import Instance, Lost, NoHeadset, load
 from vr.life import BEGIN, END, Life
 from vr.pace import RECOVER, SETTLED, Pace
-from vr.session import eye_size, known_part, tangents_of
+from vr.session import choose_blend, eye_size, known_part, tangents_of
 from vr.spaces import KINDS, choose_kind, moved_by
 
 PERIOD = 1 / 90
@@ -122,6 +124,13 @@ def test_an_eye_has_what_is_recommended_within_what_is_allowed():
     assert eye_size(view, 0.5) == (1000, 1100)
     assert eye_size(view, 2.0) == (4000, 2400)
     assert eye_size(view, 1e-6) == (1, 1)
+
+
+def test_glasses_have_their_own_way_to_cover_the_room():
+    xr = SimpleNamespace(EnvironmentBlendMode=IntEnum("Blend", {"OPAQUE": 1, "ADDITIVE": 2}))
+    opaque, additive = xr.EnvironmentBlendMode
+    assert choose_blend(xr, [2, 1]) is opaque and choose_blend(xr, []) is opaque
+    assert choose_blend(xr, [2]) is additive
 
 
 def test_tangents_are_signed_and_in_our_order():
@@ -261,4 +270,11 @@ def test_a_runtime_that_goes_away_is_lost_and_closing_it_is_no_fault(fake, error
 def test_a_system_without_openxr_says_so(monkeypatch):
     monkeypatch.setattr("sys.platform", "darwin")
     with pytest.raises(NoHeadset, match="OpenXR runs on Windows and Linux"):
+        load()
+
+
+def test_a_machine_without_pyopenxr_says_how_to_get_it(monkeypatch):
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setitem(sys.modules, "xr", None)
+    with pytest.raises(NoHeadset, match=r"pyopenxr cannot be loaded .*pip install pyopenxr"):
         load()

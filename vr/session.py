@@ -89,7 +89,9 @@ class Session:
     def _make_swapchains(self, part: float, pixels: str) -> None:
         xr, instance = self._xr, self._instance
         stereo = xr.ViewConfigurationType.PRIMARY_STEREO
-        told = xr.enumerate_view_configuration_views(instance.handle, instance.system, stereo)
+        system = (instance.handle, instance.system, stereo)
+        self._blend = choose_blend(xr, xr.enumerate_environment_blend_modes(*system))
+        told = xr.enumerate_view_configuration_views(*system)
         offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
         try:
             self.pixels = choose_format(offered, pixels)
@@ -230,8 +232,7 @@ class Session:
         self._open = None
         self._finish()
         self._drain()
-        opaque = xr.EnvironmentBlendMode.OPAQUE
-        info = xr.FrameEndInfo(state.predicted_display_time, opaque, layers=layers)
+        info = xr.FrameEndInfo(state.predicted_display_time, self._blend, layers=layers)
         self.pace.end(time.perf_counter() - self._began)
         with self._instance.asked("take a frame"):
             xr.end_frame(self._handle, info)
@@ -274,6 +275,13 @@ def eye_size(view, part: float) -> tuple[int, int]:
     most = (view.max_image_rect_width, view.max_image_rect_height)
     wanted = [max(1, round(part * side)) for side in recommended]
     return min(wanted[0], most[0]), min(wanted[1], most[1])
+
+
+def choose_blend(xr, offered: Sequence) -> object:
+    """How the picture covers the room: wholly, or as glasses that are seen through like it best."""
+    modes = [xr.EnvironmentBlendMode(int(each)) for each in offered]
+    opaque = xr.EnvironmentBlendMode.OPAQUE
+    return opaque if opaque in modes or not modes else modes[0]
 
 
 def tangents_of(fov) -> tuple[float, float, float, float]:
