@@ -28,6 +28,7 @@ from vr.stance import resized
 if TYPE_CHECKING:
     from app.wearing import Wearing
 
+HINT = "menu button: open, close    stick: slide"  # where nothing else is to be said
 LATE_S = 2.0  # so long it is said that frames were late
 LATE = 3  # frames within that time; fewer are nobody's business
 ADVICE = {"best": ": try Auto", "balanced": ": try Auto or Fast"}  # by the quality that is chosen
@@ -61,13 +62,16 @@ class WornPanel:
         self._held = held
 
     def _note(self, wearing: "Wearing", now_s: float) -> str:
-        """A line where frames are late: few of them nobody wants to hear of."""
+        """The lowest line: where frames are late that; few of them nobody wants to hear of.
+
+        There always is one, or else the panel would change its height under a pointing hand.
+        """
         seen = self._dropped
         seen.append((now_s, wearing.session.pace.dropped))
         while seen[0][0] < now_s - LATE_S:
             seen.popleft()
         late = seen[-1][1] - seen[0][1] >= LATE
-        return f"frames are late{ADVICE.get(wearing.pacing.quality, '')}" if late else ""
+        return f"frames are late{ADVICE.get(wearing.pacing.quality, '')}" if late else HINT
 
 
 def facts_of(wearing: "Wearing", note: str = "") -> Facts:

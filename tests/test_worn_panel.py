@@ -10,7 +10,7 @@ from vr_hands import a_frame, hand_at
 
 from app.pacing import Pacing
 from app.person import Person
-from app.worn_panel import WornPanel, grant, sliders_of, stops_of
+from app.worn_panel import HINT, WornPanel, grant, sliders_of, stops_of
 from runtime_models.model import Stop
 from scene.reactions import State
 from scene.scene_file import SceneFile, SceneItem
@@ -145,4 +145,4 @@ def test_late_frames_are_told_and_forgotten(quality, told):
         wearing.session.pace.dropped = dropped
         panel.act(wearing, a_frame(LEFT, seen_s=second), 0.0)
         notes.append(panel.carried.panel.facts.note)
-    assert notes == ["", "", told, told, "", ""]
+    assert notes == [HINT, HINT, told, told, HINT, HINT]

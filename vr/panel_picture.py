@@ -157,13 +157,15 @@ def _slider(
     slider, y, half = panel.slider, layout.track_y, 7
     x, _ = knob_place(panel)
     _fill(image, (TRACK[0] - half, y - half, TRACK[1] + half, y + half), LINE, half)
-    _fill(image, (TRACK[0] - half, y - half, x + half, y + half), ACCENT, half)
+    _fill(image, (TRACK[0] - half, y - half, TRACK[0] + half, y + half), ACCENT, half)
+    draw.rectangle((TRACK[0], y - half, x, y + half - 1), fill=ACCENT)  # its end is under the knob
     for stop in slider.stops:
         at = _along(stop)
         _fill(image, (at - 12, y - 12, at + 12, y + 12), TEXT, 12)
-    names, em = _placed_names(slider)
+    shown = next((s for s in slider.stops if abs(s.x - slider.x) <= ON_STOP), None)
+    names, em = _placed_names(slider.stops, shown)
     for stop, (middle, beside) in names:
-        on = abs(stop.x - slider.x) <= ON_STOP
+        on = stop == shown
         _text(draw, (middle, y + beside), stop.name, em, ACCENT if on else TEXT, "mm", on)
     state = _knob_state(panel)
     held = state == "held"
@@ -173,16 +175,17 @@ def _slider(
     _fill(image, (x - inner, y - inner, x + inner, y + inner), ACCENT if held else SURFACE, inner)
 
 
-def _placed_names(slider: Slider) -> tuple[list[tuple[Stop, Place]], int]:
+@lru_cache(maxsize=64)
+def _placed_names(
+    stops: tuple[Stop, ...], shown: Stop | None
+) -> tuple[list[tuple[Stop, Place]], int]:
     """The stops whose names find room, the middle of each beside the line, and their letters'
     height: above the line where they can, else smaller, and below it.
 
     The one that is shown always does, then the ends, then as they come.
     """
-    ranks = {s.x: rank for rank, s in enumerate(sorted(slider.stops, key=lambda s: s.x))}
-    order = sorted(
-        slider.stops, key=lambda s: (abs(s.x - slider.x) > ON_STOP, min(s.x, 1 - s.x), s.x)
-    )
+    ranks = {s.x: rank for rank, s in enumerate(sorted(stops, key=lambda s: s.x))}
+    order = sorted(stops, key=lambda s: (s != shown, min(s.x, 1 - s.x), s.x))
     for em, lanes in ((BODY, (-66,)), (SMALL, (-66,)), (LEAST, (-66, 56))):
         placed: list[tuple[Stop, Place]] = []
         spans: list[tuple[float, float, int]] = []
@@ -273,6 +276,7 @@ def _text(draw, at, text: str, em: int, ink: Ink, anchor: str, bold: bool = Fals
     draw.text(at, drawable(text, em), fill=ink, font=letters(em, bold), anchor=anchor)
 
 
+@lru_cache(maxsize=512)
 def _fitted(text: str, em: int, room: float, least: int, bold: bool = False) -> tuple[str, int]:
     """The text and the height of its letters so that it fits: smaller first, then cut short."""
     text = drawable(text, em)
