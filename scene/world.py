@@ -288,7 +288,10 @@ class World:
         A hand goes evenly from where it was at the last call to where it is now, so that what it
         throws has its speed however frames and steps fall.
         """
-        if self.paused or not seconds > 0:
+        if self.paused:
+            self._hands_before = dict(self.hands)  # whoever moves meanwhile has no speed
+            return []
+        if not seconds > 0:
             return []
         seconds = min(seconds, MOST_STEPS / self.hz)
         late = self._behind_s

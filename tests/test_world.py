@@ -172,6 +172,20 @@ def test_a_long_frame_makes_up_for_eight_steps_and_no_more():
     assert world.step().step == 9  # by hand it goes on
 
 
+def test_a_hand_that_moved_while_all_held_still_flings_nothing():
+    world = real(item(position=(0, 1, 0)), floor_y=None, gravity_m_s2=0.0)
+    world.move_hand("right", at(0, 1, 0))
+    world.grab("right")
+    world.paused = True
+    world.move_hand("right", at(0.02, 1, 0))
+    world.advance(0.1)
+    world.paused = False
+    world.advance(0.1)
+    world.release("right")
+    speed = np.linalg.norm(world.physics.velocity(world.things["a"].body)[0])
+    assert speed < 0.05
+
+
 def test_between_two_steps_it_is_drawn_between_them():
     world = thought(item())
     world.advance(8.0 / 90)
