@@ -6,18 +6,21 @@ The picture does not wait for it: a scene is there to be seen before it can be t
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.document import Document, ModelKey, key_of
+from app.opened import Told
 from app.opening import sentence
-from runtime_models.model import BadFile
-from scene.scene_file import SceneFile, SceneItem
+from runtime_models.model import BadFile, Model
+from scene.scene_file import HULLS, SceneFile, SceneItem
 
 if TYPE_CHECKING:
     from app.viewer import Viewer
     from scene.collider import Collider
     from scene.world import World
 
+PATIENCE_S = 3.0  # longest wait at the end for a collider that is being made
 HZ = 90  # steps of the physics a second
 
 
@@ -33,9 +36,22 @@ class Bodies:
         self._ground: tuple = ()  # floor and gravity of the world
         self._future: Future | None = None
         self._stale = True  # the world does not know of the last edits yet
+        self._unwanted = threading.Event()  # ends the thread at its next word
+        self._thread: threading.Thread | None = None
+        self._told = ("", 0.0)  # whose collider is being made, part done
+
+    def __enter__(self) -> "Bodies":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends what is being made, the process that cuts it up too."""
+        self._unwanted.set()
+        if self._thread is not None:
+            self._thread.join(PATIENCE_S)
 
     def forget(self) -> None:
         """Another scene; a collider that is being made is not waited for."""
+        self._unwanted.set()
         self.__init__()
 
     @property
@@ -44,7 +60,8 @@ class Bodies:
 
     @property
     def status(self) -> str:
-        return "making colliders" if self.busy else ""
+        name, part = self._told
+        return f"making the collider of {name} {part:.0%}" if self.busy else ""
 
     def follow(self, document: Document) -> None:
         """Lets the world know of an edit, as soon as there are the colliders for it.
@@ -104,21 +121,34 @@ class Bodies:
         before = self._of.get(item.name)
         if before is not None and before[0] == made_of(item):
             return before[1]
-        return self._made.get(made_of(item), MISSING)
+        return self._made.get(making_of(item), MISSING)
 
     def _start(self, document: Document, item: SceneItem) -> None:
         """Makes one collider in a thread that the program's end does not wait for."""
         future = self._future = Future()
-        file, model = document.file, document.model(item)
+        file, model, unwanted = document.file, document.model(item), self._unwanted
         beside = document.path.absolute().parent if document.path is not None else None
+        self._told = (item.name, 0.0)
+
+        def told(what: str, part: float) -> None:
+            if unwanted.is_set():
+                raise Unwanted
+            self._told = (item.name, part)
 
         def work() -> None:
             try:
-                future.set_result((made_of(item), *make(file, item, model, beside)))
+                future.set_result((making_of(item), *make(file, item, model, beside, told)))
+            except Unwanted:
+                future.cancel()
             except BaseException as error:  # handed to the window's thread, which raises it again
                 future.set_exception(error)
 
-        threading.Thread(target=work, name="colliders", daemon=True).start()
+        self._thread = threading.Thread(target=work, name="colliders", daemon=True)
+        self._thread.start()
+
+
+class Unwanted(Exception):
+    """Nobody waits for the collider any more."""
 
 
 MISSING = object()
@@ -128,13 +158,20 @@ def made_of(item: SceneItem) -> tuple[str | None, ModelKey]:
     return item.collider, key_of(item)
 
 
-def make(file: SceneFile, item: SceneItem, model, beside) -> "tuple[Collider | None, str]":
+def making_of(item: SceneItem) -> tuple:
+    """The same with the shape that its splats have at its x."""
+    return (*made_of(item), item.x if item.collider == HULLS else 0.0)
+
+
+def make(
+    file: SceneFile, item: SceneItem, model: Model, beside: Path | None, told: Told
+) -> "tuple[Collider | None, str]":
     """The collider, or None and why there is none."""
     from scene.collider import Making
     from scene.collider_files import one_collider
 
     try:
-        return one_collider(file, item, model, Making(beside=beside)), ""
+        return one_collider(file, item, model, Making(beside=beside, told=told)), ""
     except BadFile as error:
         return None, f"{error} It cannot be touched."
     except MemoryError:

@@ -89,7 +89,7 @@ def run(options: Options) -> int:
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
     stage.document.saved_regions = stage.regions.version
-    with refiner, Window("Shapeshift", size) as window:
+    with refiner, stage.bodies, Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             viewer = Viewer(window, renderer, stage, options)
             attach_refiner(viewer, refiner)

@@ -1,0 +1,132 @@
+"""Colliders that are made beside the picture: once each, ended when nobody waits for them."""
+
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scene.collider_files
+from app.bodies import Bodies
+from app.document import Document, key_of
+from app.opened import Source
+from runtime_models.model import BadFile, SplatLayers, Stop
+from scene import edits
+from scene.collider import Collider
+from scene.edits import History
+from scene.scene_file import HULLS, SceneFile, SceneItem
+from scene.triangle_mesh import TriangleMesh
+
+STOPS = (Stop("one", 0.0), Stop("two", 1.0))
+
+
+def model() -> SplatLayers:
+    return SplatLayers(
+        np.zeros((3, 3), np.float32), np.full((3, 3), 0.1, np.float32),
+        np.tile(np.array([1, 0, 0, 0], np.float32), (3, 1)), np.full(3, 0.9, np.float32),
+        np.zeros((3, 1, 3), np.float32), np.zeros(3, np.int32), STOPS,
+    )  # fmt: skip
+
+
+def document(*items: SceneItem) -> Document:
+    file = SceneFile(folder=Path("/none"), items=items)
+    sources = {key_of(item): Source(Path(item.model), model()) for item in items}
+    return Document(History.of(file), saved=file, sources=sources)
+
+
+def thing(name: str, x: float = 0.0, collider: str | None = HULLS) -> SceneItem:
+    return SceneItem(name=name, model="a.ply", x=x, collider=collider)
+
+
+def cube() -> Collider:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
+    return Collider((corners * 0.1,), TriangleMesh(corners, np.array([[0, 1, 2]], np.int32)))
+
+
+@pytest.fixture
+def made(monkeypatch) -> list:
+    """What was asked for, (name, x); it is there at once."""
+    asked = []
+
+    def one_collider(file, item, model, making):
+        asked.append((item.name, item.x))
+        if item.name == "bad":
+            raise BadFile("object 'bad': there is nothing to touch.")
+        return cube()
+
+    monkeypatch.setattr(scene.collider_files, "one_collider", one_collider)
+    return asked
+
+
+def until_there(bodies: Bodies, of: Document) -> None:
+    end = time.monotonic() + 10
+    while bodies.poll(of) and time.monotonic() < end:
+        time.sleep(0.001)
+    assert not bodies.busy
+
+
+def test_one_collider_serves_all_that_are_alike(made):
+    bodies = Bodies()
+    of = document(thing("a"), thing("b"), thing("c", x=1.0), thing("d", collider=None))
+    until_there(bodies, of)
+    assert made == [("a", 0.0), ("c", 1.0)]  # another x is another shape
+    things = bodies.world.things
+    assert list(things) == ["a", "b", "c", "d"] and bodies.world.paused
+    assert [things[name].body is not None for name in things] == [True, True, True, False]
+
+
+def test_a_slider_does_not_make_it_anew(made):
+    bodies, of = Bodies(), document(thing("a"))
+    until_there(bodies, of)
+    for x in (0.1, 0.2, 0.3):
+        of.history = of.history.take(edits.set_x(of.file, "a", x), "x")
+        bodies.follow(of)
+        until_there(bodies, of)
+    assert made == [("a", 0.0)] and bodies.world.things["a"].standing.x == 0.3
+
+
+def test_what_cannot_be_made_is_said_once_and_the_rest_can_be_touched(made):
+    bodies, of = Bodies(), document(thing("bad", x=0.5), thing("a"))
+    until_there(bodies, of)
+    assert "bad" in bodies.problem and "cannot be touched" in bodies.problem
+    things = bodies.world.things
+    assert things["bad"].body is None and things["a"].body is not None
+    bodies.problem = ""
+    for _ in range(5):
+        bodies.poll(of)
+    assert bodies.problem == "" and made == [("bad", 0.5), ("a", 0.0)]
+
+
+def test_where_nothing_can_be_touched_there_is_no_world(made):
+    bodies, of = Bodies(), document(thing("a", collider=None))
+    until_there(bodies, of)
+    assert bodies.world is None and made == []
+
+
+def test_another_scene_ends_what_is_being_made(monkeypatch):
+    begun, ended = threading.Event(), threading.Event()
+
+    def one_collider(file, item, model, making):
+        try:
+            while True:
+                begun.set()
+                making.tell("cutting it into convex pieces", 0.5)
+                time.sleep(0.001)
+        finally:
+            ended.set()
+
+    monkeypatch.setattr(scene.collider_files, "one_collider", one_collider)
+    of = document(thing("a"))
+    with Bodies() as bodies:
+        assert bodies.poll(of) and begun.wait(10)
+        end = time.monotonic() + 10
+        while "50%" not in bodies.status and time.monotonic() < end:
+            time.sleep(0.001)
+        assert bodies.status == "making the collider of a 50%"
+        bodies.forget()
+        assert ended.wait(10) and not bodies.busy
+        begun.clear()
+        ended.clear()
+        assert bodies.poll(of) and begun.wait(10)
+    assert ended.is_set()  # so does the end of the program
