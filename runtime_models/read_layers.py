@@ -8,6 +8,7 @@ import numpy as np
 from runtime_models.formats import read_plain
 from runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from runtime_models.plain_splats import PlainSplats, Reading
+from runtime_models.stop_names import stems_named
 
 MODES = ("cumulative", "exclusive")
 
@@ -30,7 +31,7 @@ def number_aware(path: Path) -> list[tuple[int, str]]:
 def read_layers(
     paths: list[Path], reading: Reading | None = None, stops: tuple[Stop, ...] | None = None
 ) -> SplatLayers:
-    """One SplatLayers; without `stops` file i of n lies at i / (n - 1) and has its file's name.
+    """One SplatLayers; without `stops` file i of n lies at i / (n - 1) and is called as its file.
 
     cumulative (or no mode): stop i shows files 0..i; exclusive: file i alone.  Raises BadFile.
     """
@@ -39,7 +40,9 @@ def read_layers(
         raise BadFile("no files were given; at least one file of splats is needed.")
     paths = [Path(path) for path in paths]
     last = max(len(paths) - 1, 1)
-    stops = stops or tuple(Stop(p.stem, i / last, "layer") for i, p in enumerate(paths))
+    if not stops:
+        names = stems_named([path.stem for path in paths])
+        stops = tuple(Stop(name, i / last, "layer") for i, name in enumerate(names))
     check_mode(reading.mode)
     parts = [read_plain(path, reading) for path in paths]
     return join_layers(parts, stops, reading.mode, [path.name for path in paths])

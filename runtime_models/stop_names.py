@@ -18,3 +18,12 @@ def is_thermal_name(name: str) -> bool:
     low = name.lower()
     words = re.split(r"[^a-z]+", low)
     return any(part in low for part in THERMAL_PARTS) or not THERMAL_WORDS.isdisjoint(words)
+
+
+def stems_named(stems: list[str]) -> list[str]:
+    """Names of stops from those of files: numbers that only put them in order ("2_fire") go.
+
+    They stay where a file would have no name without, or where two would have the same.
+    """
+    words = [re.sub(r"^[0-9]+[ _.-]+", "", stem) for stem in stems]
+    return words if all(words) and len(set(words)) == len(stems) else stems

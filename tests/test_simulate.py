@@ -44,7 +44,7 @@ def test_the_example_does_all_that_it_declares(example):
         ("ring", "grab", "hot"), ("ring", "enter", "cold")
     ]  # fmt: skip
     assert [e for e in events if e[0] == "ball"] == [
-        ("ball", "ray", "1_confetti"), ("ball", "ray", "0_ball")
+        ("ball", "ray", "confetti"), ("ball", "ray", "ball")
     ]  # fmt: skip
     assert next(e for e in events if e[0] == "cube") == ("cube", "collision", "ice")
     deeds = [(d["hand"], d["did"], d["object"]) for row in rows for d in row.get("hands", ())]

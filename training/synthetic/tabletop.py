@@ -199,8 +199,8 @@ def scene(folder: Path) -> SceneFile:
     globe = SceneItem(
         name="ball", model="touch/ball", mode="exclusive", up="+Y", collider=HULLS,
         position=(0.0, BALL + 0.001, -0.12), mass_kg=0.2, restitution=0.4, reactions=(
-            Reaction(on="ray", to="1_confetti", after=("0_ball",), seconds=0.3, ease="slow end"),
-            Reaction(on="ray", to="0_ball", after=("1_confetti",), seconds=1.0),
+            Reaction(on="ray", to="confetti", after=("ball",), seconds=0.3, ease="slow end"),
+            Reaction(on="ray", to="ball", after=("confetti",), seconds=1.0),
         ),
     )  # fmt: skip
     hoop = SceneItem(
