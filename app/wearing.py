@@ -130,6 +130,7 @@ class Wearing:
         self.renderer.update(self.world.drawn())
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
         self._drawing_ms = (time.perf_counter() - start) * 1e3
+        self.session.pace.drew(self._drawing_ms)
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
             self.eyes.overlay.draw(framebuffer, play_views[i], over)

@@ -24,6 +24,7 @@ class Pace:
     dropped: int = 0  # the runtime showed an older one in their place
     over: int = 0  # frames whose own time was longer than the period
     own_ms: list[float] = field(default_factory=list)  # from the runtime's go to our hand-over
+    drawing_ms: list[float] = field(default_factory=list)  # of that, the splats of both eyes
     wait_ms: list[float] = field(default_factory=list)  # the runtime let us wait
     _told: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
     _seen_s: float | None = None  # when the last frame was to be seen
@@ -50,6 +51,11 @@ class Pace:
         self._seen_s = seen_s
         self.frames += 1
         _keep(self.wait_ms, wait_s * 1e3)
+
+    def drew(self, drawing_ms: float) -> None:
+        """Before the end: how long the splats of both eyes took."""
+        if not self._unfair:
+            _keep(self.drawing_ms, drawing_ms)
 
     def end(self, own_s: float) -> None:
         """It was handed over; `own_s` is what we took for it."""
@@ -82,6 +88,7 @@ class Pace:
             "over_period": int(self.over),
             "period_ms": round(self.period_s * 1e3, 3),
             "own_ms": _percentiles(self.own_ms),
+            "drawing_ms": _percentiles(self.drawing_ms),
             "wait_ms": _percentiles(self.wait_ms),
         }
 
