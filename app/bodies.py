@@ -38,7 +38,7 @@ class Bodies:
         self._stale = True  # the world does not know of the last edits yet
         self._unwanted = threading.Event()  # ends the thread at its next word
         self._thread: threading.Thread | None = None
-        self._told = ("", 0.0)  # whose collider is being made, part done
+        self._told = ("", 0.0)  # what is being done for a collider, part done
 
     def __enter__(self) -> "Bodies":
         return self
@@ -60,8 +60,8 @@ class Bodies:
 
     @property
     def status(self) -> str:
-        name, part = self._told
-        return f"making the collider of {name} {part:.0%}" if self.busy else ""
+        what, part = self._told
+        return f"{what} {part:.0%}" if self.busy else ""
 
     def follow(self, document: Document) -> None:
         """Lets the world know of an edit, as soon as there are the colliders for it.
@@ -128,12 +128,12 @@ class Bodies:
         future = self._future = Future()
         file, model, unwanted = document.file, document.model(item), self._unwanted
         beside = document.path.absolute().parent if document.path is not None else None
-        self._told = (item.name, 0.0)
+        self._told = (f"{item.name}: making a collider", 0.0)
 
         def told(what: str, part: float) -> None:
             if unwanted.is_set():
                 raise Unwanted
-            self._told = (item.name, part)
+            self._told = (f"{item.name}: {what}", part)
 
         def work() -> None:
             try:

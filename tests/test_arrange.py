@@ -1,5 +1,6 @@
 """Edits of what the viewer shows: file, history, world and scene stay one and the same thing."""
 
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,10 +12,13 @@ from app.files import opened_scene
 from app.opened import Found, Source, read_files
 from app.stage import Stage
 from runtime_models.model import BadFile, SplatLayers, Stop
-from scene import edits
+from scene import collider_files, edits
 from scene.camera_list import CameraReading
+from scene.collider import Collider
+from scene.follow import put_back
 from scene.pose import Pose
-from scene.selector import Sphere
+from scene.selector import Painted, Sphere
+from scene.triangle_mesh import TriangleMesh
 
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = ["background", "cube", "ball", "ring", "plate"]
@@ -52,6 +56,13 @@ def model(name: str) -> SplatLayers:
 def plain() -> Stage:
     """Two files that were opened without a scene file."""
     return stage_of(Found(tuple(Source(Path(f"/data/{n}.ply"), model(n)) for n in ("a", "b"))))
+
+
+def cube() -> Collider:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
+    quads = [(0, 2, 1, 3), (4, 5, 6, 7), (0, 1, 4, 5), (2, 6, 3, 7), (0, 4, 2, 6), (1, 3, 5, 7)]
+    faces = np.array([f for a, b, c, d in quads for f in ((a, b, c), (b, d, c))], np.int32)
+    return Collider((corners * 0.05,), TriangleMesh(corners, faces))
 
 
 def names(stage: Stage) -> list[str]:
@@ -184,10 +195,90 @@ def test_two_of_the_same_file_have_names_of_their_own():
     assert names(stage) == ["a", "a 2", "a 3"]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_is_edited_undone_and_redone_all_stay_one(stage, seed, monkeypatch):
+    """Hundreds of edits by chance: file, scene and world tell the same after each."""
+    monkeypatch.setattr(collider_files, "one_collider", lambda *_: cube())
+    rng = np.random.default_rng(seed)
+    ready(stage)
+    for _ in range(150):
+        stage.world.paused = True
+        do_something(stage, rng)
+        ready(stage)
+        same_as_file(stage)
+        same_in_world(stage)
+        if rng.random() < 0.1:  # things fall, answer, and are put where the file says
+            stage.world.paused = False
+            for _ in range(5):
+                stage.world.step()
+            put_back(stage.world)
+            stage.follow_world()
+            same_as_file(stage)
+    for _ in range(500):
+        arrange.undo(stage)
+    ready(stage)
+    same_as_file(stage)
+    same_in_world(stage)
+    assert names(stage) == NAMES and not stage.document.edited
+
+
+def do_something(stage: Stage, rng: np.random.Generator) -> None:
+    file = stage.document.file
+    name = rng.choice(names(stage)) if stage.scene.objects else ""
+    deed = rng.integers(0, 12)
+    if deed < 2:
+        arrange.undo(stage)
+    elif deed < 4:
+        arrange.redo(stage)
+    elif not name or (deed == 4 and len(file.items) < 12):
+        item = replace(edits.find(file, name), name=f"new {rng.integers(5)}") if name else None
+        item = item or stage.document.history.steps[0].file.items[0]
+        arrange.edit(stage, edits.add(file, item), "add")
+    elif deed == 5:
+        arrange.edit(stage, edits.remove(file, name), "delete")
+    elif deed == 6 and len(file.items) < 12:
+        arrange.edit(stage, edits.duplicate(file, name, tuple(rng.normal(size=3))), "copy")
+    elif deed == 7 and name != "background":
+        wanted = f"name {rng.integers(100)}"
+        if edits.find(file, wanted) is None:
+            arrange.edit(stage, edits.rename(file, name, wanted), "rename")
+    elif deed == 8:
+        turn = rng.normal(size=4)
+        pose = Pose(rng.normal(size=3), turn / np.linalg.norm(turn))
+        arrange.place(stage, names(stage).index(name), pose)
+    elif deed == 9:
+        arrange.steer(stage, names(stage).index(name), float(rng.random()))
+    elif deed == 10:
+        file = edits.change(file, name, collider=None if rng.random() < 0.5 else "hulls")
+        if name != "background":
+            file = edits.change(file, name, static=bool(rng.random() < 0.5))
+        arrange.edit(stage, file, "body")
+    else:
+        file = edits.hide(file, name, bool(rng.random() < 0.5))
+        arrange.edit(stage, edits.ground(file, float(rng.random())), "hide, and another floor")
+    if rng.random() < 0.5:
+        stage.rest()
+
+
+def ready(stage: Stage) -> None:
+    end = time.monotonic() + 10
+    while stage.bodies.poll(stage.document) and time.monotonic() < end:
+        time.sleep(0.0005)
+    assert stage.bodies.problem == "" and not stage.bodies.busy
+
+
+def same_in_world(stage: Stage) -> None:
+    """The world has the same objects in the same order, places, values and bodies."""
+    items = stage.document.file.all_items
+    assert list(stage.world.things) == [item.name for item in items]
+    for item, thing in zip(items, stage.world.things.values(), strict=True):
+        assert thing.item is item and thing.standing.x == item.x
+        assert (thing.body is not None) == (item.collider is not None)
+        assert thing.pose.position == pytest.approx(item.position, abs=1e-5)
+
+
 def test_an_edit_that_cannot_be_leaves_all_as_it_was(stage):
     before = stage.scene
-    from scene.selector import Painted
-
     wrong = edits.change(
         stage.document.file, "ball", selectors=(Painted(np.ones(7, np.float32), 1.0),)
     )

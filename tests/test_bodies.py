@@ -123,7 +123,7 @@ def test_another_scene_ends_what_is_being_made(monkeypatch):
         end = time.monotonic() + 10
         while "50%" not in bodies.status and time.monotonic() < end:
             time.sleep(0.001)
-        assert bodies.status == "making the collider of a 50%"
+        assert bodies.status == "a: cutting it into convex pieces 50%"
         bodies.forget()
         assert ended.wait(10) and not bodies.busy
         begun.clear()
