@@ -92,7 +92,7 @@ class Gizmo:
         if index is None:
             return
         thing, view = stage.scene.objects[index], viewer.view()
-        if not self.holding:
+        if viewer.overlay and not self.holding:
             self._outline(thing, view, ui_scale)
         if self._shown:
             self._handles(index, thing, view, ui_scale)

@@ -140,3 +140,28 @@ def test_no_context_is_the_error_of_the_window(monkeypatch):
     )
     with pytest.raises(NoContext, match=r"no window with OpenGL 4.3 could be opened \(no\)"):
         Window("a", (10, 10))
+
+
+def test_a_scene_file_opens_with_one_object_more(display, scene_file, tmp_path):
+    out = tmp_path / "window.png"
+    touch = ROOT / "assets" / "touch.scene.json"
+    done = start(display, "view", touch, scene_file, "--screenshot", out, "--frames", 2)
+    assert done.returncode == 0 and done.stdout == "", done.stderr
+    assert np.asarray(Image.open(out)).std() > 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--touch", "--x", "0.5"], ["--x", "touch.scene.json"]),
+        (["--touch", "--up=-Z"], ["touch.scene.json", "which way is up"]),
+        (["broken.scene.json"], ["object 'a'", "nothing.ply"]),
+        (["broken.scene.json", "other.scene.json"], ["two scene files"]),
+    ],
+)
+def test_what_a_scene_file_cannot_is_one_sentence(display, tmp_path, arguments, words):
+    text = '{"objects": [{"name": "a", "model": "nothing.ply"}]}'
+    for name in ("broken", "other"):
+        (tmp_path / f"{name}.scene.json").write_text(text)
+    arguments = [tmp_path / a if a.endswith(".json") else a for a in arguments]
+    assert_one_sentence(start(display, "view", *arguments), 2, *words)
