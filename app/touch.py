@@ -82,7 +82,7 @@ class Touch:
 
     def forget(self) -> None:
         """Another scene: nothing of the old one is held or told."""
-        self.hand = None
+        self.hand = self._known = None
         self.pads.clear()
         self.told.clear()
         self.marks.forget()
@@ -93,9 +93,10 @@ class Touch:
         return unfold
 
     def meet(self, world: World) -> None:
-        """The bodies of what was opened are there."""
-        self._known, self._unfold = world, True
-        world.paused = not self.viewer.options.play
+        """The bodies of what was opened are there, or there anew on another floor."""
+        if self._known is None:
+            self._unfold, world.paused = True, not self.viewer.options.play
+        self._known = world
 
     def status(self) -> str:
         """Words for the status line."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
 
+from app.bodies import made_of
 from app.desktop import Options, Viewer
 from app.document import Document
 from app.opened import Source
@@ -54,11 +55,12 @@ def viewer(window, tmp_path):
     stage = Stage(lambda path: model)
     document = Document(History.of(FILE), saved=FILE, sources={("a", "", "", False): source})
     stage.take([source, source], scene_of(FILE, models), None, document)
-    viewer = Viewer(window, PlainRenderer(window.ctx), stage, Options(pictures=tmp_path, play=True))
-    stage.bodies.world = World(FILE, models, dict.fromkeys(models, BOX))
-    stage.bodies._stale = False
-    run_frames(viewer, 3)
-    return viewer
+    stage.bodies._of = {item.name: (made_of(item), BOX) for item in ITEMS}  # nothing is cut up
+    with stage.bodies:
+        options = Options(pictures=tmp_path, play=True)
+        viewer = Viewer(window, PlainRenderer(window.ctx), stage, options)
+        run_frames(viewer, 3)
+        yield viewer
 
 
 def press_key(viewer, key: int, shift: bool = False) -> None:
@@ -273,13 +275,22 @@ def test_without_a_world_nothing_is_taken(viewer):
     assert viewer.touch.status() == ""
 
 
-def test_a_new_world_waits_unless_it_is_to_play(viewer):
-    assert not viewer.stage.world.paused
-    viewer.options = replace(viewer.options, play=False)
+def new_world(viewer) -> World:
     models = {item.name: ball(20) for item in ITEMS}
     viewer.stage.bodies.world = World(FILE, models, dict.fromkeys(models, BOX))
+    return viewer.stage.bodies.world
+
+
+def test_another_scene_waits_unless_it_is_to_play_and_another_floor_does_not(viewer):
+    assert not viewer.stage.world.paused
+    viewer.options = replace(viewer.options, play=False)
+    world = new_world(viewer)  # of another floor
     run_frames(viewer, 3)
-    assert viewer.stage.world.paused and viewer.stage.world.steps == 0
+    assert not world.paused and world.steps > 0
+    viewer.touch.forget()
+    world = new_world(viewer)
+    run_frames(viewer, 3)
+    assert world.paused and world.steps == 0
     assert "T lets them move" in viewer.touch.status()
 
 
