@@ -18,6 +18,7 @@ from app.window import CLICK_PIXELS, Drag, Drop, Event, KeyDown, Press, Release
 from runtime_models.model import BadFile
 from scene import edits
 from scene.framing import model_points
+from scene.pose import Pose
 from scene.scene_file import SceneFile, SceneItem
 
 if TYPE_CHECKING:
@@ -195,7 +196,16 @@ class Objects:
         thing = stage.scene.objects[index]
         by = copy_offset(thing, model_points(thing.model)[0])
         known = {item.name for item in stage.document.file.all_items}
-        if self.edit(edits.duplicate, name, by, what=f"copy {name}"):
+        pose = thing.world_from_object
+
+        def beside(file: SceneFile) -> SceneFile:
+            """The copy stands by what is seen, wherever that may have gone since the start."""
+            file = edits.duplicate(file, name, by)
+            copy = next(item.name for item in file.items if item.name not in known)
+            file = edits.place(file, copy, Pose(pose.position + by, pose.wxyz))
+            return edits.set_x(file, copy, thing.x)
+
+        if self.edit(beside, what=f"copy {name}"):
             stage.chosen = next(i.name for i in stage.document.file.items if i.name not in known)
             self._count_changed()
 

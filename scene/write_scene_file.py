@@ -72,4 +72,7 @@ def moved(text: str, before: Path, after: Path) -> str:
     absolute = PurePosixPath(text).is_absolute() or PureWindowsPath(text).is_absolute()
     if absolute or before.absolute() == after.absolute():
         return text
-    return Path(os.path.relpath(before / text, after)).as_posix()
+    try:
+        return Path(os.path.relpath(before / text, after)).as_posix()
+    except ValueError:  # on another drive of Windows there is no way between them
+        return (before / text).absolute().as_posix()

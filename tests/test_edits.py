@@ -129,6 +129,29 @@ def test_what_is_edited_reads_as_it_was_written(file, tmp_path):
         assert replace(read, model=item.model, collider=item.collider) == item
 
 
+def test_on_another_drive_paths_become_whole(file, tmp_path, monkeypatch):
+    def no_way(path, start):
+        raise ValueError("path is on mount 'D:', start on mount 'C:'")
+
+    monkeypatch.setattr("os.path.relpath", no_way)
+    write_scene_file(file, tmp_path / "a.scene.json")
+    monkeypatch.undo()
+    again = read_scene_file(tmp_path / "a.scene.json")
+    assert [Path(item.model).is_absolute() for item in again.items] == [True] * 4
+    assert Path(again.items[0].model) == ROOT / "assets" / "touch" / "cube"
+
+
+def test_the_scene_s_own_edits(file):
+    assert edits.ground(file, None).floor_y is None and edits.ground(file, -0.7) is file
+    with pytest.raises(ValueError, match="floor"):
+        edits.ground(file, math.nan)
+    eye, target = np.array([0.1, 0.2, 1 / 3]), np.zeros(3)
+    view = edits.look_from(file, eye, target, 0.8).view
+    assert (view.eye, view.target, view.fov_y) == ((0.1, 0.2, 0.333333), (0, 0, 0), 0.8)
+    with pytest.raises(ValueError, match="straight"):
+        edits.look_from(file, np.array([0, 1.0, 0]), target, 0.8)
+
+
 # History
 
 

@@ -177,6 +177,14 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
     assert not stage.document.edited and not objects.unsaved
     stage.world.paused = True
     run_frames(viewer, 2)
+    stage.chosen = "ball"
+    objects.duplicate()
+    copy = thing(viewer, "ball 2")
+    assert copy.world_from_object.position[1:] == pytest.approx(
+        fallen.world_from_object.position[1:], abs=1e-5
+    )
+    assert copy.x == 0.25  # a copy of what is seen, not of where it started
+    key(viewer, glfw.KEY_Z, CTRL)
     objects.keep_standing()
     item = edits.find(stage.document.file, "ball")
     assert item.x == 0.25
