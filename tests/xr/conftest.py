@@ -42,8 +42,8 @@ def start() -> Iterator[Callable[..., Program]]:
     """start(stand, *arguments): a `launch.py vr` that is ended with the test."""
     with ExitStack() as ends:
 
-        def run(*arguments: object, **environment: str) -> Program:
-            program = start_program(*arguments, **environment)
+        def run(*arguments: object, **settings: object) -> Program:
+            program = start_program(*arguments, **settings)
             ends.callback(program.close)
             return program
 

@@ -90,7 +90,8 @@ def test_recentring_brings_the_person_back_before_the_scene(served, start):
     assert np.linalg.norm(eye_in_world(away)[:3, 3] - eye_in_world(before)[:3, 3]) > 0.6
     assert not later["recentred"]
     assert program.interrupt() == INTERRUPTED, program.told()
-    assert json.loads((served.folder / "report.json").read_text())["recentrings"] == 1
+    report = json.loads((served.folder / "report.json").read_text())
+    assert (report["recentrings"], report["ended"]) == (1, "interrupted")
     assert not complaints(served.folder)
 
 
@@ -110,7 +111,7 @@ def test_a_runtime_that_goes_away_is_one_sentence(served, start):
         program.until(lambda line: line["focused"], "focused")
         served.kill_runtime()
         report = program.end()
-    assert report["code"] == NO_HEADSET
+    assert (report["code"], report["ended"]) == (NO_HEADSET, "runtime lost")
     assert report["states"][-1] == "FOCUSED"
     said = [line for line in program.told().splitlines() if line.startswith("shapeshift")]
     assert len(said) == 1 and "Monado" in said[0] and "went away" in said[0], said

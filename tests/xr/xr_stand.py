@@ -1,5 +1,6 @@
 """Where a test of VR runs: Monado for it alone, and `launch.py vr` whose lines are read live."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -42,8 +43,12 @@ def find_runtime() -> Runtime:
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     named = os.environ.get("SHAPESHIFT_TEST_RUNTIME")
     runtime = Runtime(Path(named) if named else cache / "shapeshift" / "monado")
-    if not (runtime.folder / "built-from").is_file():
+    stamp = runtime.folder / "built-from"
+    if not stamp.is_file():
         raise LookupError(f"no OpenXR runtime for the tests in {runtime.folder}: {NEEDED}")
+    script = hashlib.sha256((Path(__file__).parent / "monado.sh").read_bytes()).hexdigest()
+    if script not in stamp.read_text():
+        raise LookupError(f"the OpenXR runtime in {runtime.folder} is an older one: {NEEDED}")
     return runtime
 
 
@@ -176,9 +181,12 @@ class Program:
             self.process.wait()
 
 
-def start_program(stand: Stand, *arguments: str, **environment: str) -> Program:
-    """`launch.py vr` with its report, lines and output in the stand's folder."""
-    out = ["--report", stand.folder / "report.json", "--lines", stand.folder / "lines.jsonl"]
+def start_program(
+    stand: Stand, *arguments: str, reports: bool = True, **environment: str
+) -> Program:
+    """`launch.py vr` with its lines and output, and its report, in the stand's folder."""
+    out = ["--lines", stand.folder / "lines.jsonl"]
+    out += ["--report", stand.folder / "report.json"] if reports else []
     command = [sys.executable, ROOT / "launch.py", "vr", *arguments, *out]
     with (stand.folder / "told.txt").open("wb") as told:
         process = subprocess.Popen(
