@@ -1,6 +1,9 @@
 """launch.py vr: a scene in a headset; without one a sentence, and the viewer where it can open."""
 
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from math import inf
 from pathlib import Path
@@ -127,13 +130,35 @@ def wear(options: Options) -> int:
                 session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand
             )
             try:
-                wearing.loop(options.frames)
-            except (Lost, KeyboardInterrupt) as end:
-                report.ended = "runtime lost" if isinstance(end, Lost) else "interrupted"
+                with interrupting(wearing):
+                    wearing.loop(options.frames)
+            except Lost:
+                report.ended = "runtime lost"
                 raise
             finally:
                 report.write(describe(instance, session) | pacing.report())
     return 0
+
+
+@contextmanager
+def interrupting(wearing) -> Iterator[None]:
+    """Ctrl-C ends a session as its window's cross does, a second one at once.
+
+    Torn down in the middle of a frame, runtimes and drivers crash.
+    """
+    before = signal.getsignal(signal.SIGINT)
+
+    def ask(number, stack) -> None:
+        wearing.interrupted = True
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, ask)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if wearing.interrupted:
+        raise KeyboardInterrupt
 
 
 def describe(instance, session) -> dict:

@@ -75,6 +75,7 @@ class Wearing:
         self._seen_s: float | None = None  # when the frame before was to be seen
         self._drawing_ms = 0.0  # of the splats of both eyes, last
         self._stood = False  # whether the person has been put before the scene
+        self.interrupted = False  # by Ctrl-C: no frame is left half done
         self._leaving = False
 
     def loop(self, frames: int = 0) -> None:
@@ -82,14 +83,21 @@ class Wearing:
         for frame in self.session.frames(self._rest):
             self.frame(frame)
             done = 0 < frames <= self.session.pace.frames
-            if done or self.mirror.closing:
-                self.leave("frames" if done else "closed at the desk")
+            if done or self._ends:
+                self.leave("frames" if done else self._ends)
 
     def _rest(self) -> None:
         """While the headset lies on the table: the window can be closed all the same."""
         self.mirror.rest()
-        if self.mirror.closing:
-            self.leave("closed at the desk")
+        if self._ends:
+            self.leave(self._ends)
+
+    @property
+    def _ends(self) -> str:
+        """Why the person at the desk wants it to end; "" for not at all."""
+        if self.interrupted:
+            return "interrupted"
+        return "closed at the desk" if self.mirror.closing else ""
 
     def leave(self, why: str) -> None:
         """Asks the runtime for the end; a few frames later it comes."""

@@ -1,14 +1,16 @@
 """`launch.py vr` where there is no headset, wrong options, and what a scene is to be worn as."""
 
+import signal
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from app import headset
 from app.cli import main
-from app.headset import DEMO, NO_HEADSET, Options
+from app.headset import DEMO, NO_HEADSET, Options, interrupting
 from app.worn_scene import BACKGROUND, open_worn
 from vr.instance import Lost, NoHeadset
 
@@ -80,6 +82,25 @@ def test_wrong_options_are_one_sentence(capsys, wrong, sentence):
     assert main(["vr", *wrong]) == 2
     said = capsys.readouterr().err
     assert sentence in said and said.count("\n") == 1
+
+
+def test_ctrl_c_ends_the_session_first_and_only_then_the_program():
+    wearing, before = SimpleNamespace(interrupted=False), signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), interrupting(wearing):
+        signal.raise_signal(signal.SIGINT)
+        assert wearing.interrupted  # and the session goes on to its end
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_second_ctrl_c_ends_at_once_and_none_changes_nothing():
+    wearing, before = SimpleNamespace(interrupted=False), signal.getsignal(signal.SIGINT)
+    with interrupting(wearing):
+        pass
+    assert signal.getsignal(signal.SIGINT) is before
+    with pytest.raises(KeyboardInterrupt), interrupting(wearing):
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("the second one waits")
 
 
 def test_a_scene_file_is_a_world_with_a_floor():

@@ -152,10 +152,10 @@ def test_a_long_rest_is_no_long_step(wear):
     assert passed == [0.0, LONGEST_STEP_S]
 
 
-@pytest.mark.parametrize("why", ["frames", "closed at the desk"])
+@pytest.mark.parametrize("why", ["frames", "closed at the desk", "interrupted"])
 def test_the_end_is_asked_for_once_and_frames_go_on_until_it_comes(wear, why):
     wearing, played = wear([frame_at(i * PERIOD) for i in range(20)])
-    played.closing = why != "frames"
+    played.closing, wearing.interrupted = why == "closed at the desk", why == "interrupted"
     wearing.loop(3 if why == "frames" else 0)
     assert wearing.report.ended == why
     assert played.asked.count("submit") == (4 if why == "frames" else 2)  # one more comes
