@@ -4,7 +4,6 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 import glfw
-import numpy as np
 
 from app.arrange import steer
 from app.hands import is_painting
@@ -16,7 +15,7 @@ from scene.follow import put_back
 from scene.mouse_hand import MouseHand, moved, pose, pushed, ray, rolled, take, turned
 from scene.pose import View
 from scene.record import Record
-from scene.thing import Thing
+from scene.thing import middle_of
 from scene.world import World
 
 if TYPE_CHECKING:
@@ -46,14 +45,15 @@ def attach_touch(viewer: "Viewer") -> "Touch":
     hooks.marks.append(touch.marks.draw)
     hooks.opened.append(touch.forget)
     hooks.status.append(touch.status)
-    hooks.sections.append(
+    hooks.sections.insert(  # first: its buttons stay where they are, whatever is chosen
+        0,
         Section(
             "Touch",
             lambda ui_scale: draw_touch(touch, ui_scale),
             above=True,
             opens=touch.opens,
             shown=lambda: touch.world is not None,
-        )
+        ),
     )
     hooks.keys += KEYS
     return touch
@@ -256,10 +256,3 @@ class Touch:
                 after = event["to"] or f"x {event['x']:.2f}"
                 self.told.appendleft(f"{event['object']}: {event['on']} \u2192 {after}")
                 self.marks.labels.append(Label(event["object"], after))
-
-
-def middle_of(thing: Thing) -> np.ndarray:
-    """(3,) metres, world: of the box around what can be touched of it."""
-    corners = np.concatenate(thing.collider.hulls)
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]

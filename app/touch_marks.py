@@ -16,7 +16,7 @@ from scene.collider_edges import hull_edges, mesh_edges
 from scene.mouse_hand import pose
 from scene.pose import View
 from scene.scene_file import BACKGROUND
-from scene.thing import Thing
+from scene.thing import Thing, middle_of
 
 if TYPE_CHECKING:
     from app.touch import Touch
@@ -129,12 +129,18 @@ class Marks:
             self._label(label, view, size, ui_scale)
 
     def _grip(self, view: View, size: tuple, ui_scale: float) -> None:
-        """A disc where the hand is: the middle of what it holds, unless that is kept back."""
-        at = on_picture(view, pose(self._touch.hand, view, size).position, size)
-        if at is not None:
-            draw = imgui.get_background_draw_list()
-            draw.add_circle_filled(Vec(*at), 4 * ui_scale, theme.color(theme.ACCENT))
-            draw.add_circle(Vec(*at), 9 * ui_scale, theme.color(theme.ACCENT, 0.8), 0, ui_scale)
+        """A disc where the hand is, and a line to what it holds where that is kept back."""
+        touch = self._touch
+        at = on_picture(view, pose(touch.hand, view, size).position, size)
+        if at is None:
+            return
+        draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT, 0.8)
+        thing = touch.world.things.get(touch.held)
+        middle = on_picture(view, middle_of(thing), size) if thing else None
+        if middle is not None:
+            draw.add_line(Vec(*middle), Vec(*at), ink, 2 * ui_scale)
+        draw.add_circle_filled(Vec(*at), 4 * ui_scale, theme.color(theme.ACCENT))
+        draw.add_circle(Vec(*at), 9 * ui_scale, ink, 0, ui_scale)
 
     def _could_take(self, view: View, ui_scale: float) -> None:
         """A ring at the mouse where it would take something, with its name."""

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from runtime_models.model import BadFile, Model
 from scene.pose import Pose
 from scene.reactions import Machine, Standing, start
@@ -77,6 +79,13 @@ def drawn_thing(thing: Thing, part: float | None) -> Thing:
     if drawn.x == x and same_pose(drawn.world_from_object, pose):
         return thing
     return replace(thing, drawn=replace(drawn, world_from_object=pose, x=x))
+
+
+def middle_of(thing: Thing) -> np.ndarray:
+    """(3,) metres, world: of the box around what can be touched of it."""
+    corners = np.concatenate(thing.collider.hulls)
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]
 
 
 def same_pose(a: Pose, b: Pose) -> bool:
