@@ -1,7 +1,7 @@
 """A runtime for the tests of VR; those that need it skip, with the reason, where there is none."""
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -50,8 +50,8 @@ def start() -> Iterator[Callable[..., Program]]:
         yield run
 
 
-@pytest.fixture
-def person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+@contextmanager
+def dressed(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
     """Somebody before the three things on the table; at the end all must have been in order."""
     program = start(stand, "--quality", "best", **switched_on(stand.folder))
     with program.headset(stand.port) as remote:
@@ -62,3 +62,16 @@ def person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
             assert program.interrupt() == INTERRUPTED, program.told()[-800:]
     assert not complaints(stand.folder)
     assert "Traceback" not in program.told()
+
+
+@pytest.fixture
+def person(stand: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+    with dressed(stand, start) as made:
+        yield made
+
+
+@pytest.fixture
+def served_person(served: Stand, start: Callable[..., Program]) -> Iterator[Person]:
+    """The same, with a runtime that can be told things."""
+    with dressed(served, start) as made:
+        yield made

@@ -97,8 +97,15 @@ class Stand:
 
     def recentre(self) -> None:
         """What a long press of a headset's system button does."""
+        self._control("-c")
+
+    def switch_input(self) -> None:
+        """Takes hands and buttons away from the first program, or gives them back."""
+        self._control("-i", "1")
+
+    def _control(self, *arguments: str) -> None:
         subprocess.run(
-            [self.runtime.program("monado-ctl"), "-c"],
+            [self.runtime.program("monado-ctl"), *arguments],
             env=self.environment, check=True, capture_output=True, timeout=PATIENCE_S,
         )  # fmt: skip
 
