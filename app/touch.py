@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 HAND = "mouse"
 REMEMBERED = 6  # reactions that the panel lists
+WORDS = {"collision": "struck", "grab": "taken", "ray": "hit by a ray", "enter": "arrived"}
 KEYS = (
     ("T", "let things move, hold them still"),
     ("Shift+T", "one step of 1/90 s"),
@@ -254,5 +255,5 @@ class Touch:
         for record in records:
             for event in record.events:
                 after = event["to"] or f"x {event['x']:.2f}"
-                self.told.appendleft(f"{event['object']}: {event['on']} \u2192 {after}")
+                self.told.appendleft(f"{event['object']}: {WORDS[event['on']]}, now {after}")
                 self.marks.labels.append(Label(event["object"], after))

@@ -69,7 +69,7 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
     for side, word in zip((-1, 1), side_names(thing, axes), strict=True):
         size = imgui.calc_text_size(word)
         left = corner.x + inset / 2 if side < 0 else end.x - inset / 2 - size.x
-        draw.add_text(Vec(left, corner.y + inset / 2), theme.color(theme.MUTED), word)
+        draw.add_text(Vec(left, low - size.y - inset / 2), theme.color(theme.MUTED), word)
     knob = Vec(middle + balance * half, low - power * reach)
     draw.add_line(Vec(middle, low), knob, theme.color(theme.ACCENT, 0.5), 2 * ui_scale)
     draw.add_circle_filled(knob, 7 * ui_scale, theme.color(theme.ACCENT))

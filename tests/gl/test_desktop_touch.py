@@ -220,7 +220,7 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
         world.paused = False
     run_frames(viewer, 15)
     assert viewer.stage.scene.objects[0].x == 1.0
-    assert list(viewer.touch.told) == ["cube: ray \u2192 hot"]
+    assert list(viewer.touch.told) == ["cube: hit by a ray, now hot"]
     assert [label.text for label in viewer.touch.marks.labels] == ["hot"]
     run_frames(viewer, 20, seconds=0.1)
     assert not viewer.touch.marks.fading
