@@ -36,6 +36,7 @@ class Bodies:
         self._ground: tuple = ()  # floor and gravity of the world
         self._future: Future | None = None
         self._stale = True  # the world does not know of the last edits yet
+        self._given_up = False  # there can be no world: the scene is there to be seen and edited
         self._unwanted = threading.Event()  # ends the thread at its next word
         self._thread: threading.Thread | None = None
         self._told = ("", 0.0)  # what is being done for a collider, part done
@@ -81,10 +82,11 @@ class Bodies:
             self._catch_up(document)
         except BadFile as error:
             self.problem, self._stale = str(error), False
+            self._given_up = self.world is None
         return self.busy
 
     def _catch_up(self, document: Document) -> None:
-        if self.busy or not self._stale:
+        if self.busy or not self._stale or self._given_up:
             return
         file = document.file
         touched = [item for item in file.all_items if item.collider is not None]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import scene.collider_files
+import scene.physics
 from app.bodies import Bodies
 from app.document import Document, key_of
 from app.opened import Source
@@ -102,6 +103,21 @@ def test_where_nothing_can_be_touched_there_is_no_world(made):
     bodies, of = Bodies(), document(thing("a", collider=None))
     until_there(bodies, of)
     assert bodies.world is None and made == []
+
+
+def test_without_physics_a_scene_can_be_seen_and_edited(made, monkeypatch):
+    def absent(self, *_, **__):
+        raise BadFile("the physics needs rapier3d; pip install rapier3d.")
+
+    monkeypatch.setattr(scene.physics.Physics, "__init__", absent)
+    bodies, of = Bodies(), document(thing("a"))
+    until_there(bodies, of)
+    assert "rapier3d" in bodies.problem and bodies.world is None
+    bodies.problem = ""
+    of.history = of.history.take(edits.hide(of.file, "a"), "hide")
+    bodies.follow(of)  # is no refusal of the edit
+    until_there(bodies, of)
+    assert bodies.problem == "" and bodies.world is None
 
 
 def test_another_scene_ends_what_is_being_made(monkeypatch):
