@@ -10,8 +10,11 @@ import numpy as np
 
 
 def main(given: str, wanted: str) -> None:
-    import coacd
-
+    try:
+        import coacd
+    except ImportError as why:
+        sys.stderr.write(str(why))
+        sys.exit(ABSENT)
     coacd.set_log_level("off")
     with np.load(given) as file:
         mesh = coacd.Mesh(file["vertices"], file["faces"])
@@ -21,6 +24,7 @@ def main(given: str, wanted: str) -> None:
     np.savez(wanted, *[vertices for vertices, _ in pieces])
 
 
+ABSENT = 3  # the exit code where CoACD is not installed or does not load
 WHOLE = ("max_convex_hull", "max_ch_vertex", "mcts_iterations", "mcts_nodes", "resolution")
 
 if __name__ == "__main__":

@@ -13,14 +13,14 @@ import numpy as np
 from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model
 from scene.collider_cache import content_key, find_kept, keep
-from scene.collider_hulls import cut_into_hulls, hull_volume
+from scene.collider_hulls import cut_into_hulls, hull_volume, solid_hulls
 from scene.collider_points import fill_splats
 from scene.collider_wrap import volume, wrap
 from scene.read_mesh import read_mesh
 from scene.stitch_mesh import is_watertight
 from scene.triangle_mesh import TriangleMesh, sample_faces
 
-VERSION = 2  # of the rules that make colliders: another one makes all of them anew
+VERSION = 3  # of the rules that make colliders: another one makes all of them anew
 FACES, MOST_HULLS = 2500, 16
 LEAST_SIDE_M = 0.002  # of the box of what is too small or too flat to be wrapped
 THINNEST = 0.01  # of the longest side, of such a box
@@ -52,6 +52,7 @@ class Making:
     faces: int = FACES  # of the mesh, about
     most_hulls: int = MOST_HULLS
     beside: Path | None = None  # the scene's folder; None: only the user's cache folder
+    hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from a cache or written to one
     told: Told | None = None  # (what is being done, part done 0..1); may raise to end it
 
@@ -94,10 +95,13 @@ def collider_of_model(
 def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:
     """The collider of a mesh file (.glb, .gltf, .obj, .ply, .stl), metres.  Raises BadFile.
 
-    A closed mesh is only simplified, an open one is wrapped; convex parts stay as they are.
+    A closed mesh is only simplified, an open one is wrapped; convex parts stay as they are.  A
+    hollow one stays as it is.
     """
     making = making or Making()
     given = read_mesh(path)
+    if making.hollow:  # the physics takes any triangles that stay where they are
+        return Collider(around(given), given)
     return known_or_made(making, (given.vertices, given.faces), lambda: closed_mesh(given, making))
 
 
@@ -110,17 +114,24 @@ def known_or_made(
             f"a collider of {making.faces} faces and {making.most_hulls} hulls is asked for; at "
             "least 12 faces and 1 to 64 hulls are made."
         )
-    settings = f"{VERSION} {making.faces} {making.most_hulls}"
+    settings = f"{VERSION} {making.faces} {making.most_hulls} {making.hollow}"
     key = content_key(settings, *columns) if making.kept else ""
     made = find_kept(key, making.beside) if making.kept else None
     if made is None:
         mesh = make()
-        hulls, finished = cut_into_hulls(mesh, making.most_hulls, making.tell)
+        hulls, finished = around(mesh), True
+        if not making.hollow:
+            hulls, finished = cut_into_hulls(mesh, making.most_hulls, making.tell)
         made = hulls, mesh
         if making.kept and finished:  # what a slow machine gave up on is tried again
             keep(key, made, making.beside)
     making.tell("making a collider", 1.0)
     return Collider(*made)
+
+
+def around(mesh: TriangleMesh) -> tuple[np.ndarray, ...]:
+    """One hull of all of it: of what is touched as a mesh and never cut into pieces."""
+    return solid_hulls([mesh.vertices], mesh, 1)
 
 
 def mesh_of_splats(
@@ -140,7 +151,8 @@ def mesh_of_splats(
         )
     if filling.splats < FEWEST_SPLATS or not filling.cell_m > 0:
         return box_around(filling.points)
-    return usable(wrap(filling.points, filling.cell_m, making.faces, making.tell), filling.points)
+    skin = wrap(filling.points, filling.cell_m, making.faces, making.tell, making.hollow)
+    return usable(skin, filling.points)
 
 
 def closed_mesh(given: TriangleMesh, making: Making) -> TriangleMesh:

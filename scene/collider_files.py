@@ -1,10 +1,13 @@
 """The colliders that a scene file asks for: from mesh files or from the splats."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from runtime_models.model import BadFile, Model
 from scene.collider import Collider, Making, Told, collider_of_mesh, collider_of_model
-from scene.scene_file import HULLS, SceneFile, SceneItem
+from scene.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
+
+BACKGROUND_FACES = 10_000  # it stays where it is: the physics looks only at those near a body
 
 
 def colliders_of(
@@ -17,7 +20,8 @@ def colliders_of(
     making, made, out = Making(beside=file.folder, told=told), {}, {}
     for item in file.all_items:
         if item.collider is not None:
-            key = (item.collider, id(models[item.name]), item.x if item.collider == HULLS else 0)
+            x = item.x if item.collider == HULLS else 0
+            key = (item.collider, id(models[item.name]), x, item.name == BACKGROUND)
             if key not in made:
                 made[key] = one_collider(file, item, models[item.name], making)
             out[item.name] = made[key]
@@ -25,6 +29,9 @@ def colliders_of(
 
 
 def one_collider(file: SceneFile, item: SceneItem, model: Model, making: Making) -> Collider:
+    """The object's collider; the background's is a mesh of more faces that leaves rooms open."""
+    if item.name == BACKGROUND:
+        making = replace(making, hollow=True, faces=BACKGROUND_FACES)
     try:
         if item.collider == HULLS:
             return collider_of_model(model, item.x, making)

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.model import BadFile
+from scene.coacd_run import ABSENT
 from scene.triangle_mesh import TriangleMesh, sample_faces, separate
 
 MOST_VERTICES = 64  # of a hull; at 32 a torus loses a tenth of its volume
@@ -124,7 +126,10 @@ def hull_volume(points: np.ndarray) -> float:
 
 
 def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list[np.ndarray]:
-    """The vertices of CoACD's pieces; none where it fails or takes longer."""
+    """The vertices of CoACD's pieces; none where it fails or takes longer.
+
+    Raises BadFile where it is not installed.
+    """
     with tempfile.TemporaryDirectory(prefix="shapeshift") as folder:
         given, wanted = Path(folder, "mesh.npz"), Path(folder, "hulls.npz")
         centre = mesh.vertices.mean(0, dtype=np.float64)
@@ -136,8 +141,9 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         script = str(Path(__file__).with_name("coacd_run.py"))
         # -P: this folder's modules are not to stand in for those of packages.
         command = [sys.executable, "-P", script, str(given), str(wanted)]
-        quiet = subprocess.DEVNULL
-        child = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+        quiet, said = subprocess.DEVNULL, Path(folder, "said")
+        with said.open("wb") as errors:
+            child = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=errors)
         try:
             begun = time.monotonic()
             while child.poll() is None and time.monotonic() - begun < limit_s:
@@ -147,7 +153,14 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         finally:  # also when told() or Ctrl-C ends the wait
             child.kill()
             child.wait()
+        if child.returncode == ABSENT:
+            why = said.read_text(errors="replace")
+            raise BadFile(
+                f"its collider cannot be cut into convex pieces: the package coacd does not load "
+                f"({why}); install it with: python -m pip install -r requirements.txt."
+            )
         if child.returncode != 0 or not wanted.is_file():
+            told("CoACD found no pieces: each separate part becomes one", 1.0)
             return []
         with np.load(wanted) as file:
             return [file[name] * size + centre for name in file.files]

@@ -51,7 +51,7 @@ def fill_splats(
     if not len(rows):
         return NOTHING
     reach = np.ptp(means[rows], axis=0) + 2 * np.median(scales[rows].max(1))
-    cell_m = max(reach.max() / CELLS, min(SPACING * spacing, reach.max() / COARSEST))
+    cell_m = float(max(reach.max() / CELLS, min(SPACING * spacing, reach.max() / COARSEST)))
     if not cell_m > 0:
         return Filling(means[rows].astype(np.float64), 0.0, len(rows))
     axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]
@@ -114,7 +114,7 @@ def scatter(
     means: np.ndarray, axes: np.ndarray, scales: np.ndarray, cell_m: float
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each class of sizes: splats (n,), and their points (n, k, 3), at most a cell apart."""
-    order = np.sort(scales, axis=1)
+    order = np.sort(scales.astype(np.float64), axis=1)
     wanted = 4 * np.pi * order[:, 2] * order[:, 1] / cell_m**2 + order[:, 2] * 4 / cell_m
     kind = np.searchsorted(CLASSES[:-1], wanted)
     found = []

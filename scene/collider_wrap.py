@@ -21,7 +21,8 @@ ROOM = WIDE_GAP + 3  # empty cells around everything
 OFFSET = 0.9  # cells that the surface runs outside of the points before it is moved back
 FAR = 4.0  # cells; no distance beyond is needed, and to look for them takes minutes
 LEAST_HALF = 0.35  # cells that half of a thin part keeps
-LEAST_PART = 0.03  # of the cells of the largest piece; a smaller piece is a floater
+LEAST_PART = 0.01  # of the cells of the largest piece; a smaller piece is a floater
+LEAST_ROOM = 4000  # cells of a room inside of a hollow thing; what is smaller is filled
 LEAKS = 2.0  # times the solid cells that closing more must give for the skin to have leaked
 MOST_POINTS = 400_000  # that distances are measured to
 MOST_OVER = 1.1  # times the faces wanted that a simplified mesh may have
@@ -31,13 +32,18 @@ SLOW = (3, 5, 7)  # how slowly edges merge; the package's own 7 harms thin parts
 Told = Callable[[str, float], None]
 
 
-def wrap(points: np.ndarray, cell_m: float, faces: int, told: Told) -> TriangleMesh:
-    """A watertight mesh of about `faces` faces around points (M, 3) metres, M > 0."""
+def wrap(
+    points: np.ndarray, cell_m: float, faces: int, told: Told, hollow: bool = False
+) -> TriangleMesh:
+    """A watertight mesh of about `faces` faces around points (M, 3) metres, M > 0.
+
+    hollow: what they enclose stays free, as the inside of a room; else it is solid.
+    """
     told("wrapping the splats", 0.2)
     low = points.min(0) - (ROOM + 0.5) * cell_m
-    solid, points = fill(points, low, cell_m)
+    solid, points = fill(points, low, cell_m, hollow)
     told("wrapping the splats", 0.4)
-    field = distance_field(solid, points, low, cell_m)
+    field = distance_field(solid, points, low, cell_m, hollow)
     told("wrapping the splats", 0.6)
     skin = find_surface(field)
     vertices = (skin.vertices + np.float32(0.5)) * np.float32(cell_m)  # from low: short numbers
@@ -47,7 +53,9 @@ def wrap(points: np.ndarray, cell_m: float, faces: int, told: Told) -> TriangleM
     return TriangleMesh((tight.vertices + low).astype(np.float32), tight.faces)
 
 
-def fill(points: np.ndarray, low: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
+def fill(
+    points: np.ndarray, low: np.ndarray, cell_m: float, hollow: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Solid cells (X, Y, Z) bool without floaters, and the points that lie in them."""
     from scipy import ndimage
 
@@ -55,16 +63,27 @@ def fill(points: np.ndarray, low: np.ndarray, cell_m: float) -> tuple[np.ndarray
     taken = np.zeros(cells.max(0) + ROOM + 2, bool)
     taken[tuple(cells.T)] = True
     away = ndimage.distance_transform_edt(~taken)
-    solid = enclosed(away, GAP)
-    for more in (enclosed(away, WIDE_GAP), under_a_roof(away, WIDE_GAP)):
-        if more.sum() > (1 + LEAKS) * solid.sum():
-            solid |= more
+    solid = ndimage.distance_transform_edt(away <= GAP) > GAP if hollow else all_solid(away)
     pieces, count = ndimage.label(solid, np.ones((3, 3, 3)))
     sizes = np.bincount(pieces.reshape(-1), minlength=count + 1)
     sizes[0] = 0
     kept = sizes >= LEAST_PART * sizes.max()
     solid = kept[pieces]
     return solid, points[solid[tuple(cells.T)]]
+
+
+def all_solid(away: np.ndarray) -> np.ndarray:
+    """Cells that count as solid, of a thing that is solid throughout; of a leaking skin, too.
+
+    away: cells from each to the nearest taken one.
+    """
+    solid = enclosed(away, GAP)
+    roofed = under_a_roof(away, WIDE_GAP)
+    for more in (enclosed(away, WIDE_GAP), roofed):
+        if more.sum() > (1 + LEAKS) * solid.sum():
+            solid |= more
+    # Caves that open downward, without the fillets that a wide closing leaves in corners.
+    return solid | (roofed & walled(solid))
 
 
 def enclosed(away: np.ndarray, gap: float) -> np.ndarray:
@@ -87,16 +106,21 @@ def under_a_roof(away: np.ndarray, gap: float) -> np.ndarray:
     from scipy import ndimage
 
     walls = away <= gap
-    shut = np.ones_like(walls)
+    return ndimage.distance_transform_edt(walls | walled(walls)) > gap
+
+
+def walled(solid: np.ndarray) -> np.ndarray:
+    """Cells with a solid one somewhere above (+Y) and to all four sides."""
+    shut = np.ones_like(solid)
     for axis, way in ((1, -1), (0, 1), (0, -1), (2, 1), (2, -1)):
-        turned = np.flip(walls, axis) if way < 0 else walls
+        turned = np.flip(solid, axis) if way < 0 else solid
         seen = np.logical_or.accumulate(turned, axis)
         shut &= np.flip(seen, axis) if way < 0 else seen
-    return ndimage.distance_transform_edt(walls | shut) > gap
+    return shut
 
 
 def distance_field(
-    solid: np.ndarray, points: np.ndarray, low: np.ndarray, cell_m: float
+    solid: np.ndarray, points: np.ndarray, low: np.ndarray, cell_m: float, hollow: bool = False
 ) -> np.ndarray:
     """(X, Y, Z) float32 cells to the surface OFFSET outside of points and solid, below 0 inside."""
     from scipy import ndimage
@@ -104,21 +128,31 @@ def distance_field(
 
     taken = np.zeros_like(solid)
     taken[tuple(((points - low) / cell_m).astype(np.int32).T)] = True
-    hollow = solid & (ndimage.distance_transform_edt(~taken) > 1.8)  # no point beside it
+    bare = solid & (ndimage.distance_transform_edt(~taken) > 1.8)  # no point beside it
     out = np.minimum(ndimage.distance_transform_edt(~solid), FAR).astype(np.float32)
     near = (out < 3) & (~solid | (ndimage.distance_transform_edt(solid) < 3))
     where = np.argwhere(near)
     tree = cKDTree(thin((points - low) / cell_m))
     away = tree.query(where + 0.5, distance_upper_bound=FAR)[0].astype(np.float32)
     away = np.minimum(away, FAR)  # Inf where no point is so near
-    if hollow.any():
-        to_hollow = ndimage.distance_transform_edt(~hollow)[near]
-        away = np.minimum(away, to_hollow)
+    if bare.any():
+        away = np.minimum(away, ndimage.distance_transform_edt(~bare)[near])
     field = np.where(solid, np.float32(-OFFSET), out)
     field[near] = np.where(solid[near], np.minimum(away - OFFSET, -0.1), away - OFFSET)
     field[field == 0] = 1e-6
-    free, _ = ndimage.label(field > 0)
-    field[(field > 0) & (free != free[0, 0, 0])] = -0.1  # channels that the offset has closed
+    return without_channels(field, hollow)
+
+
+def without_channels(field: np.ndarray, hollow: bool) -> np.ndarray:
+    """The field with what is free but shut in made solid; rooms of what is hollow stay."""
+    from scipy import ndimage
+
+    free, count = ndimage.label(field > 0)
+    kept = np.zeros(count + 1, bool)
+    if hollow:
+        kept = np.bincount(free.ravel(), minlength=count + 1) >= LEAST_ROOM
+    kept[free[0, 0, 0]] = True
+    field[(field > 0) & ~kept[free]] = -0.1  # channels that the offset has closed
     return field
 
 
@@ -152,7 +186,7 @@ def simplify(mesh: TriangleMesh, faces: int) -> TriangleMesh:
 def without_crumbs(mesh: TriangleMesh) -> TriangleMesh:
     """The mesh without closed parts of next to no volume, which merging edges leaves behind."""
     parts = separate(mesh)
-    sizes = [volume(part.vertices, part.faces) for part in parts]
+    sizes = [abs(volume(part.vertices, part.faces)) for part in parts]  # a room's is below 0
     kept = [p for p, size in zip(parts, sizes, strict=True) if size > CRUMB * max(sizes)]
     return join_meshes(kept) if 0 < len(kept) < len(parts) else mesh
 

@@ -22,7 +22,7 @@ from scene.grab import (
     take_hold,
     throw,
 )
-from scene.physics_rules import MOST_SPEED, more_substeps, new_world, stopped_bodies
+from scene.physics_rules import MOST_SPEED, engine, more_substeps, new_world, stopped_bodies
 from scene.physics_shapes import (
     LEAST_EXTENT,
     MOST_FRICTION,
@@ -47,7 +47,7 @@ class Physics:
     """A world of static things and bodies, stepped by 1 / hz seconds.
 
     Bad input is refused with a ValueError before it reaches the engine.  What was changed on the
-    way in (a mass out of range) is told in `findings`.
+    way in (a mass out of range) is told in `findings`.  Raises BadFile where there is no engine.
     """
 
     def __init__(
@@ -57,8 +57,7 @@ class Physics:
         hz: float = 90,
         substeps: int = 4,
     ) -> None:
-        from rapier3d import ChannelEventCollector
-
+        rapier = engine()
         gravity = checked_number(gravity_m_s2, "the gravity in m/s2", -100, 100)
         self.hz = checked_number(hz, "the steps a second", 10, 1000)
         self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
@@ -70,7 +69,7 @@ class Physics:
         self._holds: dict[int, Hold] = {}
         self._next_id, self._next_grab = FLOOR + 1, 1
         self._world = new_world(gravity)
-        self._events = ChannelEventCollector()
+        self._events = rapier.ChannelEventCollector()
         self._attach()
         if floor_y is not None:
             self._add_floor(float(checked_point((0, floor_y, 0), "the floor")[1]))

@@ -1,6 +1,8 @@
 """The engine's settings, found by sweeps over the figures of tests/test_physics_figures.py."""
 
-from runtime_models.model import Finding
+from types import ModuleType
+
+from runtime_models.model import BadFile, Finding
 
 MOST_SPEED = 40.0  # m/s: whatever is faster is slowed to it
 LENGTH_UNIT = 0.1  # metres: what things to be held measure; scales the engine's tolerances
@@ -10,6 +12,18 @@ CONTACT, STATIC_CONTACT = (240.0, 10.0), (480.0, 10.0)
 PREDICTION = 0.02  # metres: contacts are foreseen this far; with 2 mm, 12 mm go in at 5 m/s
 # m/s: above, a step has twice and four times its substeps, so that nothing passes a thin plate.
 BRISK, FAST = 7.0, 14.0
+
+
+def engine() -> ModuleType:
+    """The engine, or one sentence (BadFile) where it is not installed or does not load."""
+    try:
+        import rapier3d
+    except ImportError as why:
+        raise BadFile(
+            f"nothing can move or be touched: the package rapier3d does not load ({why}); install "
+            "it with: python -m pip install -r requirements.txt."
+        ) from why
+    return rapier3d
 
 
 def new_world(gravity_m_s2: float) -> object:
