@@ -150,7 +150,8 @@ class Marks:
             return
         draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT, 0.8)
         draw.add_circle(Vec(*cursor), 9 * ui_scale, ink, 0, 1.5 * ui_scale)
-        draw_word(name, Vec(cursor[0] + 16 * ui_scale, cursor[1]), 0.8, ui_scale)
+        if self._touch.viewer.overlay:
+            draw_word(name, Vec(cursor[0] + 16 * ui_scale, cursor[1]), 0.8, ui_scale)
 
     def _circle(self, view: View, size, point, radius: float, ink: int, ui_scale: float) -> None:
         at = on_picture(view, point, size)
