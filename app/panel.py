@@ -152,7 +152,8 @@ def draw_problem(stage: Stage, ui_scale: float) -> None:
     """The message box of a file that could not be opened; the scene stays as it was."""
     if not stage.problem:
         return
-    if not imgui.is_popup_open("A problem"):
+    fresh = not imgui.is_popup_open("A problem")  # the key that led to it is not for it
+    if fresh:
         imgui.open_popup("A problem")
     screen = imgui.get_io().display_size
     imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
@@ -164,11 +165,8 @@ def draw_problem(stage: Stage, ui_scale: float) -> None:
         imgui.pop_text_wrap_pos()
         imgui.dummy(Vec(0, 4 * ui_scale))
         closed = imgui.button("OK", Vec(90 * ui_scale, 0))
-        if (
-            closed
-            or imgui.is_key_pressed(imgui.Key.enter)
-            or imgui.is_key_pressed(imgui.Key.escape)
-        ):
+        keys = (imgui.Key.enter, imgui.Key.escape)
+        if closed or (not fresh and any(imgui.is_key_pressed(key, False) for key in keys)):
             stage.problem = ""
             imgui.close_current_popup()
         imgui.end_popup()

@@ -179,7 +179,7 @@ def answer_row(words: tuple[str, ...], ui_scale: float) -> str:
             imgui.same_line()
         if imgui.button(word, Vec(110 * ui_scale, 0)):
             clicked = word
-    return words[-1] if imgui.is_key_pressed(imgui.Key.escape) else clicked
+    return words[-1] if imgui.is_key_pressed(imgui.Key.escape, False) else clicked
 
 
 def unsaved(stage: "Stage") -> bool:

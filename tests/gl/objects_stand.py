@@ -22,7 +22,7 @@ NAMES = ["background", "cube", "ball", "ring", "plate"]
 
 
 @pytest.fixture(scope="module")
-def found() -> Found:
+def touch_found() -> Found:
     return read_files([TOUCH], None, CameraReading(), lambda *_: None)
 
 
@@ -43,14 +43,15 @@ def viewer_of(window, found: Found, folder: Path) -> Viewer:
 
 
 @pytest.fixture
-def viewer(window, found, tmp_path):
-    viewer = viewer_of(window, found, tmp_path)
+def touch_viewer(window, touch_found, tmp_path):
+    """The touch scene, its world there, things holding still."""
+    viewer = viewer_of(window, touch_found, tmp_path)
     yield viewer
     release(viewer)
 
 
 @pytest.fixture
-def plain(window, tmp_path):
+def splats_viewer(window, tmp_path):
     """A file of splats that was opened without a scene file."""
     b = ball(50)
     path = tmp_path / "models" / "ball.ply"

@@ -31,7 +31,17 @@ from runtime_models.write_ply import write_ply
 from scene import edits
 from scene.pose import Pose
 
-pytest_plugins = ["desktop_fixtures", "objects_stand"]  # fixtures: window, viewer, plain
+pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window; touch_viewer, splats_viewer
+
+
+@pytest.fixture
+def viewer(touch_viewer):
+    return touch_viewer
+
+
+@pytest.fixture
+def plain(splats_viewer):
+    return splats_viewer
 
 
 def test_a_scene_file_is_open_with_its_world(viewer):

@@ -6,7 +6,7 @@ import glfw
 import numpy as np
 import pytest
 from desktop_stand import ball, run_frames, until_opened
-from objects_stand import CTRL, NAMES, TOUCH, key, names
+from objects_stand import CTRL, NAMES, SHIFT, TOUCH, key, names
 
 from app.arrange import steer
 from app.opened import read_files
@@ -14,7 +14,17 @@ from scene import edits
 from scene.camera_list import CameraReading
 from scene.read_scene_file import read_scene_file
 
-pytest_plugins = ["desktop_fixtures", "objects_stand"]  # fixtures: window, viewer, plain
+pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window; touch_viewer, splats_viewer
+
+
+@pytest.fixture
+def viewer(touch_viewer):
+    return touch_viewer
+
+
+@pytest.fixture
+def plain(splats_viewer):
+    return splats_viewer
 
 
 def test_ctrl_s_does_not_move_the_camera_and_asks_nothing_for_an_opened_file(viewer, tmp_path):
@@ -58,6 +68,25 @@ def test_a_folder_that_cannot_be_written_is_a_sentence(viewer, tmp_path):
     (tmp_path / "file").write_text("")
     assert not viewer.objects.saving.named(str(tmp_path / "file" / "x"))
     assert "cannot be saved" in viewer.stage.problem and "\n" not in viewer.stage.problem
+
+
+def test_a_name_is_typed_and_what_goes_wrong_is_said_until_it_is_read(viewer, tmp_path):
+    (tmp_path / "file").write_text("")
+    for name, right in (("file/x", False), ("mine", True)):
+        key(viewer, glfw.KEY_S, CTRL | SHIFT)
+        run_frames(viewer, 3)
+        for letter in str(tmp_path / name):  # over what stands there, all of it
+            viewer.window._on_char(None, ord(letter))
+        run_frames(viewer, 3)
+        key(viewer, glfw.KEY_ENTER)
+        run_frames(viewer, 3)
+        assert (tmp_path / "mine.scene.json").is_file() == right
+        assert ("cannot be saved" in viewer.stage.problem) != right
+        key(viewer, glfw.KEY_ENTER)  # it is read
+        key(viewer, glfw.KEY_ESCAPE)
+        run_frames(viewer, 3)
+        assert viewer.stage.problem == "" and not viewer.objects.saving.asking
+    assert viewer.stage.document.path == tmp_path / "mine.scene.json"
 
 
 def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):

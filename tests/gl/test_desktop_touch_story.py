@@ -11,7 +11,12 @@ from objects_stand import SHIFT, button, key, mouse, place_of, thing
 
 absent = [name for name in ("rapier3d", "coacd") if find_spec(name) is None]
 pytestmark = pytest.mark.skipif(bool(absent), reason=f"not installed: {', '.join(absent)}")
-pytest_plugins = ["desktop_fixtures", "objects_stand"]  # display, window; found, viewer
+pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window; touch_viewer, splats_viewer
+
+
+@pytest.fixture
+def viewer(touch_viewer):
+    return touch_viewer
 
 
 def place(viewer, name: str) -> np.ndarray:
