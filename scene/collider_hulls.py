@@ -143,7 +143,8 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         command = [sys.executable, "-P", script, str(given), str(wanted)]
         quiet, said = subprocess.DEVNULL, Path(folder, "said")
         with said.open("wb") as errors:
-            child = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=errors)
+            pipe = subprocess.PIPE
+            child = subprocess.Popen(command, stdin=pipe, stdout=quiet, stderr=errors)
         try:
             begun = time.monotonic()
             while child.poll() is None and time.monotonic() - begun < limit_s:
@@ -153,6 +154,7 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         finally:  # also when told() or Ctrl-C ends the wait
             child.kill()
             child.wait()
+            child.stdin.close()
         if child.returncode == ABSENT:
             why = said.read_text(errors="replace")
             raise BadFile(

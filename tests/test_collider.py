@@ -1,7 +1,11 @@
 """Colliders of known shapes made of splats: near, closed, few hulls; and of hardly anything."""
 
+import subprocess
+import sys
 import time
 from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +27,7 @@ from scene.collider import (
     hulls_volume,
     mass_properties,
 )
-from scene.collider_hulls import MOST_VERTICES, cut_into_hulls
+from scene.collider_hulls import MOST_VERTICES, SEARCH, cut_into_hulls
 from scene.triangle_mesh import TriangleMesh
 
 FRESH = Making(kept=False)
@@ -187,6 +191,24 @@ def test_told_ends_it_and_leaves_no_process():
     assert time.monotonic() - begun < 20
     assert all(0 <= part <= 1 for _, part in heard)
     assert {what for what, _ in heard} >= {"wrapping the splats", "cutting it into convex pieces"}
+
+
+def test_the_cutting_ends_with_the_program_that_asked_for_it(tmp_path):
+    if find_spec("coacd") is None:
+        pytest.skip("coacd is not installed")
+    torus = shapes()["torus"]
+    np.savez(
+        tmp_path / "mesh.npz", vertices=torus.vertices, faces=torus.faces, **SEARCH,
+        threshold=0.01, max_convex_hull=64, max_ch_vertex=64,
+    )  # fmt: skip
+    script = Path(collider.__file__).with_name("coacd_run.py")
+    command = [sys.executable, "-P", str(script), str(tmp_path / "mesh.npz"), str(tmp_path / "out")]
+    child = subprocess.Popen(command, stdin=subprocess.PIPE)
+    time.sleep(1.5)
+    assert child.poll() is None
+    child.stdin.close()  # as the system does for a program that is killed
+    assert child.wait(10) == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_out_of_time_each_part_is_one_hull():
