@@ -13,7 +13,7 @@ from app.document import Document, ModelKey, key_of
 from app.opened import Told
 from app.opening import sentence
 from runtime_models.model import BadFile, Model
-from scene.scene_file import HULLS, SceneFile, SceneItem
+from scene.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
 
 if TYPE_CHECKING:
     from app.viewer import Viewer
@@ -156,8 +156,9 @@ class Unwanted(Exception):
 MISSING = object()
 
 
-def made_of(item: SceneItem) -> tuple[str | None, ModelKey]:
-    return item.collider, key_of(item)
+def made_of(item: SceneItem) -> tuple[str | None, ModelKey, bool]:
+    """What an object's collider depends on; a background's is open inside, a room."""
+    return item.collider, key_of(item), item.name == BACKGROUND
 
 
 def making_of(item: SceneItem) -> tuple:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,15 @@ def test_one_collider_serves_all_that_are_alike(made):
     things = bodies.world.things
     assert list(things) == ["a", "b", "c", "d"] and bodies.world.paused
     assert [things[name].body is not None for name in things] == [True, True, True, False]
+
+
+def test_a_background_s_is_another_than_an_object_s(made):
+    bodies, of = Bodies(), document(thing("a"))
+    background = thing("background", collider=HULLS)
+    file = replace(of.file, background=replace(background, static=True))
+    of.history = History.of(file)
+    until_there(bodies, of)
+    assert made == [("background", 0.0), ("a", 0.0)]
 
 
 def test_a_slider_does_not_make_it_anew(made):

@@ -34,7 +34,7 @@ def viewer_of(window, found: Found, folder: Path) -> Viewer:
     viewer.files.read = lambda path, told: ball()
     viewer.set_title()
     run_frames(viewer, 4)
-    end = time.monotonic() + 30
+    end = time.monotonic() + 120  # a cold cache of colliders
     while viewer.stage.bodies.busy and time.monotonic() < end:
         run_frames(viewer, 1)
         time.sleep(0.005)
