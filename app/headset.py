@@ -153,6 +153,8 @@ def interrupting(wearing) -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
     signal.signal(signal.SIGINT, ask)
+    if sys.platform != "win32":
+        signal.siginterrupt(signal.SIGINT, False)  # runtimes with a service do not call again
     try:
         yield
     finally:
