@@ -20,7 +20,7 @@ from scene.read_mesh import read_mesh
 from scene.stitch_mesh import is_watertight
 from scene.triangle_mesh import TriangleMesh, sample_faces
 
-VERSION = 3  # of the rules that make colliders: another one makes all of them anew
+VERSION = 4  # of the rules that make colliders: another one makes all of them anew
 FACES, MOST_HULLS = 2500, 16
 LEAST_SIDE_M = 0.002  # of the box of what is too small or too flat to be wrapped
 THINNEST = 0.01  # of the longest side, of such a box

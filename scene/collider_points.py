@@ -18,6 +18,7 @@ BESIDE = 2.5  # times its own size: with neighbours so near it is none
 SPACING = 1.3  # cells are no smaller than this times the distance between splats
 COARSEST = 24  # cells along the longest side, however few splats there are
 MOST_LOOKED_AT = 300_000  # splats for distances
+NEEDLE = 4.0  # cells from its centre that a splat reaches where it is alone
 CLASSES = (1, 12, 48, 192, 768)  # points a splat gets, by its size in cells
 
 
@@ -55,8 +56,10 @@ def fill_splats(
     if not cell_m > 0:
         return Filling(means[rows].astype(np.float64), 0.0, len(rows))
     axes = rotation_matrices(normalize(wxyz[rows].astype(np.float64))) * scales[rows, None, :]
-    points = scatter(means[rows].astype(np.float64), axes, scales[rows], cell_m)
-    return Filling(keep_dense(points, opacity[rows], solid, cell_m), cell_m, len(rows))
+    centres = means[rows].astype(np.float64)
+    points = scatter(centres, axes, scales[rows], cell_m)
+    dense = keep_dense(points, opacity[rows], solid, centres, cell_m)
+    return Filling(dense, cell_m, len(rows))
 
 
 def solid_or_all(opacity: np.ndarray) -> np.ndarray:
@@ -137,10 +140,12 @@ def keep_dense(
     points: list[tuple[np.ndarray, np.ndarray]],
     opacity: np.ndarray,
     solid: np.ndarray,
+    means: np.ndarray,
     cell_m: float,
 ) -> np.ndarray:
     """(M, 3) the points of solid splats, and of faint ones in cells where they add up."""
     found = [at[solid[rows]].reshape(-1, 3) for rows, at in points]
+    of = [np.repeat(rows[solid[rows]], at.shape[1]) for rows, at in points]
     faint = [(rows[~solid[rows]], at[~solid[rows]]) for rows, at in points]
     splat = np.concatenate([np.repeat(rows, at.shape[1]) for rows, at in faint])
     if len(splat):
@@ -152,5 +157,29 @@ def keep_dense(
         once = np.unique(cell * (len(opacity) + 1) + splat)  # a splat counts once in a cell
         stopped = -np.log1p(-np.clip(opacity[once % (len(opacity) + 1)], 0, 0.99))
         total = np.bincount(once // (len(opacity) + 1), stopped, cell.max() + 1)
-        found.append(places[total[cell] >= -np.log1p(-OPAQUE)])
-    return np.concatenate(found)
+        enough = total[cell] >= -np.log1p(-OPAQUE)
+        found.append(places[enough])
+        of.append(splat[enough])
+    return without_needles(np.concatenate(found), np.concatenate(of), means, cell_m)
+
+
+def without_needles(
+    points: np.ndarray, splat: np.ndarray, means: np.ndarray, cell_m: float
+) -> np.ndarray:
+    """(m, 3) the points without ends of long splats that stand out where no other splat is.
+
+    points (M, 3), the splat (M,) of each, means (N, 3) of splats: metres.
+    """
+    from scipy import ndimage
+
+    if not len(points):
+        return points
+    cells = ((points - points.min(0)) / cell_m).astype(np.int64)
+    shape = cells.max(0) + 1
+    cell = np.ravel_multi_index(cells.T, shape)
+    lowest, highest = np.full(shape, len(means), np.int32), np.full(shape, -1, np.int32)
+    np.minimum.at(lowest.reshape(-1), cell, splat)
+    np.maximum.at(highest.reshape(-1), cell, splat)
+    alone = ndimage.minimum_filter(lowest, 3) == ndimage.maximum_filter(highest, 3)
+    far = np.linalg.norm(points - means[splat], axis=1) > NEEDLE * cell_m
+    return points[~(far & alone.reshape(-1)[cell])]

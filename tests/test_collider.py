@@ -26,6 +26,7 @@ from scene.collider import (
     collider_of_splats,
     hulls_volume,
     mass_properties,
+    mesh_of_splats,
 )
 from scene.collider_hulls import MOST_VERTICES, SEARCH, cut_into_hulls
 from scene.triangle_mesh import TriangleMesh
@@ -131,6 +132,20 @@ def test_far_floaters_haze_and_damage_change_little():
     made = collider_of_splats(*both, FRESH)
     assert solid(made).volume == pytest.approx(shape.volume, rel=0.03)
     assert np.ptp(made.mesh.vertices, axis=0).max() < 0.21
+
+
+def test_long_splats_that_stand_out_alone_leave_no_spikes():
+    """Captures have them below, where nothing was seen; a thing would stand on them."""
+    cloud = splatted(shapes()["sphere"])
+    needles = Cloud(
+        np.float32([[0, -0.1, 0], [0.07, -0.07, 0], [0, 0, 0.1]]),
+        np.tile(np.float32([0.002, 0.06, 0.002]), (3, 1)),
+        np.float32([[1, 0, 0, 0], [0.924, 0, 0, 0.383], [0.707, 0.707, 0, 0]]),
+        np.full(3, 0.9, np.float32),
+    )
+    both = [np.concatenate(pair) for pair in zip(cloud.columns, needles.columns, strict=True)]
+    mesh = mesh_of_splats(*both, FRESH)
+    assert np.linalg.norm(mesh.vertices, axis=1).max() < 0.115  # not 0.16
 
 
 def test_faint_splats_count_where_they_add_up():
