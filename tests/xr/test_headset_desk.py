@@ -1,4 +1,4 @@
-"""The desktop beside a headset: a window mirrors the left eye, and takes over where it is lost."""
+"""The desktop beside a headset: its viewer takes over where the runtime is lost or absent."""
 
 import os
 import shutil
@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image, ImageGrab
+from PIL import ImageGrab
 from xr_stand import PATIENCE_S, Program
 
 HELD_S = 3.0  # a viewer that lives so long has opened
-MIRROR = (960, 720)  # the window's size: an eye of 320 x 240 fills it
 
 
 @pytest.fixture
@@ -39,12 +38,6 @@ def screen(display: str) -> np.ndarray:
     return np.asarray(ImageGrab.grab(xdisplay=display).convert("RGB")) / 255
 
 
-def window_of(picture: np.ndarray) -> np.ndarray:
-    """What differs from the empty screen, which is black."""
-    rows, columns = (np.flatnonzero(picture.max(axis=2).max(axis=1 - axis)) for axis in (0, 1))
-    return picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-
-
 def opens_a_window_instead(program: Program, display: str) -> None:
     """Said in two lines, and done: it lives on and draws."""
     until = time.monotonic() + PATIENCE_S
@@ -61,23 +54,6 @@ def opens_a_window_instead(program: Program, display: str) -> None:
     time.sleep(HELD_S)
     assert program.process.poll() is None, program.told()[-800:]
     assert "Traceback" not in program.told()
-
-
-@pytest.mark.slow
-def test_the_window_mirrors_the_left_eye(stand, start, display, tmp_path):
-    pictures = tmp_path / "pictures"
-    program = start(
-        stand, "--quality", "best", "--pictures", str(pictures), "--every", "10", DISPLAY=display
-    )
-    with program.headset(stand.port) as remote:
-        remote.send()
-        program.until(lambda line: line["focused"], "focused")
-        line = program.until(lambda line: line["frame"] >= 41, "all at rest")
-        shown = window_of(screen(display))
-    eye = Image.open(pictures / f"left-{line['frame'] // 10 * 10:05d}.png").convert("RGB")
-    wanted = np.asarray(eye.resize(shown.shape[1::-1], Image.Resampling.BILINEAR)) / 255
-    assert shown.shape[1] > 0.9 * MIRROR[0]
-    assert np.abs(shown - wanted).mean() < 0.01
 
 
 @pytest.mark.slow
