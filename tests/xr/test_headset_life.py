@@ -72,6 +72,7 @@ def check_times(seen_s: list[float]) -> None:
     np.testing.assert_allclose(periods, np.round(periods), atol=0.1)
 
 
+@pytest.mark.slow
 def test_recentring_brings_the_person_back_before_the_scene(served, start):
     program = start(served, "--frames", "1000000", **switched_on(served.folder))
     with program.headset(served.port) as remote:
@@ -104,6 +105,7 @@ def eye_in_world(line: dict) -> np.ndarray:
     return room.matrix() @ head.matrix()
 
 
+@pytest.mark.slow
 def test_a_runtime_that_goes_away_is_one_sentence(served, start):
     program = start(served, "--frames", "1000000")
     with program.headset(served.port) as remote:

@@ -130,6 +130,7 @@ def test_the_menu_button_puts_it_away_and_takes_it_out(reader):
     assert reader.line["panel"]["open"] and reader.line["panel"]["hand"] == "left"
 
 
+@pytest.mark.slow
 def test_both_eyes_see_the_panel(stand, start):
     pictures = stand.folder / "pictures"
     program = start(stand, "--quality", "best", "--pictures", str(pictures))
