@@ -16,7 +16,7 @@ from scene.scene_file import first_view
 
 ASSETS = Path(__file__).resolve().parents[1] / "assets"
 SCENE, SCRIPT = ASSETS / "touch.scene.json", ASSETS / "touch.jsonl"
-MOMENTS_S = (0.0, 1.6, 3.6, 6.0)  # all at rest; the ring carried; the cube in the air; afterwards
+MOMENTS_S = (0.0, 1.6, 3.85, 6.0)  # all at rest; the ring carried; the cube in the air; afterwards
 STEPS = 2  # of 1/90 s, a frame
 BACKGROUND = (0.0, 0.0, 0.0)  # what touch.scene.json was made to stand before
 
