@@ -225,7 +225,7 @@ def scene(folder: Path) -> SceneFile:
 
 
 SCRIPT = """\
-# Takes the ring to the plate, shoots the ball twice, throws the cube at it.
+# Takes the ring to the plate, shoots the ball twice, throws the cube at it: ice, then fire.
 {"t": 0.0, "do": "hand", "position": [0.11, 0.12, 0.14]}
 {"t": 0.5, "do": "hand", "position": [0.11, 0.03, 0.14]}
 {"t": 0.6, "do": "grab"}
@@ -239,10 +239,10 @@ SCRIPT = """\
 {"t": 2.6, "do": "hand", "hand": "left", "position": [-0.22, 0.09, 0.05]}
 {"t": 2.7, "do": "grab", "hand": "left"}
 {"t": 2.8, "do": "hand", "hand": "left", "position": [-0.22, 0.09, 0.05]}
-{"t": 3.2, "do": "hand", "hand": "left", "position": [-0.26, 0.20, -0.02]}
+{"t": 3.2, "do": "hand", "hand": "left", "position": [-0.26, 0.30, -0.02]}
 {"t": 3.3, "do": "ray", "origin": [0.0, 0.4, 0.9], "direction": [0.0, -0.34, -1.0]}
-{"t": 3.4, "do": "hand", "hand": "left", "position": [-0.26, 0.20, -0.02]}
-{"t": 3.75, "do": "hand", "hand": "left", "position": [-0.08, 0.18, -0.09]}
+{"t": 3.4, "do": "hand", "hand": "left", "position": [-0.26, 0.30, -0.02]}
+{"t": 3.75, "do": "hand", "hand": "left", "position": [-0.08, 0.30, -0.09]}
 {"t": 3.75, "do": "release", "hand": "left"}
 {"t": 5.0, "do": "control", "object": "ring", "balance": 0.6, "power": 1.0}
 """
