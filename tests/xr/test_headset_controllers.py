@@ -8,6 +8,7 @@ PROFILES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PROFILES)
 def test_controllers_of_another_make_are_bound_and_seen(stand, start, kind):
     simulated = {"SIMULATED_ENABLE": "1", "SIMULATED_LEFT": kind, "SIMULATED_RIGHT": kind}

@@ -1,6 +1,7 @@
 """Moving in a real session: the world in one's hands, flight, jumps, true size, all anew."""
 
 import numpy as np
+import pytest
 from person import pose_of
 
 from vr.stance import heading
@@ -16,6 +17,7 @@ def feet(line: dict) -> np.ndarray:
     return standing(line).point(np.array(line["head"]["position"]) * [1, 0, 1])
 
 
+@pytest.mark.slow
 def test_the_world_follows_the_hands_and_comes_back(person):
     first = person.frame()
     floor_y = feet(first)[1]

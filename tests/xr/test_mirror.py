@@ -15,6 +15,7 @@ from app.mirror import SIZE
 PROGRAM = Path(__file__).with_name("look_at_mirror.py")
 
 
+@pytest.mark.slow
 def test_the_window_shows_the_left_eye(stand, tmp_path):
     if shutil.which("xvfb-run") is None:
         pytest.skip("no xvfb-run: apt install xvfb")
