@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from app.arrange import edit, undo
 from app.camera_files import camera_reading
+from app.files import take_over
 from app.opened import Found, Opener, Told, read_files
 from app.opening import open_model
 from app.panel_rows import tip
@@ -58,23 +59,7 @@ class Adding:
 
     def poll(self) -> bool:
         """Takes over what has been read; True while something is being read."""
-        if not self._opener.busy:
-            return False
-        viewer, name = self._viewer, self._opener.paths[0].name
-        viewer.say(self._opener.note)
-        try:
-            found = self._opener.poll()
-        except (BadFile, OSError) as error:
-            viewer.stage.problem = str(error)
-            viewer.say("")
-        except MemoryError:
-            viewer.stage.problem = f"{name} needs more memory than there is."
-            viewer.say("")
-        else:
-            if found is not None:
-                viewer.say("")
-                self.take(found)
-        return self._opener.busy
+        return take_over(self._viewer, self._opener, self.take)
 
     def take(self, found: Found) -> None:
         """One object more of each source; a scene that the device cannot hold stays without."""

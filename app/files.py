@@ -1,5 +1,6 @@
 """The viewer's files: those it opens while the window goes on, and those it opened before."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -69,27 +70,13 @@ class Files:
 
     def poll(self) -> bool:
         """Takes over what has been read; True while something is being read."""
-        if not self._opener.busy:
-            return False
-        viewer, paths = self._viewer, self._opener.paths
-        try:
-            found = self._opener.poll()
-        except (BadFile, OSError) as error:
-            viewer.stage.problem = str(error)
-            viewer.say("")
-        except MemoryError:
-            viewer.stage.problem = f"{paths[0].name} needs more memory than there is."
-            viewer.say("")
+        return take_over(self._viewer, self._opener, self._ask_and_take)
+
+    def _ask_and_take(self, found: Found) -> None:
+        if found.sources:
+            self._viewer.objects.saving.before_losing(lambda: self.take(found))
         else:
-            if found is not None:
-                viewer.say("")
-                if found.sources:
-                    viewer.objects.saving.before_losing(lambda: self.take(found))
-                else:
-                    self.take(found)
-        if self._opener.busy:
-            viewer.say(self._opener.note)
-        return self._opener.busy
+            self.take(found)
 
     def take(self, found: Found) -> None:
         """Shows what has been read; a scene that the device cannot hold leaves the old one."""
@@ -150,6 +137,28 @@ class Files:
         except OSError as error:
             self._viewer.say(f"The list of recent files cannot be kept: {error.strerror}.")
             self.recent = None
+
+
+def take_over(viewer: "Viewer", opener: Opener, take: Callable[[Found], None]) -> bool:
+    """Gives what a thread has read to `take`, its failure to the viewer; True while it reads."""
+    if not opener.busy:
+        return False
+    name = opener.paths[0].name
+    try:
+        found = opener.poll()
+    except (BadFile, OSError) as error:
+        viewer.stage.problem = str(error)
+        viewer.say("")
+    except MemoryError:
+        viewer.stage.problem = f"{name} needs more memory than there is."
+        viewer.say("")
+    else:
+        if found is not None:
+            viewer.say("")
+            take(found)
+    if opener.busy:
+        viewer.say(opener.note)
+    return opener.busy
 
 
 def opened_scene(found: Found, x: float | None = None) -> tuple[Scene, Document]:
