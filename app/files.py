@@ -38,6 +38,7 @@ class Files:
         self._viewer = viewer
         self._opener = Opener()
         self.recent = recent  # None: nothing is kept
+        self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
         # Reads one scene, in the thread that opens; replaced where progress can be told.
         self.read: ReadModel = lambda path, told: viewer.stage.read_model(path)
         self._menu = RecentMenu()
@@ -61,6 +62,7 @@ class Files:
         """The scene and cameras with which the window opens."""
         viewer = self._viewer
         viewer.set_title()
+        self._at_demo = not (options.scenes or options.touch)
         if options.screenshot is None:
             self.recent = RecentFiles.read(config_folder())
             if options.scenes:
@@ -91,6 +93,7 @@ class Files:
                 viewer.shown.forget()
                 return
             stage.take(found.sources, scene, home_of(found), document)
+            self._at_demo = False
             viewer.show_scene()
         self.take_cameras(found, stand=not found.sources)
         self.remember_all(found)
@@ -114,9 +117,7 @@ class Files:
 
     def draw_recent(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""
-        viewer = self._viewer
-        at_demo = not viewer.options.scenes and viewer.stage.document.path is None
-        if at_demo and imgui.button("Things to touch", imgui.ImVec2(-1, 0)):
+        if self._at_demo and imgui.button("Things to touch", imgui.ImVec2(-1, 0)):
             self.open_soon((TOUCH,))
         chosen = self._menu.draw(self.recent, ui_scale)
         if chosen is not None:

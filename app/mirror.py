@@ -96,7 +96,8 @@ def _open_window(visible: bool):
     """A glfw window with a GL 4.3 core context, X11's where there is a choice: runtimes on Linux
     know no other.
     """
-    if glfw.platform_supported(glfw.PLATFORM_X11):
+    supported = getattr(glfw, "platform_supported", None)  # not of GLFW 3.3, which has no choice
+    if supported is not None and supported(glfw.PLATFORM_X11):
         glfw.init_hint(glfw.PLATFORM, glfw.PLATFORM_X11)
     if not glfw.init():
         raise NoContext("no window could be opened (glfw finds no display).")

@@ -65,12 +65,11 @@ def test_the_driver_in_use_names_the_line(ctx, folder, monkeypatch):
         shader.compile_compute(ctx, "main.comp")
 
 
-def test_a_fragment_error_is_not_looked_up_in_the_vertex_file(ctx, folder, monkeypatch):
+def test_a_fragment_error_is_not_looked_up_in_the_vertex_file(ctx, folder):
     (folder / "a.vert").write_text("void main() { gl_Position = vec4(0); }\n")
     (folder / "a.frag").write_text("out vec4 color;\nvoid main() { color = vec4(nowhere); }\n")
-    monkeypatch.setattr(shader.read_shader, "__defaults__", (folder,))
     with pytest.raises(shader.ShaderError, match=r"a\.frag:2: .*nowhere"):
-        shader.compile_program(ctx, "a.vert", "a.frag")
+        shader.compile_program(ctx, "a.vert", "a.frag", folder)
 
 
 @pytest.mark.parametrize("name", COMPUTE)

@@ -120,8 +120,10 @@ class Stand:
 
 
 def ours(name: str) -> bool:
-    """Whether a variable would lead a program to a display or to another runtime."""
-    return name in ("DISPLAY", "WAYLAND_DISPLAY") or name.startswith(("XR_", "XRT_", "P_"))
+    """Whether a variable would lead a program to a display, another runtime or another GLFW."""
+    return name in ("DISPLAY", "WAYLAND_DISPLAY", "PYGLFW_LIBRARY") or name.startswith(
+        ("XR_", "XRT_", "P_")
+    )
 
 
 @dataclass
