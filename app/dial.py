@@ -84,8 +84,10 @@ class Dial:
         wanted = (self.target_ms, least)
         if self._resolution is None or self._wanted != wanted:
             self._resolution, self._wanted = Resolution(*wanted), wanted
-        scale = max(settings.render_scale * self._resolution.scale, SMALLEST_SCALE)
-        return replace(settings, render_scale=scale)
+        # What was chosen may draw fewer pixels already: both together go no further than the floor.
+        chosen = settings.render_scale
+        lowest = max(min(chosen, least), SMALLEST_SCALE)
+        return replace(settings, render_scale=max(chosen * self._resolution.scale, lowest))
 
     def seen(self, frame_ms: float, moving: bool) -> None:
         """Takes the time of a frame that was drawn while something moved."""
