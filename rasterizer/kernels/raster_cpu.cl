@@ -145,6 +145,8 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
 // expects from behind: dL/dC . C + dL/dT T at first, less what each splat gave.  Then
 //   dL/dalpha = T (c . dL/dC) - rest / (1 - alpha)
 // which needs no division to get T back.  Each instance writes its 12 numbers to its own slot.
+// For growing: ABSOLUTE sums |gradient of the mean| in slots 9 and 10, or SHARE sums alpha T times
+// an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is defined.
 __kernel void rasterize_backward(int width, int height, int tiles_x,
                                  __global const int* tile_start, __global const int* tile_end,
                                  __global const int* instances, __global const uint2* places,
@@ -152,22 +154,35 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
                                  __global const float* image, __global const float* transmittance,
                                  __global const float* grad_image,
                                  __global const float* grad_transmittance, int with_transmittance,
-                                 __global float* slots) {
+                                 __global float* slots
+#ifdef SHARE
+                                 , __global const float* error
+#endif
+                                 ) {
   const int tile = get_global_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
   const size_t plane = (size_t)width * height;
   float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
   float8 block_x[BLOCKS], block_y[BLOCKS];
+#ifdef SHARE
+  float8 wrong[BLOCKS];
+#endif
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
     block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
     float r[LANES], g[LANES], b[LANES], d[LANES];
+#ifdef SHARE
+    float e[LANES];
+#endif
     for (int lane = 0; lane < LANES; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
       const size_t at = (size_t)y * width + x;
       r[lane] = g[lane] = b[lane] = d[lane] = 0;
+#ifdef SHARE
+      e[lane] = x < width && y < height ? error[at] : 0;
+#endif
       if (x >= width || y >= height) continue;
       r[lane] = grad_image[at];
       g[lane] = grad_image[at + plane];
@@ -180,6 +195,9 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
     grad_g[k] = vload8(0, g);
     grad_b[k] = vload8(0, b);
     rest[k] = vload8(0, d);
+#ifdef SHARE
+    wrong[k] = vload8(0, e);
+#endif
   }
   Batch batch;
   uint open = 0xffffffffu;
@@ -198,7 +216,7 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[CUT];
       float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
-      float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, absolute_x = 0, absolute_y = 0;
+      float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
@@ -225,8 +243,14 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
         sum_xy = fma(gx, dy, sum_xy);
         sum_yy = fma(gy, dy, sum_yy);
 #ifdef ABSOLUTE
-        absolute_x += fabs(fma(B, gy, A * gx));
-        absolute_y += fabs(fma(C, gy, B * gx));
+        extra_x += fabs(fma(B, gy, A * gx));
+        extra_y += fabs(fma(C, gy, B * gx));
+#endif
+#ifdef SHARE
+        extra_x = fma(w, wrong[k], extra_x);
+#endif
+#ifdef WEIGHT
+        sum_w += w;
 #endif
       }
       __global float* out = slots + (size_t)RECORD * slot[j];
@@ -234,7 +258,7 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
       vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
                        -0.5f * one.s4, one.s5 / s[OPACITY], one.s6, one.s7),
               0, out);
-      vstore4((float4)(sum8(sum_b), sum8(absolute_x), sum8(absolute_y), 0), 0, out + 8);
+      vstore4((float4)(sum8(sum_b), sum8(extra_x), sum8(extra_y), sum8(sum_w)), 0, out + 8);
     }
     open = still_open(open, T);
   }

@@ -67,8 +67,15 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     __global const int* tile_end, __global const int* instances, __global const uint2* places,
     __global const int* first_slot, __global const float* record, __global const float* image,
     __global const float* transmittance, __global const float* grad_image,
-    __global const float* grad_transmittance, int with_transmittance, __global float* slots) {
+    __global const float* grad_transmittance, int with_transmittance, __global float* slots
+#ifdef SHARE
+    , __global const float* error
+#endif
+    ) {
   __local float T[PIXELS], rest[PIXELS], grad_r[PIXELS], grad_g[PIXELS], grad_b[PIXELS];
+#ifdef SHARE
+  __local float wrong[PIXELS];
+#endif
   const int tile = get_group_id(0), l = get_local_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
@@ -77,6 +84,9 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     const int px = x0 + i % TILE, py = y0 + i / TILE;
     const size_t at = (size_t)py * width + px;
     T[i] = rest[i] = grad_r[i] = grad_g[i] = grad_b[i] = 0;
+#ifdef SHARE
+    wrong[i] = px < width && py < height ? error[at] : 0;
+#endif
     if (px >= width || py >= height) continue;
     grad_r[i] = grad_image[at];
     grad_g[i] = grad_image[at + plane];
@@ -126,6 +136,12 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
 #ifdef ABSOLUTE
         sum[EXTENT_X] += fabs(A * gx + B * gy);
         sum[EXTENT_Y] += fabs(B * gx + C * gy);
+#endif
+#ifdef SHARE
+        sum[EXTENT_X] += w * wrong[pixel];
+#endif
+#ifdef WEIGHT
+        sum[CUT] += w;
 #endif
       }
       barrier(CLK_LOCAL_MEM_FENCE);
