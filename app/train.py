@@ -53,6 +53,12 @@ class Options:
     """F, numbers an anchor."""
     hidden: int | None = None
     """Width of the five networks."""
+    layers: int | None = None
+    """Hidden layers of the five networks, 1 to 3."""
+    fixed: str | None = None
+    """Networks that do not see x, as offset,scale,rotation: what they give is shared by all stops."""
+    view_dependent: bool | None = None
+    """Whether colour depends on where one looks from."""
     ssim_share: float | None = None
     """lambda: (1 - lambda) L1 + lambda D-SSIM.  Equation 8 read literally has 0.8."""
     opacity_share: float | None = None

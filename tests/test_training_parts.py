@@ -18,6 +18,7 @@ from training.initial import (
     pixel_of,
     voxel_centres,
 )
+from training.networks import HeadLayout
 from training.optimizer import Adam
 from training.photos import LoadedPhoto, choose_downscale, load_photos
 from training.schedule import Budget, Schedule, choose_background
@@ -183,6 +184,17 @@ def test_budget_follows_whichever_ends_first():
 def test_settings_that_cannot_be_are_refused(changes, sentence):
     with pytest.raises(ValueError, match=sentence):
         TrainSettings(**changes)
+
+
+def test_settings_name_the_networks():
+    settings = TrainSettings(layers=2, fixed="scale, offset", view_dependent=False)
+    assert settings.layout() == HeadLayout(5, 16, 32, 16, 2, ("scale", "offset"), False)
+    assert TrainSettings(**settings.as_dict()) == settings
+    assert TrainSettings().layout() == HeadLayout(5)
+    with pytest.raises(ValueError, match="layers is 4; networks have 1 to 3 hidden ones"):
+        TrainSettings(layers=4)
+    with pytest.raises(ValueError, match="no head 'shape' to fix; they are offset"):
+        TrainSettings(fixed="shape")
 
 
 def test_presets():

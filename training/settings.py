@@ -2,6 +2,8 @@
 
 from dataclasses import asdict, dataclass, replace
 
+from training.networks import HeadLayout
+
 
 @dataclass(frozen=True)
 class Rates:
@@ -37,6 +39,9 @@ class TrainSettings:
     splats_per_anchor: int = 5  # k
     features: int = 16  # F
     hidden: int = 32
+    layers: int = 1  # hidden ones of each network
+    fixed: str = ""  # heads that do not see x, with commas between: all stops share what they give
+    view_dependent: bool = True  # whether colour sees the direction from the eye
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
     voxel: float | None = None  # metres; None: from the points and `anchors`
@@ -68,8 +73,17 @@ class TrainSettings:
                 raise ValueError(f"{name} is {value}; it has to be at least {low}.")
         if not self.ssim_share <= 1:
             raise ValueError(f"ssim_share is {self.ssim_share}; it is a share, 0 to 1.")
+        self.layout()
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
+
+    def layout(self) -> HeadLayout:
+        """The networks that are asked for.  Raises ValueError where there are none such."""
+        fixed = tuple(name.strip() for name in self.fixed.split(",") if name.strip())
+        return HeadLayout(
+            self.splats_per_anchor, self.features, self.hidden, self.control,
+            self.layers, fixed, self.view_dependent,
+        )  # fmt: skip
 
     def rates(self, iterations: int) -> Rates:
         """The learning rates of a run of so many iterations."""

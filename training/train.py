@@ -80,9 +80,7 @@ class Trainer:
         self.encoding = ControlEncoding(
             settings.control, 1 / max(settings.control - 1, 1), settings.sigma
         )
-        self.layout = HeadLayout(
-            settings.splats_per_anchor, settings.features, settings.hidden, settings.control
-        )
+        self.layout = settings.layout()
         self.targets = Targets(device)
         self.contrast: dict[tuple, float] = {}
         if resume is None:
