@@ -56,7 +56,7 @@ class Options:
     layers: int | None = None
     """Hidden layers of the five networks, 1 to 3."""
     fixed: str | None = None
-    """Networks that do not see x, as offset,scale,rotation: what they give is shared by all stops."""
+    """Networks that do not see x, as offset,scale,rotation: all stops share what they give."""
     view_dependent: bool | None = None
     """Whether colour depends on where one looks from."""
     ssim_share: float | None = None
@@ -113,11 +113,12 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
     asked = {n: value for n, value in asked.items() if value is not None}
     settings = preset(options.preset) if before is None else TrainSettings(**before)
     if before is not None:
-        other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
+        known = settings.as_dict()  # an older checkpoint may not have all of them
+        other = sorted(n for n in asked if n not in BUDGET and asked[n] != known[n])
         if other:
             raise UsageError(
                 f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
-                f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
+                f"{known[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
             )
     if "seconds" in asked and "iterations" not in asked:
         asked["iterations"] = None

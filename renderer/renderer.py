@@ -25,7 +25,7 @@ from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.timing import PassTimer
-from runtime_models.evaluate import follows_eye
+from runtime_models.evaluate import follows_eye, shape_follows_control
 from runtime_models.model import Model, SplatLayers
 from scene.control import control_key, control_of
 from scene.metrics import psnr
@@ -119,7 +119,10 @@ class Renderer:
         """Geometry of object i at x, unless it lies in the arena already."""
         if decoded.key is not None and np.array_equal(x, decoded.x):
             return  # a selector changed where nothing is
-        if not follows_eye(decoded.model):  # else with the colours, once the eye is known
+        shaped = decoded.key is not None and not shape_follows_control(decoded.model)
+        if not (
+            shaped or follows_eye(decoded.model)
+        ):  # else with the colours, once the eye is known
             self._drawing.decode_geometry(i, x)
             self._geometry_runs += 1
         decoded.x = x
