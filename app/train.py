@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 if TYPE_CHECKING:
+    from training.plain import PlainTrainer
     from training.settings import TrainSettings
     from training.train import Trainer
 
@@ -33,6 +34,18 @@ class Options:
     """Train for so long; the learning rates follow the time."""
     iterations: int | None = None
     """Train so many steps: the same bits on every run.  fast: 2000, paper: 30000."""
+    model: Literal["anchors", "splats"] = "anchors"
+    """splats: plain 3DGS splats, a set a modality, to compare with; --out is a folder of PLY files.
+    The modalities share the budget."""
+    separate: bool = False
+    """One anchor model a modality, to compare with; --out is a folder of packages.  Each takes its
+    share of the budget."""
+    sh_degree: int | None = None
+    """Of plain splats' colours: 0 to 3.  Default: 3."""
+    splats: int | None = None
+    """How many plain splats a modality starts with at most."""
+    max_splats: int | None = None
+    """Cap of growing plain splats, a modality."""
     preset: Literal["fast", "paper"] = "fast"
     """fast: minutes on a CPU.  paper: the numbers of the paper."""
     resume: bool = False
@@ -84,6 +97,11 @@ def run(options: Options) -> int:
     from training.checkpoint import checkpoint_path, read_checkpoint
     from training.train import Trainer
 
+    if options.model == "splats" or options.separate:
+        from app.train_baselines import run_baseline
+
+        return run_baseline(options)
+    refuse_plain_options(options)
     refuse_foreign(options.out)  # now, not after the training
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
@@ -130,6 +148,16 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
         raise UsageError(str(error)) from None
 
 
+def refuse_plain_options(options: Options) -> None:
+    """Raises UsageError for what only plain splats have."""
+    from app.errors import UsageError
+
+    for name in ("sh_degree", "splats", "max_splats"):
+        if getattr(options, name) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
+
+
 def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
@@ -164,8 +192,11 @@ def interrupts() -> Iterator[list]:
         signal.signal(signal.SIGINT, before)
 
 
-def train(trainer: "Trainer", checkpoint: Path) -> bool:
-    """The run with its progress on standard error; True when Ctrl-C ended it early."""
+def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
+    """The run with its progress on standard error; True when Ctrl-C ended it early.
+
+    checkpoint: written to every SAVE_EVERY seconds; None: never.
+    """
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     from app.progress import progress_bar
@@ -181,7 +212,7 @@ def train(trainer: "Trainer", checkpoint: Path) -> bool:
     ):  # fmt: skip
         task = bar.add_task("compiling kernels", total=1.0, psnr="", loss="")
         for now in trainer.steps():
-            text = f"{now.iteration} steps, {now.anchors:,} anchors"
+            text = f"{now.iteration} steps, {now.anchors:,} {trainer.unit}"
             bar.update(task, completed=min(now.fraction, 1.0), description=text)
             if now.loss is not None:
                 bar.update(task, loss=f"loss {now.loss:.4f}")
@@ -193,7 +224,7 @@ def train(trainer: "Trainer", checkpoint: Path) -> bool:
             if now.fraction >= look and trainer.settled:
                 look += 1 / LOOKS
                 bar.update(task, psnr=decibels(trainer.held_out_psnr()))
-            if time.monotonic() - saved > SAVE_EVERY:
+            if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
                 write_checkpoint(checkpoint, *trainer.checkpoint())
                 saved = time.monotonic()
             if asked and trainer.settled:

@@ -61,6 +61,8 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
 class Trainer:
     """One run.  `steps` trains; `model` may be called between any two steps."""
 
+    unit = "anchors"  # what Progress counts
+
     def __init__(
         self, device, capture: Capture, settings: TrainSettings, resume: tuple | None = None
     ) -> None:
