@@ -6,6 +6,9 @@
 // below STOP everywhere are dropped from the mask every BATCH instances; a tile ends with its last.
 #include "common/vector.cl"
 #include "common/tiles.cl"
+#ifdef SURFACE
+#include "common/surface.cl"
+#endif
 #define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
 #define BLOCK_H 2
 #define DOWN (TILE / BLOCK_H)   // blocks in a column
@@ -79,12 +82,38 @@ inline uint still_open(uint open, const float8* T) {
   return open;
 }
 
+#ifdef SURFACE
+// The fraction of surface.cl: depth under pixels (dx, dy) from the mean, before it is held.
+typedef struct {
+  float8 z, ahead, per;  // metres; 1 + l; 1 / (1 + 2 l + q)
+} Depth8;
+
+inline Depth8 depth_under(const float8 f, float8 dx, float8 dy) {
+  Depth8 d;
+  const float8 l = fma(f.s1, dx, f.s2 * dy);
+  const float8 q = fma(dx, fma(f.s3, dx, 2 * f.s4 * dy), f.s5 * dy * dy);
+  d.ahead = 1.0f + l;
+  d.per = 1.0f / fmax(fma((float8)(2.0f), l, 1.0f + q), SURFACE_LEAST);
+  d.z = f.s0 * d.ahead * d.per;
+  return d;
+}
+#endif
+
+// SURFACE: with a depth a splat (surface.cl), metres become the sum of alpha T z.
 __kernel void rasterize(int width, int height, int tiles_x, __global const int* tile_start,
                         __global const int* instances, __global const float* record, float red,
                         float green, float blue, __global float* image,
-                        __global float* transmittance, __global int* tile_end) {
+                        __global float* transmittance, __global int* tile_end
+#ifdef SURFACE
+                        , __global const float* surface, __global float* metres
+#endif
+                        ) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+#ifdef SURFACE
+  float8 Z[BLOCKS];
+  for (int k = 0; k < BLOCKS; k++) Z[k] = 0;
+#endif
   float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
@@ -103,6 +132,9 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
       const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[CUT];
+#ifdef SURFACE
+      const float8 f = vload8(instances[p + j], surface);
+#endif
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
@@ -113,6 +145,9 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
         R[k] = fma(w, s[RED], R[k]);
         G[k] = fma(w, s[GREEN], G[k]);
         B[k] = fma(w, s[BLUE], B[k]);
+#ifdef SURFACE
+        Z[k] = fma(w, fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7), Z[k]);
+#endif
         T[k] -= w;
       }
     }
@@ -128,6 +163,10 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
     vstore8(fma(t, green, G[k]), 0, g);
     vstore8(fma(t, blue, B[k]), 0, b);
     vstore8(t, 0, a);
+#ifdef SURFACE
+    float z[LANES];
+    vstore8(Z[k], 0, z);
+#endif
     for (int lane = 0; lane < LANES; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
@@ -137,6 +176,9 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
       image[at + plane] = g[lane];
       image[at + 2 * plane] = b[lane];
       transmittance[at] = a[lane];
+#ifdef SURFACE
+      metres[at] = z[lane];
+#endif
     }
   }
 }
@@ -158,6 +200,10 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
 #ifdef SHARE
                                  , __global const float* error
 #endif
+#ifdef SURFACE
+                                 , __global const float* surface, __global const float* metres,
+                                 __global const float* grad_metres, __global float* depth_slots
+#endif
                                  ) {
   const int tile = get_global_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
@@ -168,12 +214,18 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
 #ifdef SHARE
   float8 wrong[BLOCKS];
 #endif
+#ifdef SURFACE
+  float8 grad_z[BLOCKS];
+#endif
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
     block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
     float r[LANES], g[LANES], b[LANES], d[LANES];
 #ifdef SHARE
     float e[LANES];
+#endif
+#ifdef SURFACE
+    float z[LANES];
 #endif
     for (int lane = 0; lane < LANES; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
@@ -183,12 +235,18 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
 #ifdef SHARE
       e[lane] = x < width && y < height ? error[at] : 0;
 #endif
+#ifdef SURFACE
+      z[lane] = x < width && y < height ? grad_metres[at] : 0;
+#endif
       if (x >= width || y >= height) continue;
       r[lane] = grad_image[at];
       g[lane] = grad_image[at + plane];
       b[lane] = grad_image[at + 2 * plane];
       d[lane] = r[lane] * image[at] + g[lane] * image[at + plane] + b[lane] * image[at + 2 * plane];
       if (with_transmittance) d[lane] += grad_transmittance[at] * transmittance[at];
+#ifdef SURFACE
+      d[lane] += z[lane] * metres[at];
+#endif
     }
     T[k] = inside(k, x0, y0, width, height);
     grad_r[k] = vload8(0, r);
@@ -197,6 +255,9 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
     rest[k] = vload8(0, d);
 #ifdef SHARE
     wrong[k] = vload8(0, e);
+#endif
+#ifdef SURFACE
+    grad_z[k] = vload8(0, z);
 #endif
   }
   Batch batch;
@@ -217,6 +278,11 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[CUT];
       float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
       float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
+#ifdef SURFACE
+      const float8 f = vload8(instances[p + j], surface);
+      float8 by_z = 0, by_l = 0, by_u = 0, by_v = 0, by_x = 0, by_y = 0;
+      float8 by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
+#endif
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
@@ -225,7 +291,30 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
         const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), power >= least);
         const float8 before = T[k];
         const float8 w = alpha * before;
+#ifdef SURFACE
+        const Depth8 d = depth_under(f, dx, dy);
+        const float8 z = fmin(fmax(d.z, f.s6), f.s7);
+        const float8 given = fma(grad_z[k], z, fma(grad_r[k], s[RED],
+                                 fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE])));
+        const float8 all = w * grad_z[k], none = 0;
+        by_low += select(none, all, isless(d.z, (float8)(f.s6)));
+        by_high += select(none, all, isgreater(d.z, (float8)(f.s7)));
+        const int8 free = isgreaterequal(d.z, (float8)(f.s6)) & islessequal(d.z, (float8)(f.s7));
+        const float8 h = select(none, all, free);
+        by_z = fma(h, d.ahead * d.per, by_z);
+        const float8 by_ahead = h * f.s0 * d.per * (1.0f - 2.0f * d.ahead * d.per);
+        const float8 by_q = -h * d.z * d.per, qu = by_q * dx, qv = by_q * dy;
+        by_l += by_ahead;
+        by_u = fma(by_ahead, dx, by_u);
+        by_v = fma(by_ahead, dy, by_v);
+        by_x += qu;
+        by_y += qv;
+        by_uu = fma(qu, dx, by_uu);
+        by_uv = fma(qu, dy, by_uv);
+        by_vv = fma(qv, dy, by_vv);
+#else
         const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
+#endif
         const float8 behind = fma(-w, given, rest[k]);
         rest[k] = behind;
         T[k] = before - w;
@@ -258,6 +347,14 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
       vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
                        -0.5f * one.s4, one.s5 / s[OPACITY], one.s6, one.s7),
               0, out);
+#ifdef SURFACE
+      // The mean on the screen moves u and v the other way.
+      const float l = sum8(by_l), x = sum8(by_x), y = sum8(by_y);
+      out[MEAN_X] -= f.s1 * l + 2 * (f.s3 * x + f.s4 * y);
+      out[MEAN_Y] -= f.s2 * l + 2 * (f.s4 * x + f.s5 * y);
+      vstore8(sums8(by_z, by_u, by_v, by_uu, 2 * by_uv, by_vv, by_low, by_high), slot[j],
+              depth_slots);
+#endif
       vstore4((float4)(sum8(sum_b), sum8(extra_x), sum8(extra_y), sum8(sum_w)), 0, out + 8);
     }
     open = still_open(open, T);
@@ -267,6 +364,9 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
     const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
     __global float* out = slots + (size_t)RECORD * slot;
     vstore8((float8)(0), 0, out);
+#ifdef SURFACE
+    vstore8((float8)(0), slot, depth_slots);
+#endif
     vstore4((float4)(0), 0, out + 8);
   }
 }
