@@ -28,6 +28,9 @@ class Options(ReadingOptions):
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "black", "white", "gray"] = "auto"
     """Colour behind everything.  auto: the capture's, else black."""
+    vgg: Path | None = None
+    """An ONNX file of VGG16's first layers: tells a distance of its features, too.  It is no LPIPS,
+    and compares only with figures of the same file."""
 
 
 def run(options: Options) -> int:
@@ -37,6 +40,7 @@ def run(options: Options) -> int:
     from scene.read_capture import read_capture
     from scene.scene_file import is_scene_file
     from training.evaluate import evaluate_model, report
+    from training.vgg_distance import VggDistance
 
     started = time.perf_counter()
     if is_scene_file(options.scene):
@@ -44,11 +48,15 @@ def run(options: Options) -> int:
             f"{options.scene} is a scene file of objects, and photos are of one scene as it was "
             "trained; name the model of one object."
         )
+    distance = None if options.vgg is None else VggDistance(options.vgg)
     model, capture = open_model(options.scene, options), read_capture(options.capture)
     scores = evaluate_model(
-        open_device(), model, capture, options.downscale, options.masks, options.background
-    )
+        open_device(), model, capture, options.downscale, options.masks, options.background,
+        distance,
+    )  # fmt: skip
     result = report(options.scene, scores, started)
+    if distance is not None:
+        result["vgg_file"] = distance.name
     print_table(result)
     if options.json == Path("-"):
         print(json.dumps(result, indent=1))
@@ -61,10 +69,12 @@ def print_table(result: dict) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("modality", "PSNR dB", "SSIM", "photos", "splats alive")
+    vgg = ["VGG distance"] if "vgg_file" in result else []
+    table = Table("modality", "PSNR dB", "SSIM", *vgg, "photos", "splats alive")
     for name, score in result["modalities"].items():
-        row = (f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}", str(score["photos"]))
-        table.add_row(name, *row, f"{result['alive'][name]:,}")
+        row = [f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}"]
+        row += [f"{score['vgg_distance']:.4f}"] if vgg else []
+        table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
     console = Console(file=sys.stderr)
     console.print(table)
     console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")

@@ -1,6 +1,7 @@
 """How good a scene is: its pictures beside held-out photos of a capture."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +26,7 @@ class Score:
     ssim: float
     photos: int
     alive: int  # splats of this stop that are not absent
+    vgg: float | None = None  # training.vgg_distance; None: not measured
 
 
 class Painter:
@@ -83,8 +85,12 @@ def evaluate_model(
     downscale: int | None = None,
     masks: str = "object",
     background: str = "auto",
+    distance: Callable[..., float] | None = None,
 ) -> dict[str, Score]:
-    """A Score for every modality over its held-out photos.  Raises BadFile where there are none."""
+    """A Score for every modality over its held-out photos.  Raises BadFile where there are none.
+
+    distance: what Score.vgg is the mean of, a function of (picture, photo, weight).
+    """
     factor = downscale or choose_downscale(capture.photos)
     behind = choose_background(background, capture.background) or BLACK
     photos = load_photos(capture, "test", factor, masks)
@@ -106,6 +112,7 @@ def evaluate_model(
                 float(np.mean([ssim(*pair) for pair in pairs])),
                 len(pairs),
                 alive,
+                None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
             )
     return scores
 
@@ -122,6 +129,7 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
     return {
         "modalities": {
             name: {"psnr_db": round(s.psnr_db, 4), "ssim": round(s.ssim, 5), "photos": s.photos}
+            | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})
             for name, s in scores.items()
         },
         "alive": {name: s.alive for name, s in scores.items()},

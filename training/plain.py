@@ -194,12 +194,12 @@ class PlainTrainer:
         return True
 
     def change(self) -> None:
-        """Clones, halves and farewells every `grow_every` steps; opacities set back more rarely.
+        """Clones, halves and farewells every so many steps; opacities are set back more rarely.
 
         What is drawn by chance follows from the seed and the step alone.
         """
         settings = self.settings
-        if self.iteration % settings.grow_every == 0:
+        if self.iteration % settings.interval(self.run_length or 0) == 0:
             evidence = self.device.download(self.evidence.sums)
             after_reset = self.iteration > settings.reset_every
             state = self.adam.state()

@@ -36,7 +36,7 @@ class PlainSettings:
     splats: int = 30000  # to start with at most, where voxel is None
     max_splats: int = 60000  # cap of growing; what an anchor model draws at most by default
     grow: bool = True
-    grow_every: int = 100  # iterations, as 3DGS
+    grow_every: int | None = None  # iterations; None: a tenth of the run, 20 to 100 (3DGS: 100)
     grow_threshold: float = 2e-4  # screen gradient in half image widths, as 3DGS
     prune_opacity: float = 0.005  # a splat below it goes, as 3DGS
     reset_every: int = 3000  # iterations until opacities are set back, as 3DGS
@@ -63,6 +63,10 @@ class PlainSettings:
             raise ValueError(f"sh_degree is {self.sh_degree}; harmonics go up to degree 3.")
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
+
+    def interval(self, iterations: int) -> int:
+        """Iterations between changes of the splats in a run of so many."""
+        return self.grow_every or min(max(iterations // 10, 20), 100)
 
     def rates(self, iterations: int) -> PlainRates:
         """The learning rates of a run of so many iterations."""
