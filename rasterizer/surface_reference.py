@@ -23,7 +23,7 @@ def render_depth_reference(
     splats: tuple, camera: Camera, background=(0.0, 0.0, 0.0)
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Image (3, H, W), transmittance and metres (H, W) of (means, scales, wxyz, opacity, color)."""
-    means, scales, wxyz, opacity, color = splats
+    means, scales, wxyz = splats[:3]
     record, depth = project_reference(*splats, camera)
     camera_from_world = np.asarray(camera.camera_from_world, np.float64)
     places = means @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]

@@ -24,6 +24,7 @@ from renderer.recolor import (
 from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
+from renderer.surface import Surface
 from renderer.timing import PassTimer
 from runtime_models.evaluate import follows_eye, shape_follows_control
 from runtime_models.model import Model, SplatLayers
@@ -310,6 +311,12 @@ class Renderer:
                 self._resolve.copy(pixels, framebuffer)
             else:
                 self._resolve.draw(image, framebuffer, background, palette, weight)
+
+    def surface(self, view: View) -> Surface:
+        """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
+        self._decode_colors([view])
+        with self._framebuffer_kept():
+            return self._drawing.surface(view, self._settings_of_frame())
 
     def stale_order_db(self, views: list[View]) -> float:
         """PSNR of the order in use against one sorted for these views: what keeping it costs, dB.

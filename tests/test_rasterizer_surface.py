@@ -161,7 +161,7 @@ def test_without_a_gradient_of_depth_nothing_changes(form):
     size = (40, 30)
     splats, camera = random_splats(200, seed=4), off_centre_camera(size)
     d, upstream = device(), random_upstream(size)
-    on_device, projected, tiles, drawn = draw(splats, camera, form)
+    _, projected, tiles, drawn = draw(splats, camera, form)
     by_image, by_through = (d.upload(g) for g in upstream[:2])
     nothing = d.zeros(size[::-1])
     got, by_surface = rasterize_depth_backward(
