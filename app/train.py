@@ -56,6 +56,24 @@ class Options:
     """Add and remove anchors between 10 % and 60 % of the run."""
     max_anchors: int | None = None
     """Cap of growing."""
+    max_mb: float | None = None
+    """The same in megabytes of the package on disk; the start keeps within it, too."""
+    growth: Literal["gradient", "absgrad", "error"] | None = None
+    """What draws new anchors: the gradient by a splat's place on screen, that of every pixel
+    without its sign, or the splat's share of the picture's error."""
+    grow_threshold: float | None = None
+    """Of what draws them: smaller grows more.  gradient: 2e-4, absgrad: 6e-4, error: 1.2 times the
+    mean share."""
+    grow_each: bool | None = None
+    """Grow at each modality by what its own photos say, not by the mean over all."""
+    grow_replace: float | None = None
+    """When the cap is reached, so many of all anchors at most make room: those that show least."""
+    prune_opacity: float | None = None
+    """An anchor whose splats have a smaller mean opacity goes."""
+    prune_weight: float | None = None
+    """An anchor that gives less to its pictures of every modality goes; pixels, for example 0.1."""
+    prune_views: float | None = None
+    """An anchor that is in a smaller share of all pictures goes, for example 0.01."""
     anchors: int | None = None
     """How many to start with at most, where --voxel is not given."""
     voxel: float | None = None
@@ -82,6 +100,10 @@ class Options:
     """Times every learning rate."""
     downscale: int | None = None
     """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
+    coarse: int | None = None
+    """Start with photos of 1/2, 1/4 or 1/8 of the sides; the next size comes step by step."""
+    coarse_until: float | None = None
+    """Share of the run after which the photos have all their pixels, 0 to 1."""
     masks: Literal["object", "valid", "ignore"] | None = None
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None

@@ -69,7 +69,7 @@ class Targets:
     def __init__(self, device) -> None:
         self.device = device
         self.losses: dict[tuple[int, int], ImageLoss] = {}
-        self.kept: dict[tuple[str, str], Target] = {}
+        self.kept: dict[tuple, Target] = {}
         self.bytes = 0
 
     def loss(self, photo: LoadedPhoto) -> ImageLoss:
@@ -81,7 +81,7 @@ class Targets:
 
     def target(self, photo: LoadedPhoto, background: tuple[float, float, float]) -> Target:
         """The photo over a background; kept unless the photo shows the background."""
-        key = (photo.modality, photo.name)
+        key = (photo.modality, photo.name, photo.view.size)
         if key in self.kept:
             return self.kept[key]
         rgba = self.device.upload(photo.rgba)
@@ -90,3 +90,7 @@ class Targets:
             self.kept[key] = target
             self.bytes += target.bytes
         return target
+
+    def forget(self) -> None:
+        """Make all targets anew at their next use: the photos have another size now."""
+        self.kept, self.bytes = {}, 0

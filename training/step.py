@@ -88,8 +88,9 @@ class Step:
         with self.timed("loss"):
             grad_image = loss.compare(drawing.frame.image, target, ssim_share)
         with self.timed("rasterize backward"):
+            asked = {} if evidence is None else evidence.asks(drawing.frame.image, target)
             grad_record = rasterize_backward(
-                device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None
+                device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None, **asked
             )
         with self.timed("project backward"):
             grad = Gaussians(
@@ -99,9 +100,8 @@ class Step:
             )
         with self.timed("density"):
             if evidence is not None:
-                width = drawing.camera.size[0]
-                record = drawing.projected.record
-                evidence.add(record, grad_record, drawing.splats.opacity, width)
+                record, opacity = drawing.projected.record, drawing.splats.opacity
+                evidence.add(record, grad_record, opacity, drawing.camera.size)
         with self.timed("heads backward"):
             if opacity_share or scale_share:
                 regularise(device, drawing.splats, grad, opacity_share, scale_share)

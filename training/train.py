@@ -8,7 +8,11 @@ import numpy as np
 
 from runtime_models.model import AnchorModel, BadFile, ControlEncoding
 from scene.capture import Capture
-from training.density import Evidence, changed_state, given_up, newcomers
+from training.coarse import Coarse
+from training.density import Evidence, Watch
+from training.density_budget import most_anchors, within
+from training.density_grow import changed
+from training.density_strategy import strategy
 from training.export import model_of
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
@@ -83,7 +87,13 @@ class Trainer:
             settings.control, 1 / max(settings.control - 1, 1), settings.sigma
         )
         self.layout = settings.layout()
-        self.targets = Targets(device)
+        self.coarse = Coarse(settings.coarse, settings.coarse_until, {})
+        self.watch = Watch(
+            strategy(settings.growth), len(self.stops), settings.grow_each,
+            bool(settings.grow_replace or settings.prune_weight or settings.prune_views),
+        )  # fmt: skip
+        self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
+        self.targets, self.photo_factor = Targets(device), 1
         self.contrast: dict[tuple, float] = {}
         if resume is None:
             self.start(photos)
@@ -99,9 +109,9 @@ class Trainer:
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
         points, self.origin = initial_points(self.capture, photos, rng)
-        most = min(settings.anchors, settings.max_anchors)
+        most = min(settings.anchors, self.most_anchors)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
-        anchors = voxel_centres(points, self.voxel)
+        anchors = within(voxel_centres(points, self.voxel), self.most_anchors, settings.max_mb)
         features = np.zeros((len(anchors), padded(settings.features)), np.float32)
         features[:, : settings.features] = (
             rng.normal(size=(len(anchors), settings.features)) * FEATURE_SPREAD
@@ -114,7 +124,7 @@ class Trainer:
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
         self.rate_scale, self.run_length = settings.rate_scale, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
-        self.evidence = Evidence(self.device, self.layout, len(anchors))
+        self.evidence = Evidence(self.device, self.layout, len(anchors), self.watch)
 
     def go_on(self, state: dict[str, np.ndarray], notes: dict) -> None:
         """Everything as it was when the checkpoint was written."""
@@ -125,7 +135,7 @@ class Trainer:
         values = {n: state[f"{n}.value"] for n in ("weights", "anchors", "features")}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
-        self.evidence = Evidence(self.device, self.layout, len(values["anchors"]))
+        self.evidence = Evidence(self.device, self.layout, len(values["anchors"]), self.watch)
         self.evidence.load(state)
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
@@ -176,16 +186,27 @@ class Trainer:
         before, evidence = self.adam.state(), self.evidence.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
-            for photo in {p.view.size: p for p in photos}.values():
+            whole = {p.view.size: p for p in photos}.values()
+            for photo in [self.coarse.photo(p, f) for f in self.coarse.factors for p in whole]:
                 self.step.update(self.learn(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
                 self.guard.expect(modality, loss, self.visible(), self.shown(photo, background))
         self.adam.load(before)
         self.evidence.load(evidence)
 
+    def next_photo(self) -> LoadedPhoto:
+        """The photo of this step, as small as this part of the run has them."""
+        factor = self.coarse.factor(self.budget.fraction(self.iteration, self.elapsed))
+        if factor != self.photo_factor:
+            self.photo_factor = factor
+            self.targets.forget()
+            self.coarse.drop(factor)
+        return self.coarse.photo(self.schedule.photo(self.iteration), factor)
+
     def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
         settings = self.settings
         target = self.targets.target(photo, background)
+        self.evidence.stop = [s.name for s in self.stops].index(photo.modality)
         self.drawing = self.step.draw(photo.view, self.control(photo.modality), background)
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
@@ -194,7 +215,7 @@ class Trainer:
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""
-        photo = self.schedule.photo(self.iteration)
+        photo = self.next_photo()
         background = self.schedule.background_of(self.iteration, photo)
         grads = self.learn(photo, background)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
@@ -209,7 +230,7 @@ class Trainer:
             self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
             self.adam.set_rates(self.all_rates())
         if self.settings.grow and self.iteration % self.settings.grow_every == 0:
-            if GROW_FROM <= fraction <= GROW_UNTIL:
+            if GROW_FROM <= fraction <= GROW_UNTIL and self.steps_to_go() >= SETTLE:
                 self.grow()
         return loss, fell_back
 
@@ -220,7 +241,7 @@ class Trainer:
     def shown(self, photo: LoadedPhoto, background: Color) -> float:
         """Contrast of the last drawing to its background, over that of its photo."""
         behind = np.asarray(background, np.float32)
-        key = (photo.name, background)
+        key = (photo.name, photo.view.size, background)
         contrast = self.contrast.get(key)
         if contrast is None:
             contrast = float(np.abs(photo.over(background) - behind).mean())
@@ -241,31 +262,25 @@ class Trainer:
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
         self.adam.load(self.guard.fall_back())
-        self.evidence = Evidence(self.device, self.layout, self.anchors_count)
+        self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
         self.rate_scale /= 2
         return True
 
     def grow(self) -> None:
-        """New anchors where splats pull at the picture; anchors that show nothing go."""
-        settings, count = self.settings, self.anchors_count
-        state, evidence = self.adam.state(), self.evidence.state()
+        """New anchors where they are needed; anchors that show nothing go."""
         means = [
             self.device.download(self.step.decode(self.encoding.encode(s.x), np.zeros(3)).means)
             for s in self.stops
         ]
-        new = newcomers(
-            state["anchors.value"], means, evidence["evidence.gradient"], self.voxel,
-            settings.grow_threshold, max(settings.max_anchors - count, 0),
-        )  # fmt: skip
-        gone = given_up(
-            evidence["evidence.opacity"], self.evidence.steps, self.layout.splats,
-            settings.prune_opacity,
-        )  # fmt: skip
-        if gone.all():
-            gone[:] = False
-        self.adam.load(changed_state(state, ~gone, new))
-        self.evidence = Evidence(self.device, self.layout, self.anchors_count)
+        now, budget = self.adam.state(), self.most_anchors
+        self.adam.load(changed(now, means, self.evidence, self.voxel, budget, self.settings))
+        self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
         self.grown_at = self.iteration
+
+    def steps_to_go(self) -> int:
+        """How many more the budget allows, as fast as they have been."""
+        done = self.budget.fraction(self.iteration, self.elapsed)
+        return round(self.iteration * (1 - done) / done)
 
     def held_out_psnr(self, most: int = 2) -> dict[str, float]:
         """Mean PSNR in dB of each modality over its first held-out photos, as they are trained."""
