@@ -16,6 +16,7 @@ from training.gaussians import Activation, Gaussians
 from training.networks import HeadLayout, Heads, initial_weights, padded
 from training.reference import activate_reference, directions, head_inputs, heads_reference
 
+FORMS = ("cpu", "gpu")
 VOXEL = 0.05
 EYE = np.array([2.0, 1.0, 1.5])
 
@@ -83,24 +84,26 @@ def test_pack_then_unpack_is_the_identity(layout):
     assert np.count_nonzero(flat) == sum(a.size for n in networks.values() for a in n)
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", [1, 3, 4, 5, 8, 9, 129])
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
-def test_forward_equals_plain_numpy(device, layout, count):
+def test_forward_equals_plain_numpy(device, layout, count, form):
     weights, anchors, features, control = model(layout, count)
     arrays = map(device.upload, (weights, anchors, features))
-    raw = device.download(Heads(device, layout).forward(*arrays, control, EYE))
+    raw = device.download(Heads(device, layout, form).forward(*arrays, control, EYE))
     wanted = plain_heads(layout, layout.unpack(weights), anchors, features, control)
     for name in HEADS:
         assert relative(raw_of(raw, layout, name), wanted[name][1]) < 2e-6, name
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 137])
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
-def test_backward_equals_plain_numpy(device, layout, count):
+def test_backward_equals_plain_numpy(device, layout, count, form):
     weights, anchors, features, control = model(layout, count)
     rng = np.random.default_rng(5)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
-    heads = Heads(device, layout)
+    heads = Heads(device, layout, form)
     heads.forward(*on_device, control, EYE)
     grad_raw = np.zeros((count, layout.raw_at[-1]), np.float32)
     for name in HEADS:
@@ -141,13 +144,14 @@ def test_backward_equals_plain_numpy(device, layout, count):
     assert np.abs(added - through_direction).max() < 5e-6 * max(np.abs(before).max(), 1)
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize(
     "layout", [x for x in LAYOUTS if x.features == 7 or x.fixed or not x.view_dependent], ids=str
 )
-def test_padding_and_what_no_head_sees_never_learn(device, layout):
+def test_padding_and_what_no_head_sees_never_learn(device, layout, form):
     weights, anchors, features, control = model(layout, 20)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
-    heads = Heads(device, layout)
+    heads = Heads(device, layout, form)
     heads.forward(*on_device, control, EYE)
     grad_raw = np.zeros((20, layout.raw_at[-1]), np.float32)
     for name in HEADS:
@@ -160,12 +164,13 @@ def test_padding_and_what_no_head_sees_never_learn(device, layout):
     assert not grad_features[:, layout.features :].any()
 
 
-def test_an_eye_at_an_anchor_is_finite(device):
+@pytest.mark.parametrize("form", FORMS)
+def test_an_eye_at_an_anchor_is_finite(device, form):
     layout = HeadLayout(splats=2)
     weights, anchors, features, control = model(layout, 4)
     anchors[2] = EYE
     on_device = [device.upload(a) for a in (weights, anchors, features)]
-    heads = Heads(device, layout)
+    heads = Heads(device, layout, form)
     raw = heads.forward(*on_device, control, EYE)
     grads = heads.backward(*on_device, raw, device.zeros((4, 3)))
     for array in (raw, *grads):

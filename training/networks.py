@@ -11,6 +11,8 @@ from runtime_models.model import HEADS, SIZE_PER_SPLAT
 KERNELS = Path(__file__).parent / "kernels"
 DIRECTION = 3
 MOST_LAYERS = 3
+CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
+SIDE = 16  # of a block of weights, as in heads_gpu.cl
 Layers = tuple[
     np.ndarray, ...
 ]  # of each layer W (out, in) and b (out,), from the first to the last
@@ -170,16 +172,43 @@ def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
     return layout.pack(networks)
 
 
-class Heads:
-    """Runs the heads; device buffers are kept from call to call and grow with the anchors."""
+def blocks_of_weights(layout: HeadLayout) -> np.ndarray:
+    """(jobs, 4) int32 head, layer, first input, first output: what a work-group sums up at once.
 
-    def __init__(self, device, layout: HeadLayout) -> None:
+    A layer's bias counts as one more input.
+    """
+    rows = []
+    for head, out in enumerate(layout.outs):
+        hidden = padded(layout.hidden)
+        widths = [layout.inputs, *[hidden] * layout.layers, padded(out)]
+        for layer, (takes, gives) in enumerate(pairwise(widths)):
+            rows += [
+                (head, layer, i, j)
+                for i in range(0, takes + 1, SIDE)
+                for j in range(0, gives, SIDE)
+            ]
+    return np.array(rows, np.int32)
+
+
+class Heads:
+    """Runs the heads; device buffers are kept from call to call and grow with the anchors.
+
+    form: "cpu" or "gpu", by default the device's kind.  Sums are made in another order: their
+    results agree to about 1e-6 of the largest.
+    """
+
+    def __init__(self, device, layout: HeadLayout, form: str | None = None) -> None:
         self.device, self.layout = device, layout
-        self.kernels = device.program(KERNELS / "heads.cl", **layout.defines())
+        self.form = form or device.kind
+        file = {"cpu": "heads.cl", "gpu": "heads_gpu.cl"}[self.form]
+        self.kernels = device.program(KERNELS / file, **layout.defines())
         hidden, features = padded(layout.hidden), padded(layout.features)
-        # Each chunk sums its own weight gradients.  The number is fixed a kind of device, never
-        # taken from the cores: the order of additions, so every bit, would depend on it.
-        self.chunks = 16 if device.kind == "cpu" else 512
+        # Each chunk sums its own weight gradients.  The number is fixed a form, never taken from
+        # the cores: the order of additions, so every bit, would depend on it.
+        self.chunks = CHUNKS[self.form]
+        if self.form == "gpu":
+            blocks = blocks_of_weights(layout)
+            self.groups, self.blocks = len(blocks) * self.chunks, device.upload(blocks)
         self.control = device.zeros(layout.control)
         self.bias = device.empty(5 * hidden)
         self.first_t = device.empty(5 * hidden * features)
@@ -194,6 +223,7 @@ class Heads:
             return
         device, layout, self.count = self.device, self.layout, count
         self.hidden = device.empty((count, 5, layout.layers, padded(layout.hidden)))
+        self.grad_units = device.empty(self.hidden.shape) if self.form == "gpu" else None
         self.raw = device.empty((count, layout.raw_at[-1]))
         self.grad_features = device.empty((count, padded(layout.features)))
 
@@ -207,20 +237,17 @@ class Heads:
             self.kernels["prepare_weights"], 5 * padded(layout.hidden), 8,
             weights, self.control, self.bias, self.first_t, self.middle_t, self.second_t,
         )  # fmt: skip
+        items, group = ((self.count + 3) // 4, 1) if self.form == "cpu" else (5 * self.count, 64)
         self.device.launch(
-            self.kernels["heads_forward"], (self.count + 3) // 4, 1,
+            self.kernels["heads_forward"], items, group,
             self.count, *self.eye, weights, self.bias, anchors, features, self.hidden, self.raw,
         )  # fmt: skip
         return self.raw
 
     def backward(self, weights, anchors, features, grad_raw, grad_anchors):
         """(grad_weights, grad_features) of the last `forward`; adds to grad_anchors in place."""
-        self.device.launch(
-            self.kernels["heads_backward"], self.chunks, 1,
-            self.count, self.chunks, *self.eye, weights, self.first_t, self.middle_t,
-            self.second_t, anchors, features, self.hidden, grad_raw, self.grad_chunks,
-            self.grad_features, grad_anchors,
-        )  # fmt: skip
+        flow = {"cpu": self._chunks_backward, "gpu": self._blocks_backward}[self.form]
+        flow(weights, anchors, features, grad_raw, grad_anchors)
         self.device.launch(
             self.kernels["sum_chunks"], self.layout.weights_at[-1], 64, self.chunks,
             self.grad_chunks, self.grad_weights,
@@ -230,3 +257,30 @@ class Heads:
             self.control, self.grad_weights,
         )  # fmt: skip
         return self.grad_weights, self.grad_features
+
+    def _chunks_backward(self, weights, anchors, features, grad_raw, grad_anchors) -> None:
+        """A work-item takes a chunk of anchors through everything."""
+        self.device.launch(
+            self.kernels["heads_backward"], self.chunks, 1,
+            self.count, self.chunks, *self.eye, weights, self.first_t, self.middle_t,
+            self.second_t, anchors, features, self.hidden, grad_raw, self.grad_chunks,
+            self.grad_features, grad_anchors,
+        )  # fmt: skip
+
+    def _blocks_backward(self, weights, anchors, features, grad_raw, grad_anchors) -> None:
+        """Units first, an item an anchor and head; then a group a block of weights and a chunk."""
+        kernels, launch = self.kernels, self.device.launch
+        launch(
+            kernels["units_gradient"], 5 * self.count, 64,
+            self.count, *self.eye, weights, self.middle_t, self.second_t, anchors, self.hidden,
+            grad_raw, self.grad_units, grad_anchors,
+        )  # fmt: skip
+        launch(
+            kernels["features_gradient"], self.grad_features.size, 64,
+            self.count, self.first_t, self.grad_units, self.grad_features,
+        )  # fmt: skip
+        launch(
+            kernels["weights_gradient"], self.groups * SIDE * SIDE, SIDE * SIDE,
+            self.count, self.chunks, *self.eye, self.blocks, anchors, features, self.hidden,
+            self.grad_units, grad_raw, self.grad_chunks,
+        )  # fmt: skip
