@@ -20,13 +20,28 @@ PAPER_ITERATIONS = 30000  # of 3DGS, and of the shape-shifting paper
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What a run of several models left behind."""
+class Run:
+    """What the training of one model left behind."""
 
-    files: dict[str, Path]  # of every modality that was trained
-    seconds: float  # of training, all models together
+    file: Path
+    seconds: float  # of training alone
     steps: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the training of a model a modality left behind."""
+
+    runs: dict[str, Run]  # of every modality that was trained
     interrupted: bool
+
+    @property
+    def seconds(self) -> float:
+        return sum(run.seconds for run in self.runs.values())
+
+    @property
+    def steps(self) -> int:
+        return sum(run.steps for run in self.runs.values())
 
 
 def run_baseline(options: Options) -> int:
@@ -93,19 +108,19 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
 
     refuse_other_folder(out)  # now, not after the training
     settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
-    layers, seconds, steps, interrupted = [], 0.0, 0, False
-    for part in parts:
+    layers, runs, interrupted = [], {}, False
+    for number, part in enumerate(parts):
         trainer = PlainTrainer(device, part, settings)
         say(describe_plain(trainer))
         interrupted = train(trainer, None)
         layers.append((trainer.stop, trainer.splats()))
-        seconds, steps = seconds + trainer.elapsed, steps + trainer.iteration
+        file = out / layer_name(number, trainer.stop)
+        runs[trainer.stop.name] = Run(file, trainer.elapsed, trainer.iteration)
         say(told(trainer, trainer.count))
         if interrupted:
             break
     write_layer_list(layers, out)
-    files = {stop.name: out / layer_name(i, stop) for i, (stop, _) in enumerate(layers)}
-    return Outcome(files, seconds, steps, interrupted)
+    return Outcome(runs, interrupted)
 
 
 def train_separate(device, capture: "Capture", settings: "TrainSettings", out: Path) -> Outcome:
@@ -124,18 +139,17 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
     for file in files.values():
         refuse_foreign(file)  # now, not after the training
     settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
-    done, seconds, steps, interrupted = {}, 0.0, 0, False
+    runs, interrupted = {}, False
     for part in parts:
         trainer, name = Trainer(device, part, settings), part.stops[0].name
         say(describe(trainer))
         interrupted = train(trainer, None)
         write_package(trainer.model(), files[name])
-        done[name] = files[name]
-        seconds, steps = seconds + trainer.elapsed, steps + trainer.iteration
+        runs[name] = Run(files[name], trainer.elapsed, trainer.iteration)
         say(told(trainer, trainer.anchors_count))
         if interrupted:
             break
-    return Outcome(done, seconds, steps, interrupted)
+    return Outcome(runs, interrupted)
 
 
 def each_modality(capture: "Capture", one_modality) -> list["Capture"]:
@@ -161,7 +175,7 @@ def told(trainer, count: int) -> str:
 
 
 def word_on(outcome: Outcome, capture: "Capture", out: Path) -> str:
-    missing = [s.name for s in capture.stops if s.name not in outcome.files]
+    missing = [s.name for s in capture.stops if s.name not in outcome.runs]
     if outcome.interrupted:
         rest = f"; not trained: {', '.join(missing)}" if missing else ""
         return f"{out}: interrupted after {outcome.seconds:.1f} s{rest}"

@@ -174,8 +174,14 @@ class PlainTrainer:
             self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
             self.adam.set_rates(self.all_rates())
         if self.settings.grow and GROW_FROM <= fraction <= GROW_UNTIL:
-            self.change()
+            if self.steps_to_go() >= SETTLE:
+                self.change()
         return loss, fell_back
+
+    def steps_to_go(self) -> float:
+        """How many more the budget allows, as fast as they have been."""
+        done = self.budget.fraction(self.iteration, self.elapsed)
+        return self.iteration * (1 - done) / max(done, 1e-9)
 
     def visible(self) -> float:
         """The share of all splats that the last drawing has on screen."""

@@ -49,18 +49,22 @@ class VggDistance:
 
         weight (H, W) 0..1: where it is 0 the picture is taken to be as the photo.
         """
-        height, width = photo.shape[:2]
-        if not min(height, width) >= LEAST_SIDE:
-            raise BadFile(
-                f"photos of {width}x{height} pixels are too small for VGG16, which needs "
-                f"{LEAST_SIDE} a side; leave out --vgg."
-            )
+        refuse_small(photo.shape[1], photo.shape[0])
         image = np.clip(image, 0, 1)
         if weight is not None:
             image = photo + weight[..., None] * (image - photo)
         pair = 255 * np.stack([image, photo])[..., ::-1] - MEAN_BGR
         pair = np.ascontiguousarray(pair.transpose(0, 3, 1, 2), np.float32)
         return distance_of(self.session.run(list(LAYERS), {self.input: pair}))
+
+
+def refuse_small(width: int, height: int) -> None:
+    """Raises BadFile for photos of which three halvings leave nothing."""
+    if not min(width, height) >= LEAST_SIDE:
+        raise BadFile(
+            f"photos of {width}x{height} pixels are too small for VGG16, which needs "
+            f"{LEAST_SIDE} a side; leave out --vgg."
+        )
 
 
 def opened(data: bytes, path: Path):
