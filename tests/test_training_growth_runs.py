@@ -1,6 +1,10 @@
 """Runs that grow in each of the ways, on a small capture: caps, bits, resuming, small photos."""
 
+import csv
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -86,3 +90,21 @@ def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
     assert write_package(trainer.model(), tmp_path / "a.shift") <= 0.085e6
     finite = all(np.isfinite(a).all() for a in trainer.adam.state().values())
     assert finite
+
+
+def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):
+    root, out = Path(__file__).resolve().parents[1], tmp_path / "growth.csv"
+    ways = ["none", "error each replace", "gradient coarse"]
+    program = [sys.executable, "docs/bench/growth.py", str(balls.folder), "--out", str(out)]
+    program += ["--iterations", "90", "--grow-every", "30", "--anchors", "400", "--ways", *ways]
+    subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
+    lines = out.read_text().splitlines()
+    assert lines[0].startswith("# python3 docs/bench/growth.py ")
+    rows = list(csv.DictReader(lines[2:]))
+    last = [row for row in rows if row["steps"] == "90"]
+    assert [row["way"] for row in last if row["modality"] == "mean"] == ways
+    assert {row["modality"] for row in last} == {"RGB", "Thermal", "mean"}
+    assert int(last[3]["anchors"]) > int(last[0]["anchors"])
+    for row in rows:
+        assert float(row["psnr_db"]) > 10 and int(row["package_bytes"]) > 10_000
+        assert 0 < int(row["splats"]) <= 5 * int(row["anchors"])

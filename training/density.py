@@ -46,12 +46,12 @@ class Evidence:
         """How many pulls a splat has."""
         return self.watch.stops if self.watch.each else 1
 
-    def asks(self, image, target) -> dict:
+    def asks(self, image, target) -> dict[str, object]:
         """What rasterize_backward has to sum up beside the gradients, its arguments.
 
         image: (3, H, W) drawn, target: a losses.Target; both on the device.
         """
-        wanted: dict = {"weight": True} if self.watch.seen else {}
+        wanted = {"absolute": self.watch.strategy.pull == 1, "weight": self.watch.seen}
         if self.watch.strategy.pull == 2:
             width, height = target.size
             error, masked = self.device.empty((height, width)), int(target.weight is not None)
