@@ -20,6 +20,7 @@ from scene.capture_rules import (
     spread_stops,
     stops_from,
 )
+from scene.depth_photo import depth_of
 from scene.json_values import is_number, shortened, shown, text_in
 from scene.pose import OPENCV_FROM_EYE, View
 from scene.read_points import read_points
@@ -41,6 +42,7 @@ class Shot:
     path: Path
     world_from_camera: np.ndarray  # (4, 4) OpenCV axes, the file's world
     where: str  # for messages
+    folder: Path  # where the names of its photos begin
 
 
 def read_transforms(*files: Path) -> Capture:
@@ -145,8 +147,11 @@ def shots_of(
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
             )
-        return [Shot(entry, modality, find_image(folder / file, where), matrix, where)]
-    return [Shot(entry, n, find_image(folder / n / file, where), matrix, where) for n in names]
+        return [Shot(entry, modality, find_image(folder / file, where), matrix, where, folder)]
+    return [
+        Shot(entry, n, find_image(folder / n / file, where), matrix, where, folder / n)
+        for n in names
+    ]
 
 
 def opencv_axes(entry: dict) -> bool:
@@ -187,7 +192,8 @@ def photo_of(shot: Shot, world: CaptureWorld, folder: Path) -> Photo:
         view = View.from_pinhole(world.turned(shot.world_from_camera), focal, centre, size)
     except ValueError as error:
         raise BadFile(f"{where}: {error}") from None
-    return Photo(view, shot.path, shot.modality, mask, SPLITS[split])
+    depth, unit = depth_of(entry, shot.folder, size, where)
+    return Photo(view, shot.path, shot.modality, mask, SPLITS[split], depth, unit)
 
 
 def intrinsics(entry: dict, size: tuple[int, int], where: str) -> tuple[tuple, tuple]:

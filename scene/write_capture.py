@@ -64,6 +64,9 @@ def frame(photo: Photo, folder: Path) -> dict:
     }
     if photo.mask is not None:
         out["mask_path"] = photo.mask.relative_to(folder).as_posix()
+    if photo.depth is not None:
+        out["depth_path"] = photo.depth.relative_to(folder).as_posix()
+        out["depth_unit"] = photo.depth_unit
     return out
 
 
