@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import LEAST_ALPHA, project
-from rasterizer.raster import rasterize
+from rasterizer.bin import Tiles, bin_tiles
+from rasterizer.project import LEAST_ALPHA, Projected, project
+from rasterizer.raster import Frame, rasterize
 from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
@@ -56,6 +56,13 @@ class Painter:
 
     def picture(self, view: View, background: tuple[float, float, float]) -> np.ndarray:
         """(H, W, 3) float32 of the model at the last control value."""
+        _, _, frame = self.draw(view, background)
+        return self.device.download(frame.image).transpose(1, 2, 0)
+
+    def draw(
+        self, view: View, background: tuple[float, float, float]
+    ) -> tuple[Projected, Tiles, Frame]:
+        """The model at the last control value: what was projected, its tiles, and the frame."""
         if follows_eye(self.evaluator.model):
             self._decode(view.world_from_eye.position)
         color = self.evaluator.color(self.x, view.world_from_eye.position)
@@ -63,7 +70,7 @@ class Painter:
         projected = project(self.device, *self.geometry, color, camera_of(view))
         tiles = bin_tiles(self.device, projected, view.size)
         frame = rasterize(self.device, projected, tiles, view.size, background)
-        return self.device.download(frame.image).transpose(1, 2, 0)
+        return projected, tiles, frame
 
 
 def stop_for(model: Model, capture_stop: Stop) -> Stop:
