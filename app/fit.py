@@ -33,6 +33,10 @@ class Options:
     """Steps of every training.  Default: 600."""
     seconds: float | None = None
     """Train every trial for so long instead."""
+    final_iterations: int | None = None
+    """Train the chosen model again, for so many steps.  Default: the trial's model is written."""
+    final_seconds: float | None = None
+    """The same, for so long."""
     preset: Literal["fast", "paper"] = "fast"
     """As of train: where nothing is said, the preset decides."""
     seed: int | None = None
@@ -85,7 +89,11 @@ def run(options: Options) -> int:
     if options.iterations is None and options.seconds is None:
         options = replace(options, iterations=TRIAL)
     refuse_foreign(options.out)  # now, not after the trials
-    settings, capture = settings_of(options, None), read_capture(options.capture)
+    settings, last = settings_of(options, None), None
+    if options.final_iterations is not None or options.final_seconds is not None:
+        longer = {"iterations": options.final_iterations, "seconds": options.final_seconds}
+        last = settings_of(replace(options, **longer), None)
+    capture = read_capture(options.capture)
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
 
@@ -94,7 +102,7 @@ def run(options: Options) -> int:
 
         fit = Fit(
             open_device(options.device), capture, settings, options.tolerance_db, options.seeds,
-            tell,
+            tell, last=last,
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]

@@ -70,7 +70,7 @@ def test_what_goes_without_training_changes_next_to_nothing(captures):
 
 
 def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("training.fit.Fit.__init__.__defaults__", (PARTS[-2:],))
+    monkeypatch.setattr("training.fit.Fit.__init__.__defaults__", (PARTS[-2:], None))
     options = command.Options(
         captures["shared"].folder, tmp_path / "fit.shift", tolerance_db=5.0, seeds=2,
         json=tmp_path / "fit.json", iterations=20, grow=False, anchors=90, splats_per_anchor=2,
@@ -90,6 +90,20 @@ def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkey
     assert "one splat of every anchor" in shown and "Outlines of RGB and Thermal" in shown
 
 
+def test_the_chosen_model_is_trained_once_more(captures):
+    steps = []
+    fit = Fit(
+        open_device("cpu"), captures["shared"], replace(SMALL, iterations=20), 9.0, 1,
+        lambda what, done: steps.append(what), (), replace(SMALL, iterations=50),
+    )  # fmt: skip
+    need = fit.run()
+    assert steps.count("the largest") == 20 and steps.count("the chosen model") == 50
+    assert need.settings.iterations == need.fitted.models[0].provenance["iterations"] == 50
+    assert need.full.models[0].provenance["iterations"] == 20
+    before, after = (np.mean(list(m.psnr.values())) for m in (need.full, need.fitted))
+    assert after > before + 1
+
+
 def test_too_few_photos_to_tell_are_refused(captures):
     capture = captures["shared"]
     photos = [p for p in capture.photos if p.split == "train" or "test_000" in p.path.name]
@@ -105,6 +119,12 @@ def test_a_trial_that_ends_unsettled_is_refused(captures, monkeypatch):
     monkeypatch.setattr("training.train.Trainer.settled", False)
     with pytest.raises(BadFile, match="of 2 steps ends while new anchors still settle"):
         needs(captures["shared"], (), replace(SMALL, iterations=2))
+
+
+def test_a_last_run_that_cannot_be_is_refused_before_the_trials(captures, tmp_path):
+    options = command.Options(captures["shared"].folder, tmp_path / "fit.shift", final_seconds=-1.0)
+    with pytest.raises(UsageError, match=r"seconds is -1\.0"):
+        command.run(options)
 
 
 @pytest.mark.parametrize("wrong", [{"seeds": 0}, {"tolerance_db": -1.0}, {"tolerance_db": np.nan}])

@@ -62,8 +62,12 @@ class Fit:
         seeds: int,
         tell: Tell,
         parts: tuple[Part, ...] = PARTS,
+        last: TrainSettings | None = None,
     ) -> None:
-        """Raises BadFile where the held-out photos could not tell how sure a difference is."""
+        """last: settings whose iterations and seconds the chosen model is trained for once more.
+
+        Raises BadFile where the held-out photos could not tell how sure a difference is.
+        """
         self.device, self.capture, self.tell = device, capture, tell
         self.tolerance_db, self.seeds, self.verdicts = tolerance_db, seeds, []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
@@ -78,11 +82,11 @@ class Fit:
                     "needs two to tell how sure it is; mark more with split 'test'"
                     + (" or give --seeds 2." if count else ".")
                 )
-        self.settings, self.parts = settings, parts
+        self.settings, self.parts, self.last = settings, parts, last
 
     def run(self) -> Need:
-        self.full = self.current = self.trained(self.settings, "the largest")
-        outlines = shared_outlines(self.device, self.full.models[0], self.held_out, self.stops)
+        full = self.full = self.current = self.trained(self.settings, "the largest")
+        outlines = shared_outlines(self.device, full.models[0], self.held_out, self.stops)
         for part in self.parts:
             while (fewer := part.without(self.settings, self.stops)) is not None:
                 if not self.take(part.name, self.trained(fewer, f"without {part.name}")):
@@ -90,9 +94,13 @@ class Fit:
                 self.settings = fewer
                 if not part.again:
                     break
+        if self.last is not None:  # what is cleaned is held to the one that was trained last
+            budget = {"iterations": self.last.iterations, "seconds": self.last.seconds}
+            self.settings = replace(self.settings, **budget)
+            self.full = self.current = self.trained(self.settings, "the chosen model")
         self.clean()
         return Need(
-            self.settings, self.full, self.current, tuple(self.verdicts), outlines, self.counts,
+            self.settings, full, self.current, tuple(self.verdicts), outlines, self.counts,
             self.seeds, self.tolerance_db,
         )  # fmt: skip
 
