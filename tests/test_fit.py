@@ -60,7 +60,7 @@ def test_stops_of_two_shapes_do_not(captures):
 def test_what_goes_without_training_changes_next_to_nothing(captures):
     need = needs(captures["apart"], (), tolerance=0.05)
     words = {verdict.part: verdict.word for verdict in need.verdicts}
-    assert words["features as float32, not float16"] == DROPPED
+    assert words["features as float32 instead of float16"] == DROPPED
     assert need.fitted.bytes < need.full.bytes
     saved = sum(v.bytes for v in need.verdicts if v.word == DROPPED)
     assert need.full.bytes - need.fitted.bytes == saved

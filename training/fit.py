@@ -118,8 +118,9 @@ class Fit:
         for seed in range(self.seeds):
             what = name if self.seeds == 1 else f"{name}, seed {seed + 1} of {self.seeds}"
             trainer = Trainer(
-                self.device, self.capture, replace(settings, seed=settings.seed + seed)
-            )
+                self.device, self.capture, replace(settings, seed=settings.seed + seed),
+                loaded={"train": self.photos, "test": self.held_out},
+            )  # fmt: skip
             for now in trainer.steps():
                 self.tell(what, min(now.fraction, 1.0))
             if not trainer.settled:

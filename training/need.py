@@ -14,7 +14,7 @@ from training.settings import TrainSettings
 
 SHAPE = ("offset", "scale", "rotation", "opacity")
 LEAST_HIDDEN, LEAST_FEATURES, LEAST_ANCHORS = 8, 4, 50
-DROPPED, KEPT, UNSURE = "dropped", "kept", "kept, not sure"
+DROPPED, KEPT, UNSURE = "dropped", "kept", "kept: not sure"
 
 
 @dataclass(frozen=True)

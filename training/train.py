@@ -68,15 +68,25 @@ class Trainer:
     unit = "anchors"  # what Progress counts
 
     def __init__(
-        self, device, capture: Capture, settings: TrainSettings, resume: tuple | None = None
+        self,
+        device,
+        capture: Capture,
+        settings: TrainSettings,
+        resume: tuple | None = None,
+        loaded: dict[str, list[LoadedPhoto]] | None = None,
     ) -> None:
-        """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller."""
+        """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller.
+
+        loaded: photos of the splits train and test, where they were read before.
+        """
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
         self.stops = capture.stops
-        photos = load_photos(capture, "train", self.factor, settings.masks)
-        self.held_out = load_photos(capture, "test", self.factor, settings.masks)
+        photos, self.held_out = (
+            loaded[split] if loaded else load_photos(capture, split, self.factor, settings.masks)
+            for split in ("train", "test")
+        )
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:
