@@ -40,11 +40,12 @@ class Tiles:
         device.launch(kernel, 1, 1, count, self.places, first_slot)
         return first_slot
 
-    def room(self, device: Device, columns: int) -> "Array":
+    def room(self, device: Device, first_slot: "Array", columns: int) -> "Array":
         """(count, columns) float32 for what instances leave in their slots; the others are 0."""
-        listed = int(device.view(self.starts)[self.grid[0] * self.grid[1]])
-        shape = (self.count, columns)
-        return device.empty(shape) if listed == self.count else device.zeros(shape)
+        slots, count = device.empty((self.count, columns)), self.places.shape[0]
+        kernel = device.program(KERNELS / "sum_slots.cl")["clear_boxes"]
+        device.launch(kernel, count, 64, count, columns, self.places, first_slot, slots)
+        return slots
 
 
 def bin_tiles(

@@ -136,7 +136,8 @@ def rasterize_backward(
     """
     count = projected.depth.shape[0]
     _, height, width = frame.image.shape
-    first_slot, slots = tiles.slots(device), tiles.room(device, RECORD)
+    first_slot = tiles.slots(device)
+    slots = tiles.room(device, first_slot, RECORD)
     file, _, group = FORMS[form or device.kind]
     defines = {"ABSOLUTE": 1} if absolute and error is None else {}
     defines |= {"SHARE": 1} if error is not None else {}

@@ -124,7 +124,7 @@ def rasterize_depth_backward(
     count, frame = projected.depth.shape[0], drawn.frame
     _, height, width = frame.image.shape
     first_slot = tiles.slots(device)
-    slots, depth_slots = (tiles.room(device, n) for n in (RECORD, SURFACE))
+    slots, depth_slots = (tiles.room(device, first_slot, n) for n in (RECORD, SURFACE))
     file, _, group = FORMS[form or device.kind]
     defines = WITH_DEPTH | ({"ABSOLUTE": 1} if absolute and error is None else {})
     defines |= {"SHARE": 1} if error is not None else {}
