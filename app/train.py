@@ -96,6 +96,8 @@ class Options:
     """lambda_alpha of equation 9."""
     scale_share: float | None = None
     """lambda_S of equation 9."""
+    depth_share: float | None = None
+    """Weight of the depth loss where photos have depth photos; 0: they are not used."""
     rate_scale: float | None = None
     """Times every learning rate."""
     downscale: int | None = None

@@ -57,8 +57,7 @@ def depth_size(path: Path) -> tuple[int, int]:
 def load_depth(photo: Photo, size: tuple[int, int] | None = None) -> np.ndarray:
     """(H, W) float32 metres along the view of a photo that has depth; 0 where none is known.
 
-    `size` (width, height): the depth at each new pixel's centre.  Means would put points between a
-    thing and what is behind it.
+    size: (width, height) to have it in; None: as it is.
     """
     path = photo.depth
     if path.suffix.lower() == ".npy":
@@ -71,13 +70,21 @@ def load_depth(photo: Photo, size: tuple[int, int] | None = None) -> np.ndarray:
     values = values.astype(np.float32)
     known = (values > 0) & (values <= FARTHEST)  # NaN is not
     values[~known] = 0
-    if size is None or size == values.shape[::-1]:
-        return values
+    return values if size is None else at_centres(values, size)
+
+
+def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(H, W) in another size (width, height): what lies at each new pixel's centre.
+
+    Means would put points between a thing and what is behind it.
+    """
+    if size == depth.shape[::-1]:
+        return depth
     rows, columns = (
         np.minimum(((np.arange(new) + 0.5) * old / new).astype(int), old - 1)
-        for new, old in zip(size[::-1], values.shape, strict=True)
+        for new, old in zip(size[::-1], depth.shape, strict=True)
     )
-    return values[np.ix_(rows, columns)]
+    return depth[np.ix_(rows, columns)]
 
 
 def _integers(path: Path) -> np.ndarray:

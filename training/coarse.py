@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scene.depth_photo import at_centres
 from scene.photo import shrink
 from training.photos import LoadedPhoto
 
@@ -24,7 +25,9 @@ def smaller(photo: LoadedPhoto, factor: int) -> LoadedPhoto:
     weight = photo.weight
     if weight is not None:
         weight = shrink(weight[..., None], size)[..., 0]
-    return replace(photo, view=photo.view.resized(size), rgba=rgba, weight=weight)
+    depth = None if photo.depth is None else at_centres(photo.depth, size)
+    view = photo.view.resized(size)
+    return replace(photo, view=view, rgba=rgba, weight=weight, depth=depth)
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,7 @@ class TrainSettings:
     prune_views: float = 0.0  # ... and one that a smaller share of all steps had on screen
     ssim_share: float = 0.2  # of the image loss; eq. 8 read literally says 0.8, which is worse
     opacity_share: float = 0.0  # lambda_alpha of eq. 9; the paper says 0.01
+    depth_share: float = 0.1  # of the depth loss, beside the image's, where photos have depth
     scale_share: float = 0.0  # lambda_S of eq. 9; the paper says 1e-9
     downscale: int | None = None  # of the photos; None: until neither side exceeds 640 pixels
     coarse: int = 1  # the sides are divided by this at the start: 1, 2, 4, 8; halved step by step
@@ -74,6 +75,7 @@ class TrainSettings:
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
             "hidden": 1, "control": 2, "anchors": 1, "max_anchors": 1, "grow_every": 1,
             "downscale": 1, "ssim_share": 0, "opacity_share": 0, "scale_share": 0,
+            "depth_share": 0,
             "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,
             "coarse_until": 0, "grow_replace": 0, "prune_opacity": 0, "prune_weight": 0,
             "prune_views": 0,

@@ -217,10 +217,13 @@ class Trainer:
         settings = self.settings
         target = self.targets.target(photo, background)
         self.evidence.stop = [s.name for s in self.stops].index(photo.modality)
-        self.drawing = self.step.draw(photo.view, self.control(photo.modality), background)
+        depth = self.targets.wish(photo, settings.depth_share)
+        self.drawing = self.step.draw(
+            photo.view, self.control(photo.modality), background, depth is not None
+        )
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
-            settings.opacity_share, settings.scale_share, self.evidence,
+            settings.opacity_share, settings.scale_share, self.evidence, depth,
         )  # fmt: skip
 
     def one_step(self) -> tuple[float | None, bool]:
