@@ -13,7 +13,7 @@ from runtime_models.read_layer_list import LIST
 from runtime_models.read_scene import describe, read_model
 from runtime_models.write_layer_list import layer_name, write_layer_list
 from training.evaluate import evaluate_model
-from training.plain import PlainTrainer, one_modality, seen_colors
+from training.plain import PlainTrainer, first_scales, one_modality, seen_colors
 from training.plain_density import (
     AFTER_RESET,
     SMALLER,
@@ -141,6 +141,15 @@ def test_the_extent_is_that_of_the_cameras(balls):
     far = np.linalg.norm(eyes - eyes.mean(0), axis=1).max()
     assert extent_of(views) == pytest.approx(1.1 * far)
     assert extent_of(views[:1]) > 0
+
+
+def test_first_scales_are_the_distances_to_the_nearest():
+    """Of a line of points 1, 2, 4 ... apart, by hand; and of so few that there are no three."""
+    points = np.zeros((5, 3))
+    points[:, 1] = [0, 1, 3, 7, 15]
+    wanted = [[1, 3, 7], [1, 2, 6], [2, 3, 4], [4, 6, 7], [8, 12, 14]]
+    np.testing.assert_allclose(first_scales(points), np.sqrt(np.mean(np.square(wanted), axis=1)))
+    assert first_scales(points[:2]).tolist() == [1, 1] and first_scales(points[:1]).tolist() == [1]
 
 
 def test_first_colours_are_the_photos(device, balls):

@@ -29,7 +29,7 @@ from training.train import PACE_STEPS, SETTLE, Progress
 
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
 DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
-UNIT = 0.5  # cells: the first scale
+NEIGHBOURS = 3  # whose distance is the first scale, as 3DGS
 FIRST_OPACITY = 0.1
 COLOR_PHOTOS = 24  # that the first colours are taken from
 
@@ -56,10 +56,21 @@ def seen_colors(points: np.ndarray, photos: list[LoadedPhoto], background: Color
     return np.where(times[:, None] > 0, total / np.maximum(times, 1)[:, None], 0.5)
 
 
-def group_rates(rates: PlainRates, voxel: float) -> dict[str, np.ndarray]:
+def first_scales(points: np.ndarray) -> np.ndarray:
+    """(P,) metres: root mean square distance to the nearest neighbours; of a lone point, 1."""
+    from scipy.spatial import cKDTree
+
+    near = min(NEIGHBOURS, len(points) - 1)
+    if near < 1:
+        return np.ones(len(points))
+    distance, _ = cKDTree(points).query(points, k=near + 1)
+    return np.sqrt((distance[:, 1:] ** 2).mean(axis=1))
+
+
+def group_rates(rates: PlainRates, extent: float) -> dict[str, np.ndarray]:
     """Rates as the optimiser takes them: one a group."""
     each = {name: getattr(rates, name) for name in PlainRates.__dataclass_fields__}
-    each["means"] *= voxel
+    each["means"] *= extent
     return {name: np.array([rate], np.float32) for name, rate in each.items() if name != "decay"}
 
 
@@ -98,7 +109,7 @@ class PlainTrainer:
         colors = seen_colors(means, photos, self.schedule.background or BLACK)
         values = {
             "means": means,
-            "scales": np.full((count, 3), np.log(UNIT * self.voxel)),
+            "scales": np.log(first_scales(means))[:, None].repeat(3, axis=1),
             "wxyz": np.tile([1.0, 0, 0, 0], (count, 1)),
             "opacity": np.full(count, np.log(FIRST_OPACITY / (1 - FIRST_OPACITY))),
             "base": (colors - 0.5) / C0,
@@ -119,7 +130,7 @@ class PlainTrainer:
         return self.settings.rates(self.run_length or 0)
 
     def all_rates(self) -> dict[str, np.ndarray]:
-        return group_rates(self.rates(), self.voxel)
+        return group_rates(self.rates(), self.extent)
 
     def steps(self) -> Iterator[Progress]:
         """Train until the budget is used; yields after every step."""
