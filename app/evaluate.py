@@ -70,10 +70,14 @@ def print_table(result: dict) -> None:
     from rich.table import Table
 
     vgg = ["VGG distance"] if "vgg_file" in result else []
-    table = Table("modality", "PSNR dB", "SSIM", *vgg, "photos", "splats alive")
+    depth = any("depth_error" in score for score in result["modalities"].values())
+    more = [*vgg, *(["depth error %"] if depth else [])]
+    table = Table("modality", "PSNR dB", "SSIM", *more, "photos", "splats alive")
     for name, score in result["modalities"].items():
         row = [f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}"]
         row += [f"{score['vgg_distance']:.4f}"] if vgg else []
+        if depth:
+            row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")
         table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
     console = Console(file=sys.stderr)
     console.print(table)

@@ -10,12 +10,13 @@ import numpy as np
 from rasterizer.bin import Tiles, bin_tiles
 from rasterizer.project import LEAST_ALPHA, Projected, project
 from rasterizer.raster import Frame, rasterize
+from rasterizer.surface import rasterize_depth, surface
 from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
 from training.metrics import psnr, ssim
-from training.photos import BLACK, choose_downscale, load_photos
+from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from training.schedule import choose_background
 from training.step import camera_of
 
@@ -27,6 +28,7 @@ class Score:
     photos: int
     alive: int  # splats of this stop that are not absent
     vgg: float | None = None  # training.vgg_distance; None: not measured
+    depth_error: float | None = None  # of photos with depth: Painter.depth_error
 
 
 class Painter:
@@ -72,6 +74,23 @@ class Painter:
         frame = rasterize(self.device, projected, tiles, view.size, background)
         return projected, tiles, frame
 
+    def depth_error(self, photo: LoadedPhoto) -> float | None:
+        """Mean |depth - d| / d over the depths d that a photo knows; None where it knows none.
+
+        Where less than half of a pixel is covered there is no depth: that counts as 1.
+        """
+        known = None if photo.depth is None else photo.depth > 0
+        if known is None or not known.any():
+            return None
+        view, device = photo.view, self.device
+        projected, tiles, _ = self.draw(view, BLACK)
+        surfaces = surface(device, *self.geometry[:3], camera_of(view), projected)
+        drawn = rasterize_depth(device, projected, tiles, surfaces, view.size)
+        coverage = 1 - device.download(drawn.frame.transmittance)
+        depth = device.download(drawn.metres) / np.maximum(coverage, 1e-6)
+        away = np.abs(depth[known] - photo.depth[known]) / photo.depth[known]
+        return float(np.where(coverage[known] >= 0.5, away, 1).mean())
+
 
 def stop_for(model: Model, capture_stop: Stop) -> Stop:
     """The model's stop of the same name as the capture's.  Raises BadFile."""
@@ -108,11 +127,9 @@ def evaluate_model(
     painter, scores = Painter(device, model), {}
     for stop in capture.stops:
         alive = painter.set_control(stop_for(model, stop).x)
-        pairs = [
-            (painter.picture(p.view, behind), p.over(behind), p.weight)
-            for p in photos
-            if p.modality == stop.name
-        ]
+        mine = [p for p in photos if p.modality == stop.name]
+        pairs = [(painter.picture(p.view, behind), p.over(behind), p.weight) for p in mine]
+        errors = [e for p in mine if (e := painter.depth_error(p)) is not None]
         if pairs:
             scores[stop.name] = Score(
                 float(np.mean([psnr(*pair) for pair in pairs])),
@@ -120,6 +137,7 @@ def evaluate_model(
                 len(pairs),
                 alive,
                 None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
+                float(np.mean(errors)) if errors else None,
             )
     return scores
 
@@ -137,6 +155,7 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
         "modalities": {
             name: {"psnr_db": round(s.psnr_db, 4), "ssim": round(s.ssim, 5), "photos": s.photos}
             | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})
+            | ({} if s.depth_error is None else {"depth_error": round(s.depth_error, 5)})
             for name, s in scores.items()
         },
         "alive": {name: s.alive for name, s in scores.items()},
