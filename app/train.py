@@ -100,6 +100,10 @@ class Options:
     """Weight of the depth loss where photos have depth photos; 0: they are not used."""
     rate_scale: float | None = None
     """Times every learning rate."""
+    rise: int | None = None
+    """Steps over which the networks' rates rise, for scenes of which all would vanish at once."""
+    revive: float | None = None
+    """Weight of a pull on splats that are absent, for example 0.01."""
     downscale: int | None = None
     """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
     coarse: int | None = None

@@ -68,6 +68,8 @@ class TrainSettings:
     masks: str = "object"  # object: nothing outside it | valid: unknown outside it | ignore
     background: str = "auto"  # auto: the capture's, else random where photos have alpha | black ...
     rate_scale: float = 1.0  # times every learning rate
+    rise: int = 0  # steps over which the networks' rates rise; after a fall it is 200
+    revive: float = 0.0  # lambda of a pull on absent splats: mean max(0.02 - opacity, 0)
 
     def __post_init__(self) -> None:
         """Raises ValueError naming the first number that cannot be."""
@@ -75,7 +77,7 @@ class TrainSettings:
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
             "hidden": 1, "control": 2, "anchors": 1, "max_anchors": 1, "grow_every": 1,
             "downscale": 1, "ssim_share": 0, "opacity_share": 0, "scale_share": 0,
-            "depth_share": 0,
+            "depth_share": 0, "rise": 0, "revive": 0,
             "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,
             "coarse_until": 0, "grow_replace": 0, "prune_opacity": 0, "prune_weight": 0,
             "prune_views": 0,

@@ -24,6 +24,7 @@ from training.gaussians import Activation, Gaussians
 from training.losses import ImageLoss, Target, regularise
 from training.networks import HeadLayout, Heads
 from training.optimizer import Adam
+from training.rise import draw_up
 
 Color = tuple[float, float, float]
 
@@ -108,6 +109,7 @@ class Step:
         scale_share: float = 0.0,
         evidence: Evidence | None = None,
         depth: DepthWish | None = None,
+        revive: float = 0.0,
     ) -> dict[str, object]:
         """Gradients of the loss by weights, anchors and features, as the optimiser names them."""
         device, adam = self.device, self.adam
@@ -144,6 +146,8 @@ class Step:
         with self.timed("heads backward"):
             if opacity_share or scale_share:
                 regularise(device, drawing.splats, grad, opacity_share, scale_share)
+            if revive:
+                draw_up(device, drawing.splats, grad, revive)
             grad_raw, grad_anchors = self.activation.backward(self.heads.raw, grad)
             weights, features = self.heads.backward(
                 adam["weights"], adam["anchors"], adam["features"], grad_raw, grad_anchors

@@ -27,6 +27,7 @@ from training.photos import (
     choose_downscale,
     load_photos,
 )
+from training.rise import Rise, after_fall
 from training.schedule import Budget, Schedule, choose_background
 from training.settings import Rates, TrainSettings
 from training.step import Color, Step
@@ -104,6 +105,7 @@ class Trainer:
         )  # fmt: skip
         self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
         self.targets, self.photo_factor = Targets(device), 1
+        self.rise = Rise(settings.rise, 0, settings.revive)
         self.contrast: dict[tuple, float] = {}
         if resume is None:
             self.start(photos)
@@ -142,6 +144,7 @@ class Trainer:
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
         self.grown_at, self.rate_scale = notes["grown_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
+        self.rise = Rise(*notes.get("rise", ()))
         values = {n: state[f"{n}.value"] for n in ("weights", "anchors", "features")}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
@@ -155,6 +158,7 @@ class Trainer:
             "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
             "run_length": self.run_length, "first_loss": self.guard.first_loss,
             "settings": self.settings.as_dict(),
+            "rise": [self.rise.steps, self.rise.since, self.rise.pull],
         }  # fmt: skip
         return self.adam.state() | self.evidence.state(), notes
 
@@ -171,7 +175,8 @@ class Trainer:
         return self.settings.rates(self.run_length or 0)
 
     def all_rates(self) -> dict[str, np.ndarray]:
-        return parameter_rates(self.layout, self.rates(), self.voxel)
+        rates = parameter_rates(self.layout, self.rates(), self.voxel)
+        return self.rise.rates(rates, self.iteration)
 
     def control(self, modality: str) -> np.ndarray:
         x = next(s.x for s in self.stops if s.name == modality)
@@ -224,6 +229,7 @@ class Trainer:
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
             settings.opacity_share, settings.scale_share, self.evidence, depth,
+            self.rise.pull,
         )  # fmt: skip
 
     def one_step(self) -> tuple[float | None, bool]:
@@ -232,6 +238,8 @@ class Trainer:
         background = self.schedule.background_of(self.iteration, photo)
         grads = self.learn(photo, background)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
+        if self.rise.going(self.iteration):
+            self.adam.set_rates(self.all_rates())
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
         self.iteration += 1
         loss, fell_back = None, False
@@ -274,7 +282,9 @@ class Trainer:
                 self.guard.remember(self.adam.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
-        self.adam.load(self.guard.fall_back())
+        self.rise = after_fall(self.iteration, self.rate_scale / 2, self.rise)
+        looks = self.rise.steps if self.rise.since == self.iteration else 0
+        self.adam.load(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
         self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
         self.rate_scale /= 2
         return True
