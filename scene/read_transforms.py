@@ -14,11 +14,13 @@ from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
+    counts_from,
     image_size,
     rigid,
     split_every_8th,
     spread_stops,
     stops_from,
+    with_counts,
 )
 from scene.depth_photo import depth_of
 from scene.json_values import is_number, shortened, shown, text_in
@@ -63,6 +65,7 @@ def read_transforms(*files: Path) -> Capture:
         where,
     )
     photos = [photo_of(shot, world, folder) for shot in shots]
+    photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors = None, None
