@@ -234,6 +234,16 @@ def test_networks_that_cannot_be_are_refused(layers, fixed, sentence):
         HeadLayout(layers=layers, fixed=fixed)
 
 
+def test_rates_shrink_behind_wide_layers_and_between_layers():
+    for plain in (HeadLayout(), HeadLayout(hidden=8), HeadLayout(fixed=HEADS)):
+        assert (plain.rate_shares() == 1).all()
+    layout = HeadLayout(splats=2, hidden=64, layers=3)
+    shares = layout.unpack(layout.rate_shares())
+    for name in HEADS:
+        found = [np.unique(array).tolist() for array in shares[name]]
+        assert found == [[1], [1], [0.125], [0.25], [0.125], [0.25], [0.5], [1]]
+
+
 @pytest.mark.parametrize("layers", [1, 3])
 def test_what_a_head_does_not_see_changes_no_other_first_weight(layers):
     whole = HeadLayout(splats=3, layers=layers)

@@ -13,9 +13,8 @@ DIRECTION = 3
 MOST_LAYERS = 3
 CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
-Layers = tuple[
-    np.ndarray, ...
-]  # of each layer W (out, in) and b (out,), from the first to the last
+RATED = 32  # hidden units of the networks for which the learning rates were chosen
+Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
 def padded(width: int) -> int:
@@ -102,6 +101,22 @@ class HeadLayout:
             views.append(flat[at + takes * gives : at + (takes + 1) * gives])
             at += (takes + 1) * gives
         return tuple(views)
+
+    def rate_shares(self) -> np.ndarray:
+        """(weights,) float32: what part of a head's learning rate each of its weights takes.
+
+        Rates are chosen for one hidden layer of RATED units.  Steps of Adam do not shrink where
+        more inputs add up, so weights behind wider layers take smaller ones; middle layers take
+        a half or a quarter, since a step moves all that lies between two others.
+        """
+        shares = np.ones(self.weights_at[-1], np.float32)
+        for head in range(len(HEADS)):
+            views = self.parts(shares, head)
+            for weight in views[2::2]:
+                weight *= min(1.0, RATED / self.hidden)
+            for view in views[2:-2]:
+                view *= 0.5 ** (self.layers - 1)
+        return shares
 
     def first_rows(self, name: str) -> list[int]:
         """Rows of the device's first layer in the order of the exported network's inputs."""

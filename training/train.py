@@ -57,7 +57,7 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
     for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
         flat[start:stop] = rate
     return {
-        "weights": flat,
+        "weights": flat * layout.rate_shares(),
         "anchors": np.array([rates.anchor * voxel], np.float32),
         "features": np.array([rates.feature], np.float32),
     }
