@@ -1,7 +1,12 @@
 """launch.py table, train --model splats and --separate: a small comparison from end to end."""
 
 import csv
+import importlib.util
+import os
+import signal
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +20,11 @@ from app.train_baselines import Run, plain_settings, share_of
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
 from tests.test_vgg_distance import write_small
+from training.plain import PlainTrainer
 from training.plain_settings import PlainSettings
 from training.settings import TrainSettings
 from training.synthetic.balls import make_balls
+from training.train import Trainer
 
 SMALL = {"anchors": 300, "max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
 
@@ -199,3 +206,47 @@ def test_options_of_another_kind_of_model_are_refused(balls, tmp_path):
     assert settings.iterations == 30000 and settings.sh_degree == 0
     assert plain_settings(replace(asked, iterations=None, seconds=5.0)).iterations is None
     assert plain_settings(replace(asked, seconds=5.0)).iterations == 2
+
+
+@pytest.mark.parametrize(("kind", "trainer"), [("splats", PlainTrainer), ("anchors", Trainer)])
+def test_ctrl_c_keeps_what_was_trained(balls, tmp_path, monkeypatch, capsys, kind, trainer):
+    step = trainer.one_step
+
+    def interrupted(self):
+        if self.iteration == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        return step(self)
+
+    monkeypatch.setattr(trainer, "one_step", interrupted)
+    asked = TrainOptions(
+        balls.folder, tmp_path / "out", model=kind, separate=kind == "anchors", iterations=4000,
+        grow=False, device="cpu", **({"splats": 300} if kind == "splats" else {"anchors": 100}),
+    )  # fmt: skip
+    assert run_training(asked) == 130
+    assert "interrupted" in (told := capsys.readouterr().err) and "not trained: Thermal" in told
+    path = tmp_path / "out" if kind == "splats" else tmp_path / "out" / "0_RGB.shift"
+    assert [stop.name for stop in read_model(path).stops] == ["RGB"]
+    table = Options(balls.folder, tmp_path / "t", iterations=4000, methods=("splats",), splats=300)
+    if kind == "splats":
+        assert run(table) == 130  # no row of half a method
+        assert not (tmp_path / "t" / "table.csv").exists()
+
+
+def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
+    """docs/bench/baselines.py at its smallest: budgets, sizes, and nothing is run twice."""
+    path = Path(__file__).resolve().parents[1] / "docs" / "bench" / "baselines.py"
+    spec = importlib.util.spec_from_file_location("baselines", path)
+    program = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(program)
+    words = [str(balls.folder), "--seconds", "0.3", "--sizes", "0.02", "--downscale", "2"]
+    words += ["--out", str(tmp_path / "work"), "--csv", str(tmp_path / "rows.csv")]
+    monkeypatch.setattr(program, "caps", lambda size: {"anchors": 60, "splats": round(99 * size)})
+    monkeypatch.setattr(sys, "argv", ["baselines.py", *words])
+    assert program.main() == 0
+    lines = (tmp_path / "rows.csv").read_text().splitlines()
+    assert lines[0].startswith(f"# python3 docs/bench/baselines.py {balls.folder.name} --seconds")
+    rows = list(csv.DictReader(lines[2:]))
+    assert len(rows) == 3 * 3 + 2 * 3 and {row["size"] for row in rows} == {"1.0", "0.02"}
+    assert program.main() == 0
+    assert (tmp_path / "rows.csv").read_text().splitlines() == lines
+    assert program.plan([60, 9], [1, 0.1])[-1] == (60, 0.1, ("joint", "splats"))
