@@ -13,6 +13,7 @@ spreads over all of them.
 
 import argparse
 import csv
+import shlex
 import sys
 import tempfile
 import time
@@ -28,6 +29,7 @@ from rasterizer.device import open_device  # noqa: E402
 from rasterizer.project import LEAST_ALPHA  # noqa: E402
 from runtime_models.write_package import package_files, zip_files  # noqa: E402
 from scene.read_capture import read_capture  # noqa: E402
+from training.photos import choose_downscale, load_photos  # noqa: E402
 from training.settings import TrainSettings  # noqa: E402
 from training.train import Trainer  # noqa: E402
 
@@ -52,7 +54,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def main() -> None:
+def asked() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("captures", nargs="+")
     parser.add_argument("--out", type=Path, required=True)
@@ -69,6 +71,11 @@ def main() -> None:
     options = parser.parse_args()
     if options.seconds is None and options.iterations is None:
         parser.error("a run needs an end: give --seconds or --iterations")
+    return options
+
+
+def main() -> None:
+    options = asked()
     settings = TrainSettings(
         iterations=options.iterations, seconds=options.seconds, anchors=options.anchors,
         max_anchors=options.max_anchors, max_mb=options.max_mb, downscale=options.downscale,
@@ -76,16 +83,22 @@ def main() -> None:
     )  # fmt: skip
     device = open_device()
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 docs/bench/growth.py {' '.join(sys.argv[1:])}\n")
+        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
+        file.write(f"# python3 docs/bench/growth.py {shlex.join(words)}\n")
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         rows.writeheader()
         for name in options.captures:
             capture = read_capture(made(name, Path(folder), options.size))
+            factor = options.downscale or choose_downscale(capture.photos)
+            photos = {
+                split: load_photos(capture, split, factor, settings.masks)
+                for split in ("train", "test")
+            }
             for seed in options.seeds:
                 for way in options.ways:
-                    asked = replace(settings, seed=seed, **WAYS[way])
-                    for row in measured(Trainer(device, capture, asked)):
+                    changed = replace(settings, seed=seed, **WAYS[way])
+                    for row in measured(Trainer(device, capture, changed, loaded=photos)):
                         rows.writerow({"capture": Path(name).name, "way": way, "seed": seed} | row)
                     file.flush()
 
