@@ -156,7 +156,7 @@ class Fit:
         for more, storage in pairwise(FEATURES):
             now = self.current
             tried = self.measured(list(now.models), storage, now.train_s)
-            if not self.take(f"features as {more}, not {storage}", tried):
+            if not self.take(f"features as {more} instead of {storage}", tried):
                 break
 
     def try_models(self, part: str, models: list[AnchorModel]) -> bool:
