@@ -64,6 +64,8 @@ class Options:
     grow_threshold: float | None = None
     """Of what draws them: smaller grows more.  gradient: 2e-4, absgrad: 6e-4, error: 1.2 times the
     mean share."""
+    grow_grids: int | None = None
+    """Grids that new anchors fill: 1 a voxel, 2 also half a voxel, 3 also a quarter."""
     grow_each: bool | None = None
     """Grow at each modality by what its own photos say, not by the mean over all."""
     grow_replace: float | None = None

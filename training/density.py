@@ -7,7 +7,7 @@ import numpy as np
 from training.density_strategy import STRATEGIES, Strategy
 from training.networks import KERNELS, HeadLayout
 
-LEVELS = ((1.0, 1.0), (0.5, 2.0))  # (voxels of the grid, times the threshold)
+GRIDS = 2  # that newcomers fill: of a voxel, half a voxel at twice the threshold, a quarter ...
 LEAST_VIEWS = 10  # steps in which a splat must have been on screen to count
 LEAST_STEPS = 50  # before an anchor can be given up
 AXIS_BITS = 21  # of a grid key
@@ -136,6 +136,7 @@ def newcomers(
     voxel: float,
     threshold: float,
     relative: bool = False,
+    grids: int = GRIDS,
 ) -> Newcomers:
     """New anchors at free cells under splats with a large pull, largest first in each grid."""
     splats_per_anchor = len(gradients[0]) // max(len(anchors), 1)
@@ -145,11 +146,11 @@ def newcomers(
     for stop, mean in enumerate(means):
         pull, counts = pulls(gradients[stop if len(gradients) > 1 else 0], relative)
         eligible = counts & finite
-        for level, times in LEVELS:
+        for times in (2.0**level for level in range(grids)):
             candidates = np.flatnonzero(eligible & (pull > threshold * times))
             if not len(candidates):
                 continue
-            cell = voxel * level
+            cell = voxel / times
             taken = np.concatenate([anchors, found])
             # a multiple of the voxel, so that the nodes coincide with those of the first grid
             low = np.minimum(mean[candidates].min(0), taken.min(0))

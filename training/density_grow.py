@@ -58,7 +58,9 @@ def change(
     known, strategy = evidence.state(), evidence.watch.strategy
     threshold = settings.grow_threshold or strategy.threshold
     gradients = np.split(known["evidence.gradient"], evidence.groups)
-    new = newcomers(anchors, means, gradients, voxel, threshold, strategy.relative)
+    new = newcomers(
+        anchors, means, gradients, voxel, threshold, strategy.relative, settings.grow_grids
+    )
     splats = len(means[0]) // len(anchors)
     gone = useless(known, splats, settings)
     if gone.all():

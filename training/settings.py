@@ -53,6 +53,7 @@ class TrainSettings:
     grow_every: int = 100  # iterations
     growth: str = "gradient"  # what draws newcomers: gradient | absgrad | error
     grow_threshold: float | None = None  # of what draws them; None: that of the strategy
+    grow_grids: int = 2  # that newcomers fill: of a voxel, a half, a quarter ...
     grow_each: bool = False  # at every stop by what its own photos say, not by the mean over all
     grow_replace: float = 0.0  # of all anchors, so many at most make room when no more may come
     prune_opacity: float = 0.005  # an anchor whose splats' mean opacity stays below goes
@@ -76,6 +77,7 @@ class TrainSettings:
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
             "hidden": 1, "control": 2, "anchors": 1, "max_anchors": 1, "grow_every": 1,
+            "grow_grids": 1,
             "downscale": 1, "ssim_share": 0, "opacity_share": 0, "scale_share": 0,
             "depth_share": 0, "rise": 0, "revive": 0,
             "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,

@@ -43,6 +43,7 @@ WAYS = {
     "error each": {"growth": "error", "grow_each": True},
     "gradient replace": {"growth": "gradient", "grow_replace": 0.03},
     "error each replace": {"growth": "error", "grow_each": True, "grow_replace": 0.03},
+    "gradient 3 grids": {"growth": "gradient", "grow_grids": 3},
     "gradient coarse": {"growth": "gradient", "coarse": 2},
     "gradient regularised": {"growth": "gradient", "opacity_share": 0.01, "scale_share": 1e-9},
     "gradient prune": {"growth": "gradient", "prune_weight": 0.1},
