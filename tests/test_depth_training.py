@@ -14,16 +14,20 @@ from rasterizer.surface_reference import render_depth_reference
 from runtime_models.model import SplatLayers
 from scene.capture import Capture
 from scene.depth_photo import load_depth
+from tests.test_plain_gradients import situation as plain_situation
 from tests.test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 from training.coarse import smaller
 from training.depth_loss import DepthLoss, DepthWish
+from training.drawing import camera_of
 from training.evaluate import evaluate_model, report
 from training.losses import ImageLoss
 from training.optimizer import Adam
 from training.photos import Targets, read
+from training.plain_reference import decode_plain_reference
+from training.plain_step import GROUPS, PlainStep
 from training.reference import decode_reference, image_loss_reference
 from training.settings import TrainSettings
-from training.step import Step, camera_of
+from training.step import Step
 from training.synthetic.balls import make_balls
 from training.train import Trainer
 
@@ -77,6 +81,33 @@ def test_every_gradient_of_a_step_with_depth(device, seed):
         want = finite_differences(lambda v, name=name: loss(name, v), values, 1e-7)
         if name == "weights":  # what no head sees is frozen; the reference does not know it at all
             want = LAYOUT.pack(LAYOUT.unpack(want))
+        error = np.abs(have - want).max() / np.abs(want).max()
+        assert error < 2e-5, (name, error)
+
+
+def test_every_gradient_of_plain_splats_with_depth(device):
+    parameters, view, rgba = plain_situation(1, 0)
+    depth, camera, photo = depth_photo(3), camera_of(view), rgba[..., :3] / 255
+
+    def loss(name, values):
+        eye = view.world_from_eye.position
+        splats = decode_plain_reference(parameters | {name: values}, eye, 0)
+        image, through, metres = render_depth_reference(splats, camera, BACKGROUND)
+        shown = image_loss_reference(image.transpose(1, 2, 0), photo, 0.2)
+        return shown + SHARE * depth_loss_reference(metres, through, depth)
+
+    adam = Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1)))
+    step, image_loss, depth_loss = (
+        PlainStep(device, adam, 0), ImageLoss(device, SIZE), DepthLoss(device, SIZE)
+    )  # fmt: skip
+    target = image_loss.target(device.upload(rgba), BACKGROUND)
+    wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
+    drawing = step.draw(view, BACKGROUND, with_depth=True)
+    grads = step.gradients(drawing, image_loss, target, 0.2, None, wish)
+    for name in ("means", "scales", "wxyz", "opacity", "base"):
+        have = device.download(grads[name]).astype(np.float64)
+        values = parameters[name].astype(np.float64)
+        want = finite_differences(lambda v, name=name: loss(name, v), values, 1e-7)
         error = np.abs(have - want).max() / np.abs(want).max()
         assert error < 2e-5, (name, error)
 

@@ -6,12 +6,12 @@ import pytest
 from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from scene.pose import View, look_at, perspective
+from training.drawing import camera_of
 from training.losses import ImageLoss
 from training.optimizer import Adam
 from training.plain_reference import decode_plain_reference
 from training.plain_step import GROUPS, REST, PlainEvidence, PlainStep
 from training.reference import step_loss_reference
-from training.step import camera_of
 
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
 BACKGROUND = (0.2, 0.5, 0.9)

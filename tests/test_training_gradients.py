@@ -8,11 +8,12 @@ import pytest
 from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from scene.pose import View, look_at, perspective
+from training.drawing import camera_of
 from training.losses import ImageLoss
 from training.networks import HeadLayout, initial_weights
 from training.optimizer import Adam
 from training.reference import decode_reference, step_loss_reference
-from training.step import Step, camera_of
+from training.step import Step
 
 LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
 OTHERS = {

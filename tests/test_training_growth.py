@@ -15,6 +15,7 @@ from training.density import Evidence, Newcomers, Watch, newcomers
 from training.density_budget import most_anchors, within
 from training.density_grow import change, given, useless, weakest
 from training.density_strategy import STRATEGIES
+from training.drawing import camera_of
 from training.export import model_of
 from training.losses import ImageLoss
 from training.networks import HeadLayout
@@ -22,7 +23,7 @@ from training.optimizer import Adam
 from training.photos import LoadedPhoto
 from training.reference import decode_reference
 from training.settings import TrainSettings
-from training.step import Step, camera_of
+from training.step import Step
 
 RNG = np.random.default_rng
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0))
@@ -130,6 +131,20 @@ def test_pulls_of_each_stop_grow_where_that_stop_has_the_splat():
     assert (new.anchors[:, 0] < 0).all() and len(new.anchors)
     both = newcomers(anchors, means, [loud], 0.2, 1.0)
     assert (both.anchors[:, 0] < 0).any() and (both.anchors[:, 0] > 0).any()
+
+
+@pytest.mark.parametrize(("pull", "grids", "cells"), [
+    (1.5, 3, {1.0}), (3.0, 3, {1.0, 0.5}), (3.0, 1, {1.0}), (9.0, 3, {1.0, 0.5, 0.25}),
+    (9.0, 2, {1.0, 0.5}), (0.9, 3, set()),
+])  # fmt: skip
+def test_finer_grids_take_a_stronger_pull(pull, grids, cells):
+    """One splat between the nodes of all grids: each that its pull reaches gets its nearest."""
+    mean = np.array([[0.64, 0.0, 0.0]])
+    gradient = np.array([[pull * 30, 30]])
+    far = np.array([[9.0, 0, 0]], np.float32)
+    new = newcomers(far, [mean], [gradient], 1.0, 1.0, grids=grids)
+    nearest = {round(0.64 / cell) * cell for cell in cells}
+    assert set(np.round(new.anchors[:, 0], 5).tolist()) == nearest
 
 
 def test_a_relative_pull_counts_in_means_of_what_was_on_screen():

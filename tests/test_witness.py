@@ -12,9 +12,9 @@ from runtime_models.evaluate import evaluate
 from runtime_models.model import Mlp
 from scene.pose import View, look_at, perspective
 from tests.models import make_random_model, without_control
+from training.drawing import camera_of
 from training.metrics import psnr
 from training.photos import LoadedPhoto
-from training.step import camera_of
 from training.witness import likeness, most_pixels, shared_outlines
 
 SIZE = (40, 30)

@@ -15,10 +15,10 @@ from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
+from training.drawing import camera_of
 from training.metrics import psnr, ssim
 from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from training.schedule import choose_background
-from training.step import camera_of
 
 
 @dataclass(frozen=True)

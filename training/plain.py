@@ -14,6 +14,7 @@ from runtime_models.plain_splats import PlainSplats
 from runtime_models.rotation import normalize
 from runtime_models.spherical_harmonics import C0
 from scene.capture import Capture
+from training.drawing import Color
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import choose_voxel, initial_points, pixel_of, voxel_centres
@@ -24,7 +25,6 @@ from training.plain_density import changed_splats, decide, extent_of, reset_opac
 from training.plain_settings import PlainRates, PlainSettings
 from training.plain_step import REST, PlainEvidence, PlainStep
 from training.schedule import Budget, Schedule, choose_background
-from training.step import Color
 from training.train import PACE_STEPS, SETTLE, Progress
 
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
@@ -163,10 +163,11 @@ class PlainTrainer:
 
     def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
         target = self.targets.target(photo, background)
-        self.drawing = self.step.draw(photo.view, background)
+        depth = self.targets.wish(photo, self.settings.depth_share)
+        self.drawing = self.step.draw(photo.view, background, depth is not None)
         loss = self.targets.loss(photo)
         share = self.settings.ssim_share
-        return self.step.gradients(self.drawing, loss, target, share, self.evidence)
+        return self.step.gradients(self.drawing, loss, target, share, self.evidence, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""

@@ -42,6 +42,7 @@ class PlainSettings:
     prune_opacity: float = 0.005  # a splat below it goes, as 3DGS
     reset_every: int = 3000  # iterations until opacities are set back, as 3DGS
     ssim_share: float = 0.2
+    depth_share: float = 0.1  # as in TrainSettings
     downscale: int | None = None
     masks: str = "object"
     background: str = "auto"
@@ -52,6 +53,7 @@ class PlainSettings:
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "sh_degree": 0, "voxel": 1e-6, "splats": 1,
             "max_splats": 1, "grow_every": 1, "reset_every": 1, "downscale": 1, "ssim_share": 0,
+            "depth_share": 0,
             "rate_scale": 0,
         }  # fmt: skip
         for name, low in least.items():

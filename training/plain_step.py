@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import project, project_backward
-from rasterizer.raster import rasterize, rasterize_backward
 from scene.pose import View
+from training.depth_loss import DepthWish
+from training.drawing import Color, Drawing, draw_splats, splats_backward
 from training.gaussians import Gaussians
 from training.losses import ImageLoss, Target
 from training.networks import KERNELS
 from training.optimizer import Adam
-from training.step import Color, Drawing, camera_of
 
 # What the optimiser holds of N splats of degree n: means (N, 3) metres, scales (N, 3) logarithms of
 # one sigma, wxyz (N, 4) any length, opacity (N,) logits, base (N, 3) first coefficient of the
@@ -67,12 +65,9 @@ class PlainStep:
         """The buffer of `rest`; of degree 0, which has none, one that is not read."""
         return self.adam["rest"] if self.rest else self.adam["base"]
 
-    def draw(self, view: View, background: Color) -> Drawing:
-        splats, camera = self.decode(view.world_from_eye.position), camera_of(view)
-        projected = project(self.device, *splats.fields(), camera)
-        tiles = bin_tiles(self.device, projected, view.size)
-        frame = rasterize(self.device, projected, tiles, view.size, background)
-        return Drawing(camera, splats, projected, tiles, frame)
+    def draw(self, view: View, background: Color, with_depth: bool = False) -> Drawing:
+        splats = self.decode(view.world_from_eye.position)
+        return draw_splats(self.device, splats, view, background, with_depth)
 
     def gradients(
         self,
@@ -81,18 +76,12 @@ class PlainStep:
         target: Target,
         ssim_share: float,
         evidence: PlainEvidence | None = None,
+        depth: DepthWish | None = None,
     ) -> dict[str, object]:
         """Gradients of the loss by what the optimiser holds, under its names."""
         device, splats = self.device, drawing.splats
         grad_image = loss.compare(drawing.frame.image, target, ssim_share)
-        grad_record = rasterize_backward(
-            device, drawing.projected, drawing.tiles, drawing.frame, grad_image, absolute=False
-        )
-        grad = Gaussians(
-            *project_backward(
-                device, *splats.fields(), drawing.camera, drawing.projected, grad_record
-            )
-        )
+        grad, grad_record = splats_backward(device, drawing, grad_image, depth, absolute=False)
         if evidence is not None:
             evidence.add(drawing.projected.record, grad_record, drawing.camera.size[0])
         grad_rest = self.grad_rest if self.rest else grad.color

@@ -3,46 +3,18 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, project, project_backward
-from rasterizer.raster import rasterize, rasterize_backward
-from rasterizer.surface import (
-    DepthFrame,
-    rasterize_depth,
-    rasterize_depth_backward,
-    surface,
-    surface_backward,
-)
 from scene.pose import View
 from training.density import Evidence
 from training.depth_loss import DepthWish
+from training.drawing import Color, Drawing, draw_splats, splats_backward
 from training.gaussians import Activation, Gaussians
 from training.losses import ImageLoss, Target, regularise
 from training.networks import HeadLayout, Heads
 from training.optimizer import Adam
 from training.rise import draw_up
-
-Color = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A drawn view with what the way back needs; device arrays."""
-
-    camera: Camera
-    splats: Gaussians
-    projected: object
-    tiles: object
-    frame: object
-    depth: DepthFrame | None = None  # the same frame with its depth, where that was asked for
-
-
-def camera_of(view: View) -> Camera:
-    return Camera(*view.pinhole(), view.size, view.near)
 
 
 class Step:
@@ -76,28 +48,7 @@ class Step:
         self, view: View, control: np.ndarray, background: Color, with_depth: bool = False
     ) -> Drawing:
         splats = self.decode(control, view.world_from_eye.position)
-        camera = camera_of(view)
-        with self.timed("project"):
-            projected = project(self.device, *splats.fields(), camera)
-        with self.timed("bin"):
-            tiles = bin_tiles(self.device, projected, view.size)
-        if with_depth:
-            return self._draw_depth(camera, splats, projected, tiles, background)
-        with self.timed("rasterize"):
-            frame = rasterize(self.device, projected, tiles, view.size, background)
-        return Drawing(camera, splats, projected, tiles, frame)
-
-    def _draw_depth(
-        self, camera: Camera, splats: Gaussians, projected, tiles, background: Color
-    ) -> Drawing:
-        geometry = splats.fields()[:3]
-        with self.timed("surface"):
-            surfaces = surface(self.device, *geometry, camera, projected)
-        with self.timed("rasterize"):
-            drawn = rasterize_depth(
-                self.device, projected, tiles, surfaces, camera.size, background
-            )
-        return Drawing(camera, splats, projected, tiles, drawn.frame, drawn)
+        return draw_splats(self.device, splats, view, background, with_depth, self.timed)
 
     def gradients(
         self,
@@ -115,30 +66,8 @@ class Step:
         device, adam = self.device, self.adam
         with self.timed("loss"):
             grad_image = loss.compare(drawing.frame.image, target, ssim_share)
-        with self.timed("rasterize backward"):
-            asked = {} if evidence is None else evidence.asks(drawing.frame.image, target)
-            if depth is None:
-                grad_record = rasterize_backward(
-                    device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None,
-                    **asked,
-                )  # fmt: skip
-            else:
-                by_metres, by_through = depth.loss.compare(drawing.depth, depth.target, depth.share)
-                grad_record, by_surface = rasterize_depth_backward(
-                    device, drawing.projected, drawing.tiles, drawing.depth, grad_image,
-                    by_through, by_metres, **asked,
-                )  # fmt: skip
-        with self.timed("project backward"):
-            grad = Gaussians(
-                *project_backward(
-                    device, *drawing.splats.fields(), drawing.camera, drawing.projected, grad_record
-                )
-            )
-            if depth is not None:
-                surface_backward(
-                    device, *drawing.splats.fields()[:3], drawing.camera, drawing.projected,
-                    drawing.depth.surface, by_surface, grad.fields()[:3],
-                )  # fmt: skip
+        asked = {} if evidence is None else evidence.asks(drawing.frame.image, target)
+        grad, grad_record = splats_backward(device, drawing, grad_image, depth, self.timed, **asked)
         with self.timed("density"):
             if evidence is not None:
                 record, opacity = drawing.projected.record, drawing.splats.opacity

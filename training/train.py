@@ -13,6 +13,7 @@ from training.density import Evidence, Watch
 from training.density_budget import most_anchors, within
 from training.density_grow import changed
 from training.density_strategy import strategy
+from training.drawing import Color
 from training.export import model_of
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
@@ -30,7 +31,7 @@ from training.photos import (
 from training.rise import Rise, after_fall
 from training.schedule import Budget, Schedule, choose_background
 from training.settings import Rates, TrainSettings
-from training.step import Color, Step
+from training.step import Step
 
 GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
