@@ -133,7 +133,7 @@ def print_report(need: "Need") -> None:
     console.print(
         f"Differences to the model before, ± one standard error over {need.seeds} seeds and "
         f"{', '.join(f'{count} {name}' for name, count in need.photos.items())} held-out photos.  "
-        f"A part is dropped where the loss to the largest model and its error stay within "
+        f"A part is dropped where the loss, to the largest model too, and its error stay within "
         f"{need.tolerance_db:g} dB in every modality."
     )
     for (a, b), iou in need.outlines.items():

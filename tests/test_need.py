@@ -87,6 +87,15 @@ def test_small_losses_do_not_add_up_to_more_than_the_tolerance():
     assert verdict.total["RGB"].mean == pytest.approx(-0.14)
 
 
+def test_what_another_part_won_is_not_used_up():
+    full = measured([30, 30.001], [30, 30.001])
+    before = measured([31, 31.001], [30, 30.001])
+    after = measured([30.5, 30.501], [30, 30.001])
+    verdict = judge("a part", full, before, after, 0.1)
+    assert verdict.total["RGB"].mean == pytest.approx(0.5)
+    assert verdict.word == KEPT and verdict.needed_by == ("RGB",)
+
+
 def test_settings_without_each_part():
     settings = TrainSettings(layers=2, voxel=0.1)
     found = {name: part.without(settings, STOPS) for name, part in BY_NAME.items()}

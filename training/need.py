@@ -2,7 +2,8 @@
 
 A change is judged by differences of the same photo and seed, so what is hard about a photo falls
 out of it.  A part goes where every modality, by its mean change less the error of that, stays
-within the tolerance of the largest model: what several parts cost together may not exceed it.
+within the tolerance of the model before, and of the largest one: neither may several parts cost
+more together, nor one part use up what another happened to win.
 """
 
 from dataclasses import dataclass, replace
@@ -104,12 +105,15 @@ def judge(
     part: str, full: Measured, before: Measured, after: Measured, tolerance_db: float
 ) -> Verdict:
     """Whether the part may go: `after` is the model without it, `full` the largest."""
-    total = changes(full, after)
-    needed_by = tuple(n for n, c in total.items() if not c.mean - c.error >= -tolerance_db)
-    likely = all(c.mean >= -tolerance_db for c in total.values())
+    change, total = changes(before, after), changes(full, after)
+    both = {n: (change[n], total[n]) for n in total}
+    needed_by = tuple(
+        n for n, two in both.items() if not all(c.mean - c.error >= -tolerance_db for c in two)
+    )
+    likely = all(c.mean >= -tolerance_db for two in both.values() for c in two)
     word = DROPPED if not needed_by else UNSURE if likely else KEPT
     return Verdict(
-        part, changes(before, after), total, word, needed_by,
+        part, change, total, word, needed_by,
         before.bytes - after.bytes, before.decode_ms - after.decode_ms,
         before.train_s - after.train_s,
     )  # fmt: skip
