@@ -40,11 +40,12 @@ class HeadLayout:
     def __post_init__(self) -> None:
         if not 1 <= self.layers <= MOST_LAYERS:
             raise ValueError(
-                f"layers is {self.layers}; networks have 1 to {MOST_LAYERS} hidden ones"
+                f"layers is {self.layers}; networks have 1 to {MOST_LAYERS} hidden ones."
             )
         for name in self.fixed:
             if name not in HEADS:
-                raise ValueError(f"there is no head '{name}' to fix; they are {', '.join(HEADS)}")
+                known = ", ".join(HEADS)
+                raise ValueError(f"There is no head '{name}' to fix; they are {known}.")
 
     def parts_of(self, name: str) -> tuple[str, ...]:
         """What a head's network takes, in the order of the exported one (eq. 5)."""
