@@ -7,7 +7,7 @@ import numpy as np
 
 from runtime_models.model import BadFile
 from runtime_models.read_package import BAD_HEADER
-from scene.capture import Photo
+from scene.capture import Capture, Photo
 from scene.json_values import is_number, shortened, shown, text_in
 from scene.photo import BROKEN, GREY_16, MOST_PIXELS, open_image, quiet
 
@@ -15,6 +15,8 @@ NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio'
 UNITS = ("depth_unit", "integer_depth_scale")  # ours; instant-ngp's
 MILLIMETRES = 0.001  # metres a step where nothing is said
 ASPECT = 0.02  # by how much a depth photo may be wider or narrower than its photo
+LOOKED_AT, FEW_POINTS = 3, 30  # photos, points: to tell whether a unit can be right
+OTHER_UNIT = 8  # times: more than this the points of a scene do not lie behind what is seen
 FARTHEST = 1e6  # metres: beyond that nothing was measured
 
 
@@ -85,6 +87,43 @@ def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
         for new, old in zip(size[::-1], depth.shape, strict=True)
     )
     return depth[np.ix_(rows, columns)]
+
+
+def refuse_other_units(capture: Capture, where: str) -> None:
+    """Raises BadFile where depth photos are some other unit than the points that they show.
+
+    Looks at a few photos; without points, or where too few lie in the picture, nothing is said.
+    Points may lie behind what a photo shows, so only what no scene explains is refused.
+    """
+    with_depth = [photo for photo in capture.photos if photo.depth is not None]
+    if capture.points is None or not with_depth:
+        return
+    some = with_depth[:: -(-len(with_depth) // LOOKED_AT)]
+    ratios = np.concatenate([_over_points(photo, capture.points) for photo in some])
+    if len(ratios) < FEW_POINTS:
+        return
+    ratio = float(np.median(ratios))
+    if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+        unit = f"{10.0 ** -np.round(np.log10(ratio)):g}"
+        raise BadFile(
+            f"{where}: the depth photos are {ratio:.3g} times as deep as the points that they "
+            f"show; multiply 'depth_unit' (or the numbers of a .npy) by about {unit}"
+        )
+
+
+def _over_points(photo: Photo, points: np.ndarray) -> np.ndarray:
+    """What a depth photo says over how deep the points in the picture lie."""
+    depth, view = load_depth(photo), photo.view
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    x, y, z = (points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]).T
+    ahead = z > view.near
+    x, y, z = x[ahead], y[ahead], z[ahead]
+    height, width = depth.shape
+    across, down = width / view.size[0], height / view.size[1]  # its pixels a pixel of the photo
+    column, row = (fx * x / z + cx) * across, (fy * y / z + cy) * down
+    inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+    seen = depth[row[inside].astype(int), column[inside].astype(int)]
+    return (seen / z[inside])[seen > 0]
 
 
 def _integers(path: Path) -> np.ndarray:

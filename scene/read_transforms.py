@@ -22,7 +22,7 @@ from scene.capture_rules import (
     stops_from,
     with_counts,
 )
-from scene.depth_photo import depth_of
+from scene.depth_photo import depth_of, refuse_other_units
 from scene.json_values import is_number, shortened, shown, text_in
 from scene.pose import OPENCV_FROM_EYE, View
 from scene.read_points import read_points
@@ -76,7 +76,9 @@ def read_transforms(*files: Path) -> Capture:
     background, notes = background_from(data, where), data.get("notes")
     if not isinstance(notes, dict | None):
         raise BadFile(f"{where}: 'notes' is {shown(notes)}; an object is wanted")
-    return world.capture(folder, stops, photos, points, colors, background, not named, notes)
+    capture = world.capture(folder, stops, photos, points, colors, background, not named, notes)
+    refuse_other_units(capture, where)
+    return capture
 
 
 def gather(files: tuple[Path, ...]) -> tuple[dict, list[dict]]:

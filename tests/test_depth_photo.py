@@ -1,5 +1,6 @@
 """Depth photos of captures: both ways of writing them, their sizes, and what is refused."""
 
+import json
 import shutil
 from dataclasses import replace
 
@@ -8,10 +9,11 @@ import pytest
 from PIL import Image
 
 from runtime_models.model import BadFile
-from scene.depth_photo import load_depth
+from scene.depth_photo import load_depth, refuse_other_units
 from scene.read_capture import read_capture
 from scene.write_capture import write_capture
 from tests.captures import simple, write_transforms
+from training.synthetic.balls import DEPTH_UNIT, make_balls
 
 STEPS = np.array([[0, 1, 2, 1000], [65534, 65535, 7, 30000], [5, 5, 5, 5]], np.uint16)
 
@@ -145,3 +147,29 @@ def test_a_header_that_promises_more_takes_no_memory(tmp_path):
     path.write_bytes(header + told.ljust(117) + b"\n")
     with pytest.raises(BadFile):
         load_depth(good.photos[0])
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    return make_balls(tmp_path_factory.mktemp("balls"), 48, 4, 1, depth=True)
+
+
+@pytest.mark.parametrize("times", [0.001, 0.1, 10, 1000])
+def test_depth_of_another_unit_than_the_points_is_refused(balls, times):
+    told = balls.folder / "transforms.json"
+    data = json.loads(told.read_text())
+    assert read_capture(balls.folder).photos[0].depth_unit == DEPTH_UNIT
+    other = told.with_name("other.json")
+    for frame in data["frames"]:
+        frame["depth_unit"] = DEPTH_UNIT * times
+    other.write_text(json.dumps(data))
+    with pytest.raises(BadFile, match=rf"by about {1 / times:g}\.$"):
+        read_capture(other)
+    other.write_text(json.dumps(data | {"points": ""}))  # nothing to compare with
+    (balls.folder / "points3d.npz").unlink(missing_ok=True)
+    assert read_capture(other).points is None
+
+
+def test_points_that_are_hidden_do_not_matter(balls):
+    hidden = np.concatenate([balls.points, balls.points - [0, 9, 0]])  # under the floor
+    refuse_other_units(replace(balls, points=hidden), "here")
