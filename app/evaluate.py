@@ -3,13 +3,16 @@
 import json
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from app.opening import ReadingOptions, open_model
+
+if TYPE_CHECKING:
+    from scene.capture import Capture
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,8 @@ class Options(ReadingOptions):
     """A package, or any other file of splats."""
     capture: Annotated[Path, tyro.conf.Positional]
     """A folder of posed photos."""
+    modality: str | None = None
+    """Only this one of the capture: for a scene that was trained on it alone."""
     json: Path | None = None
     """Write the result here; - writes it to standard output."""
     downscale: int | None = None
@@ -49,7 +54,10 @@ def run(options: Options) -> int:
             "trained; name the model of one object."
         )
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    model, capture = open_model(options.scene, options), read_capture(options.capture)
+    capture = read_capture(options.capture)
+    if options.modality is not None:
+        capture = only(capture, options.modality)
+    model = open_model(options.scene, options)
     scores = evaluate_model(
         open_device(), model, capture, options.downscale, options.masks, options.background,
         distance,
@@ -63,6 +71,18 @@ def run(options: Options) -> int:
     elif options.json is not None:
         write_json(options.json, result)
     return 0
+
+
+def only(capture: "Capture", name: str) -> "Capture":
+    """The capture with one of its modalities.  Raises UsageError."""
+    from app.errors import UsageError
+
+    stops = tuple(stop for stop in capture.stops if stop.name == name)
+    if not stops:
+        names = ", ".join(stop.name for stop in capture.stops)
+        raise UsageError(f"the capture has no modality '{name}'; it has {names}.")
+    photos = tuple(photo for photo in capture.photos if photo.modality == name)
+    return replace(capture, stops=stops, photos=photos)
 
 
 def print_table(result: dict) -> None:

@@ -1,6 +1,10 @@
 """Training plain splats: growing by the rules of 3DGS, quality, bits, and what is written."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +16,7 @@ from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_layer_list import LIST
 from runtime_models.read_scene import describe, read_model
 from runtime_models.write_layer_list import layer_name, write_layer_list
+from scene.read_capture import read_capture
 from training.evaluate import evaluate_model
 from training.plain import PlainTrainer, first_scales, one_modality, seen_colors
 from training.plain_density import (
@@ -27,6 +32,7 @@ from training.plain_settings import PlainSettings
 from training.plain_step import GROUPS
 from training.synthetic.balls import STOPS, make_balls
 
+ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_every=20, sh_degree=2)
 
 
@@ -178,6 +184,32 @@ def test_the_same_seed_gives_the_same_bits(device, balls, trained):
         np.testing.assert_array_equal(again[name], values, err_msg=name)
     other = run(PlainTrainer(device, one_modality(balls, "RGB"), replace(SETTINGS, seed=1)), 5)
     assert not np.array_equal(other.adam.state()["base.value"], again["base.value"])
+
+
+ONE_THREAD = """
+import sys
+from pathlib import Path
+import numpy as np
+from rasterizer.device import open_device
+from scene.read_capture import read_capture
+from tests.test_plain import SETTINGS, run
+from training.plain import PlainTrainer, one_modality
+capture = one_modality(read_capture(Path(sys.argv[1])), "RGB")
+np.savez(sys.argv[2], **run(PlainTrainer(open_device("cpu"), capture, SETTINGS), 45).adam.state())
+"""
+
+
+def test_one_thread_gives_the_same_bits_as_all(device, balls, tmp_path):
+    capture = one_modality(read_capture(balls.folder), "RGB")
+    here = run(PlainTrainer(device, capture, SETTINGS), 45).adam.state()  # over two changes
+    out = tmp_path / "one.npz"
+    environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": "1", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", ONE_THREAD, str(balls.folder), str(out)]
+    subprocess.run(command, check=True, cwd=ROOT, env=environment, timeout=120)
+    with np.load(out) as there:
+        assert set(there.files) == set(here)
+        for name, values in here.items():
+            np.testing.assert_array_equal(there[name], values, err_msg=name)
 
 
 def test_degrees_come_one_after_the_other(device, balls):

@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import json
 import os
 import signal
 import sys
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 
 from app.errors import UsageError
+from app.evaluate import Options as EvalOptions
+from app.evaluate import run as evaluate
 from app.table import Options, command_line, run, train_options
 from app.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
 from app.train import Options as TrainOptions
@@ -105,6 +108,26 @@ def test_separate_models_are_single_stops_of_the_capture(compared, balls):
     assert [m.stops for m in models] == [(stop,) for stop in balls.stops]
     splats = read_model(options.out / "splats")
     assert splats.stops == balls.stops and np.bincount(splats.layer).max() <= 900
+
+
+def test_one_modality_is_evaluated_alone(compared, balls, tmp_path, capsys):
+    options, lines = compared
+    asked = EvalOptions(
+        options.out / "separate" / "1_Thermal.shift", balls.folder, "Thermal", tmp_path / "e.json"
+    )
+    assert evaluate(asked) == 0
+    found = json.loads((tmp_path / "e.json").read_text())["modalities"]
+    wanted = rows_of(lines)["separate", "Thermal"]
+    assert list(found) == ["Thermal"] and "VGG" not in capsys.readouterr().err
+    assert found["Thermal"]["psnr_db"] == pytest.approx(float(wanted["psnr_db"]), abs=1e-3)
+    with pytest.raises(BadFile, match="has no stop 'RGB'"):
+        evaluate(replace(asked, modality=None))
+    with pytest.raises(UsageError, match="no modality 'Xray'; it has RGB, Thermal"):
+        evaluate(replace(asked, modality="Xray"))
+    assert evaluate(replace(asked, vgg=options.vgg)) == 0
+    told = json.loads((tmp_path / "e.json").read_text())
+    assert told["modalities"]["Thermal"]["vgg_distance"] == float(wanted["vgg_distance"])
+    assert told["vgg_file"].startswith("small.onnx, sha256 ")
 
 
 def test_without_a_file_the_column_is_absent_and_the_reason_is_told(balls, tmp_path, capsys):
