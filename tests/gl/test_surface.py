@@ -11,9 +11,20 @@ from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from renderer.surface_reference import reference_surface
+from runtime_models.read_scene import read_model
 from scene.pose import View
 from scene.scene import Scene
-from tests.splat_scenes import alone, front_view, one_splat, random_model, shell, two_objects
+from tests.scaffold_scenes import random_raw, write_run
+from tests.splat_scenes import (
+    alone,
+    front_view,
+    one_splat,
+    poisoned,
+    random_layers,
+    random_model,
+    shell,
+    two_objects,
+)
 
 
 @pytest.fixture(scope="module", params=["quads", "tiles"])
@@ -69,6 +80,26 @@ def test_it_is_that_of_rays_through_ellipsoids(renderer, name, order):
     np.testing.assert_allclose(depth[solid], want.depth()[solid], rtol=5e-3)
     turned = (got.normals()[solid] * want.normals()[solid]).sum(axis=1)
     assert np.quantile(np.degrees(np.arccos(np.clip(turned, -1, 1))), 0.99) < 1.0
+
+
+@pytest.mark.parametrize("kind", ["poisoned", "antialiased", "limits", "follows the eye"])
+def test_what_is_left_out_and_what_is_fainter(renderer, kind, tmp_path):
+    view, limits, layers = front_view((48, 40)), {}, random_layers(500, seed=3)
+    if kind == "poisoned":
+        layers, _ = poisoned(layers)
+    elif kind == "antialiased":
+        layers = replace(layers, antialiased=True, scales=layers.scales * np.float32(0.2))
+    elif kind == "follows the eye":
+        layers = read_model(write_run(random_raw(60), tmp_path / "run"))
+    else:
+        limits = {"max_distance": 4.0, "max_pixels": 6.0, "min_pixels": 1.0, "fade": 0.3}
+    scene = alone(layers)
+    got = surface_of(renderer, scene, view, **limits)
+    want = reference_surface(scene, view, RenderSettings(**limits))
+    assert want.coverage.max() > 0.2
+    for name in ("metres", "normal", "coverage"):
+        error = np.abs(getattr(got, name) - getattr(want, name))
+        assert error.mean() < 2e-3 and np.quantile(error, 0.99) < 0.03, (name, error.max())
 
 
 def test_coverage_is_the_picture_s(renderer):
