@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_plain_gradients import situation as plain_situation
 from test_training_gradients import (
     BACKGROUND,
     LAYOUT,
@@ -20,6 +21,7 @@ from scene.capture import Capture
 from training.losses import ImageLoss
 from training.networks import HeadLayout, Heads, blocks_of_weights, initial_weights, padded
 from training.optimizer import Adam
+from training.plain_step import GROUPS, PlainStep
 from training.settings import TrainSettings
 from training.step import Step
 from training.synthetic.balls import make_balls
@@ -66,6 +68,21 @@ def test_a_step_of_both_forms(device, as_gpu, seed):
     for name, one in found[0].items():
         difference = np.abs(found[1][name] - one).max() / np.abs(one).max()
         assert difference < 1e-5, (name, difference)
+
+
+@pytest.mark.parametrize("degree", [0, 3])
+def test_a_step_of_plain_splats_of_both_forms(device, as_gpu, degree):
+    parameters, view, rgba = plain_situation(1, degree)
+    found = []
+    for where in (device, as_gpu):
+        adam = Adam(where, parameters, dict.fromkeys(GROUPS, np.ones(1)))
+        step, loss = PlainStep(where, adam, degree), ImageLoss(where, SIZE)
+        target = loss.target(where.upload(rgba), BACKGROUND)
+        grads = step.gradients(step.draw(view, BACKGROUND), loss, target, 0.2)
+        found.append({name: where.download(grad) for name, grad in grads.items()})
+    for name, one in found[0].items():
+        if one.size:
+            assert np.abs(found[1][name] - one).max() < 1e-5 * np.abs(one).max(), name
 
 
 @pytest.mark.parametrize("count", [63, 64, 65, 1023, 1025, 3000])
@@ -116,3 +133,13 @@ def test_runs_of_both_forms_learn_alike_and_each_keeps_its_bits(device, as_gpu, 
     assert len(cpu) >= 2 and cpu[-1] < 0.8 * cpu[0]
     # Rounding grows from step to step: Adam's first steps are the sign of the gradient.
     np.testing.assert_allclose(gpu, cpu, rtol=0.02)
+
+
+@pytest.mark.parametrize("growth", ["gradient", "error"])
+def test_growing_works_in_the_gpu_forms(as_gpu, balls, growth):
+    changes = {"grow": True, "grow_every": 20, "growth": growth, "iterations": 120, "coarse": 2}
+    trainer = Trainer(as_gpu, balls, replace(SETTINGS, **changes, max_anchors=400))
+    first = trainer.anchors_count
+    losses = [now.loss for now in trainer.steps() if now.loss is not None]
+    assert np.isfinite(losses).all() and losses[-1] < losses[0]
+    assert trainer.anchors_count != first
