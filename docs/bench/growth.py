@@ -46,6 +46,7 @@ WAYS = {
     "gradient 3 grids": {"growth": "gradient", "grow_grids": 3},
     "gradient coarse": {"growth": "gradient", "coarse": 2},
     "gradient regularised": {"growth": "gradient", "opacity_share": 0.01, "scale_share": 1e-9},
+    "gradient rise": {"growth": "gradient", "rise": 100},
     "gradient prune": {"growth": "gradient", "prune_weight": 0.1},
 }
 LOOKS = (0.25, 0.5, 0.75, 1.0)  # shares of the run
