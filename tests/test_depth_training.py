@@ -189,6 +189,14 @@ def test_without_depth_photos_or_a_share_the_bits_are_the_same(device, balls):
     np.testing.assert_array_equal(*runs)
 
 
+def test_photos_with_and_without_depth_train_together(device, balls):
+    """And small photos first; what has no depth learns from its colours alone."""
+    photos = tuple(replace(p, depth=None) if i % 3 else p for i, p in enumerate(balls.photos))
+    trainer = trained(device, replace(balls, photos=photos), coarse=2, depth_share=0.1)
+    assert min(trainer.held_out_psnr(9).values()) > 15
+    assert all(np.isfinite(values).all() for values in trainer.adam.state().values())
+
+
 def test_eval_tells_how_far_off_depth_is(device, balls, tmp_path, capsys):
     """By hand: splats on the true surface; and nothing at all, which is wrong by all of it."""
     scores = evaluate_model(device, wall_of(balls), balls)

@@ -146,7 +146,8 @@ class PlainTrainer:
         """Compile every kernel for every photo size, outside of the time that is counted."""
         before = self.adam.state()
         background = self.schedule.background or BLACK
-        for photo in {p.view.size: p for p in self.schedule.photos[self.stop.name]}.values():
+        photos = self.schedule.photos[self.stop.name]
+        for photo in {(p.view.size, p.depth is None): p for p in photos}.values():
             self.adam.step(self.learn(photo, background), 0.0)
             loss, visible = self.empty_loss(photo, background), self.visible()
             self.guard.expect(self.stop.name, loss, visible, 1.0)

@@ -202,7 +202,7 @@ class Trainer:
         before, evidence = self.adam.state(), self.evidence.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
-            whole = {p.view.size: p for p in photos}.values()
+            whole = {(p.view.size, p.depth is None): p for p in photos}.values()
             for photo in [self.coarse.photo(p, f) for f in self.coarse.factors for p in whole]:
                 self.step.update(self.learn(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
