@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from training.vgg_distance import VggDistance
 
 NO_VGG = "no VGG distance: --vgg names no file"
-PLACES = {"joint": "joint.shift", "separate": "separate", "splats": "splats"}  # in --out
+PLACES = {
+    "joint": "joint.shift", "separate": "separate", "splats": "splats", "spz": "spz",
+}  # in --out  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,11 @@ class Options:
     """Budget of every method; where it trains several models, they share it."""
     iterations: int | None = None
     """The same in steps: the same bits on every run."""
-    methods: tuple[Literal["joint", "separate", "splats"], ...] = ("joint", "separate", "splats")
+    methods: tuple[Literal["joint", "separate", "splats", "spz"], ...] = (
+        "joint", "separate", "splats", "spz",
+    )  # fmt: skip
     """joint: one shape-shifting model.  separate: one anchor model a modality.  splats: plain 3DGS
-    splats a modality."""
+    splats a modality, as PLY.  spz: those splats packed, without training again."""
     vgg: Path | None = None
     """An ONNX file of VGG16's first layers: adds a distance of its features, which is no LPIPS."""
     seed: int | None = None
@@ -71,7 +75,9 @@ def run(options: Options) -> int:
     if options.seconds is None and options.iterations is None:
         raise UsageError("a comparison needs a budget: give --seconds or --iterations.")
     if not options.methods:
-        raise UsageError("--methods names none; leave it out for all three.")
+        raise UsageError("--methods names none; leave it out for all.")
+    if "spz" in options.methods and "splats" not in options.methods:
+        raise UsageError("--methods spz packs the files of splats; add splats before it.")
     if options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is a file; --out is a folder.")
     capture, device = read_capture(options.capture), open_device(options.device)
@@ -81,12 +87,15 @@ def run(options: Options) -> int:
     head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
     table = RowsFile(options.out / "table.csv", VggRow if distance else Row, head)
     say(head[1])
-    for method in options.methods:
+    for method in sorted(set(options.methods), key=list(PLACES).index):
         if any(row.method == method and row.modality == MEAN for row in table.rows):
             say(f"{NAMES[method]}: already in {table.path}")
             continue
         say(f"{NAMES[method]}:")
-        runs = train_method(method, device, capture, options)
+        if method == "spz":
+            runs = pack_splats(capture, options.out, table.rows)
+        else:
+            runs = train_method(method, device, capture, options)
         if runs is None:
             say(f"{options.out}: interrupted; the same command goes on with this method.")
             return INTERRUPTED
@@ -137,6 +146,29 @@ def train_method(method: str, device, capture: "Capture", options: Options) -> d
         one = Run(out, trainer.elapsed, trainer.iteration)
         return {stop.name: one for stop in capture.stops}
     return None if outcome.interrupted else outcome.runs
+
+
+def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
+    """A Run for each modality: the files of `splats` as spz, trained when those were."""
+    from app.errors import UsageError
+    from app.train_baselines import Run
+    from runtime_models.formats import read_plain
+    from runtime_models.plain_splats import Reading
+    from runtime_models.write_layer_list import layer_name, write_layer_list
+    from runtime_models.write_spz import write_spz
+
+    layers, runs, reading = [], {}, Reading(allow_huge=True)
+    for number, stop in enumerate(capture.stops):
+        source = out / PLACES["splats"] / layer_name(number, stop)
+        layers.append((stop, read_plain(source, reading)))
+        made = next(r for r in rows if (r.method, r.modality) == ("splats", stop.name))
+        file = out / PLACES["spz"] / layer_name(number, stop, ".spz")
+        runs[stop.name] = Run(file, made.seconds, made.steps)
+    try:
+        write_layer_list(layers, out / PLACES["spz"], write_spz, ".spz")
+    except ValueError as error:  # places that spz cannot hold
+        raise UsageError(f"{error}  Leave spz out of --methods.") from None
+    return runs
 
 
 def train_options(method: str, options: Options) -> TrainOptions:

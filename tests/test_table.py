@@ -75,11 +75,16 @@ def test_bytes_are_those_on_disk(compared):
     rows, out = rows_of(lines), options.out
     joint = (out / "joint.shift").stat().st_size / 1e6
     assert float(rows["joint", "RGB"]["mb"]) == float(rows["joint", MEAN]["mb"]) == joint
-    for method, ending in (("separate", "shift"), ("splats", "ply")):
+    for method, ending in (("separate", "shift"), ("splats", "ply"), ("spz", "spz")):
         sizes = [f.stat().st_size / 1e6 for f in sorted((out / method).glob(f"*.{ending}"))]
         assert [float(rows[method, x]["mb"]) for x in ("RGB", "Thermal")] == sizes
         assert float(rows[method, MEAN]["mb"]) == pytest.approx(sum(sizes))
     assert joint < float(rows["splats", MEAN]["mb"]) / 2
+    for name in ("RGB", "Thermal", MEAN):  # packed: smaller, trained no longer, nearly as good
+        plain, packed = rows["splats", name], rows["spz", name]
+        assert float(packed["mb"]) < float(plain["mb"]) / 3
+        assert (packed["seconds"], packed["steps"]) == (plain["seconds"], plain["steps"])
+        assert abs(float(packed["psnr_db"]) - float(plain["psnr_db"])) < 1
 
 
 def test_a_finished_comparison_is_not_run_again_and_another_is_refused(compared, capsys):
@@ -87,7 +92,7 @@ def test_a_finished_comparison_is_not_run_again_and_another_is_refused(compared,
     before = (options.out / "joint.shift").stat().st_mtime_ns
     assert run(options) == 0
     assert (options.out / "joint.shift").stat().st_mtime_ns == before
-    assert capsys.readouterr().err.count("already in") == 3
+    assert capsys.readouterr().err.count("already in") == 4
     assert (options.out / "table.csv").read_text().splitlines() == lines
     with pytest.raises(UsageError, match="is of another run"):
         run(replace(options, iterations=21))
@@ -97,7 +102,7 @@ def test_the_markdown_names_methods_and_what_was_gained(compared):
     options, _ = compared
     text = (options.out / "table.md").read_text()
     table = [line for line in text.splitlines() if line.startswith("| ")]
-    assert len(table) == 2 + 9 and len({line.count("|") for line in table}) == 1
+    assert len(table) == 2 + 12 and len({line.count("|") for line in table}) == 1
     assert all(name in text for name in NAMES.values())
     assert "shape-shifting against 3DGS splats: " in text and "of the bytes" in text
 
@@ -154,6 +159,7 @@ def test_the_verdict_is_arithmetic():
         "shape-shifting against 3DGS splats: -0.50 dB in the mean, 0.050 of the bytes, "
         "2.00 of the seconds.",
     ]
+    assert "3DGS splats as spz: +1.50 dB" in compare([rows[0], made("spz", 29.0, 2.0)])[0]
     assert compare(rows[1:]) == [] and len(compare(rows[:2])) == 1
 
 
@@ -200,6 +206,8 @@ def test_what_cannot_be_compared_is_refused_before_training(balls, tmp_path):
         run(replace(good, iterations=None))
     with pytest.raises(UsageError, match="names none"):
         run(replace(good, methods=()))
+    with pytest.raises(UsageError, match="add splats before it"):
+        run(replace(good, methods=("joint", "spz")))
     (tmp_path / "file").write_text("x")
     with pytest.raises(UsageError, match="is a file"):
         run(replace(good, out=tmp_path / "file"))
@@ -269,7 +277,7 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     lines = (tmp_path / "rows.csv").read_text().splitlines()
     assert lines[0].startswith(f"# python3 docs/bench/baselines.py {balls.folder.name} --seconds")
     rows = list(csv.DictReader(lines[2:]))
-    assert len(rows) == 3 * 3 + 2 * 3 and {row["size"] for row in rows} == {"1.0", "0.02"}
+    assert len(rows) == 4 * 3 + 3 * 3 and {row["size"] for row in rows} == {"1.0", "0.02"}
     assert program.main() == 0
     assert (tmp_path / "rows.csv").read_text().splitlines() == lines
-    assert program.plan([60, 9], [1, 0.1])[-1] == (60, 0.1, ("joint", "splats"))
+    assert program.plan([60, 9], [1, 0.1])[-1] == (60, 0.1, ("joint", "splats", "spz"))

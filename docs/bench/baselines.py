@@ -4,7 +4,7 @@
         --out WORK --csv docs/bench/baselines.csv [--vgg FILE]
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  Each
-budget of `--seconds` is a `launch.py table` of all three methods at full size; then, with the last
+budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the last
 budget, the shape-shifting model and plain splats once more at each of `--sizes`: that share of the
 anchors and splats to start with and of their caps.  Tables lie in WORK/CAPTURE/...; what is
 there is not run again, so an interrupted run goes on where it was.
@@ -61,8 +61,8 @@ def main() -> int:
 
 def plan(seconds: list[float], sizes: list[float]) -> list[tuple[float, float, tuple[str, ...]]]:
     """(seconds, size, methods) of every table."""
-    whole = [(budget, 1.0, ("joint", "separate", "splats")) for budget in sorted(seconds)]
-    rest = [(max(seconds), size, ("joint", "splats")) for size in sorted(sizes) if size != 1]
+    whole = [(budget, 1.0, ("joint", "separate", "splats", "spz")) for budget in sorted(seconds)]
+    rest = [(max(seconds), size, ("joint", "splats", "spz")) for size in sorted(sizes) if size != 1]
     return [*whole, *rest]
 
 
