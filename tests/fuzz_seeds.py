@@ -129,9 +129,15 @@ def archive_seeds(folder: Path) -> list[Seed]:
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     write_package(model, folder / "package.shift")
     write_package(model, folder / "package")
+    write_package(model, folder / "bytes.shift", "uint8")
     seeds = [
         Seed("package zip", {"package.shift": (folder / "package.shift").read_bytes()}, read_model),
         Seed("package folder", files_of(folder / "package"), read_model),
+        Seed(
+            "package of bytes",
+            {"bytes.shift": (folder / "bytes.shift").read_bytes()},
+            read_model,
+        ),
     ]
     for version, bands in ((1, 1), (2, 0), (2, 2)):
         meta, pictures = random_sog(40, version, bands)
