@@ -17,7 +17,7 @@ from scene.depth_photo import load_depth
 from tests.test_plain_gradients import situation as plain_situation
 from tests.test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 from training.coarse import smaller
-from training.depth_loss import DepthLoss, DepthWish
+from training.depth_loss import HOLE, DepthLoss, DepthWish
 from training.drawing import camera_of
 from training.evaluate import evaluate_model, report
 from training.losses import ImageLoss
@@ -49,7 +49,7 @@ def depth_photo(seed: int) -> np.ndarray:
 def depth_loss_reference(metres, through, depth) -> float:
     known = depth > 0
     away = np.abs(metres - (1 - through) * depth)[known] / depth[known]
-    return float((away + through[known]).mean())
+    return float((away + HOLE * through[known]).mean())
 
 
 @pytest.mark.parametrize("seed", [1])
@@ -173,9 +173,9 @@ def trained(device, capture, **changes) -> Trainer:
 
 
 def test_depth_photos_bring_the_depth_nearer(device, balls):
-    """Where the first points are a visual hull; measured once: 0.077 against 0.148."""
+    """Where the first points are a visual hull; measured once: 0.084 against 0.233."""
     hull = replace(balls, points=None, point_colors=None)
-    with_depth, without = (trained(device, hull, depth_share=share) for share in (0.1, 0.0))
+    with_depth, without = (trained(device, hull, depth_share=share) for share in (0.3, 0.0))
     one, other = depth_error(with_depth), depth_error(without)
     assert one < 0.8 * other, (one, other)
 

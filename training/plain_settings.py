@@ -42,7 +42,7 @@ class PlainSettings:
     prune_opacity: float = 0.005  # a splat below it goes, as 3DGS
     reset_every: int = 3000  # iterations until opacities are set back, as 3DGS
     ssim_share: float = 0.2
-    depth_share: float = 0.1  # as in TrainSettings
+    depth_share: float = 0.3  # as in TrainSettings
     downscale: int | None = None
     masks: str = "object"
     background: str = "auto"

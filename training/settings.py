@@ -61,7 +61,7 @@ class TrainSettings:
     prune_views: float = 0.0  # ... and one that a smaller share of all steps had on screen
     ssim_share: float = 0.2  # of the image loss; eq. 8 read literally says 0.8, which is worse
     opacity_share: float = 0.0  # lambda_alpha of eq. 9; the paper says 0.01
-    depth_share: float = 0.1  # of the depth loss, beside the image's, where photos have depth
+    depth_share: float = 0.3  # of the depth loss, beside the image's, where photos have depth
     scale_share: float = 0.0  # lambda_S of eq. 9; the paper says 1e-9
     downscale: int | None = None  # of the photos; None: until neither side exceeds 640 pixels
     coarse: int = 1  # the sides are divided by this at the start: 1, 2, 4, 8; halved step by step

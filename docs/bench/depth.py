@@ -46,7 +46,7 @@ def main() -> None:
         "--starts", nargs="+", choices=("points", "hull"), default=["points", "hull"]
     )
     parser.add_argument("--views", type=int, nargs="+", default=[3, 6, 12, 0])
-    parser.add_argument("--shares", type=float, nargs="+", default=[0, 0.05, 0.1, 0.2, 0.5, 1.0])
+    parser.add_argument("--shares", type=float, nargs="+", default=[0, 0.1, 0.2, 0.3, 0.5, 1.0])
     parser.add_argument("--seeds", type=int, nargs="+", default=[0])
     parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
     options = parser.parse_args()
