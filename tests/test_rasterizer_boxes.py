@@ -1,11 +1,14 @@
 """Large splats: lists leave out what their ellipse misses, gradients do not notice."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rasterizer_scenes import device, off_centre_camera, random_splats, upload
 
 from rasterizer.bin import bin_tiles
 from rasterizer.project import Projected, project
+from rasterizer.raster import FORMS as RASTER_FORMS
 from rasterizer.raster import rasterize, rasterize_backward
 
 FORMS = ("cpu", "gpu")
@@ -121,3 +124,30 @@ def test_gradients_are_those_of_full_boxes(form):
         found.append(d.download(rasterize_backward(d, projected, tiles, frame, grad, form=form)))
         assert np.isfinite(found[-1]).all()
     np.testing.assert_array_equal(*found)
+
+
+@pytest.mark.parametrize("longest", [1.0, 4.0, 15.0, 100.0, 900.0, 1e5])
+@pytest.mark.parametrize("shape", [1.0, 0.3, 0.05, 1e-3, 1e-6])
+@pytest.mark.parametrize("opacity", [0.004, 0.1, 0.9])
+def test_blocks_that_are_left_out_change_no_bit(longest, shape, opacity):
+    """Within a tile, too: picture and gradients beside those of a pass over every block."""
+    rng, size, count = np.random.default_rng(int(longest)), (120, 90), 150
+    sigmas = np.tile([[longest, max(longest * shape, 0.55)]], (count, 1))
+    centres = rng.uniform((-20, -20), (140, 110), (count, 2))
+    turns = np.r_[0, np.pi / 2, np.pi / 4, 1e-4, rng.uniform(0, np.pi, count - 4)]
+    projected = ellipses(centres, sigmas, turns, opacity)
+    every = replace(device(), programs={})
+    path = RASTER_FORMS["cpu"][0]
+    for defines in ({}, {"ABSOLUTE": 1}):
+        key = (str(path), tuple(sorted(defines.items())))
+        every.programs[key] = device().program(path, **defines, EVERY_BLOCK=1)
+    grad = device().upload(rng.normal(size=(3, size[1], size[0])).astype(np.float32))
+    found = []
+    for where in (device(), every):
+        tiles = bin_tiles(where, projected, size, "cpu")
+        frame = rasterize(where, projected, tiles, size, form="cpu")
+        backward = rasterize_backward(where, projected, tiles, frame, grad, form="cpu")
+        found.append([where.download(a) for a in (frame.image, frame.transmittance, backward)])
+    assert found[0][1].min() < 1
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -15,9 +15,7 @@
 #define ACROSS (TILE / BLOCK_W)  // columns
 #define BLOCKS (DOWN * ACROSS)   // 32: one bit each
 #define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
-#define EVERY_COLUMN 0x01010101u  // the first bit of each column
-#define SHIFT_W 2                // log2 of BLOCK_W and BLOCK_H
-#define SHIFT_H 1
+#define SHIFT_H 1                // log2 of BLOCK_H
 #define BATCH 32
 #define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
 #define HALF_LOG2E 0.72134752044f
@@ -28,8 +26,45 @@
 // A batch of instances of one tile.
 typedef struct {
   float splats[BATCH * RECORD];
-  uint blocks[BATCH];  // the blocks that the splat's box touches
+  uint blocks[BATCH];  // those that the splat's ellipse touches
 } Batch;
+
+// What of a batch the masks are made of, a column each.
+typedef struct {
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], cut[BATCH];
+} Columns;
+
+// Bit k of each block that the ellipse touches, for eight splats from 8 g on: in every column of
+// blocks the interval of y while the ellipse is, in x, between its first and last pixel centres.
+//   y = tilt x +- sqrt((cut - x^2 / covariance_xx) / c), largest at x = lean
+// With room for what float rounding does to a pixel's own test, as in span_of_row of tiles.cl: no
+// pixel is lost, so every bit of the image is that of a test of all blocks.
+inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
+  const float8 x = vload8(g, e->x) - (x0 + 0.5f), y = vload8(g, e->y) - (y0 + 0.5f);
+  const float8 a = vload8(g, e->a), b = vload8(g, e->b), c = vload8(g, e->c);
+  const float8 ex = vload8(g, e->half_x), ey = vload8(g, e->half_y), cut = vload8(g, e->cut);
+  const float8 per_c = 1.0f / c, tilt = -b * per_c, lean = -b / a * ey;
+  const float8 most = (1.0001f * cut + 5e-7f * (a * ex * ex + c * ey * ey)) * per_c;
+  const float8 per_xx = cut / fmax(ex * ex, FLT_MIN) * per_c;
+  const float8 spare = 1e-6f * (fabs(tilt) * (ex + fabs(x)) + ey + fabs(y));
+  const float8 above = y - spare, below = y + spare, low = -1, high = TILE;
+  float8 left = -x;
+  uint8 mask = 0;
+  for (int column = 0; column < ACROSS; column++) {
+    const float8 right = left + (BLOCK_W - 1);
+    const float8 up = fmin(fmax(-lean, left), right), down = fmin(fmax(lean, left), right);
+    const float8 highest = above + tilt * up - sqrt(fmax(most - up * up * per_xx, 0.0f));
+    const float8 lowest = below + tilt * down + sqrt(fmax(most - down * down * per_xx, 0.0f));
+    const int8 top = convert_int8(ceil(fmin(fmax(highest, 0.0f), high))) / BLOCK_H;
+    const int8 bottom = convert_int8(floor(fmin(fmax(lowest, low), high - 1))) >> SHIFT_H;
+    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
+                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom)) & COLUMN_BITS;
+    const int8 meets = (left <= ex) & (right >= -ex);
+    mask |= (rows & as_uint8(meets)) << (uint8)(DOWN * column);
+    left += BLOCK_W;
+  }
+  return mask;
+}
 
 // Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
 // independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
@@ -37,33 +72,27 @@ typedef struct {
 inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
                  __global const float* record, Batch* batch) {
   const int n = min(BATCH, end - p);
-  float mean_x[BATCH], mean_y[BATCH], half_x[BATCH], half_y[BATCH];
+  Columns e;
   for (int j = 0; j < n; j++) {
     __global const float* from = record + (size_t)RECORD * instances[p + j];
     float* s = batch->splats + RECORD * j;
     vstore8(vload8(0, from), 0, s);
     vstore4(vload4(0, from + 8), 0, s + 8);
-    mean_x[j] = s[MEAN_X];
-    mean_y[j] = s[MEAN_Y];
-    half_x[j] = s[EXTENT_X];
-    half_y[j] = s[EXTENT_Y];
+    e.x[j] = s[MEAN_X];
+    e.y[j] = s[MEAN_Y];
+    e.a[j] = s[CONIC_A];
+    e.b[j] = s[CONIC_B];
+    e.c[j] = s[CONIC_C];
+    e.half_x[j] = s[EXTENT_X];
+    e.half_y[j] = s[EXTENT_Y];
+    e.cut[j] = s[CUT];
   }
-  for (int g = 0; g * LANES < n; g++) {
-    const float8 x = vload8(g, mean_x) - (x0 + 0.5f), y = vload8(g, mean_y) - (y0 + 0.5f);
-    const float8 ex = vload8(g, half_x), ey = vload8(g, half_y);
-    // First and last pixel of the tile inside the box; beyond it by one at most, for the shifts.
-    const float8 low = -1, high = TILE;
-    const int8 left = convert_int8(ceil(fmin(fmax(x - ex, 0.0f), high))) / BLOCK_W;
-    const int8 right = convert_int8(floor(fmin(fmax(x + ex, low), high - 1))) >> SHIFT_W;
-    const int8 top = convert_int8(ceil(fmin(fmax(y - ey, 0.0f), high))) / BLOCK_H;
-    const int8 bottom = convert_int8(floor(fmin(fmax(y + ey, low), high - 1))) >> SHIFT_H;
-    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
-                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom));
-    // In two halves: a shift by all 32 bits is not defined.
-    const uint8 from = as_uint8(left * (DOWN / 2)), to = as_uint8((ACROSS - 1 - right) * (DOWN / 2));
-    const uint8 columns = ((uint8)(0xffffffffu) << from << from) & ((uint8)(0xffffffffu) >> to >> to);
-    vstore8(rows * EVERY_COLUMN & columns, g, batch->blocks);
-  }
+  for (int g = 0; g * LANES < n; g++)
+#ifdef EVERY_BLOCK  // what a test compares with
+    vstore8((uint8)(0xffffffffu), g, batch->blocks);
+#else
+    vstore8(blocks_of_eight(&e, g, x0, y0), g, batch->blocks);
+#endif
   return n;
 }
 
