@@ -23,7 +23,9 @@ COMMANDS = {
     "simulate": ("simulate", "a scene file in motion: hands and rays of a script, told as lines"),
     "vr": ("headset", "a scene in a headset: walk into it and touch it"),
     "train": ("train", "posed photos of several modalities to a scene"),
+    "fit": ("fit", "the smallest scene that shows a capture as well as the largest, and why"),
     "eval": ("evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
+    "table": ("table", "one model beside separate ones and plain splats: dB, bytes, seconds"),
     "demo": ("demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("headless", "draw the bundled demo into pictures and time it"),
 }

@@ -3,13 +3,16 @@
 import json
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from app.opening import ReadingOptions, open_model
+
+if TYPE_CHECKING:
+    from scene.capture import Capture
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,8 @@ class Options(ReadingOptions):
     """A package, or any other file of splats."""
     capture: Annotated[Path, tyro.conf.Positional]
     """A folder of posed photos."""
+    modality: str | None = None
+    """Only this one of the capture: for a scene that was trained on it alone."""
     json: Path | None = None
     """Write the result here; - writes it to standard output."""
     downscale: int | None = None
@@ -28,6 +33,9 @@ class Options(ReadingOptions):
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "black", "white", "gray"] = "auto"
     """Colour behind everything.  auto: the capture's, else black."""
+    vgg: Path | None = None
+    """An ONNX file of VGG16's first layers: tells a distance of its features, too.  It is no LPIPS,
+    and compares only with figures of the same file."""
 
 
 def run(options: Options) -> int:
@@ -37,6 +45,7 @@ def run(options: Options) -> int:
     from scene.read_capture import read_capture
     from scene.scene_file import is_scene_file
     from training.evaluate import evaluate_model, report
+    from training.vgg_distance import VggDistance
 
     started = time.perf_counter()
     if is_scene_file(options.scene):
@@ -44,11 +53,18 @@ def run(options: Options) -> int:
             f"{options.scene} is a scene file of objects, and photos are of one scene as it was "
             "trained; name the model of one object."
         )
-    model, capture = open_model(options.scene, options), read_capture(options.capture)
+    distance = None if options.vgg is None else VggDistance(options.vgg)
+    capture = read_capture(options.capture)
+    if options.modality is not None:
+        capture = only(capture, options.modality)
+    model = open_model(options.scene, options)
     scores = evaluate_model(
-        open_device(), model, capture, options.downscale, options.masks, options.background
-    )
+        open_device(), model, capture, options.downscale, options.masks, options.background,
+        distance,
+    )  # fmt: skip
     result = report(options.scene, scores, started)
+    if distance is not None:
+        result["vgg_file"] = distance.name
     print_table(result)
     if options.json == Path("-"):
         print(json.dumps(result, indent=1))
@@ -57,14 +73,32 @@ def run(options: Options) -> int:
     return 0
 
 
+def only(capture: "Capture", name: str) -> "Capture":
+    """The capture with one of its modalities.  Raises UsageError."""
+    from app.errors import UsageError
+
+    stops = tuple(stop for stop in capture.stops if stop.name == name)
+    if not stops:
+        names = ", ".join(stop.name for stop in capture.stops)
+        raise UsageError(f"the capture has no modality '{name}'; it has {names}.")
+    photos = tuple(photo for photo in capture.photos if photo.modality == name)
+    return replace(capture, stops=stops, photos=photos)
+
+
 def print_table(result: dict) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("modality", "PSNR dB", "SSIM", "photos", "splats alive")
+    vgg = ["VGG distance"] if "vgg_file" in result else []
+    depth = any("depth_error" in score for score in result["modalities"].values())
+    more = [*vgg, *(["depth error %"] if depth else [])]
+    table = Table("modality", "PSNR dB", "SSIM", *more, "photos", "splats alive")
     for name, score in result["modalities"].items():
-        row = (f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}", str(score["photos"]))
-        table.add_row(name, *row, f"{result['alive'][name]:,}")
+        row = [f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}"]
+        row += [f"{score['vgg_distance']:.4f}"] if vgg else []
+        if depth:
+            row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")
+        table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
     console = Console(file=sys.stderr)
     console.print(table)
     console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")

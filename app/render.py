@@ -12,6 +12,7 @@ import tyro
 from app.opening import ReadingOptions, open_model
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
+LEGEND = "legend.json"  # of --output
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
 
@@ -46,6 +47,11 @@ class Options(ReadingOptions):
     debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
     """Instead of the picture: which splats are left out and why, the same from above, how many
     splats lie over each pixel, how far they are, which object they are of; with a legend."""
+    output: Literal["picture", "depth", "normal", "coverage"] = "picture"
+    """Instead of the colours: metres along the view, directions of the surface or how much of a
+    pixel is covered; each as a .npy and a 16-bit .png, and a legend.json that tells the numbers."""
+    depth_unit: float | None = None
+    """Metres a step of --output depth's .png; default: the finest power of ten that is enough."""
     max_pixels: float = inf
     """Leave out splats larger than this: one sigma of the longer axis, pixels."""
     max_distance: float = inf
@@ -78,6 +84,7 @@ def run(options: Options) -> int:
         parse_size,
     )
     from app.errors import UsageError
+    from app.outputs import draw_outputs
     from scene.scene_file import is_scene_file
 
     controls = parse_controls(options.x) if options.x else [None]
@@ -90,6 +97,7 @@ def run(options: Options) -> int:
         raise UsageError(f"--stereo is {options.stereo}, expected metres from 0 to 1.")
     settings, budget = choose_settings(options), read_budget(options.target_ms, options.floor_db)
     check_one_of(options, budget)
+    check_output(options)
     # What needs no scene comes before it: large ones take a while to open.
     cameras = choose_cameras(options, size)
     pairs, paths = choose_paths(options, controls, len(cameras.views) if cameras else None)
@@ -106,7 +114,11 @@ def run(options: Options) -> int:
             drawn = Drawn(opened.subject, x, views[0].size, eyes)
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
         scenes = [opened.scene_at(x, i) for x, i in pairs]
-        draw_all(renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
+        work = (renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
+        if options.output == "picture":
+            draw_all(*work)
+        else:
+            draw_outputs(*work, options.output, unit_of(options, opened.subject, views))
     print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {options.out}", file=sys.stderr)
     return 0
 
@@ -160,6 +172,25 @@ def check_one_of(options: Options, budget) -> None:
         raise UsageError(f"--target-ms chooses what {option} says; leave one of the two out.")
 
 
+def check_output(options: Options) -> None:
+    """Numbers have neither a legend drawn over them nor a budget."""
+    from app.errors import UsageError
+
+    for name in ("debug", "target_ms"):
+        if options.output != "picture" and getattr(options, name) != getattr(Options, name):
+            option = f"--{name.replace('_', '-')}"
+            raise UsageError(f"--output {options.output} goes without {option}; leave one out.")
+    if options.depth_unit is not None and not 1e-9 <= options.depth_unit <= 1e6:
+        raise UsageError(f"--depth-unit is {options.depth_unit}, expected metres above 0.")
+
+
+def unit_of(options: Options, subject, views: list) -> float:
+    """Metres a step of a depth picture."""
+    from app.outputs import choose_unit
+
+    return options.depth_unit or choose_unit(*subject.bounds(), views)
+
+
 def choose_settings(options: Options):
     """The RenderSettings of the options; UsageError names what is out of range."""
     from app.errors import UsageError
@@ -198,7 +229,9 @@ def choose_paths(
         raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
     pairs = [(x, i) for x in controls for i in range(views)]
     paths = [options.out / f"{i:04d}_x{x or 0:.3f}.png" for i, (x, _) in enumerate(pairs)]
-    taken = [p for p in paths if p.exists()]
+    beside = [p.with_suffix(".npy") for p in paths] + [options.out / LEGEND]
+    files = paths if options.output == "picture" else paths + beside
+    taken = [p for p in files if p.exists()]
     if taken and not options.overwrite:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
     return pairs, paths

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 if TYPE_CHECKING:
+    from training.plain import PlainTrainer
     from training.settings import TrainSettings
     from training.train import Trainer
 
@@ -33,6 +34,18 @@ class Options:
     """Train for so long; the learning rates follow the time."""
     iterations: int | None = None
     """Train so many steps: the same bits on every run.  fast: 2000, paper: 30000."""
+    model: Literal["anchors", "splats"] = "anchors"
+    """splats: plain 3DGS splats, a set a modality, to compare with; --out is a folder of PLY files.
+    The modalities share the budget."""
+    separate: bool = False
+    """One anchor model a modality, to compare with; --out is a folder of packages.  Each takes its
+    share of the budget."""
+    sh_degree: int | None = None
+    """Of plain splats' colours: 0 to 3.  Default: 3."""
+    splats: int | None = None
+    """How many plain splats a modality starts with at most."""
+    max_splats: int | None = None
+    """Cap of growing plain splats, a modality."""
     preset: Literal["fast", "paper"] = "fast"
     """fast: minutes on a CPU.  paper: the numbers of the paper."""
     resume: bool = False
@@ -43,6 +56,26 @@ class Options:
     """Add and remove anchors between 10 % and 60 % of the run."""
     max_anchors: int | None = None
     """Cap of growing."""
+    max_mb: float | None = None
+    """The same in megabytes of the package on disk; the start keeps within it, too."""
+    growth: Literal["gradient", "absgrad", "error"] | None = None
+    """What draws new anchors: the gradient by a splat's place on screen, that of every pixel
+    without its sign, or the splat's share of the picture's error."""
+    grow_threshold: float | None = None
+    """Of what draws them: smaller grows more.  gradient: 2e-4, absgrad: 6e-4, error: 1.2 times the
+    mean share."""
+    grow_grids: int | None = None
+    """Grids that new anchors fill: 1 a voxel, 2 also half a voxel, 3 also a quarter."""
+    grow_each: bool | None = None
+    """Grow at each modality by what its own photos say, not by the mean over all."""
+    grow_replace: float | None = None
+    """When the cap is reached, so many of all anchors at most make room: those that show least."""
+    prune_opacity: float | None = None
+    """An anchor whose splats have a smaller mean opacity goes."""
+    prune_weight: float | None = None
+    """An anchor that gives less to its pictures of every modality goes; pixels, for example 0.1."""
+    prune_views: float | None = None
+    """An anchor that is in a smaller share of all pictures goes, for example 0.01."""
     anchors: int | None = None
     """How many to start with at most, where --voxel is not given."""
     voxel: float | None = None
@@ -53,16 +86,32 @@ class Options:
     """F, numbers an anchor."""
     hidden: int | None = None
     """Width of the five networks."""
+    layers: int | None = None
+    """Hidden layers of the five networks, 1 to 3."""
+    fixed: str | None = None
+    """Networks that do not see x, as offset,scale,rotation: all stops share what they give."""
+    view_dependent: bool | None = None
+    """Whether colour depends on where one looks from."""
     ssim_share: float | None = None
     """lambda: (1 - lambda) L1 + lambda D-SSIM.  Equation 8 read literally has 0.8."""
     opacity_share: float | None = None
     """lambda_alpha of equation 9."""
     scale_share: float | None = None
     """lambda_S of equation 9."""
+    depth_share: float | None = None
+    """Weight of the depth loss where photos have depth photos; 0: they are not used."""
     rate_scale: float | None = None
     """Times every learning rate."""
+    rise: int | None = None
+    """Steps over which the networks' rates rise, for scenes of which all would vanish at once."""
+    revive: float | None = None
+    """Weight of a pull on splats that are absent, for example 0.01."""
     downscale: int | None = None
     """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
+    coarse: int | None = None
+    """Start with photos of 1/2, 1/4 or 1/8 of the sides; the next size comes step by step."""
+    coarse_until: float | None = None
+    """Share of the run after which the photos have all their pixels, 0 to 1."""
     masks: Literal["object", "valid", "ignore"] | None = None
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None
@@ -78,6 +127,11 @@ def run(options: Options) -> int:
     from training.checkpoint import checkpoint_path, read_checkpoint
     from training.train import Trainer
 
+    if options.model == "splats" or options.separate:
+        from app.train_baselines import run_baseline
+
+        return run_baseline(options)
+    refuse_plain_options(options)
     refuse_foreign(options.out)  # now, not after the training
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
@@ -107,11 +161,12 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
     asked = {n: value for n, value in asked.items() if value is not None}
     settings = preset(options.preset) if before is None else TrainSettings(**before)
     if before is not None:
-        other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
+        known = settings.as_dict()  # an older checkpoint may not have all of them
+        other = sorted(n for n in asked if n not in BUDGET and asked[n] != known[n])
         if other:
             raise UsageError(
                 f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
-                f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
+                f"{known[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
             )
     if "seconds" in asked and "iterations" not in asked:
         asked["iterations"] = None
@@ -121,6 +176,16 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
         return replace(settings, **asked)
     except ValueError as error:
         raise UsageError(str(error)) from None
+
+
+def refuse_plain_options(options: Options) -> None:
+    """Raises UsageError for what only plain splats have."""
+    from app.errors import UsageError
+
+    for name in ("sh_degree", "splats", "max_splats"):
+        if getattr(options, name) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
 
 
 def say(text: str) -> None:
@@ -157,8 +222,11 @@ def interrupts() -> Iterator[list]:
         signal.signal(signal.SIGINT, before)
 
 
-def train(trainer: "Trainer", checkpoint: Path) -> bool:
-    """The run with its progress on standard error; True when Ctrl-C ended it early."""
+def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
+    """The run with its progress on standard error; True when Ctrl-C ended it early.
+
+    checkpoint: written to every SAVE_EVERY seconds; None: never.
+    """
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
     from app.progress import progress_bar
@@ -174,7 +242,7 @@ def train(trainer: "Trainer", checkpoint: Path) -> bool:
     ):  # fmt: skip
         task = bar.add_task("compiling kernels", total=1.0, psnr="", loss="")
         for now in trainer.steps():
-            text = f"{now.iteration} steps, {now.anchors:,} anchors"
+            text = f"{now.iteration} steps, {now.anchors:,} {trainer.unit}"
             bar.update(task, completed=min(now.fraction, 1.0), description=text)
             if now.loss is not None:
                 bar.update(task, loss=f"loss {now.loss:.4f}")
@@ -186,7 +254,7 @@ def train(trainer: "Trainer", checkpoint: Path) -> bool:
             if now.fraction >= look and trainer.settled:
                 look += 1 / LOOKS
                 bar.update(task, psnr=decibels(trainer.held_out_psnr()))
-            if time.monotonic() - saved > SAVE_EVERY:
+            if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
                 write_checkpoint(checkpoint, *trainer.checkpoint())
                 saved = time.monotonic()
             if asked and trainer.settled:

@@ -27,8 +27,8 @@ class Tiles:
     instances: "Array"  # (I or more,) int32 splat indices
     places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
     order: "Array"  # (visible,) int32: the visible splats by depth, stable
-    count: int  # I
-    first_slot: "Array | None" = None  # (N,) int32: a splat's instances are numbered from there
+    count: int  # slots: as many as instances, and more where large boxes have tiles left out
+    first_slot: "Array | None" = None  # (N,) int32: a splat's slots are numbered from there
 
     def slots(self, device: Device) -> "Array":
         """first_slot; counted now if the form that made these lists did not need it."""
@@ -39,6 +39,13 @@ class Tiles:
         kernel = device.program(KERNELS / "bin.cl")["number_slots"]
         device.launch(kernel, 1, 1, count, self.places, first_slot)
         return first_slot
+
+    def room(self, device: Device, first_slot: "Array", columns: int) -> "Array":
+        """(count, columns) float32 for what instances leave in their slots; the others are 0."""
+        slots, count = device.empty((self.count, columns)), self.places.shape[0]
+        kernel = device.program(KERNELS / "sum_slots.cl")["clear_boxes"]
+        device.launch(kernel, count, 64, count, columns, self.places, first_slot, slots)
+        return slots
 
 
 def bin_tiles(
@@ -85,21 +92,25 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     )  # fmt: skip
     keys, order = sort_pairs(device, keys, splats, 32)
 
-    offsets, visible = device.empty(count + 1, np.int32), device.empty(1, np.int32)
+    offsets, slots, visible = (device.empty(n, np.int32) for n in (count + 1, count + 1, 1))
     device.launch(
-        kernels["count_instances"], count + 1, 64, count, keys, order, places, offsets, visible
-    )
+        kernels["count_instances"], count + 1, 64,
+        count, keys, order, projected.record, places, offsets, slots, visible,
+    )  # fmt: skip
     prefix_sums(device, offsets)
+    prefix_sums(device, slots)
     shown, total = int(device.view(visible)[0]), int(device.view(offsets)[-1])
+    slot_count = int(device.view(slots)[-1])
     tile_of, instances = device.empty(total, np.uint32), device.empty(total, np.int32)
     device.launch(
         kernels["write_instances"], shown, 64,
-        shown, grid[0], order, places, offsets, tile_of, instances, first_slot,
+        shown, grid[0], order, projected.record, places, offsets, slots, tile_of, instances,
+        first_slot,
     )  # fmt: skip
     tile_of, instances = sort_pairs(device, tile_of, instances, (tiles - 1).bit_length())
     starts = device.empty(tiles + 1, np.int32)
     device.launch(kernels["find_starts"], total + 1, 64, total, tiles, tile_of, starts)
-    return Tiles(grid, starts, instances, places, order[:shown], total, first_slot)
+    return Tiles(grid, starts, instances, places, order[:shown], slot_count, first_slot)
 
 
 def _bin_chunks(
@@ -117,8 +128,7 @@ def _bin_chunks(
         )  # fmt: skip
     total = int(device.view(found.status)[:, 1].sum(dtype=np.int64))
     order = sort_order(device, found) if order is None else order
-    visible = order.shape[0]
-    starts, instances = _scatter_tiles(device, kernels, order, found, visible, total)
+    starts, instances = _scatter_tiles(device, kernels, order, projected.record, found, total)
     return Tiles(grid, starts, instances, found.places, order, total)
 
 
@@ -165,9 +175,9 @@ def _sort(device: Device, kernels: dict, found: Found, visible: int, least: int,
     return order
 
 
-def _scatter_tiles(device, kernels, order, found: Found, visible: int, total: int) -> tuple:
-    """(tiles + 1,) starts and (total,) instances from the splats in depth order."""
-    grid, tiles = found.grid, found.grid[0] * found.grid[1]
+def _scatter_tiles(device, kernels, order, record, found: Found, total: int) -> tuple:
+    """(tiles + 1,) starts and at most (total,) instances from the splats in depth order."""
+    grid, tiles, visible = found.grid, found.grid[0] * found.grid[1], order.shape[0]
     chunks = chunks_of(device, visible)
     chunk = -(-visible // chunks)
     # The branch-free walk looks at a tile's right, lower and lower right neighbours, too.
@@ -177,10 +187,12 @@ def _scatter_tiles(device, kernels, order, found: Found, visible: int, total: in
     near_to_far = device.empty((visible, 2), np.uint32)  # places
     shared = (visible, chunk, grid[0], bins)
     device.launch(
-        kernels["count_tiles"], chunks, 1, *shared, order, found.places, near_to_far, table
-    )
+        kernels["count_tiles"], chunks, 1,
+        *shared, order, record, found.places, near_to_far, table,
+    )  # fmt: skip
     device.launch(kernels["scan_table"], 1, 1, bins, chunks, table, starts)
     device.launch(
-        kernels["scatter_tiles"], chunks, 1, *shared, total, order, near_to_far, table, instances
-    )
+        kernels["scatter_tiles"], chunks, 1,
+        *shared, total, order, record, near_to_far, table, instances,
+    )  # fmt: skip
     return starts, instances

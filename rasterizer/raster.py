@@ -124,17 +124,24 @@ def rasterize_backward(
     grad_transmittance: "Array | None" = None,
     form: str | None = None,
     absolute: bool = True,
+    error: "Array | None" = None,
+    weight: bool = False,
 ) -> "Array":
     """(N, 12) gradients of the records from those of the image (3, H, W) and transmittance (H, W).
 
-    Slots 9 and 10 hold the sums of the absolute gradients of the mean, for growing; absolute=False
-    leaves them 0 and saves about a tenth of the time.
+    Slots 9 to 11 are for growing.  9 and 10 hold the sums of the absolute gradients of the mean;
+    absolute=False leaves them 0 and saves about a tenth of the time.  With an `error` (H, W) of the
+    pixels slot 9 holds the splat's share of it instead, the sum of alpha T error.  weight=True puts
+    the sum of alpha T into slot 11, in pixels.
     """
     count = projected.depth.shape[0]
     _, height, width = frame.image.shape
-    first_slot, slots = tiles.slots(device), device.empty((tiles.count, RECORD))
+    first_slot = tiles.slots(device)
+    slots = tiles.room(device, first_slot, RECORD)
     file, _, group = FORMS[form or device.kind]
-    defines = {"ABSOLUTE": 1} if absolute else {}
+    defines = {"ABSOLUTE": 1} if absolute and error is None else {}
+    defines |= {"SHARE": 1} if error is not None else {}
+    defines |= {"WEIGHT": 1} if weight else {}
     kernel = device.program(file, **defines)["rasterize_backward"]
     with_transmittance = grad_transmittance is not None
     device.launch(
@@ -142,7 +149,7 @@ def rasterize_backward(
         width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.instances, tiles.places,
         first_slot, projected.record, frame.image, frame.transmittance, grad_image,
         grad_transmittance if with_transmittance else frame.transmittance, with_transmittance,
-        slots,
+        slots, *([] if error is None else [error]),
     )  # fmt: skip
     grad_record = device.empty((count, RECORD))
     kernel = device.program(KERNELS / "sum_slots.cl")["sum_slots"]

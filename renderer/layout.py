@@ -32,6 +32,8 @@ SLOTS = {
     "COMMAND": 4,  # uint (5,)      one indirect draw
     # splat
     "ORDER": 1,  # uint (N,)      indices, near to far
+    # surface
+    "SURFACES": 4,  # vec4 (N, 3)    depth around the mean, and a normal
     # decode
     "ANCHORS": 2,  # vec4 (A,)      metres in the object
     "FEATURES": 3,  # vec4 (A, F / 4)

@@ -24,6 +24,8 @@ from renderer.project import Projector
 from renderer.settings import RenderSettings
 from renderer.sort_check import checked_sorter
 from renderer.splat import Splatter
+from renderer.surface import Surface
+from renderer.surface_quads import draw_surface
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
 from runtime_models.evaluate import Control, follows_eye
@@ -206,6 +208,19 @@ class QuadsDrawing:
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of a view just drawn blends, for a debug view."""
         return count_overdraw(self._gpu, self._projector, self._arena, view, settings)
+
+    def surface(self, view: View, settings: RenderSettings) -> Surface:
+        """Depth, normals and coverage from a view; the order and the counts in use stay."""
+        arena = self._arena
+        if not arena.count:
+            return Surface.empty(view.size)
+        with self.order_set_aside():
+            counts = arena.counts.read()
+            self._projector.project(arena, [view], settings)
+            self._sorter.sort(arena, settings.key_bits)
+            made = draw_surface(self._gpu, arena, view, settings)
+            arena.counts.write(counts)
+        return made
 
     def close(self) -> None:
         self._release_arena()

@@ -29,6 +29,8 @@ class Projected:
     covariance: np.ndarray  # (N, 2, 2) px^2, low_pass included
     opacity: np.ndarray  # (N,) after the fade
     color: np.ndarray  # (N, 3)
+    mean: np.ndarray  # (N, 3) metres in the camera, OpenCV axes
+    axes: np.ndarray  # (N, 3, 3) metres in the camera: the columns are one sigma long
 
 
 def reference_image(
@@ -139,7 +141,8 @@ def gate_object(
         mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
         reason, faded = gate(mean, mean_px, covariance, opacity, seen, color, view, settings)
         place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
-    return Projected(reason, depth, place, mean_px, covariance, faded, color)
+        in_camera = camera_from_object[:3, :3] @ axes
+    return Projected(reason, depth, place, mean_px, covariance, faded, color, mean, in_camera)
 
 
 def kept_light(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:

@@ -24,8 +24,9 @@ from renderer.recolor import (
 from renderer.resample import bilinear
 from renderer.resolve import Resolve
 from renderer.settings import TARGETS, FrameStats, RenderSettings
+from renderer.surface import Surface
 from renderer.timing import PassTimer
-from runtime_models.evaluate import follows_eye
+from runtime_models.evaluate import follows_eye, shape_follows_control
 from runtime_models.model import Model, SplatLayers
 from scene.control import control_key, control_of
 from scene.metrics import psnr
@@ -119,7 +120,10 @@ class Renderer:
         """Geometry of object i at x, unless it lies in the arena already."""
         if decoded.key is not None and np.array_equal(x, decoded.x):
             return  # a selector changed where nothing is
-        if not follows_eye(decoded.model):  # else with the colours, once the eye is known
+        shaped = decoded.key is not None and not shape_follows_control(decoded.model)
+        if not (
+            shaped or follows_eye(decoded.model)
+        ):  # else with the colours, once the eye is known
             self._drawing.decode_geometry(i, x)
             self._geometry_runs += 1
         decoded.x = x
@@ -307,6 +311,12 @@ class Renderer:
                 self._resolve.copy(pixels, framebuffer)
             else:
                 self._resolve.draw(image, framebuffer, background, palette, weight)
+
+    def surface(self, view: View) -> Surface:
+        """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
+        self._decode_colors([view])
+        with self._framebuffer_kept():
+            return self._drawing.surface(view, self._settings_of_frame())
 
     def stale_order_db(self, views: list[View]) -> float:
         """PSNR of the order in use against one sorted for these views: what keeping it costs, dB.

@@ -20,10 +20,12 @@ from rasterizer.quantize_keys import quantize_keys
 from rasterizer.raster import rasterize_rgba_views
 from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
+from rasterizer.surface import rasterize_depth, surface_arena
 from rasterizer.tint import tint
 from renderer.cadence import Cadence
 from renderer.limits import check_tiles
 from renderer.settings import RenderSettings
+from renderer.surface import Surface
 from renderer.timing import PassTimer
 from runtime_models.evaluate import Control, Evaluator
 from runtime_models.model import Model, SplatLayers, is_antialiased
@@ -275,6 +277,25 @@ class TilesDrawing:
         if not self.splats:
             return np.zeros(view.size[::-1], np.int32)
         return count_overdraw(self.device, self._projected[i], view.size)
+
+    def surface(self, view: View, settings: RenderSettings) -> Surface:
+        """Depth, normals and coverage from a view; the last frame stays as it is."""
+        if not self.splats:
+            return Surface.empty(view.size)
+        camera = Camera(*view.pinhole(), view.size, view.near)
+        sort = SortFrames((camera.camera_from_world,), settings.order == "distance")
+        (projected,) = self._launch([view], settings, sort)
+        order = sort_order(self.device, projected.found)
+        tiles = bin_tiles(self.device, projected, view.size, order=order)
+        surfaces = surface_arena(
+            self.device, self._mean_opacity, self._covariance, self._object_index,
+            self._world_from_objects, camera, projected,
+        )  # fmt: skip
+        drawn = rasterize_depth(self.device, projected, tiles, surfaces, view.size)
+        normal = self.device.download(drawn.frame.image)
+        through = self.device.download(drawn.frame.transmittance)
+        metres = self.device.download(drawn.metres)
+        return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - through)
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""

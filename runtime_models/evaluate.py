@@ -6,6 +6,7 @@ import numpy as np
 
 from runtime_models.evaluate_scaffold import ScaffoldEvaluator
 from runtime_models.model import (
+    HEADS,
     SIZE_PER_SPLAT,
     AnchorModel,
     ControlEncoding,
@@ -26,6 +27,13 @@ Control = float | np.ndarray  # of everything, or (A,) one an anchor (layers: on
 def follows_eye(model: Model) -> bool:
     """Whether more than a model's colours depends on the eye: opacity, scales and rotations."""
     return isinstance(model, ScaffoldModel)
+
+
+def shape_follows_control(model: Model) -> bool:
+    """Whether more than a model's colours depends on x: where its splats are, and which."""
+    if isinstance(model, AnchorModel):
+        return any("control" in model.networks[n].inputs for n in HEADS if n != "color")
+    return isinstance(model, SplatLayers)
 
 
 def evaluate(model: Model, x: Control, eye: np.ndarray) -> Splats:
@@ -57,7 +65,8 @@ class Evaluator:
     that looks at the eye, what the features give the first layer is kept: a colour run is a seventh
     faster, for one float an anchor and hidden unit (128 bytes an anchor of the demo).
     keep: geometry() writes into the same arrays again: no fresh memory, a quarter faster, but what
-    it gave before is gone.
+    it gave before is gone.  A network that does not see x then runs once; its caller must not write
+    into what it is given.
     """
 
     def __init__(
@@ -70,6 +79,7 @@ class Evaluator:
         self.model = model
         self._networks: dict[str, FoldedNetwork | WholeNetwork] = {}
         self._kept: dict[str, np.ndarray] | None = {} if keep else None  # outputs of networks
+        self._lasting: set[str] = set()  # of these, which hold for every x
         self._whole: dict[str, WholeNetwork] = {}  # for a control value an anchor
         self._threads = threads
         self._own: tuple[np.ndarray, np.ndarray] | None = None  # x (A,) and its Psi (A, d)
@@ -104,10 +114,9 @@ class Evaluator:
             return model.means, model.scales, model.wxyz, model.opacity * there
         if self._centres is None:
             self._centres = np.tile(model.anchors, model.splats_per_anchor)
-        means = self._run("offset", x)  # (A, k * 3), from the anchor
-        means += self._centres
-        scales, wxyz = self._run("scale", x), self._run("rotation", x).reshape(-1, 4)
-        opacity = self._run("opacity", x).reshape(-1)
+        means = self._shape("offset", x)  # (A, k * 3)
+        scales, wxyz = self._shape("scale", x), self._shape("rotation", x).reshape(-1, 4)
+        opacity = self._shape("opacity", x).reshape(-1)
         wxyz = normalize(wxyz) if unit else wxyz
         return means.reshape(-1, 3), scales.reshape(-1, 3), wxyz, opacity
 
@@ -162,6 +171,20 @@ class Evaluator:
         shape = (len(direction), 3 * self.model.splats_per_anchor)
         out = np.empty(shape, np.float32) if out is None else out.reshape(shape)
         return self._run("color", x, direction, rows, out).reshape(-1, 3)
+
+    def _shape(self, name: str, x: Control) -> np.ndarray:
+        """(A, k * size) of a network of the geometry, of offset from the world's origin.
+
+        With `keep`, one that does not see x is what it was.
+        """
+        if name in self._lasting:
+            return self._kept[name]
+        values = self._run(name, x)
+        if name == "offset":
+            values += self._centres
+        if self._kept is not None and "control" not in self.model.networks[name].inputs:
+            self._lasting.add(name)
+        return values
 
     def _run(
         self,

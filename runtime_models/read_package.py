@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.feature_codes import decode_features
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, BadFile, Mlp
 from runtime_models.package_files import (
     ANCHORS,
@@ -21,7 +22,8 @@ from runtime_models.read_manifest import Manifest, read_manifest
 from runtime_models.read_onnx import read_onnx
 
 BAD_HEADER = (TypeError, SyntaxError, tokenize.TokenError)  # numpy reads it as Python's literal
-TYPES = {"positions": ("float32",), "features": ("float32", "float16")}
+TYPES = {"positions": ("float32",), "features": ("float32", "float16", "uint8")}
+RANGE = "feature_range"  # there where features are bytes
 
 
 def read_package(path: str | Path) -> AnchorModel:
@@ -55,20 +57,21 @@ def read_anchors(data: bytes, width: int, where: str) -> tuple[np.ndarray, np.nd
             raise BadFile(f"{where}: {name} has shape {array.shape}, expected (A, {columns}).")
         if len(array) == 0:
             raise BadFile(f"{where} holds no anchors: {name} has shape {array.shape}.")
-        bad = ~np.isfinite(array).all(axis=1)
+        bad = ~np.isfinite(array).all(axis=1)  # of bytes: none
         if bad.any():
             raise BadFile(
                 f"{where}: {name} has NaN or Inf in {bad.sum()} of {len(array)} rows, "
                 f"first in row {int(bad.argmax())}; export it again."
             )
-    positions, features = (np.ascontiguousarray(arrays[name], np.float32) for name in TYPES)
+    positions = np.ascontiguousarray(arrays["positions"], np.float32)
+    features = decode_features(arrays["features"], arrays.get(RANGE), where)
     if len(positions) != len(features):
         raise BadFile(f"{where}: {len(positions)} positions but {len(features)} features.")
     return positions, features
 
 
 def read_arrays(data: bytes, where: str) -> dict[str, np.ndarray]:
-    """The arrays of TYPES, as stored; never unpickled."""
+    """The arrays of TYPES, as stored, and RANGE where it is there; never unpickled."""
     if not zipfile.is_zipfile(io.BytesIO(data)):
         raise BadFile(f"{where} is cut off or no npz; copy or export it again.")
     try:
@@ -77,7 +80,8 @@ def read_arrays(data: bytes, where: str) -> dict[str, np.ndarray]:
             refuse_bomb(where, size, len(data))
             lacking = [name for name in TYPES if name not in archive]
             small = size <= LARGEST[ANCHORS]
-            arrays = {name: archive[name] for name in TYPES} if small and not lacking else {}
+            wanted = [name for name in (*TYPES, RANGE) if name in archive]
+            arrays = {name: archive[name] for name in wanted} if small and not lacking else {}
     except BadFile:
         raise
     except (*DAMAGED, *BAD_HEADER, MemoryError):

@@ -10,6 +10,7 @@ from runtime_models.lint_package import refuse_filling
 from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
 from runtime_models.plain_splats import Reading
+from runtime_models.read_layer_list import LIST, has_layer_list, read_layer_list
 from runtime_models.read_layers import layer_files, read_layers
 from runtime_models.read_output_folder import (
     in_run,
@@ -52,7 +53,7 @@ def read_whole(path: Path, reading: Reading) -> Model:
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if not (path.is_file() or path.is_dir()):  # reading a pipe would wait for ever
         raise BadFile(f"{path} is neither a file nor a folder; wanted is {KNOWN}.")
-    if path.name == MANIFEST:
+    if path.name in (MANIFEST, LIST):
         path = path.parent
     if is_streamed(path):
         return read_streamed(path, reading)
@@ -61,6 +62,8 @@ def read_whole(path: Path, reading: Reading) -> Model:
     if path.is_dir():
         if (path / MANIFEST).exists():
             return read_upright(path, reading)
+        if has_layer_list(path):
+            return read_layer_list(path, reading)
         if is_sog(b"", path):
             return read_sog_folder(path, reading)
         if is_scaffold(path):
@@ -162,7 +165,7 @@ def describe_head(mlp: Mlp) -> dict:
 
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
-    if path.name in (MANIFEST, META, TREE):
+    if path.name in (MANIFEST, META, TREE, LIST):
         path = path.parent
     if isinstance(model, ScaffoldModel) and not path.is_dir():
         path = path.parent

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.feature_codes import encode_features
 from runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST, open_package
 from runtime_models.read_package import read_files
@@ -23,9 +24,9 @@ DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the sam
 def write_package(model: AnchorModel, path: str | Path, features: str = "float16") -> int:
     """Write the package and return its bytes on disk.  Atomic: a reader sees all or nothing.
 
-    `path` ending in .shift is a zip, anything else a folder.  `features` float16 becomes float32
-    where a value is too large for it.  Raises BadFile rather than replace something that is not a
-    package, or write one that read_package would refuse.
+    `path` ending in .shift is a zip, anything else a folder.  `features` is one of FEATURES.
+    Raises BadFile rather than replace something that is not a package, or write one that
+    read_package would refuse.
     """
     path = Path(path)
     files = package_files(model, features)
@@ -41,11 +42,10 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
 
 def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
     """File name to content, the manifest first."""
-    if np.abs(model.features).max(initial=0) > np.finfo(np.dtype(features)).max:
-        features = "float32"
     arrays = io.BytesIO()
-    stored = model.features.astype(np.dtype(features))
-    np.savez_compressed(arrays, positions=model.anchors, features=stored)
+    np.savez_compressed(
+        arrays, positions=model.anchors, **encode_features(model.features, features)
+    )
     manifest = json.dumps(describe_model(model), indent=1, ensure_ascii=False).encode()
     files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
     for name in HEADS:

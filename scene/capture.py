@@ -16,6 +16,9 @@ class Photo:
     modality: str  # a Stop's name
     mask: Path | None = None  # white where the photo counts
     split: str = "train"  # train | test
+    depth: Path | None = None  # metres along the view, of the same field of view
+    depth_unit: float = 0.001  # metres a step, where the depth photo holds integers
+    counts: tuple[float, float] | None = None  # numbers of a grey photo that stand for 0 and 1
 
 
 @dataclass(frozen=True)

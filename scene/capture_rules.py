@@ -186,6 +186,23 @@ def stop_from(entry: dict, where: str) -> Stop:
     )
 
 
+def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
+    """Of the modalities that have 'counts': which numbers of a grey photo stand for 0 and 1."""
+    out = {}
+    for entry in listed if isinstance(listed, list) else ():
+        if isinstance(entry, dict) and entry.get("counts") is not None:
+            whose = f"{where}: modality {shown(entry.get('name'))}"
+            low, high = numbers_in(entry, "counts", 2, whose)
+            if not low < high:
+                raise BadFile(f"{whose} needs counts [low, high], not {[low, high]}")
+            out[entry.get("name")] = (low, high)
+    return out
+
+
+def with_counts(photos: list[Photo], counts: dict[str, tuple[float, float]]) -> list[Photo]:
+    return [replace(photo, counts=counts.get(photo.modality)) for photo in photos]
+
+
 def background_from(entry: dict, where: str) -> tuple[float, ...] | None:
     """The colour 'background', display sRGB; None where none is stated."""
     color = numbers_in(entry, "background", 3, where)

@@ -15,6 +15,7 @@ MOST_PIXELS = 1 << 27
 # Of one colour a picture packs 1000 pixels into a byte; 4K may pack better still.
 FREE_PIXELS, PIXELS_A_BYTE = 1 << 23, 1024
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
+FLOATS = "F"  # how PIL names floating-point greyscale
 GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
 
 
@@ -48,7 +49,7 @@ def load_photo(
     laid over black with it; a mask file takes precedence over alpha.  `size` (width, height) is
     reached by the mean over each new pixel's area.
     """
-    rgb, alpha = read_pixels(photo.path)
+    rgb, alpha = read_pixels(photo.path, photo.counts)
     mask = alpha if photo.mask is None else read_pixels(photo.mask)[0].mean(axis=2)
     if mask is not None and mask.shape != rgb.shape[:2]:
         raise BadFile(
@@ -60,7 +61,10 @@ def load_photo(
     return shrink(rgb, size), None if mask is None else shrink(mask[..., None], size)[..., 0]
 
 
-def read_pixels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
+def read_pixels(
+    path: Path, counts: tuple[float, float] | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """rgb and alpha or None, as load_photo gives them; counts: what stands for 0 and 1."""
     with open_image(path) as image:
         size = path.stat().st_size
         most = min(MOST_PIXELS, max(FREE_PIXELS, PIXELS_A_BYTE * size))
@@ -74,13 +78,31 @@ def read_pixels(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
                 image.load()
         except BROKEN as error:
             raise BadFile(f"{path}: the image is cut off ({error}); copy it again") from None
-        if image.mode in GREY_16:
-            grey = np.asarray(image, np.float32) / 65535
+        if counts is not None or image.mode in (*GREY_16, FLOATS):
+            grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return np.repeat(grey[..., None], 3, axis=2), None
         if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
             rgba = np.asarray(image.convert("RGBA"), np.float32) / 255
             return rgba[..., :3] * rgba[..., 3:], rgba[..., 3].copy()
         return np.asarray(image.convert("RGB"), np.float32) / 255, None
+
+
+def shares(
+    grey: np.ndarray, mode: str, counts: tuple[float, float] | None, path: Path
+) -> np.ndarray:
+    """(H, W) float32 0..1 of a grey photo's numbers; what is none of them counts as 0."""
+    if counts is None:
+        if mode == FLOATS:
+            raise BadFile(
+                f"{path}: a photo of floating-point numbers; say with its modality's 'counts' "
+                "[low, high] which of them stand for black and white"
+            )
+        return grey / 65535
+    if mode not in (*GREY_16, FLOATS, "L"):
+        raise BadFile(f"{path}: 'counts' are for greyscale photos, this one is {mode}")
+    low, high = counts
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.clip(np.nan_to_num((grey - low) / (high - low)), 0, 1).astype(np.float32)
 
 
 def shrink(pixels: np.ndarray, size: tuple[int, int]) -> np.ndarray:

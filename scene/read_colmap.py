@@ -11,10 +11,12 @@ from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
+    counts_from,
     image_size,
     split_every_8th,
     spread_stops,
     stops_from,
+    with_counts,
 )
 from scene.colmap_points import read_colmap_points
 from scene.colmap_tables import Lens, find_model, read_tables
@@ -48,7 +50,8 @@ def read_colmap(folder: Path) -> Capture:
         photos.append(Photo(view, path, modality_of[image.name], mask))
     xyz, rgb = read_colmap_points(model / f"points3D{ending}")
     points, colors = (xyz, rgb.astype(np.float32) / 255) if len(xyz) else (None, None)
-    photos = split_every_8th(photos)
+    counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
+    photos = with_counts(split_every_8th(photos), counts)
     background = background_from(said, f"{folder}/capture.json")
     guessed = not said.get("modalities")
     return world.capture(folder, stops, photos, points, colors, background, guessed)

@@ -14,12 +14,15 @@ from scene.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
+    counts_from,
     image_size,
     rigid,
     split_every_8th,
     spread_stops,
     stops_from,
+    with_counts,
 )
+from scene.depth_photo import depth_of, refuse_other_units
 from scene.json_values import is_number, shortened, shown, text_in
 from scene.pose import OPENCV_FROM_EYE, View
 from scene.read_points import read_points
@@ -41,6 +44,7 @@ class Shot:
     path: Path
     world_from_camera: np.ndarray  # (4, 4) OpenCV axes, the file's world
     where: str  # for messages
+    folder: Path  # where the names of its photos begin
 
 
 def read_transforms(*files: Path) -> Capture:
@@ -61,6 +65,7 @@ def read_transforms(*files: Path) -> Capture:
         where,
     )
     photos = [photo_of(shot, world, folder) for shot in shots]
+    photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors = None, None
@@ -71,7 +76,9 @@ def read_transforms(*files: Path) -> Capture:
     background, notes = background_from(data, where), data.get("notes")
     if not isinstance(notes, dict | None):
         raise BadFile(f"{where}: 'notes' is {shown(notes)}; an object is wanted")
-    return world.capture(folder, stops, photos, points, colors, background, not named, notes)
+    capture = world.capture(folder, stops, photos, points, colors, background, not named, notes)
+    refuse_other_units(capture, where)
+    return capture
 
 
 def gather(files: tuple[Path, ...]) -> tuple[dict, list[dict]]:
@@ -145,8 +152,11 @@ def shots_of(
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
             )
-        return [Shot(entry, modality, find_image(folder / file, where), matrix, where)]
-    return [Shot(entry, n, find_image(folder / n / file, where), matrix, where) for n in names]
+        return [Shot(entry, modality, find_image(folder / file, where), matrix, where, folder)]
+    return [
+        Shot(entry, n, find_image(folder / n / file, where), matrix, where, folder / n)
+        for n in names
+    ]
 
 
 def opencv_axes(entry: dict) -> bool:
@@ -187,7 +197,8 @@ def photo_of(shot: Shot, world: CaptureWorld, folder: Path) -> Photo:
         view = View.from_pinhole(world.turned(shot.world_from_camera), focal, centre, size)
     except ValueError as error:
         raise BadFile(f"{where}: {error}") from None
-    return Photo(view, shot.path, shot.modality, mask, SPLITS[split])
+    depth, unit = depth_of(entry, shot.folder, size, where)
+    return Photo(view, shot.path, shot.modality, mask, SPLITS[split], depth, unit)
 
 
 def intrinsics(entry: dict, size: tuple[int, int], where: str) -> tuple[tuple, tuple]:

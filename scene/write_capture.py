@@ -34,6 +34,7 @@ def write_capture(capture: Capture) -> Path:
                 "palette": stop.palette,
                 "value_range": list(stop.value_range) if stop.value_range else None,
                 "unit": stop.unit,
+                "counts": counts_of(capture, stop.name),
             }
             for stop in capture.stops
         ],
@@ -46,6 +47,12 @@ def write_capture(capture: Capture) -> Path:
     beside.write_text(json.dumps(data, indent=1, ensure_ascii=False), encoding="utf-8")
     os.replace(beside, target)
     return target
+
+
+def counts_of(capture: Capture, modality: str) -> list[float] | None:
+    """Of a modality's photos, which share them."""
+    counts = next((p.counts for p in capture.photos if p.modality == modality), None)
+    return None if counts is None else list(counts)
 
 
 def frame(photo: Photo, folder: Path) -> dict:
@@ -64,6 +71,9 @@ def frame(photo: Photo, folder: Path) -> dict:
     }
     if photo.mask is not None:
         out["mask_path"] = photo.mask.relative_to(folder).as_posix()
+    if photo.depth is not None:
+        out["depth_path"] = photo.depth.relative_to(folder).as_posix()
+        out["depth_unit"] = photo.depth_unit
     return out
 
 

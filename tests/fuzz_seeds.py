@@ -129,9 +129,15 @@ def archive_seeds(folder: Path) -> list[Seed]:
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     write_package(model, folder / "package.shift")
     write_package(model, folder / "package")
+    write_package(model, folder / "bytes.shift", "uint8")
     seeds = [
         Seed("package zip", {"package.shift": (folder / "package.shift").read_bytes()}, read_model),
         Seed("package folder", files_of(folder / "package"), read_model),
+        Seed(
+            "package of bytes",
+            {"bytes.shift": (folder / "bytes.shift").read_bytes()},
+            read_model,
+        ),
     ]
     for version, bands in ((1, 1), (2, 0), (2, 2)):
         meta, pictures = random_sog(40, version, bands)
@@ -186,17 +192,23 @@ def torch_seeds(folder: Path) -> list[Seed]:
 
 
 def thermal_seeds(folder: Path) -> list[Seed]:
-    """A pair, and ThermalGaussian's two sets of harmonics in one PLY."""
+    """A pair, a list of stops, and ThermalGaussian's two sets of harmonics in one PLY."""
     from test_output_folder import with_thermal_harmonics
 
+    from runtime_models.model import Stop
+    from runtime_models.write_layer_list import write_layer_list
     from runtime_models.write_ply import write_ply
 
     (folder / "pair").mkdir()
     for name in ("rgb", "thermal"):
         write_ply(some_splats(20, 1), folder / f"pair/{name}.ply")
     with_thermal_harmonics(folder / "ommg.ply", 20)
+    heat = Stop("heat", 1.0, "thermal", "ironbow", (10.0, 60.0), "K")
+    layers = [(stop, some_splats(20, 4)) for stop in (Stop("RGB", 0.0), heat)]
+    write_layer_list(layers, folder / "listed")
     return [
         Seed("thermal pair", files_of(folder / "pair"), read_model),
+        Seed("list of stops", files_of(folder / "listed"), read_model),
         Seed("thermal harmonics", {"a.ply": (folder / "ommg.ply").read_bytes()}, read_model),
     ]
 

@@ -1,5 +1,7 @@
 """Small random models that tests share."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp, Stop
@@ -46,6 +48,18 @@ def make_random_model(
         STOPS,
         {"seed": seed},
     )
+
+
+def without_control(model: AnchorModel, *names: str) -> AnchorModel:
+    """The same model whose networks of these names do not see x."""
+    networks = dict(model.networks)
+    for name in names:
+        mlp = networks[name]
+        seen = mlp.weights[0][:, : -model.encoding.d]  # Psi(x) comes last
+        networks[name] = replace(
+            mlp, weights=(np.ascontiguousarray(seen), *mlp.weights[1:]), inputs=mlp.inputs[:-1]
+        )
+    return replace(model, networks=networks)
 
 
 def run_in_numpy(mlp: Mlp, rows: np.ndarray) -> np.ndarray:

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import Evaluator, directions, encode_rows, evaluate
-from runtime_models.model import ControlEncoding
-from tests.models import make_random_model
+from runtime_models.evaluate import (
+    Evaluator,
+    directions,
+    encode_rows,
+    evaluate,
+    shape_follows_control,
+)
+from runtime_models.model import HEADS, ControlEncoding
+from tests.models import make_random_model, without_control
 
 EYE = np.array([0.3, -0.2, 2.0])
 
@@ -25,6 +31,24 @@ def test_kept_memory_holds_what_fresh_memory_would(own):
         assert [again[i].ctypes.data for i in (0, 1, 3)] == [places[i] for i in (0, 1, 3)]
         assert np.shares_memory(kept.color(x, EYE, out=out), out)
         np.testing.assert_array_equal(out, fresh.color(x, EYE))
+
+
+GEOMETRY = ("offset", "scale", "rotation", "opacity")
+
+
+@pytest.mark.parametrize("fixed", [("offset",), ("scale", "rotation"), HEADS])
+def test_a_network_that_does_not_see_x_runs_once(fixed, monkeypatch):
+    model = without_control(make_random_model(70, k=3), *fixed)
+    fresh, kept, ran = Evaluator(model), Evaluator(model, keep=True), []
+    run = Evaluator._run
+    monkeypatch.setattr(Evaluator, "_run", lambda *a: ran.append(a[1]) or run(*a))
+    for x in (0.0, 0.4, 0.4, 1.0):
+        ours = [array.copy() for array in kept.geometry(x)]
+        assert ran == [n for n in GEOMETRY if x == 0.0 or n not in fixed]
+        for a, b in zip(ours, fresh.geometry(x), strict=True):
+            np.testing.assert_array_equal(a, b)
+        ran.clear()
+    assert shape_follows_control(model) == (fixed != HEADS)
 
 
 def test_two_objects_of_one_model_keep_their_own_colours():

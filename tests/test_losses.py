@@ -28,15 +28,17 @@ def planar(image):
     return np.ascontiguousarray(image.transpose(2, 0, 1), np.float32)
 
 
+FORMS = ("cpu", "gpu")
 SIZES = [(7, 5), (8, 8), (9, 12), (1, 1), (16, 3), (199, 21), (200, 21), (201, 21), (300, 11)]
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("size", SIZES, ids=str)
 @pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
-def test_value_and_gradient(device, size, share):
+def test_value_and_gradient(device, size, share, form):
     rgba, image = photo_and_image(*size)
     photo = rgba[..., :3].astype(np.float64) / 255
-    loss = ImageLoss(device, size)
+    loss = ImageLoss(device, size, form)
     target = loss.target(device.upload(rgba), (0, 0, 0))
     grad = device.download(loss.compare(device.upload(planar(image)), target, share))
     grad = grad.transpose(1, 2, 0)
@@ -67,10 +69,11 @@ def check_gradient(grad, plain, photo, share, weight=None):
             assert abs(grad[y, x, channel] - numeric / (2 * step)) < 1e-5 * largest
 
 
-def test_nothing_is_written_beyond_the_image(device):
+@pytest.mark.parametrize("form", FORMS)
+def test_nothing_is_written_beyond_the_image(device, form):
     size = (201, 13)
     rgba, image = photo_and_image(*size)
-    loss = ImageLoss(device, size)
+    loss = ImageLoss(device, size, form)
     loss.grad_image = device.upload(np.full((4, 13, 201), 7, np.float32))  # one plane too many
     target = loss.target(device.upload(rgba), (0, 0, 0))
     loss.compare(device.upload(planar(image)), target, 0.2)
@@ -78,27 +81,29 @@ def test_nothing_is_written_beyond_the_image(device):
     assert not device.download(target.planes)[..., 201:].any()
 
 
-def test_flat_white_photos_have_a_tame_gradient(device):
+@pytest.mark.parametrize("form", FORMS)
+def test_flat_white_photos_have_a_tame_gradient(device, form):
     """Variances of white are differences of nearly equal numbers: C2 has to hold the quotient."""
     size = (64, 64)
     rgba = np.full((64, 64, 4), 255, np.uint8)
     image = np.ones((64, 64, 3), np.float32)
-    loss = ImageLoss(device, size)
+    loss = ImageLoss(device, size, form)
     target = loss.target(device.upload(rgba), (0, 0, 0))
     grad = device.download(loss.compare(device.upload(planar(image)), target, 1.0))
     assert loss.value() == pytest.approx(0, abs=1e-3)
     assert np.abs(grad).max() * grad.size < 0.1  # an L1 gradient has 1 here
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("share", [0.0, 0.2, 1.0])
-def test_weights_leave_pixels_out(device, share):
+def test_weights_leave_pixels_out(device, share, form):
     size = (33, 30)
     rgba, image = photo_and_image(*size)
     photo = rgba[..., :3].astype(np.float64) / 255
     weight = np.zeros((30, 33), np.float32)
     weight[5:25, 3:20] = 1
     weight[10, 10:15] = 0.25
-    loss = ImageLoss(device, size)
+    loss = ImageLoss(device, size, form)
     target = loss.target(device.upload(rgba), (0, 0, 0), weight)
     on_device = device.upload(planar(image))
     grad = device.download(loss.compare(on_device, target, share)).transpose(1, 2, 0)
@@ -114,10 +119,11 @@ def test_weights_leave_pixels_out(device, share):
     assert loss.value() == pytest.approx(before, rel=1e-6)
 
 
-def test_photos_are_laid_over_the_background(device):
+@pytest.mark.parametrize("form", FORMS)
+def test_photos_are_laid_over_the_background(device, form):
     rgba, _ = photo_and_image(11, 6)
     rgba[..., 3] = np.random.default_rng(1).integers(0, 256, (6, 11))
-    loss = ImageLoss(device, (11, 6))
+    loss = ImageLoss(device, (11, 6), form)
     target = loss.target(device.upload(rgba), (0.1, 0.5, 1.0))
     alpha = rgba[..., 3:] / 255
     wanted = alpha * rgba[..., :3] / 255 + (1 - alpha) * (0.1, 0.5, 1.0)

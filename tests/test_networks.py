@@ -1,14 +1,22 @@
 """The five heads on the device against plain numpy in float64, forward and backward."""
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from rasterizer.device import open_device
-from runtime_models.model import HEADS, SIZE_PER_SPLAT
+from runtime_models.evaluate import evaluate
+from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
+from runtime_models.read_package import read_files
+from runtime_models.write_package import package_files
+from training.export import model_of
 from training.gaussians import Activation, Gaussians
 from training.networks import HeadLayout, Heads, initial_weights, padded
 from training.reference import activate_reference, directions, head_inputs, heads_reference
 
+FORMS = ("cpu", "gpu")
 VOXEL = 0.05
 EYE = np.array([2.0, 1.0, 1.5])
 
@@ -29,9 +37,9 @@ def model(layout: HeadLayout, count: int, seed: int = 0):
 
 
 def plain_heads(layout, networks, anchors, features, control):
-    """(hidden, raw) of every head by name, float64."""
+    """(units, raw) of every head by name, float64."""
     real = features[:, : layout.features].astype(np.float64)
-    return heads_reference(networks, real, directions(anchors, EYE), control)
+    return heads_reference(layout, networks, real, directions(anchors, EYE), control)
 
 
 def raw_of(raw, layout, name):
@@ -50,6 +58,13 @@ LAYOUTS = [
     HeadLayout(splats=1, features=1, hidden=1, control=1),
     HeadLayout(splats=3, features=7, hidden=9, control=5),
     HeadLayout(splats=4, features=32, hidden=64, control=16),
+    HeadLayout(splats=2, features=8, hidden=16, layers=2),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, layers=3),
+    HeadLayout(splats=1, features=1, hidden=1, control=1, layers=3),
+    HeadLayout(splats=2, features=5, hidden=130, layers=2),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, fixed=("offset", "scale", "rotation")),
+    HeadLayout(splats=2, hidden=12, layers=2, fixed=HEADS, view_dependent=False),
 ]
 
 
@@ -58,8 +73,9 @@ def test_pack_then_unpack_is_the_identity(layout):
     rng = np.random.default_rng(1)
     networks = {}
     for name in HEADS:
-        inputs, out = len(layout.first_rows(name)), layout.splats * SIZE_PER_SPLAT[name]
-        shapes = ((layout.hidden, inputs), layout.hidden, (out, layout.hidden), out)
+        out = layout.splats * SIZE_PER_SPLAT[name]
+        widths = [len(layout.first_rows(name)), *[layout.hidden] * layout.layers, out]
+        shapes = [s for i, o in pairwise(widths) for s in ((o, i), o)]
         networks[name] = tuple(rng.normal(size=s).astype(np.float32) for s in shapes)
     flat = layout.pack(networks)
     for name, arrays in layout.unpack(flat).items():
@@ -68,24 +84,26 @@ def test_pack_then_unpack_is_the_identity(layout):
     assert np.count_nonzero(flat) == sum(a.size for n in networks.values() for a in n)
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", [1, 3, 4, 5, 8, 9, 129])
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
-def test_forward_equals_plain_numpy(device, layout, count):
+def test_forward_equals_plain_numpy(device, layout, count, form):
     weights, anchors, features, control = model(layout, count)
     arrays = map(device.upload, (weights, anchors, features))
-    raw = device.download(Heads(device, layout).forward(*arrays, control, EYE))
+    raw = device.download(Heads(device, layout, form).forward(*arrays, control, EYE))
     wanted = plain_heads(layout, layout.unpack(weights), anchors, features, control)
     for name in HEADS:
         assert relative(raw_of(raw, layout, name), wanted[name][1]) < 2e-6, name
 
 
+@pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 137])
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
-def test_backward_equals_plain_numpy(device, layout, count):
+def test_backward_equals_plain_numpy(device, layout, count, form):
     weights, anchors, features, control = model(layout, count)
     rng = np.random.default_rng(5)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
-    heads = Heads(device, layout)
+    heads = Heads(device, layout, form)
     heads.forward(*on_device, control, EYE)
     grad_raw = np.zeros((count, layout.raw_at[-1]), np.float32)
     for name in HEADS:
@@ -98,20 +116,25 @@ def test_backward_equals_plain_numpy(device, layout, count):
     networks = layout.unpack(weights)
     plain = plain_heads(layout, networks, anchors, features, control)
     found = layout.unpack(grad_weights)
-    wanted_features, flow = np.zeros((count, layout.features)), None
+    wanted_features, flow = np.zeros((count, layout.features)), np.zeros((count, 3))
     for name in HEADS:
-        w1, _, w2, _ = (a.astype(np.float64) for a in networks[name])
-        d_out = raw_of(grad_raw, layout, name).astype(np.float64)
-        d_hidden = (d_out @ w2) * (plain[name][0] > 0)
+        w1, *_ = (a.astype(np.float64) for a in networks[name])
+        parts = layout.parts_of(name)
         inputs = head_inputs(
-            name, features[:, : layout.features], directions(anchors, EYE), control
+            parts, features[:, : layout.features], directions(anchors, EYE), control
         )
-        wanted = (d_hidden.T @ inputs, d_hidden.sum(0), d_out.T @ plain[name][0], d_out.sum(0))
+        flowing = raw_of(grad_raw, layout, name).astype(np.float64)
+        takes, wanted = [inputs, *plain[name][0]], []
+        for layer in reversed(range(layout.layers + 1)):
+            wanted = [flowing.T @ takes[layer], flowing.sum(0), *wanted]
+            if layer:
+                weight = networks[name][2 * layer].astype(np.float64)
+                flowing = (flowing @ weight) * (takes[layer] > 0)
         for got, want in zip(found[name], wanted, strict=True):
             assert relative(got, want) < 5e-6, name
-        wanted_features += (d_hidden @ w1)[:, : layout.features]
-        if name == "color":
-            flow = (d_hidden @ w1)[:, layout.features : layout.features + 3]
+        wanted_features += (flowing @ w1)[:, : layout.features]
+        if "direction" in parts:
+            flow = (flowing @ w1)[:, layout.features : layout.features + 3]
     assert relative(grad_features[:, : layout.features], wanted_features) < 5e-6
     away = anchors - EYE
     length = np.linalg.norm(away, axis=1, keepdims=True)
@@ -121,27 +144,33 @@ def test_backward_equals_plain_numpy(device, layout, count):
     assert np.abs(added - through_direction).max() < 5e-6 * max(np.abs(before).max(), 1)
 
 
-def test_padding_never_learns(device):
-    layout = HeadLayout(splats=3, features=7, hidden=9, control=5)
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize(
+    "layout", [x for x in LAYOUTS if x.features == 7 or x.fixed or not x.view_dependent], ids=str
+)
+def test_padding_and_what_no_head_sees_never_learn(device, layout, form):
     weights, anchors, features, control = model(layout, 20)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
-    heads = Heads(device, layout)
+    heads = Heads(device, layout, form)
     heads.forward(*on_device, control, EYE)
     grad_raw = np.zeros((20, layout.raw_at[-1]), np.float32)
     for name in HEADS:
         raw_of(grad_raw, layout, name)[:] = 1
-    grads = heads.backward(*on_device, device.upload(grad_raw), device.zeros((20, 3)))
+    moved = device.zeros((20, 3))
+    grads = heads.backward(*on_device, device.upload(grad_raw), moved)
+    assert layout.view_dependent == bool(device.download(moved).any())
     grad_weights, grad_features = (device.download(g) for g in grads)
     np.testing.assert_array_equal(layout.pack(layout.unpack(grad_weights)), grad_weights)
     assert not grad_features[:, layout.features :].any()
 
 
-def test_an_eye_at_an_anchor_is_finite(device):
+@pytest.mark.parametrize("form", FORMS)
+def test_an_eye_at_an_anchor_is_finite(device, form):
     layout = HeadLayout(splats=2)
     weights, anchors, features, control = model(layout, 4)
     anchors[2] = EYE
     on_device = [device.upload(a) for a in (weights, anchors, features)]
-    heads = Heads(device, layout)
+    heads = Heads(device, layout, form)
     raw = heads.forward(*on_device, control, EYE)
     grads = heads.backward(*on_device, raw, device.zeros((4, 3)))
     for array in (raw, *grads):
@@ -192,3 +221,61 @@ def test_activations_and_their_gradient(device, spread):
     assert not found[:, unused].any()
     summed = grads[0].reshape(21, 3, 3).sum(1)
     np.testing.assert_allclose(device.download(grad_anchors), summed, atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("layers", "fixed", "sentence"),
+    [
+        (0, (), "layers is 0"), (4, (), "layers is 4"), (1, ("colour",), "no head 'colour' to fix"),
+    ],
+)  # fmt: skip
+def test_networks_that_cannot_be_are_refused(layers, fixed, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        HeadLayout(layers=layers, fixed=fixed)
+
+
+def test_rates_shrink_behind_wide_layers_and_between_layers():
+    for plain in (HeadLayout(), HeadLayout(hidden=8), HeadLayout(fixed=HEADS)):
+        assert (plain.rate_shares() == 1).all()
+    layout = HeadLayout(splats=2, hidden=64, layers=3)
+    shares = layout.unpack(layout.rate_shares())
+    for name in HEADS:
+        found = [np.unique(array).tolist() for array in shares[name]]
+        assert found == [[1], [1], [0.125], [0.25], [0.125], [0.25], [0.5], [1]]
+
+
+@pytest.mark.parametrize("layers", [1, 3])
+def test_what_a_head_does_not_see_changes_no_other_first_weight(layers):
+    whole = HeadLayout(splats=3, layers=layers)
+    less = replace(whole, fixed=("offset", "color"), view_dependent=False)
+    mine, theirs = (
+        layout.unpack(initial_weights(layout, np.random.default_rng(4))) for layout in (less, whole)
+    )
+    for name in HEADS:
+        seen = np.isin(whole.first_rows(name), less.first_rows(name))
+        np.testing.assert_array_equal(mine[name][0], theirs[name][0][:, seen])
+        for ours, full in zip(mine[name][1:], theirs[name][1:], strict=True):
+            np.testing.assert_array_equal(ours, full)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
+    weights, anchors, features, _ = model(layout, 21)
+    encoding, stops = ControlEncoding(layout.control), (Stop("RGB", 0.0), Stop("Heat", 1.0))
+    state = {"weights.value": weights, "anchors.value": anchors, "features.value": features}
+    exported = model_of(state, layout, VOXEL, encoding, stops, {})
+    files = package_files(exported, "float32")
+    read = read_files(files.__getitem__, "test")
+    assert {n: read.networks[n].inputs for n in HEADS} == {n: layout.parts_of(n) for n in HEADS}
+    heads, activation = Heads(device, layout), Activation(device, layout, VOXEL)
+    on_device = [device.upload(a) for a in (weights, anchors, features)]
+    colors = []
+    for x in (0.0, 0.3, 1.0):
+        raw = heads.forward(*on_device, encoding.encode(x), EYE)
+        ours = activation.forward(raw, on_device[1])
+        theirs = evaluate(read, x, EYE)
+        for name in ("means", "scales", "opacity", "color"):
+            mine = device.download(getattr(ours, name))
+            assert np.abs(mine - getattr(theirs, name)).max() < 2e-5, name
+        colors.append(theirs.color)
+    assert ("color" in layout.fixed) == bool((colors[0] == colors[2]).all())

@@ -28,6 +28,7 @@ from runtime_models.model import SplatLayers, Stop
 from runtime_models.read_scene import read_model
 from scene.pose import Pose, View, look_at
 from scene.scene import Scene, SceneObject
+from tests.models import without_control
 
 AWAY = View(look_at((0, 0, 9), (0, 0, 20)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (32, 16))
 
@@ -104,6 +105,9 @@ def test_a_model_of_networks_equals_the_reference_and_runs_only_what_changed(ren
     assert runs(0.25, view) == (0, 0)
     assert runs(0.25, front_view((96, 96), distance=3)) == (0, 1)
     assert runs(0.75, front_view((96, 96), distance=3)) == (1, 1)
+    model = without_control(model, "offset", "scale", "rotation", "opacity")
+    assert runs(0.25, view) == (1, 1)
+    assert runs(0.75, view) == (0, 1)  # all stops share their shape: colours alone change
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 9, 16])

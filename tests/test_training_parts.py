@@ -18,6 +18,7 @@ from training.initial import (
     pixel_of,
     voxel_centres,
 )
+from training.networks import HeadLayout
 from training.optimizer import Adam
 from training.photos import LoadedPhoto, choose_downscale, load_photos
 from training.schedule import Budget, Schedule, choose_background
@@ -185,6 +186,17 @@ def test_settings_that_cannot_be_are_refused(changes, sentence):
         TrainSettings(**changes)
 
 
+def test_settings_name_the_networks():
+    settings = TrainSettings(layers=2, fixed="scale, offset", view_dependent=False)
+    assert settings.layout() == HeadLayout(5, 16, 32, 16, 2, ("scale", "offset"), False)
+    assert TrainSettings(**settings.as_dict()) == settings
+    assert TrainSettings().layout() == HeadLayout(5)
+    with pytest.raises(ValueError, match="layers is 4; networks have 1 to 3 hidden ones"):
+        TrainSettings(layers=4)
+    with pytest.raises(ValueError, match="no head 'shape' to fix; they are offset"):
+        TrainSettings(fixed="shape")
+
+
 def test_presets():
     paper = preset("paper")
     assert paper.rates(30000) is PAPER and paper.splats_per_anchor == 10
@@ -198,15 +210,15 @@ def test_new_anchors_stand_free_under_the_splats_that_pull():
     anchors = np.array([[0, 0, 0], [1, 0, 0]], np.float32)
     means = np.array([[0.02, 0, 0], [0.6, 0, 0], [1.01, 0, 0], [1.3, 0.3, 0]])  # k = 2
     gradient = np.array([[90, 30], [90, 30], [90, 30], [9, 30]], float)  # pulls 3, 3, 3, 0.3
-    new = newcomers(anchors, [means], gradient, voxel=0.2, threshold=1.0, room=10)
+    new = newcomers(anchors, [means], [gradient], voxel=0.2, threshold=1.0)
     assert new.parents.tolist() == [0] * len(new.parents) and len(new.anchors)
     assert np.allclose(new.anchors[0], [0.6, 0, 0])
     assert len(np.unique(np.round(np.concatenate([anchors, new.anchors]), 4), axis=0)) == 2 + len(
         new.anchors
     )
-    assert not len(newcomers(anchors, [means], gradient, 0.2, 1.0, room=0).anchors)
+    assert not len(new.at_most(0, by_pull=True).anchors)
     gradient[:, 1] = 5  # too rarely seen
-    assert not len(newcomers(anchors, [means], gradient, 0.2, 1.0, room=10).anchors)
+    assert not len(newcomers(anchors, [means], [gradient], 0.2, 1.0).anchors)
 
 
 def test_anchors_that_show_nothing_are_given_up():

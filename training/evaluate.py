@@ -1,22 +1,24 @@
 """How good a scene is: its pictures beside held-out photos of a capture."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import LEAST_ALPHA, project
-from rasterizer.raster import rasterize
+from rasterizer.bin import Tiles, bin_tiles
+from rasterizer.project import LEAST_ALPHA, Projected, project
+from rasterizer.raster import Frame, rasterize
+from rasterizer.surface import rasterize_depth, surface
 from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
+from training.drawing import camera_of
 from training.metrics import psnr, ssim
-from training.photos import BLACK, choose_downscale, load_photos
+from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from training.schedule import choose_background
-from training.step import camera_of
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,8 @@ class Score:
     ssim: float
     photos: int
     alive: int  # splats of this stop that are not absent
+    vgg: float | None = None  # training.vgg_distance; None: not measured
+    depth_error: float | None = None  # of photos with depth: Painter.depth_error
 
 
 class Painter:
@@ -54,6 +58,13 @@ class Painter:
 
     def picture(self, view: View, background: tuple[float, float, float]) -> np.ndarray:
         """(H, W, 3) float32 of the model at the last control value."""
+        _, _, frame = self.draw(view, background)
+        return self.device.download(frame.image).transpose(1, 2, 0)
+
+    def draw(
+        self, view: View, background: tuple[float, float, float]
+    ) -> tuple[Projected, Tiles, Frame]:
+        """The model at the last control value: what was projected, its tiles, and the frame."""
         if follows_eye(self.evaluator.model):
             self._decode(view.world_from_eye.position)
         color = self.evaluator.color(self.x, view.world_from_eye.position)
@@ -61,7 +72,24 @@ class Painter:
         projected = project(self.device, *self.geometry, color, camera_of(view))
         tiles = bin_tiles(self.device, projected, view.size)
         frame = rasterize(self.device, projected, tiles, view.size, background)
-        return self.device.download(frame.image).transpose(1, 2, 0)
+        return projected, tiles, frame
+
+    def depth_error(self, photo: LoadedPhoto) -> float | None:
+        """Mean |depth - d| / d over the depths d that a photo knows; None where it knows none.
+
+        Where less than half of a pixel is covered there is no depth: that counts as 1.
+        """
+        known = None if photo.depth is None else photo.depth > 0
+        if known is None or not known.any():
+            return None
+        view, device = photo.view, self.device
+        projected, tiles, _ = self.draw(view, BLACK)
+        surfaces = surface(device, *self.geometry[:3], camera_of(view), projected)
+        drawn = rasterize_depth(device, projected, tiles, surfaces, view.size)
+        coverage = 1 - device.download(drawn.frame.transmittance)
+        depth = device.download(drawn.metres) / np.maximum(coverage, 1e-6)
+        away = np.abs(depth[known] - photo.depth[known]) / photo.depth[known]
+        return float(np.where(coverage[known] >= 0.5, away, 1).mean())
 
 
 def stop_for(model: Model, capture_stop: Stop) -> Stop:
@@ -83,8 +111,12 @@ def evaluate_model(
     downscale: int | None = None,
     masks: str = "object",
     background: str = "auto",
+    distance: Callable[..., float] | None = None,
 ) -> dict[str, Score]:
-    """A Score for every modality over its held-out photos.  Raises BadFile where there are none."""
+    """A Score for every modality over its held-out photos.  Raises BadFile where there are none.
+
+    distance: what Score.vgg is the mean of, a function of (picture, photo, weight).
+    """
     factor = downscale or choose_downscale(capture.photos)
     behind = choose_background(background, capture.background) or BLACK
     photos = load_photos(capture, "test", factor, masks)
@@ -95,17 +127,17 @@ def evaluate_model(
     painter, scores = Painter(device, model), {}
     for stop in capture.stops:
         alive = painter.set_control(stop_for(model, stop).x)
-        pairs = [
-            (painter.picture(p.view, behind), p.over(behind), p.weight)
-            for p in photos
-            if p.modality == stop.name
-        ]
+        mine = [p for p in photos if p.modality == stop.name]
+        pairs = [(painter.picture(p.view, behind), p.over(behind), p.weight) for p in mine]
+        errors = [e for p in mine if (e := painter.depth_error(p)) is not None]
         if pairs:
             scores[stop.name] = Score(
                 float(np.mean([psnr(*pair) for pair in pairs])),
                 float(np.mean([ssim(*pair) for pair in pairs])),
                 len(pairs),
                 alive,
+                None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
+                float(np.mean(errors)) if errors else None,
             )
     return scores
 
@@ -122,6 +154,8 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
     return {
         "modalities": {
             name: {"psnr_db": round(s.psnr_db, 4), "ssim": round(s.ssim, 5), "photos": s.photos}
+            | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})
+            | ({} if s.depth_error is None else {"depth_error": round(s.depth_error, 5)})
             for name, s in scores.items()
         },
         "alive": {name: s.alive for name, s in scores.items()},

@@ -24,10 +24,9 @@ def model_of(
     networks = {}
     unpacked = layout.unpack(state["weights.value"])
     for name in HEADS:
-        w1, b1, w2, b2 = unpacked[name]
-        inputs = ("feature", "direction", "control") if name == "color" else ("feature", "control")
+        arrays = unpacked[name]
         networks[name] = Mlp(
-            (w1, w2), (b1, b2), ACTIVATION[name], inputs,
+            arrays[::2], arrays[1::2], ACTIVATION[name], layout.parts_of(name),
             SCALE_CLIP if name == "scale" else None, gain.get(name, 1.0),
         )  # fmt: skip
     return AnchorModel(

@@ -25,6 +25,7 @@ class Guard:
         self.trips = 0
         self.empty = 0  # looks in a row
         self.gains: list[float] | None = None  # losses over first losses since falling back
+        self.patience = 0  # looks before these count
 
     def expect(self, modality: str, loss: float, visible: float, shown: float) -> None:
         """What a picture of a modality has; the first time, of the untrained or resumed model.
@@ -44,7 +45,9 @@ class Guard:
         enough = visible > LEAST_VISIBLE * most_visible and shown > LEAST_SHOWN * most_shown
         self.empty = 0 if enough else self.empty + 1
         improves = True
-        if self.gains is not None:
+        if self.patience:
+            self.patience -= 1
+        elif self.gains is not None:
             self.gains.append(loss / self.first_loss[modality])
             if len(self.gains) == PROBATION:
                 improves = bool(np.mean(self.gains) < GAINED)
@@ -59,8 +62,11 @@ class Guard:
     def remember(self, state: dict[str, np.ndarray]) -> None:
         self.snapshots = [*self.snapshots, state][-KEPT:]
 
-    def fall_back(self) -> dict[str, np.ndarray]:
-        """The newest snapshot, which is given up unless it is the last one left."""
+    def fall_back(self, patience: int = 0) -> dict[str, np.ndarray]:
+        """The newest snapshot, which is given up unless it is the last one left.
+
+        patience: looks that a gentler start takes before the loss has to come down.
+        """
         self.trips += 1
-        self.empty, self.gains = 0, []
+        self.empty, self.gains, self.patience = 0, [], patience
         return self.snapshots.pop() if len(self.snapshots) > 1 else self.snapshots[0]

@@ -27,35 +27,42 @@ class Target:
 
 
 class ImageLoss:
-    """(1 - share) L1 + share (1 - SSIM) for images of one size; buffers are reused."""
+    """(1 - share) L1 + share (1 - SSIM) for images of one size; buffers are reused.
 
-    def __init__(self, device, size: tuple[int, int]) -> None:
-        self.device, self.size = device, size
+    form: "cpu" or "gpu", by default the device's kind; they agree to float rounding.
+    """
+
+    def __init__(self, device, size: tuple[int, int], form: str | None = None) -> None:
+        self.device, self.size, self.form = device, size, form or device.kind
         width, height = size
         self.stride = padded(width)
         row = -(-(self.stride + 2 * REACH + 8) // 256) * 256  # few sizes, few compilations
-        self.kernels = device.program(KERNELS / "losses.cl", ROW=row)
+        file, defines = {
+            "cpu": ("losses.cl", {"ROW": row}), "gpu": ("losses_gpu.cl", {}),
+        }[self.form]  # fmt: skip
+        self.kernels = device.program(KERNELS / file, **defines)
         self.blurred = device.empty((3, 3, height, self.stride))
         self.derivative = device.empty((3, 3, height, self.stride))
         self.grad_image = device.empty((3, height, width))
         self.ssim_rows, self.l1_rows = device.empty(3 * height), device.empty(3 * height)
+        self.told = self.ssim_rows, self.l1_rows  # what the kernels fill
+        if self.form == "gpu":  # a value a pixel, summed up when it is asked for
+            self.told = tuple(device.empty((3, height, self.stride)) for _ in range(2))
         self.nothing = device.zeros(1)
+
+    def launch(self, name: str, *arguments) -> None:
+        """A kernel over the whole image: an item a row, or one a pixel."""
+        (width, height), stride = self.size, self.stride
+        items, group = (3 * height, 1) if self.form == "cpu" else (3 * height * stride, 64)
+        self.device.launch(self.kernels[name], items, group, width, height, stride, *arguments)
 
     def target(self, rgba, background, weight=None) -> Target:
         """A Target of photo bytes (H, W, 4) on the device over a background (r, g, b)."""
         (width, height), stride, device = self.size, self.stride, self.device
         planes, mean, square = (device.empty((3, height, stride)) for _ in range(3))
-        rows = 3 * height
-        device.launch(
-            self.kernels["compose_target"], rows, 1, width, height, stride,
-            *map(np.float32, background), rgba, planes,
-        )  # fmt: skip
-        device.launch(
-            self.kernels["target_rows"], rows, 1, width, height, stride, planes, self.blurred
-        )
-        device.launch(
-            self.kernels["target_columns"], rows, 1, height, stride, self.blurred, mean, square
-        )
+        self.launch("compose_target", *map(np.float32, background), rgba, planes)
+        self.launch("target_rows", planes, self.blurred)
+        self.launch("target_columns", self.blurred, mean, square)
         values = 3.0 * width * height
         if weight is not None:
             values = 3.0 * float(weight.sum(dtype=np.float64))
@@ -64,32 +71,29 @@ class ImageLoss:
 
     def compare(self, image, target: Target, ssim_share: float):
         """Gradient (3, H, W) of the loss by the drawn image (3, H, W); then `value` tells it."""
-        (width, height), stride = self.size, self.stride
-        rows, masked = 3 * height, int(target.weight is not None)
+        masked = int(target.weight is not None)
         weight = target.weight if masked else self.nothing
         self.ssim_share, self.values = ssim_share, target.values
-        self.device.launch(
-            self.kernels["image_rows"], rows, 1, width, height, stride, masked,
-            image, target.planes, weight, self.blurred,
-        )  # fmt: skip
-        self.device.launch(
-            self.kernels["ssim_columns"], rows, 1, width, height, stride, self.blurred,
-            target.mean, target.square, self.derivative, self.ssim_rows,
-        )  # fmt: skip
-        self.device.launch(
-            self.kernels["derivative_rows"], rows, 1, width, height, stride,
-            self.derivative, self.blurred,
-        )  # fmt: skip
-        self.device.launch(
-            self.kernels["gradient_columns"], rows, 1, width, height, stride, masked,
-            np.float32(ssim_share), np.float32(1 / target.values), self.blurred,
-            image, target.planes, weight, self.grad_image, self.l1_rows,
+        self.launch("image_rows", masked, image, target.planes, weight, self.blurred)
+        self.launch(
+            "ssim_columns", self.blurred, target.mean, target.square, self.derivative, self.told[0]
+        )
+        self.launch("derivative_rows", self.derivative, self.blurred)
+        self.launch(
+            "gradient_columns", masked, np.float32(ssim_share), np.float32(1 / target.values),
+            self.blurred, image, target.planes, weight, self.grad_image, self.told[1],
         )  # fmt: skip
         return self.grad_image
 
     def parts(self) -> tuple[float, float]:
         """(L1, SSIM) of the last `compare`, over what counts."""
-        everything = 3.0 * self.size[0] * self.size[1]
+        width, height = self.size
+        if self.form == "gpu":
+            self.device.launch(
+                self.kernels["sum_rows"], 3 * height, 64, width, 3 * height, self.stride,
+                *self.told, self.ssim_rows, self.l1_rows,
+            )  # fmt: skip
+        everything = 3.0 * width * height
         ssim = self.device.download(self.ssim_rows).sum(dtype=np.float64)
         l1 = self.device.download(self.l1_rows).sum(dtype=np.float64)
         return float(l1 / self.values), float(1 - (everything - ssim) / self.values)

@@ -6,8 +6,10 @@ import numpy as np
 
 from runtime_models.model import BadFile
 from scene.capture import Capture, Photo
+from scene.depth_photo import load_depth
 from scene.photo import load_photo
 from scene.pose import View
+from training.depth_loss import DepthLoss, DepthTarget, DepthWish
 from training.losses import ImageLoss, Target
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
@@ -22,6 +24,7 @@ class LoadedPhoto:
     rgba: np.ndarray  # (H, W, 4) uint8; alpha below 255 where the background shows
     weight: np.ndarray | None  # (H, W) float32, what counts; None = everything
     name: str  # of the file
+    depth: np.ndarray | None = None  # (H, W) float32 metres along the view, 0 = not known
 
     @property
     def see_through(self) -> bool:
@@ -56,7 +59,12 @@ def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
         if not weight.sum() > 0:
             raise BadFile(f"{photo.mask} is black all over: nothing of its photo would count.")
     rgba = np.clip(np.rint(255 * np.concatenate([rgb, alpha], axis=2)), 0, 255).astype(np.uint8)
-    return LoadedPhoto(photo.view.resized(size), photo.modality, rgba, weight, str(photo.path))
+    depth = None if photo.depth is None else load_depth(photo, size)
+    if depth is not None:  # nothing is known of what does not count
+        seen = rgba[..., 3] >= 128 if weight is None else weight >= 0.5
+        depth = np.where(seen, depth, np.float32(0))
+    view = photo.view.resized(size)
+    return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth)
 
 
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
@@ -69,7 +77,8 @@ class Targets:
     def __init__(self, device) -> None:
         self.device = device
         self.losses: dict[tuple[int, int], ImageLoss] = {}
-        self.kept: dict[tuple[str, str], Target] = {}
+        self.kept: dict[tuple, Target | DepthTarget] = {}
+        self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
         self.bytes = 0
 
     def loss(self, photo: LoadedPhoto) -> ImageLoss:
@@ -81,7 +90,7 @@ class Targets:
 
     def target(self, photo: LoadedPhoto, background: tuple[float, float, float]) -> Target:
         """The photo over a background; kept unless the photo shows the background."""
-        key = (photo.modality, photo.name)
+        key = (photo.modality, photo.name, photo.view.size)
         if key in self.kept:
             return self.kept[key]
         rgba = self.device.upload(photo.rgba)
@@ -90,3 +99,21 @@ class Targets:
             self.kept[key] = target
             self.bytes += target.bytes
         return target
+
+    def wish(self, photo: LoadedPhoto, share: float) -> DepthWish | None:
+        """What is to be learned from the photo's depth; None where it has none or share is 0."""
+        if photo.depth is None or not share > 0:
+            return None
+        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size, "depth")
+        if size not in self.depth_losses:
+            self.depth_losses[size] = DepthLoss(self.device, size)
+        loss = self.depth_losses[size]
+        target = self.kept.get(key) or loss.target(photo.depth)
+        if key not in self.kept and self.bytes + target.bytes <= CACHE_BYTES:
+            self.kept[key] = target
+            self.bytes += target.bytes
+        return DepthWish(loss, target, share) if target.known else None
+
+    def forget(self) -> None:
+        """Make all targets anew at their next use: the photos have another size now."""
+        self.kept, self.bytes = {}, 0

@@ -17,21 +17,26 @@ def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 def head_inputs(
-    name: str, features: np.ndarray, direction: np.ndarray, control: np.ndarray
+    parts: tuple[str, ...], features: np.ndarray, direction: np.ndarray, control: np.ndarray
 ) -> np.ndarray:
-    """(A, in): feature and Psi, and for colour the direction between them (eq. 5)."""
+    """(A, in): the parts that a head takes, side by side (eq. 5)."""
     repeated = np.repeat(np.asarray(control, np.float64)[None], len(features), axis=0)
-    middle = [direction] if name == "color" else []
-    return np.concatenate([features, *middle, repeated], axis=1)
+    values = {"feature": features, "direction": direction, "control": repeated}
+    return np.concatenate([values[part] for part in parts], axis=1)
 
 
-def heads_reference(networks: dict, features, direction, control) -> dict[str, tuple]:
-    """(hidden (A, H), raw (A, out)) of every head; networks as HeadLayout.unpack gives them."""
+def heads_reference(
+    layout: HeadLayout, networks: dict, features, direction, control
+) -> dict[str, tuple]:
+    """(units of every hidden layer [(A, H)], raw (A, out)) of every head; networks as unpacked."""
     out = {}
     for name in HEADS:
-        w1, b1, w2, b2 = (np.asarray(a, np.float64) for a in networks[name])
-        hidden = np.maximum(head_inputs(name, features, direction, control) @ w1.T + b1, 0)
-        out[name] = (hidden, hidden @ w2.T + b2)
+        arrays = [np.asarray(a, np.float64) for a in networks[name]]
+        value, units = head_inputs(layout.parts_of(name), features, direction, control), []
+        for weight, bias in zip(arrays[:-2:2], arrays[1:-2:2], strict=True):
+            value = np.maximum(value @ weight.T + bias, 0)
+            units.append(value)
+        out[name] = (units, value @ arrays[-2].T + arrays[-1])
     return out
 
 
@@ -55,7 +60,7 @@ def decode_reference(
     anchors = np.asarray(parameters["anchors"], np.float64)
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
     networks = layout.unpack(parameters["weights"])
-    heads = heads_reference(networks, features, directions(anchors, eye), control)
+    heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
     return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel)
 
 

@@ -2,6 +2,9 @@
 
 from dataclasses import asdict, dataclass, replace
 
+from training.density_strategy import strategy
+from training.networks import HeadLayout
+
 
 @dataclass(frozen=True)
 class Rates:
@@ -37,39 +40,71 @@ class TrainSettings:
     splats_per_anchor: int = 5  # k
     features: int = 16  # F
     hidden: int = 32
+    layers: int = 1  # hidden ones of each network
+    fixed: str = ""  # heads that do not see x, with commas between: all stops share what they give
+    view_dependent: bool = True  # whether colour sees the direction from the eye
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
     voxel: float | None = None  # metres; None: from the points and `anchors`
     anchors: int = 6000  # to start with at most, where voxel is None
     max_anchors: int = 12000  # cap of growing
+    max_mb: float | None = None  # the same as megabytes of the package on disk, from the start
     grow: bool = True
     grow_every: int = 100  # iterations
-    grow_threshold: float = 2e-4  # screen gradient of a splat, in half image widths
+    growth: str = "gradient"  # what draws newcomers: gradient | absgrad | error
+    grow_threshold: float | None = None  # of what draws them; None: that of the strategy
+    grow_grids: int = 2  # that newcomers fill: of a voxel, a half, a quarter ...
+    grow_each: bool = False  # at every stop by what its own photos say, not by the mean over all
+    grow_replace: float = 0.0  # of all anchors, so many at most make room when no more may come
     prune_opacity: float = 0.005  # an anchor whose splats' mean opacity stays below goes
+    prune_weight: float = 0.0  # ... and one that gives less to its pictures of every stop, pixels
+    prune_views: float = 0.0  # ... and one that a smaller share of all steps had on screen
     ssim_share: float = 0.2  # of the image loss; eq. 8 read literally says 0.8, which is worse
     opacity_share: float = 0.0  # lambda_alpha of eq. 9; the paper says 0.01
+    depth_share: float = 0.3  # of the depth loss, beside the image's, where photos have depth
     scale_share: float = 0.0  # lambda_S of eq. 9; the paper says 1e-9
     downscale: int | None = None  # of the photos; None: until neither side exceeds 640 pixels
+    coarse: int = 1  # the sides are divided by this at the start: 1, 2, 4, 8; halved step by step
+    coarse_until: float = 0.35  # of the run, from when on the photos have all their pixels
     masks: str = "object"  # object: nothing outside it | valid: unknown outside it | ignore
     background: str = "auto"  # auto: the capture's, else random where photos have alpha | black ...
     rate_scale: float = 1.0  # times every learning rate
+    rise: int = 0  # steps over which the networks' rates rise; after a fall it is 200
+    revive: float = 0.0  # lambda of a pull on absent splats: mean max(0.02 - opacity, 0)
 
     def __post_init__(self) -> None:
         """Raises ValueError naming the first number that cannot be."""
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
             "hidden": 1, "control": 2, "anchors": 1, "max_anchors": 1, "grow_every": 1,
+            "grow_grids": 1,
             "downscale": 1, "ssim_share": 0, "opacity_share": 0, "scale_share": 0,
-            "rate_scale": 0, "voxel": 1e-6,
+            "depth_share": 0, "rise": 0, "revive": 0,
+            "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,
+            "coarse_until": 0, "grow_replace": 0, "prune_opacity": 0, "prune_weight": 0,
+            "prune_views": 0,
         }  # fmt: skip
         for name, low in least.items():
             value = getattr(self, name)
             if value is not None and not low <= value < float("inf"):
                 raise ValueError(f"{name} is {value}; it has to be at least {low}.")
-        if not self.ssim_share <= 1:
-            raise ValueError(f"ssim_share is {self.ssim_share}; it is a share, 0 to 1.")
+        for name in ("ssim_share", "coarse_until", "grow_replace", "prune_views"):
+            if not getattr(self, name) <= 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it is a share, 0 to 1.")
+        if self.coarse & (self.coarse - 1):
+            raise ValueError(f"coarse is {self.coarse}; it has to be a power of two: 1, 2, 4 or 8.")
+        strategy(self.growth)
+        self.layout()
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
+
+    def layout(self) -> HeadLayout:
+        """The networks that are asked for.  Raises ValueError where there are none such."""
+        fixed = tuple(name.strip() for name in self.fixed.split(",") if name.strip())
+        return HeadLayout(
+            self.splats_per_anchor, self.features, self.hidden, self.control,
+            self.layers, fixed, self.view_dependent,
+        )  # fmt: skip
 
     def rates(self, iterations: int) -> Rates:
         """The learning rates of a run of so many iterations."""

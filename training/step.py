@@ -3,36 +3,18 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, project, project_backward
-from rasterizer.raster import rasterize, rasterize_backward
 from scene.pose import View
 from training.density import Evidence
+from training.depth_loss import DepthWish
+from training.drawing import Color, Drawing, draw_splats, splats_backward
 from training.gaussians import Activation, Gaussians
 from training.losses import ImageLoss, Target, regularise
 from training.networks import HeadLayout, Heads
 from training.optimizer import Adam
-
-Color = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A drawn view with what the way back needs; device arrays."""
-
-    camera: Camera
-    splats: Gaussians
-    projected: object
-    tiles: object
-    frame: object
-
-
-def camera_of(view: View) -> Camera:
-    return Camera(*view.pinhole(), view.size, view.near)
+from training.rise import draw_up
 
 
 class Step:
@@ -62,16 +44,11 @@ class Step:
         with self.timed("activate"):
             return self.activation.forward(raw, adam["anchors"])
 
-    def draw(self, view: View, control: np.ndarray, background: Color) -> Drawing:
+    def draw(
+        self, view: View, control: np.ndarray, background: Color, with_depth: bool = False
+    ) -> Drawing:
         splats = self.decode(control, view.world_from_eye.position)
-        camera = camera_of(view)
-        with self.timed("project"):
-            projected = project(self.device, *splats.fields(), camera)
-        with self.timed("bin"):
-            tiles = bin_tiles(self.device, projected, view.size)
-        with self.timed("rasterize"):
-            frame = rasterize(self.device, projected, tiles, view.size, background)
-        return Drawing(camera, splats, projected, tiles, frame)
+        return draw_splats(self.device, splats, view, background, with_depth, self.timed)
 
     def gradients(
         self,
@@ -82,29 +59,24 @@ class Step:
         opacity_share: float = 0.0,
         scale_share: float = 0.0,
         evidence: Evidence | None = None,
+        depth: DepthWish | None = None,
+        revive: float = 0.0,
     ) -> dict[str, object]:
         """Gradients of the loss by weights, anchors and features, as the optimiser names them."""
         device, adam = self.device, self.adam
         with self.timed("loss"):
             grad_image = loss.compare(drawing.frame.image, target, ssim_share)
-        with self.timed("rasterize backward"):
-            grad_record = rasterize_backward(
-                device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None
-            )
-        with self.timed("project backward"):
-            grad = Gaussians(
-                *project_backward(
-                    device, *drawing.splats.fields(), drawing.camera, drawing.projected, grad_record
-                )
-            )
+        asked = {} if evidence is None else evidence.asks(drawing.frame.image, target)
+        grad, grad_record = splats_backward(device, drawing, grad_image, depth, self.timed, **asked)
         with self.timed("density"):
             if evidence is not None:
-                width = drawing.camera.size[0]
-                record = drawing.projected.record
-                evidence.add(record, grad_record, drawing.splats.opacity, width)
+                record, opacity = drawing.projected.record, drawing.splats.opacity
+                evidence.add(record, grad_record, opacity, drawing.camera.size)
         with self.timed("heads backward"):
             if opacity_share or scale_share:
                 regularise(device, drawing.splats, grad, opacity_share, scale_share)
+            if revive:
+                draw_up(device, drawing.splats, grad, revive)
             grad_raw, grad_anchors = self.activation.backward(self.heads.raw, grad)
             weights, features = self.heads.backward(
                 adam["weights"], adam["anchors"], adam["features"], grad_raw, grad_anchors

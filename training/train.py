@@ -8,7 +8,12 @@ import numpy as np
 
 from runtime_models.model import AnchorModel, BadFile, ControlEncoding
 from scene.capture import Capture
-from training.density import Evidence, changed_state, given_up, newcomers
+from training.coarse import Coarse
+from training.density import Evidence, Watch
+from training.density_budget import most_anchors, within
+from training.density_grow import changed
+from training.density_strategy import strategy
+from training.drawing import Color
 from training.export import model_of
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
@@ -23,9 +28,10 @@ from training.photos import (
     choose_downscale,
     load_photos,
 )
+from training.rise import Rise, after_fall
 from training.schedule import Budget, Schedule, choose_background
 from training.settings import Rates, TrainSettings
-from training.step import Color, Step
+from training.step import Step
 
 GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
@@ -52,7 +58,7 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
     for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
         flat[start:stop] = rate
     return {
-        "weights": flat,
+        "weights": flat * layout.rate_shares(),
         "anchors": np.array([rates.anchor * voxel], np.float32),
         "features": np.array([rates.feature], np.float32),
     }
@@ -61,16 +67,28 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
 class Trainer:
     """One run.  `steps` trains; `model` may be called between any two steps."""
 
+    unit = "anchors"  # what Progress counts
+
     def __init__(
-        self, device, capture: Capture, settings: TrainSettings, resume: tuple | None = None
+        self,
+        device,
+        capture: Capture,
+        settings: TrainSettings,
+        resume: tuple | None = None,
+        loaded: dict[str, list[LoadedPhoto]] | None = None,
     ) -> None:
-        """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller."""
+        """`resume`: (state, notes) of a checkpoint whose settings were compared by the caller.
+
+        loaded: photos of the splits train and test, where they were read before.
+        """
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
         self.stops = capture.stops
-        photos = load_photos(capture, "train", self.factor, settings.masks)
-        self.held_out = load_photos(capture, "test", self.factor, settings.masks)
+        photos, self.held_out = (
+            loaded[split] if loaded else load_photos(capture, split, self.factor, settings.masks)
+            for split in ("train", "test")
+        )
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:
@@ -80,10 +98,15 @@ class Trainer:
         self.encoding = ControlEncoding(
             settings.control, 1 / max(settings.control - 1, 1), settings.sigma
         )
-        self.layout = HeadLayout(
-            settings.splats_per_anchor, settings.features, settings.hidden, settings.control
-        )
-        self.targets = Targets(device)
+        self.layout = settings.layout()
+        self.coarse = Coarse(settings.coarse, settings.coarse_until, {})
+        self.watch = Watch(
+            strategy(settings.growth), len(self.stops), settings.grow_each,
+            bool(settings.grow_replace or settings.prune_weight or settings.prune_views),
+        )  # fmt: skip
+        self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
+        self.targets, self.photo_factor = Targets(device), 1
+        self.rise = Rise(settings.rise, 0, settings.revive)
         self.contrast: dict[tuple, float] = {}
         if resume is None:
             self.start(photos)
@@ -99,9 +122,9 @@ class Trainer:
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
         points, self.origin = initial_points(self.capture, photos, rng)
-        most = min(settings.anchors, settings.max_anchors)
+        most = min(settings.anchors, self.most_anchors)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
-        anchors = voxel_centres(points, self.voxel)
+        anchors = within(voxel_centres(points, self.voxel), self.most_anchors, settings.max_mb)
         features = np.zeros((len(anchors), padded(settings.features)), np.float32)
         features[:, : settings.features] = (
             rng.normal(size=(len(anchors), settings.features)) * FEATURE_SPREAD
@@ -114,7 +137,7 @@ class Trainer:
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
         self.rate_scale, self.run_length = settings.rate_scale, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
-        self.evidence = Evidence(self.device, self.layout, len(anchors))
+        self.evidence = Evidence(self.device, self.layout, len(anchors), self.watch)
 
     def go_on(self, state: dict[str, np.ndarray], notes: dict) -> None:
         """Everything as it was when the checkpoint was written."""
@@ -122,10 +145,11 @@ class Trainer:
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
         self.grown_at, self.rate_scale = notes["grown_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
+        self.rise = Rise(*notes.get("rise", ()))
         values = {n: state[f"{n}.value"] for n in ("weights", "anchors", "features")}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
-        self.evidence = Evidence(self.device, self.layout, len(values["anchors"]))
+        self.evidence = Evidence(self.device, self.layout, len(values["anchors"]), self.watch)
         self.evidence.load(state)
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
@@ -135,6 +159,7 @@ class Trainer:
             "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
             "run_length": self.run_length, "first_loss": self.guard.first_loss,
             "settings": self.settings.as_dict(),
+            "rise": [self.rise.steps, self.rise.since, self.rise.pull],
         }  # fmt: skip
         return self.adam.state() | self.evidence.state(), notes
 
@@ -151,7 +176,8 @@ class Trainer:
         return self.settings.rates(self.run_length or 0)
 
     def all_rates(self) -> dict[str, np.ndarray]:
-        return parameter_rates(self.layout, self.rates(), self.voxel)
+        rates = parameter_rates(self.layout, self.rates(), self.voxel)
+        return self.rise.rates(rates, self.iteration)
 
     def control(self, modality: str) -> np.ndarray:
         x = next(s.x for s in self.stops if s.name == modality)
@@ -176,28 +202,45 @@ class Trainer:
         before, evidence = self.adam.state(), self.evidence.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
-            for photo in {p.view.size: p for p in photos}.values():
+            whole = {(p.view.size, p.depth is None): p for p in photos}.values()
+            for photo in [self.coarse.photo(p, f) for f in self.coarse.factors for p in whole]:
                 self.step.update(self.learn(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
                 self.guard.expect(modality, loss, self.visible(), self.shown(photo, background))
         self.adam.load(before)
         self.evidence.load(evidence)
 
+    def next_photo(self) -> LoadedPhoto:
+        """The photo of this step, as small as this part of the run has them."""
+        factor = self.coarse.factor(self.budget.fraction(self.iteration, self.elapsed))
+        if factor != self.photo_factor:
+            self.photo_factor = factor
+            self.targets.forget()
+            self.coarse.drop(factor)
+        return self.coarse.photo(self.schedule.photo(self.iteration), factor)
+
     def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
         settings = self.settings
         target = self.targets.target(photo, background)
-        self.drawing = self.step.draw(photo.view, self.control(photo.modality), background)
+        self.evidence.stop = [s.name for s in self.stops].index(photo.modality)
+        depth = self.targets.wish(photo, settings.depth_share)
+        self.drawing = self.step.draw(
+            photo.view, self.control(photo.modality), background, depth is not None
+        )
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
-            settings.opacity_share, settings.scale_share, self.evidence,
+            settings.opacity_share, settings.scale_share, self.evidence, depth,
+            self.rise.pull,
         )  # fmt: skip
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""
-        photo = self.schedule.photo(self.iteration)
+        photo = self.next_photo()
         background = self.schedule.background_of(self.iteration, photo)
         grads = self.learn(photo, background)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
+        if self.rise.going(self.iteration):
+            self.adam.set_rates(self.all_rates())
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
         self.iteration += 1
         loss, fell_back = None, False
@@ -209,7 +252,7 @@ class Trainer:
             self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
             self.adam.set_rates(self.all_rates())
         if self.settings.grow and self.iteration % self.settings.grow_every == 0:
-            if GROW_FROM <= fraction <= GROW_UNTIL:
+            if GROW_FROM <= fraction <= GROW_UNTIL and self.steps_to_go() >= SETTLE:
                 self.grow()
         return loss, fell_back
 
@@ -220,7 +263,7 @@ class Trainer:
     def shown(self, photo: LoadedPhoto, background: Color) -> float:
         """Contrast of the last drawing to its background, over that of its photo."""
         behind = np.asarray(background, np.float32)
-        key = (photo.name, background)
+        key = (photo.name, photo.view.size, background)
         contrast = self.contrast.get(key)
         if contrast is None:
             contrast = float(np.abs(photo.over(background) - behind).mean())
@@ -240,32 +283,28 @@ class Trainer:
                 self.guard.remember(self.adam.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
-        self.adam.load(self.guard.fall_back())
-        self.evidence = Evidence(self.device, self.layout, self.anchors_count)
+        self.rise = after_fall(self.iteration, self.rate_scale / 2, self.rise)
+        looks = self.rise.steps if self.rise.since == self.iteration else 0
+        self.adam.load(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
+        self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
         self.rate_scale /= 2
         return True
 
     def grow(self) -> None:
-        """New anchors where splats pull at the picture; anchors that show nothing go."""
-        settings, count = self.settings, self.anchors_count
-        state, evidence = self.adam.state(), self.evidence.state()
+        """New anchors where they are needed; anchors that show nothing go."""
         means = [
             self.device.download(self.step.decode(self.encoding.encode(s.x), np.zeros(3)).means)
             for s in self.stops
         ]
-        new = newcomers(
-            state["anchors.value"], means, evidence["evidence.gradient"], self.voxel,
-            settings.grow_threshold, max(settings.max_anchors - count, 0),
-        )  # fmt: skip
-        gone = given_up(
-            evidence["evidence.opacity"], self.evidence.steps, self.layout.splats,
-            settings.prune_opacity,
-        )  # fmt: skip
-        if gone.all():
-            gone[:] = False
-        self.adam.load(changed_state(state, ~gone, new))
-        self.evidence = Evidence(self.device, self.layout, self.anchors_count)
+        now, budget = self.adam.state(), self.most_anchors
+        self.adam.load(changed(now, means, self.evidence, self.voxel, budget, self.settings))
+        self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
         self.grown_at = self.iteration
+
+    def steps_to_go(self) -> int:
+        """How many more the budget allows, as fast as they have been."""
+        done = self.budget.fraction(self.iteration, self.elapsed)
+        return round(self.iteration * (1 - done) / done)
 
     def held_out_psnr(self, most: int = 2) -> dict[str, float]:
         """Mean PSNR in dB of each modality over its first held-out photos, as they are trained."""

@@ -86,9 +86,9 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   }
 }
 
-// VISIT(tile, touched) for the tiles of a place: branch free where it is within 2 x 2 tiles, as
+// VISIT(tile, touched) for the tiles of a splat's place: branch free where it is within 2 x 2 tiles, as
 // nearly all are; there `touched` is 0 or 1 and the tile may lie beyond the last one.
-#define FOR_EACH_TILE(place, tiles_x)                                              \
+#define FOR_EACH_TILE(place, tiles_x, splat)                                       \
   const uint2 here = (place);                                                      \
   const int tile = PLACE_ROW(here) * (tiles_x) + PLACE_COLUMN(here);               \
   if (here.x & MASKED && !(here.y & ~0x303u)) {                                    \
@@ -101,34 +101,39 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
       const int bit = popcount(~mask & (mask - 1)); /* number of the lowest */     \
       VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7), 1);                         \
     }                                                                              \
-  } else {                                                                         \
-    for (uint row = 0; row < here.y >> 16; row++)                                  \
-      for (uint column = 0; column < (here.y & 0xffff); column++)                  \
+  } else if (here.x & BOX) {                                                       \
+    const Slant slant = slant_of(record + (size_t)RECORD * (splat), here);         \
+    for (int row = 0; row < (int)(here.y >> 16); row++) {                          \
+      const int2 span = span_of_row(&slant, row);                                  \
+      for (int column = span.x; column < span.y; column++)                         \
         VISIT(tile + row * (tiles_x) + column, 1);                                 \
+    }                                                                              \
   }
 
 // table (chunks, bins): how often each tile is touched; a row of tiles and more lies beyond them.
 __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global const int* order,
-                          __global const uint2* places, __global uint2* sorted_places,
-                          __global int* table) {
+                          __global const float* record, __global const uint2* places,
+                          __global uint2* sorted_places, __global int* table) {
   const int c = get_global_id(0);
   __global int* mine = table + c * bins;
   for (int t = 0; t < bins; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     PREFETCH(places + order[min(i + AHEAD, last - 1)]);
-    const uint2 place = places[order[i]];
+    const int splat = order[i];
+    const uint2 place = places[splat];
     sorted_places[i] = place;  // side by side for the next pass
 #define VISIT(tile, touched) mine[tile] += touched
-    FOR_EACH_TILE(place, tiles_x)
+    FOR_EACH_TILE(place, tiles_x, splat)
 #undef VISIT
   }
 }
 
 // instances is longer than the lists by a cache line a chunk: what touches nothing is written there.
 __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int total,
-                            __global const int* order, __global const uint2* sorted_places,
-                            __global int* table, __global int* instances) {
+                            __global const int* order, __global const float* record,
+                            __global const uint2* sorted_places, __global int* table,
+                            __global int* instances) {
   const int c = get_global_id(0);
   __global int* next = table + c * bins;
   const int spare = total + SPARE * c;
@@ -141,7 +146,7 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
     instances[(touched) ? to : spare] = splat;            \
     next[tile] = to + (touched);                          \
   }
-    FOR_EACH_TILE(sorted_places[i], tiles_x)
+    FOR_EACH_TILE(sorted_places[i], tiles_x, splat)
 #undef VISIT
   }
 }

@@ -6,15 +6,16 @@
 // below STOP everywhere are dropped from the mask every BATCH instances; a tile ends with its last.
 #include "common/vector.cl"
 #include "common/tiles.cl"
+#ifdef SURFACE
+#include "common/surface.cl"
+#endif
 #define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
 #define BLOCK_H 2
 #define DOWN (TILE / BLOCK_H)   // blocks in a column
 #define ACROSS (TILE / BLOCK_W)  // columns
 #define BLOCKS (DOWN * ACROSS)   // 32: one bit each
 #define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
-#define EVERY_COLUMN 0x01010101u  // the first bit of each column
-#define SHIFT_W 2                // log2 of BLOCK_W and BLOCK_H
-#define SHIFT_H 1
+#define SHIFT_H 1                // log2 of BLOCK_H
 #define BATCH 32
 #define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
 #define HALF_LOG2E 0.72134752044f
@@ -25,8 +26,45 @@
 // A batch of instances of one tile.
 typedef struct {
   float splats[BATCH * RECORD];
-  uint blocks[BATCH];  // the blocks that the splat's box touches
+  uint blocks[BATCH];  // those that the splat's ellipse touches
 } Batch;
+
+// What of a batch the masks are made of, a column each.
+typedef struct {
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], cut[BATCH];
+} Columns;
+
+// Bit k of each block that the ellipse touches, for eight splats from 8 g on: in every column of
+// blocks the interval of y while the ellipse is, in x, between its first and last pixel centres.
+//   y = tilt x +- sqrt((cut - x^2 / covariance_xx) / c), largest at x = lean
+// With room for what float rounding does to a pixel's own test, as in span_of_row of tiles.cl: no
+// pixel is lost, so every bit of the image is that of a test of all blocks.
+inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
+  const float8 x = vload8(g, e->x) - (x0 + 0.5f), y = vload8(g, e->y) - (y0 + 0.5f);
+  const float8 a = vload8(g, e->a), b = vload8(g, e->b), c = vload8(g, e->c);
+  const float8 ex = vload8(g, e->half_x), ey = vload8(g, e->half_y), cut = vload8(g, e->cut);
+  const float8 per_c = 1.0f / c, tilt = -b * per_c, lean = -b / a * ey;
+  const float8 most = (1.0001f * cut + 5e-7f * (a * ex * ex + c * ey * ey)) * per_c;
+  const float8 per_xx = cut / fmax(ex * ex, FLT_MIN) * per_c;
+  const float8 spare = 1e-6f * (fabs(tilt) * (ex + fabs(x)) + ey + fabs(y));
+  const float8 above = y - spare, below = y + spare, low = -1, high = TILE;
+  float8 left = -x;
+  uint8 mask = 0;
+  for (int column = 0; column < ACROSS; column++) {
+    const float8 right = left + (BLOCK_W - 1);
+    const float8 up = fmin(fmax(-lean, left), right), down = fmin(fmax(lean, left), right);
+    const float8 highest = above + tilt * up - sqrt(fmax(most - up * up * per_xx, 0.0f));
+    const float8 lowest = below + tilt * down + sqrt(fmax(most - down * down * per_xx, 0.0f));
+    const int8 top = convert_int8(ceil(fmin(fmax(highest, 0.0f), high))) / BLOCK_H;
+    const int8 bottom = convert_int8(floor(fmin(fmax(lowest, low), high - 1))) >> SHIFT_H;
+    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
+                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom)) & COLUMN_BITS;
+    const int8 meets = (left <= ex) & (right >= -ex);
+    mask |= (rows & as_uint8(meets)) << (uint8)(DOWN * column);
+    left += BLOCK_W;
+  }
+  return mask;
+}
 
 // Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
 // independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
@@ -34,33 +72,27 @@ typedef struct {
 inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
                  __global const float* record, Batch* batch) {
   const int n = min(BATCH, end - p);
-  float mean_x[BATCH], mean_y[BATCH], half_x[BATCH], half_y[BATCH];
+  Columns e;
   for (int j = 0; j < n; j++) {
     __global const float* from = record + (size_t)RECORD * instances[p + j];
     float* s = batch->splats + RECORD * j;
     vstore8(vload8(0, from), 0, s);
     vstore4(vload4(0, from + 8), 0, s + 8);
-    mean_x[j] = s[MEAN_X];
-    mean_y[j] = s[MEAN_Y];
-    half_x[j] = s[EXTENT_X];
-    half_y[j] = s[EXTENT_Y];
+    e.x[j] = s[MEAN_X];
+    e.y[j] = s[MEAN_Y];
+    e.a[j] = s[CONIC_A];
+    e.b[j] = s[CONIC_B];
+    e.c[j] = s[CONIC_C];
+    e.half_x[j] = s[EXTENT_X];
+    e.half_y[j] = s[EXTENT_Y];
+    e.cut[j] = s[CUT];
   }
-  for (int g = 0; g * LANES < n; g++) {
-    const float8 x = vload8(g, mean_x) - (x0 + 0.5f), y = vload8(g, mean_y) - (y0 + 0.5f);
-    const float8 ex = vload8(g, half_x), ey = vload8(g, half_y);
-    // First and last pixel of the tile inside the box; beyond it by one at most, for the shifts.
-    const float8 low = -1, high = TILE;
-    const int8 left = convert_int8(ceil(fmin(fmax(x - ex, 0.0f), high))) / BLOCK_W;
-    const int8 right = convert_int8(floor(fmin(fmax(x + ex, low), high - 1))) >> SHIFT_W;
-    const int8 top = convert_int8(ceil(fmin(fmax(y - ey, 0.0f), high))) / BLOCK_H;
-    const int8 bottom = convert_int8(floor(fmin(fmax(y + ey, low), high - 1))) >> SHIFT_H;
-    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
-                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom));
-    // In two halves: a shift by all 32 bits is not defined.
-    const uint8 from = as_uint8(left * (DOWN / 2)), to = as_uint8((ACROSS - 1 - right) * (DOWN / 2));
-    const uint8 columns = ((uint8)(0xffffffffu) << from << from) & ((uint8)(0xffffffffu) >> to >> to);
-    vstore8(rows * EVERY_COLUMN & columns, g, batch->blocks);
-  }
+  for (int g = 0; g * LANES < n; g++)
+#ifdef EVERY_BLOCK  // what a test compares with
+    vstore8((uint8)(0xffffffffu), g, batch->blocks);
+#else
+    vstore8(blocks_of_eight(&e, g, x0, y0), g, batch->blocks);
+#endif
   return n;
 }
 
@@ -79,12 +111,38 @@ inline uint still_open(uint open, const float8* T) {
   return open;
 }
 
+#ifdef SURFACE
+// The fraction of surface.cl: depth under pixels (dx, dy) from the mean, before it is held.
+typedef struct {
+  float8 z, ahead, per;  // metres; 1 + l; 1 / (1 + 2 l + q)
+} Depth8;
+
+inline Depth8 depth_under(const float8 f, float8 dx, float8 dy) {
+  Depth8 d;
+  const float8 l = fma(f.s1, dx, f.s2 * dy);
+  const float8 q = fma(dx, fma(f.s3, dx, 2 * f.s4 * dy), f.s5 * dy * dy);
+  d.ahead = 1.0f + l;
+  d.per = 1.0f / fmax(fma((float8)(2.0f), l, 1.0f + q), SURFACE_LEAST);
+  d.z = f.s0 * d.ahead * d.per;
+  return d;
+}
+#endif
+
+// SURFACE: with a depth a splat (surface.cl), metres become the sum of alpha T z.
 __kernel void rasterize(int width, int height, int tiles_x, __global const int* tile_start,
                         __global const int* instances, __global const float* record, float red,
                         float green, float blue, __global float* image,
-                        __global float* transmittance, __global int* tile_end) {
+                        __global float* transmittance, __global int* tile_end
+#ifdef SURFACE
+                        , __global const float* surface, __global float* metres
+#endif
+                        ) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+#ifdef SURFACE
+  float8 Z[BLOCKS];
+  for (int k = 0; k < BLOCKS; k++) Z[k] = 0;
+#endif
   float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
@@ -103,6 +161,9 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
       const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[CUT];
+#ifdef SURFACE
+      const float8 f = vload8(instances[p + j], surface);
+#endif
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
@@ -113,6 +174,9 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
         R[k] = fma(w, s[RED], R[k]);
         G[k] = fma(w, s[GREEN], G[k]);
         B[k] = fma(w, s[BLUE], B[k]);
+#ifdef SURFACE
+        Z[k] = fma(w, fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7), Z[k]);
+#endif
         T[k] -= w;
       }
     }
@@ -128,6 +192,10 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
     vstore8(fma(t, green, G[k]), 0, g);
     vstore8(fma(t, blue, B[k]), 0, b);
     vstore8(t, 0, a);
+#ifdef SURFACE
+    float z[LANES];
+    vstore8(Z[k], 0, z);
+#endif
     for (int lane = 0; lane < LANES; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
@@ -137,6 +205,9 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
       image[at + plane] = g[lane];
       image[at + 2 * plane] = b[lane];
       transmittance[at] = a[lane];
+#ifdef SURFACE
+      metres[at] = z[lane];
+#endif
     }
   }
 }
@@ -145,6 +216,8 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
 // expects from behind: dL/dC . C + dL/dT T at first, less what each splat gave.  Then
 //   dL/dalpha = T (c . dL/dC) - rest / (1 - alpha)
 // which needs no division to get T back.  Each instance writes its 12 numbers to its own slot.
+// For growing: ABSOLUTE sums |gradient of the mean| in slots 9 and 10, or SHARE sums alpha T times
+// an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is defined.
 __kernel void rasterize_backward(int width, int height, int tiles_x,
                                  __global const int* tile_start, __global const int* tile_end,
                                  __global const int* instances, __global const uint2* places,
@@ -152,34 +225,69 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
                                  __global const float* image, __global const float* transmittance,
                                  __global const float* grad_image,
                                  __global const float* grad_transmittance, int with_transmittance,
-                                 __global float* slots) {
+                                 __global float* slots
+#ifdef SHARE
+                                 , __global const float* error
+#endif
+#ifdef SURFACE
+                                 , __global const float* surface, __global const float* metres,
+                                 __global const float* grad_metres, __global float* depth_slots
+#endif
+                                 ) {
   const int tile = get_global_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
   const size_t plane = (size_t)width * height;
   float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
   float8 block_x[BLOCKS], block_y[BLOCKS];
+#ifdef SHARE
+  float8 wrong[BLOCKS];
+#endif
+#ifdef SURFACE
+  float8 grad_z[BLOCKS];
+#endif
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
     block_y[k] = LANE_Y + (float)(k % DOWN * BLOCK_H);
     float r[LANES], g[LANES], b[LANES], d[LANES];
+#ifdef SHARE
+    float e[LANES];
+#endif
+#ifdef SURFACE
+    float z[LANES];
+#endif
     for (int lane = 0; lane < LANES; lane++) {
       const int x = x0 + k / DOWN * BLOCK_W + lane % BLOCK_W;
       const int y = y0 + k % DOWN * BLOCK_H + lane / BLOCK_W;
       const size_t at = (size_t)y * width + x;
       r[lane] = g[lane] = b[lane] = d[lane] = 0;
+#ifdef SHARE
+      e[lane] = x < width && y < height ? error[at] : 0;
+#endif
+#ifdef SURFACE
+      z[lane] = x < width && y < height ? grad_metres[at] : 0;
+#endif
       if (x >= width || y >= height) continue;
       r[lane] = grad_image[at];
       g[lane] = grad_image[at + plane];
       b[lane] = grad_image[at + 2 * plane];
       d[lane] = r[lane] * image[at] + g[lane] * image[at + plane] + b[lane] * image[at + 2 * plane];
       if (with_transmittance) d[lane] += grad_transmittance[at] * transmittance[at];
+#ifdef SURFACE
+      d[lane] += z[lane] * metres[at];
+#endif
     }
     T[k] = inside(k, x0, y0, width, height);
     grad_r[k] = vload8(0, r);
     grad_g[k] = vload8(0, g);
     grad_b[k] = vload8(0, b);
     rest[k] = vload8(0, d);
+#ifdef SHARE
+    wrong[k] = vload8(0, e);
+#endif
+#ifdef SURFACE
+    grad_z[k] = vload8(0, z);
+#endif
   }
   Batch batch;
   uint open = 0xffffffffu;
@@ -198,7 +306,12 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[CUT];
       float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
-      float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, absolute_x = 0, absolute_y = 0;
+      float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
+#ifdef SURFACE
+      const float8 f = vload8(instances[p + j], surface);
+      float8 by_z = 0, by_l = 0, by_u = 0, by_v = 0, by_x = 0, by_y = 0;
+      float8 by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
+#endif
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
@@ -207,7 +320,30 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
         const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), power >= least);
         const float8 before = T[k];
         const float8 w = alpha * before;
+#ifdef SURFACE
+        const Depth8 d = depth_under(f, dx, dy);
+        const float8 z = fmin(fmax(d.z, f.s6), f.s7);
+        const float8 given = fma(grad_z[k], z, fma(grad_r[k], s[RED],
+                                 fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE])));
+        const float8 all = w * grad_z[k], none = 0;
+        by_low += select(none, all, isless(d.z, (float8)(f.s6)));
+        by_high += select(none, all, isgreater(d.z, (float8)(f.s7)));
+        const int8 free = isgreaterequal(d.z, (float8)(f.s6)) & islessequal(d.z, (float8)(f.s7));
+        const float8 h = select(none, all, free);
+        by_z = fma(h, d.ahead * d.per, by_z);
+        const float8 by_ahead = h * f.s0 * d.per * (1.0f - 2.0f * d.ahead * d.per);
+        const float8 by_q = -h * d.z * d.per, qu = by_q * dx, qv = by_q * dy;
+        by_l += by_ahead;
+        by_u = fma(by_ahead, dx, by_u);
+        by_v = fma(by_ahead, dy, by_v);
+        by_x += qu;
+        by_y += qv;
+        by_uu = fma(qu, dx, by_uu);
+        by_uv = fma(qu, dy, by_uv);
+        by_vv = fma(qv, dy, by_vv);
+#else
         const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
+#endif
         const float8 behind = fma(-w, given, rest[k]);
         rest[k] = behind;
         T[k] = before - w;
@@ -225,8 +361,14 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
         sum_xy = fma(gx, dy, sum_xy);
         sum_yy = fma(gy, dy, sum_yy);
 #ifdef ABSOLUTE
-        absolute_x += fabs(fma(B, gy, A * gx));
-        absolute_y += fabs(fma(C, gy, B * gx));
+        extra_x += fabs(fma(B, gy, A * gx));
+        extra_y += fabs(fma(C, gy, B * gx));
+#endif
+#ifdef SHARE
+        extra_x = fma(w, wrong[k], extra_x);
+#endif
+#ifdef WEIGHT
+        sum_w += w;
 #endif
       }
       __global float* out = slots + (size_t)RECORD * slot[j];
@@ -234,7 +376,15 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
       vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
                        -0.5f * one.s4, one.s5 / s[OPACITY], one.s6, one.s7),
               0, out);
-      vstore4((float4)(sum8(sum_b), sum8(absolute_x), sum8(absolute_y), 0), 0, out + 8);
+#ifdef SURFACE
+      // The mean on the screen moves u and v the other way.
+      const float l = sum8(by_l), x = sum8(by_x), y = sum8(by_y);
+      out[MEAN_X] -= f.s1 * l + 2 * (f.s3 * x + f.s4 * y);
+      out[MEAN_Y] -= f.s2 * l + 2 * (f.s4 * x + f.s5 * y);
+      vstore8(sums8(by_z, by_u, by_v, by_uu, 2 * by_uv, by_vv, by_low, by_high), slot[j],
+              depth_slots);
+#endif
+      vstore4((float4)(sum8(sum_b), sum8(extra_x), sum8(extra_y), sum8(sum_w)), 0, out + 8);
     }
     open = still_open(open, T);
   }
@@ -243,6 +393,9 @@ __kernel void rasterize_backward(int width, int height, int tiles_x,
     const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
     __global float* out = slots + (size_t)RECORD * slot;
     vstore8((float8)(0), 0, out);
+#ifdef SURFACE
+    vstore8((float8)(0), slot, depth_slots);
+#endif
     vstore4((float4)(0), 0, out + 8);
   }
 }

@@ -1,16 +1,43 @@
 // raster, GPU form: one work-group a tile of 16x16 pixels; same inputs and outputs as raster_cpu.cl.
 #include "common/tiles.cl"
+#ifdef SURFACE
+#include "common/surface.cl"
+#endif
 #define PIXELS (TILE * TILE)
 #ifndef STOP       // drawing for the screen says where it stops
 #define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
 #endif
 #define LANES 32  // of the backward pass: splats in flight
 
+#ifdef SURFACE  // as in raster_cpu.cl
+typedef struct {
+  float z, ahead, per;
+} Depth;
+
+inline Depth depth_under(const float8 f, float dx, float dy) {
+  Depth d;
+  const float l = f.s1 * dx + f.s2 * dy;
+  const float q = f.s3 * dx * dx + 2 * f.s4 * dx * dy + f.s5 * dy * dy;
+  d.ahead = 1 + l;
+  d.per = 1 / fmax(1 + 2 * l + q, SURFACE_LEAST);
+  d.z = f.s0 * d.ahead * d.per;
+  return d;
+}
+#endif
+
 // A work-item owns a pixel; the group loads 256 splats at a time to local memory.
 __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
     int width, int height, int tiles_x, __global const int* tile_start,
     __global const int* instances, __global const float* record, float red, float green,
-    float blue, __global float* image, __global float* transmittance, __global int* tile_end) {
+    float blue, __global float* image, __global float* transmittance, __global int* tile_end
+#ifdef SURFACE
+    , __global const float* surface, __global float* metres
+#endif
+    ) {
+#ifdef SURFACE
+  __local int splat_of[PIXELS];
+  float depth = 0;
+#endif
   __local float batch[PIXELS * RECORD];
   __local int open;
   const int tile = get_group_id(0), l = get_local_id(0);
@@ -30,6 +57,9 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
     if (l < n) {
       __global const float* s = record + (size_t)RECORD * instances[p + l];
       for (int k = 0; k < RECORD; k++) batch[l * RECORD + k] = s[k];
+#ifdef SURFACE
+      splat_of[l] = instances[p + l];
+#endif
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     for (int j = 0; j < n && T >= STOP; j++) {
@@ -41,6 +71,10 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
       r += w * s[RED];
       g += w * s[GREEN];
       b += w * s[BLUE];
+#ifdef SURFACE
+      const float8 f = vload8(splat_of[j], surface);
+      depth += w * fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7);
+#endif
       T -= w;
     }
     p += n;
@@ -57,6 +91,9 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
   image[at + 2 * plane] = b + T * blue;
   transmittance[at] = T;
 #endif
+#ifdef SURFACE
+  metres[at] = depth;
+#endif
 }
 
 // A work-item owns a splat, the pixels lie in local memory; item l meets pixel i - l at step i, so
@@ -67,8 +104,22 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     __global const int* tile_end, __global const int* instances, __global const uint2* places,
     __global const int* first_slot, __global const float* record, __global const float* image,
     __global const float* transmittance, __global const float* grad_image,
-    __global const float* grad_transmittance, int with_transmittance, __global float* slots) {
+    __global const float* grad_transmittance, int with_transmittance, __global float* slots
+#ifdef SHARE
+    , __global const float* error
+#endif
+#ifdef SURFACE
+    , __global const float* surface, __global const float* metres,
+    __global const float* grad_metres, __global float* depth_slots
+#endif
+    ) {
   __local float T[PIXELS], rest[PIXELS], grad_r[PIXELS], grad_g[PIXELS], grad_b[PIXELS];
+#ifdef SHARE
+  __local float wrong[PIXELS];
+#endif
+#ifdef SURFACE
+  __local float grad_z[PIXELS];
+#endif
   const int tile = get_group_id(0), l = get_local_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
@@ -77,6 +128,12 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     const int px = x0 + i % TILE, py = y0 + i / TILE;
     const size_t at = (size_t)py * width + px;
     T[i] = rest[i] = grad_r[i] = grad_g[i] = grad_b[i] = 0;
+#ifdef SHARE
+    wrong[i] = px < width && py < height ? error[at] : 0;
+#endif
+#ifdef SURFACE
+    grad_z[i] = px < width && py < height ? grad_metres[at] : 0;
+#endif
     if (px >= width || py >= height) continue;
     grad_r[i] = grad_image[at];
     grad_g[i] = grad_image[at + plane];
@@ -85,6 +142,9 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     rest[i] = grad_r[i] * image[at] + grad_g[i] * image[at + plane] +
               grad_b[i] * image[at + 2 * plane];
     if (with_transmittance) rest[i] += grad_transmittance[at] * transmittance[at];
+#ifdef SURFACE
+    rest[i] += grad_z[i] * metres[at];
+#endif
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   const int end = tile_end[tile], last = tile_start[tile + 1];
@@ -96,6 +156,11 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
       s[k] = mine ? record[(size_t)RECORD * splat + k] : 0;
       sum[k] = 0;
     }
+#ifdef SURFACE
+    const float8 f = mine ? vload8(splat, surface) : (float8)(0);
+    float8 by = 0;  // of the surface's own floats
+    float by_l = 0, by_x = 0, by_y = 0;
+#endif
     const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
     for (int i = 0; i < PIXELS + LANES - 1; i++) {
       const int pixel = i - l;
@@ -106,8 +171,20 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
       if (meets && q <= s[CUT] && T[pixel] >= STOP) {
         const float raw = s[OPACITY] * exp(-0.5f * q), alpha = fmin(raw, MAX_ALPHA);
         const float before = T[pixel], w = alpha * before;
-        const float given =
-            grad_r[pixel] * s[RED] + grad_g[pixel] * s[GREEN] + grad_b[pixel] * s[BLUE];
+        float given = grad_r[pixel] * s[RED] + grad_g[pixel] * s[GREEN] + grad_b[pixel] * s[BLUE];
+#ifdef SURFACE
+        const Depth d = depth_under(f, dx, dy);
+        const float all = w * grad_z[pixel];
+        given += grad_z[pixel] * fmin(fmax(d.z, f.s6), f.s7);
+        const float h = d.z >= f.s6 && d.z <= f.s7 ? all : 0;
+        const float by_ahead = h * f.s0 * d.per * (1 - 2 * d.ahead * d.per);
+        const float qu = -h * d.z * d.per * dx, qv = -h * d.z * d.per * dy;
+        by_l += by_ahead;
+        by_x += qu;
+        by_y += qv;
+        by += (float8)(h * d.ahead * d.per, by_ahead * dx, by_ahead * dy, qu * dx, 2 * qu * dy,
+                       qv * dy, d.z < f.s6 ? all : 0, d.z > f.s7 ? all : 0);
+#endif
         const float behind = rest[pixel] - w * given;
         rest[pixel] = behind;
         T[pixel] = before - w;
@@ -127,6 +204,12 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
         sum[EXTENT_X] += fabs(A * gx + B * gy);
         sum[EXTENT_Y] += fabs(B * gx + C * gy);
 #endif
+#ifdef SHARE
+        sum[EXTENT_X] += w * wrong[pixel];
+#endif
+#ifdef WEIGHT
+        sum[CUT] += w;
+#endif
       }
       barrier(CLK_LOCAL_MEM_FENCE);
     }
@@ -137,12 +220,22 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
       sum[CONIC_B] = -xy;
       sum[CONIC_C] = -0.5f * yy;
       sum[OPACITY] /= s[OPACITY];
+#ifdef SURFACE
+      sum[MEAN_X] -= f.s1 * by_l + 2 * (f.s3 * by_x + f.s4 * by_y);
+      sum[MEAN_Y] -= f.s2 * by_l + 2 * (f.s4 * by_x + f.s5 * by_y);
+#endif
       const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
       for (int k = 0; k < RECORD; k++) slots[(size_t)RECORD * slot + k] = sum[k];
+#ifdef SURFACE
+      vstore8(by, slot, depth_slots);
+#endif
     }
   }
   for (int p = end + l; p < last; p += LANES) {  // behind the early stop: nothing is felt there
     const int slot = first_slot[instances[p]] + rank_of_tile(places[instances[p]], tile_x, tile_y);
     for (int k = 0; k < RECORD; k++) slots[(size_t)RECORD * slot + k] = 0;
+#ifdef SURFACE
+    vstore8((float8)(0), slot, depth_slots);
+#endif
   }
 }

@@ -1,6 +1,16 @@
 // The end of the backward pass, both forms: from gradients of instances to those of splats.
 #include "common/tiles.cl"
 
+// Of a box some tiles are in no list: their slots have to be 0 before the backward pass fills the
+// others.
+__kernel void clear_boxes(int count, int columns, __global const uint2* places,
+                          __global const int* first_slot, __global float* slots) {
+  const int i = get_global_id(0);
+  if (i >= count || !(places[i].x & BOX)) return;
+  const size_t first = first_slot[i], last = first + tiles_at(places[i]);
+  for (size_t k = first * columns; k < last * columns; k++) slots[k] = 0;
+}
+
 // A splat's slots lie side by side: their sum in a fixed order is its gradient.
 __kernel void sum_slots(int count, __global const uint2* places, __global const int* first_slot,
                         __global const float* slots, __global float* grad_record) {

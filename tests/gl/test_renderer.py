@@ -26,6 +26,7 @@ from runtime_models.read_scene import read_model
 from scene.framing import default_view
 from scene.pose import Pose, View, look_at
 from scene.scene import Scene, SceneObject
+from tests.models import without_control
 
 DRAWINGS = ("quads", "tiles")
 AWAY = View(look_at((0, 0, 9), (0, 0, 20)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (32, 16))
@@ -218,6 +219,13 @@ def test_only_what_changed_is_decoded(opened, drawing):
     assert runs(0.2, far) == (0, 1)
     assert runs(0.3, far) == (1, 1)
     assert runs(0.3, far, world_from_object=Pose(np.ones(3), IDENTITY)) == (0, 1)
+    model = without_control(model, "offset", "scale", "rotation", "opacity")
+    assert runs(0.3, near) == (1, 1)
+    before = renderer.image().copy()
+    assert runs(0.9, near) == (0, 1)  # all stops share the shape
+    assert not np.array_equal(renderer.image(), before)
+    wanted = reference_image(alone(model, x=0.9), near)
+    assert np.abs(renderer.image() - wanted).max() < 0.02
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS)

@@ -1,47 +1,27 @@
 // The five heads, forward and backward: anchor features -> raw outputs (paper section 3.2, eq. 5).
-//
-// Defined by networks.py: FEATURES, HIDDEN (padded to 8), CONTROL, RAW (row of all raw outputs) and
-// for each head m OUTm (padded width), OUT_AT m (its place in a raw row), WEIGHTS_ATm.
-// The weights of one head lie as W1 [FEATURES + CONTROL + 3][HIDDEN], b1 [HIDDEN],
-// W2 [HIDDEN][OUT], b2 [OUT]; the last three rows of W1 meet the view direction, which only the
-// last head (colour) takes.  Padding weights are zero, get zero gradients and so stay zero.
-//
-// Psi(x) is one vector for all anchors, so W1_control . Psi + b1 is folded into one bias a step;
-// that is exact and halves the first layer.
-
-#define DIRECTION_ROW (FEATURES + CONTROL)
-#define INPUTS (FEATURES + CONTROL + 3)
-#define HIDDEN8 (HIDDEN / 8)
-#define FEATURES8 (FEATURES / 8)
-#define COLOR 4
+// CPU form: vectors of eight units, a few anchors at a time; heads_gpu.cl is the other.
+#include "heads_shared.cl"
 #define BLOCK 8  // anchors that share one pass over the weights in the backward kernel
 
-__constant int OUT[5] = {OUT0, OUT1, OUT2, OUT3, OUT4};
-__constant int OUT_AT[5] = {OUT_AT0, OUT_AT1, OUT_AT2, OUT_AT3, OUT_AT4};
-__constant int WEIGHTS_AT[5] = {WEIGHTS_AT0, WEIGHTS_AT1, WEIGHTS_AT2, WEIGHTS_AT3, WEIGHTS_AT4};
-
-// Unit vector from the eye to an anchor (eq. 4) and 1 / distance; finite when they coincide.
-inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {
-  float3 d = (float3)(anchor[0], anchor[1], anchor[2]) - eye;
-  float inverse = 1.0f / fmax(sqrt(dot(d, d)), 1e-8f);
-  return (float4)(d * inverse, inverse);
-}
-
-// One work-item a hidden unit of a head: the folded bias, and both layers transposed, so that the
-// backward kernel never sums across a vector.
-__kernel void prepare_weights(__global const float *weights, __global const float *control,
-                              __global float *bias, __global float *first_t,
-                              __global float *second_t) {
-  int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
-  __global const float *first = weights + WEIGHTS_AT[m];
-  __global const float *second = first + (INPUTS + 1) * HIDDEN;
-  float sum = first[INPUTS * HIDDEN + j];
-  for (int d = 0; d < CONTROL; d++) sum += control[d] * first[(FEATURES + d) * HIDDEN + j];
-  bias[m * HIDDEN + j] = sum;
-  for (int i = 0; i < FEATURES; i++)
-    first_t[(m * HIDDEN + j) * FEATURES + i] = first[i * HIDDEN + j];
-  for (int c = 0; c < OUT[m]; c++)
-    second_t[OUT_AT[m] * HIDDEN + c * HIDDEN + j] = second[j * OUT[m] + c];
+// A middle layer of head m for four anchors, in place; l counts hidden layers, so it is 1 or more.
+inline void middle_forward(float unit[4][HIDDEN], const int a[4], int m, int l,
+                           __global const float *weights, __global float *hidden) {
+  float next[4][HIDDEN];
+  for (int j = 0; j < HIDDEN8; j++) {
+    float8 h[4];
+    for (int b = 0; b < 4; b++) h[b] = vload8(j, weights + HIDDEN * HIDDEN);
+    for (int i = 0; i < HIDDEN; i++) {
+      float8 w = vload8(j, weights + i * HIDDEN);
+      for (int b = 0; b < 4; b++) h[b] += unit[b][i] * w;
+    }
+    for (int b = 0; b < 4; b++) {
+      h[b] = fmax(h[b], (float8)(0.0f));
+      vstore8(h[b], j, next[b]);
+      vstore8(h[b], j, hidden + UNITS_OF(a[b], m, l));
+    }
+  }
+  for (int b = 0; b < 4; b++)
+    for (int j = 0; j < HIDDEN8; j++) vstore8(vload8(j, next[b]), j, unit[b]);
 }
 
 // One work-item four anchors: every weight row is loaded once for the four.
@@ -62,7 +42,7 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
   }
   for (int m = 0; m < 5; m++) {
     __global const float *first = weights + WEIGHTS_AT[m];
-    __global const float *second = first + (INPUTS + 1) * HIDDEN;
+    __global const float *second = first + LAST_AT;
     float unit[4][HIDDEN];
     for (int j = 0; j < HIDDEN8; j++) {
       float8 h[4];
@@ -71,7 +51,7 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
         float8 w = vload8(j, first + i * HIDDEN);
         for (int b = 0; b < 4; b++) h[b] += feature[b][i] * w;
       }
-      if (m == COLOR)
+      if (m == COLOR && VIEW_COLOR)
         for (int i = 0; i < 3; i++) {
           float8 w = vload8(j, first + (DIRECTION_ROW + i) * HIDDEN);
           for (int b = 0; b < 4; b++) h[b] += direction[b][i] * w;
@@ -79,9 +59,11 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
       for (int b = 0; b < 4; b++) {
         h[b] = fmax(h[b], (float8)(0.0f));
         vstore8(h[b], j, unit[b]);
-        vstore8(h[b], j, hidden + (a[b] * 5 + m) * HIDDEN);
+        vstore8(h[b], j, hidden + UNITS_OF(a[b], m, 0));
       }
     }
+    for (int l = 1; l < LAYERS; l++)
+      middle_forward(unit, a, m, l, first + MIDDLE_AT + (l - 1) * MIDDLE_SIZE, hidden);
     int outs = OUT[m];
     for (int c = 0; c < outs / 8; c++) {
       float8 y[4];
@@ -112,6 +94,15 @@ inline void load_anchors(Block *k, int base, int count, float3 eye, __global con
   }
 }
 
+inline void load_units(Block *k, int m, int l, int base, int count,
+                       __global const float *hidden) {
+  for (int b = 0; b < BLOCK; b++) {
+    int a = base + min(b, count - 1);
+    for (int j = 0; j < HIDDEN8; j++)
+      vstore8(vload8(j, hidden + UNITS_OF(a, m, l)), j, k->unit[b]);
+  }
+}
+
 inline void load_head(Block *k, int m, int base, int count, __global const float *hidden,
                       __global const float *grad_raw) {
   for (int b = 0; b < BLOCK; b++) {
@@ -119,9 +110,8 @@ inline void load_head(Block *k, int m, int base, int count, __global const float
     float live = b < count ? 1.0f : 0.0f;
     for (int c = 0; c < OUT[m] / 8; c++)
       vstore8(live * vload8(c, grad_raw + a * RAW + OUT_AT[m]), c, k->d_out[b]);
-    for (int j = 0; j < HIDDEN8; j++)
-      vstore8(vload8(j, hidden + (a * 5 + m) * HIDDEN), j, k->unit[b]);
   }
+  load_units(k, m, MIDDLE, base, count, hidden);
 }
 
 // b2 and W2 of a head with `outs` outputs.
@@ -138,11 +128,10 @@ inline void second_layer_gradient(Block *k, int outs, __global float *grad) {
   }
 }
 
-// Through the ReLU into the hidden units, and b1 and W1 of the features (and of the direction).
-inline void first_layer_gradient(Block *k, int m, __global const float *second_t,
-                                 __global float *grad) {
+// Through the last layer and the ReLU into the last hidden units.
+inline void last_units_gradient(Block *k, int m, __global const float *second_t) {
   for (int j = 0; j < HIDDEN8; j++) {
-    float8 d[BLOCK], sum = vload8(j, grad + INPUTS * HIDDEN);
+    float8 d[BLOCK];
     for (int b = 0; b < BLOCK; b++) d[b] = 0;
     for (int c = 0; c < OUT[m]; c++) {
       float8 w = vload8(j, second_t + c * HIDDEN);
@@ -150,16 +139,49 @@ inline void first_layer_gradient(Block *k, int m, __global const float *second_t
     }
     for (int b = 0; b < BLOCK; b++) {
       d[b] = select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
-      sum += d[b];
       vstore8(d[b], j, k->d_unit[b]);
     }
+  }
+}
+
+// A middle layer: k->unit holds the units that go into it.  Adds to the gradients of its b and W,
+// then takes d_unit from what it gives to what it takes.
+inline void middle_layer_gradient(Block *k, __global const float *middle_t, __global float *grad) {
+  float8 before[BLOCK][HIDDEN8];
+  for (int j = 0; j < HIDDEN8; j++) {
+    float8 d[BLOCK], sum = vload8(j, grad + HIDDEN * HIDDEN);
+    for (int b = 0; b < BLOCK; b++) { d[b] = vload8(j, k->d_unit[b]); sum += d[b]; }
+    vstore8(sum, j, grad + HIDDEN * HIDDEN);
+    for (int i = 0; i < HIDDEN; i++) {
+      float8 g = vload8(j, grad + i * HIDDEN);
+      for (int b = 0; b < BLOCK; b++) g += k->unit[b][i] * d[b];
+      vstore8(g, j, grad + i * HIDDEN);
+    }
+    for (int b = 0; b < BLOCK; b++) d[b] = 0;
+    for (int i = 0; i < HIDDEN; i++) {
+      float8 w = vload8(j, middle_t + i * HIDDEN);
+      for (int b = 0; b < BLOCK; b++) d[b] += k->d_unit[b][i] * w;
+    }
+    for (int b = 0; b < BLOCK; b++)
+      before[b][j] =
+          select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
+  }
+  for (int b = 0; b < BLOCK; b++)
+    for (int j = 0; j < HIDDEN8; j++) vstore8(before[b][j], j, k->d_unit[b]);
+}
+
+// b1 and W1 of the features (and of the direction).
+inline void first_layer_gradient(Block *k, int m, __global float *grad) {
+  for (int j = 0; j < HIDDEN8; j++) {
+    float8 d[BLOCK], sum = vload8(j, grad + INPUTS * HIDDEN);
+    for (int b = 0; b < BLOCK; b++) { d[b] = vload8(j, k->d_unit[b]); sum += d[b]; }
     vstore8(sum, j, grad + INPUTS * HIDDEN);
     for (int i = 0; i < FEATURES; i++) {
       float8 g = vload8(j, grad + i * HIDDEN);
       for (int b = 0; b < BLOCK; b++) g += k->input[b][i] * d[b];
       vstore8(g, j, grad + i * HIDDEN);
     }
-    if (m != COLOR) continue;
+    if (!(m == COLOR && VIEW_COLOR)) continue;
     for (int i = 0; i < 3; i++) {
       float8 g = vload8(j, grad + (DIRECTION_ROW + i) * HIDDEN);
       for (int b = 0; b < BLOCK; b++) {
@@ -200,7 +222,8 @@ inline void add_direction_gradient(Block *k, int base, int count, __global const
 // grad_anchors already holds the gradient through the means and gets that of the direction added.
 __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float eye_y, float eye_z,
                              __global const float *weights, __global const float *first_t,
-                             __global const float *second_t, __global const float *anchors,
+                             __global const float *middle_t, __global const float *second_t,
+                             __global const float *anchors,
                              __global const float *features, __global const float *hidden,
                              __global const float *grad_raw, __global float *grad_chunks,
                              __global float *grad_features, __global float *grad_anchors) {
@@ -217,30 +240,20 @@ __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float e
     for (int m = 0; m < 5; m++) {
       __global float *g_first = grad + WEIGHTS_AT[m];
       load_head(&k, m, base, count, hidden, grad_raw);
-      second_layer_gradient(&k, OUT[m], g_first + (INPUTS + 1) * HIDDEN);
-      first_layer_gradient(&k, m, second_t + OUT_AT[m] * HIDDEN, g_first);
+      second_layer_gradient(&k, OUT[m], g_first + LAST_AT);
+      last_units_gradient(&k, m, second_t + OUT_AT[m] * HIDDEN);
+      for (int l = MIDDLE - 1; l >= 0; l--) {
+        load_units(&k, m, l, base, count, hidden);
+        middle_layer_gradient(&k, middle_t + (m * MIDDLE + l) * HIDDEN * HIDDEN,
+                              g_first + MIDDLE_AT + l * MIDDLE_SIZE);
+      }
+      first_layer_gradient(&k, m, g_first);
       add_input_gradient(&k, first_t + m * HIDDEN * FEATURES);
-      if (m == COLOR)
+      if (m == COLOR && VIEW_COLOR)
         add_direction_gradient(&k, base, count, weights + WEIGHTS_AT[m], grad_anchors);
     }
     for (int b = 0; b < count; b++)
       for (int i = 0; i < FEATURES8; i++)
         vstore8(k.d_input[b][i], i, grad_features + (base + b) * FEATURES);
   }
-}
-
-__kernel void sum_chunks(int chunks, __global const float *grad_chunks, __global float *grad) {
-  int i = get_global_id(0);
-  if (!(i < WEIGHTS)) return;
-  float sum = 0;
-  for (int c = 0; c < chunks; c++) sum += grad_chunks[(long)c * WEIGHTS + i];
-  grad[i] = sum;
-}
-
-// The rows of W1 that meet Psi: each is Psi[d] times the gradient of the bias it was folded into.
-__kernel void control_gradient(__global const float *control, __global float *grad) {
-  int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
-  __global float *first = grad + WEIGHTS_AT[m];
-  for (int d = 0; d < CONTROL; d++)
-    first[(FEATURES + d) * HIDDEN + j] = control[d] * first[INPUTS * HIDDEN + j];
 }

@@ -1,4 +1,5 @@
 // Image losses and their gradient: (1 - lambda) L1 + lambda (1 - SSIM), both fused (eq. 8).
+// CPU form: a work-item walks a row in vectors of eight pixels; losses_gpu.cl is the other.
 //
 // Images are planar: the drawn image and its gradient [3][H][W] as the rasterizer has them, every
 // map of ours [3][H][STRIDE] with STRIDE = W padded to 8, so that whole vectors can be written for
@@ -12,14 +13,7 @@
 // A weight map (a photo's mask) draws the pixel towards its target, a = t + w (p - t): what a mask
 // leaves out counts as right, in L1 and in every SSIM window that sees it.
 
-#define REACH 5
-#define TAPS 11
-#define C1 1e-4f  // (0.01)^2, for images in 0..1
-#define C2 9e-4f  // (0.03)^2
-
-__constant float WINDOW[TAPS] = {0.00102838f, 0.00759876f, 0.03600077f, 0.10936069f,
-                                 0.21300554f, 0.26601172f, 0.21300554f, 0.10936069f,
-                                 0.03600077f, 0.00759876f, 0.00102838f};
+#include "losses_shared.cl"
 
 inline float sum8(float8 v) {
   float4 a = v.lo + v.hi;
@@ -82,7 +76,7 @@ __kernel void target_rows(int width, int height, int stride, __global const floa
   }
 }
 
-__kernel void target_columns(int height, int stride, __global const float *blurred,
+__kernel void target_columns(int width, int height, int stride, __global const float *blurred,
                              __global float *target_mean, __global float *target_square) {
   int channel = get_global_id(0) / height, y = get_global_id(0) % height;
   int plane = channel * height * stride, map = 3 * height * stride;

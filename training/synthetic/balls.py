@@ -4,6 +4,7 @@ The two modalities are photographed from different places.  Some of what one sho
 not: the box hides a hot band, and one ball is nearly as cool as the floor.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from training.synthetic.tracer import (
     Place,
     Solid,
     Surface,
+    depth_under,
     look,
     pattern_at,
     photograph,
@@ -34,6 +36,7 @@ LIGHT = Light(towards=(0.4, 0.77, 0.5))
 FOCAL = 1.2  # focal length over image width
 TARGET = (0.0, 0.25, 0.0)  # metres; every camera looks there
 GOLDEN = (5**0.5 + 1) / 2
+DEPTH_UNIT = 0.0001  # metres a step of depth photos
 
 
 def celsius(share: np.ndarray) -> np.ndarray:
@@ -130,8 +133,20 @@ def save_png(path: Path, image: np.ndarray) -> None:
     Image.fromarray(np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)).save(path)
 
 
-def make_balls(folder: Path, size: int = 200, views: int = 40, test_views: int = 8) -> Capture:
-    """Writes the capture into `folder` (size x size pixels, that many views a modality)."""
+def save_depth(path: Path, metres: np.ndarray) -> Path:
+    """A depth photo of 16 bits, DEPTH_UNIT metres a step."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.rint(metres / DEPTH_UNIT).astype(np.uint16)).save(path)
+    return path
+
+
+def make_balls(
+    folder: Path, size: int = 200, views: int = 40, test_views: int = 8, depth: bool = False
+) -> Capture:
+    """Writes the capture into `folder` (size x size pixels, that many views a modality).
+
+    depth: each photo gets a depth photo.
+    """
     here, photos = place(), []
     for number, stop in enumerate(STOPS):
         (folder / stop.name.lower()).mkdir(parents=True, exist_ok=True)
@@ -143,7 +158,12 @@ def make_balls(folder: Path, size: int = 200, views: int = 40, test_views: int =
                 path = folder / stop.name.lower() / f"{split}_{i:03}.png"
                 image, _ = photograph(view, radiance(here, stop.name))
                 save_png(path, image)
-                photos.append(Photo(view, path, stop.name, None, split))
+                photo = Photo(view, path, stop.name, None, split)
+                if depth:
+                    beside = folder / f"{stop.name.lower()}_depth" / path.name
+                    beside = save_depth(beside, depth_under(here, view))
+                    photo = replace(photo, depth=beside, depth_unit=DEPTH_UNIT)
+                photos.append(photo)
     points, solids = surface_points(here, dome_views(12, 99, size), 20000, 0.004)
     hues = np.array(
         [(0.5, 0.5, 0.5), (0.5, 0.3, 0.2), (0.2, 0.5, 0.2), (0.9, 0.75, 0.1), (0.4, 0.5, 0.9)]

@@ -250,6 +250,16 @@ def photograph(
     return image[..., :3], image[..., 3]
 
 
+def depth_under(place: Place, view: View) -> np.ndarray:
+    """(H, W) float64 metres along the view at each pixel's centre, 0 where nothing is."""
+    width, height = view.size
+    rows, columns = (g.ravel() + 0.5 for g in np.mgrid[:height, :width])
+    d = pixel_rays(view, columns, rows)
+    distance, index = trace(place, np.broadcast_to(view.world_from_eye.position, d.shape), d)
+    along = -d @ view.world_from_eye.matrix()[:3, 2]
+    return np.where(index >= 0, np.where(index >= 0, distance, 0) * along, 0).reshape(height, width)
+
+
 def at_edges(image: np.ndarray, index: np.ndarray) -> np.ndarray:
     """(H, W) whether a pixel and one of its four neighbours differ in colour or in solid."""
     out = np.zeros(index.shape, bool)

@@ -1,7 +1,7 @@
 // Which tiles of 16x16 pixels a splat touches: its place, a uint2.
 //   x: first column | first row << 12 | kind (0 culled, MASKED, BOX)
 //   y: MASKED: bit 8 row + column for each touched tile of a grid of 8 x 4
-//      BOX: columns | rows << 16, all of a box larger than that grid
+//      BOX: columns | rows << 16 of a box larger than that grid; span_of_row says which of them
 #include "common/record.cl"
 #define TILE 16
 #define MASKED (1u << 24)
@@ -43,6 +43,46 @@ inline uint2 place_of(const float* s, int tiles_x, int tiles_y) {
   return mask ? (uint2)(corner | MASKED, mask) : (uint2)(0);
 }
 
+// What the rows of a BOX are found by: as above, with room for what float rounding does to a pixel's
+// own test, which is much for long thin splats.  Lists are counted and written by two kernels, which
+// have to agree: whatever a compiler might fuse in one and not in the other is an fma already.
+typedef struct {
+  float tilt, per_a, lean, per_yy, most, left, top, spare;
+  int columns;
+} Slant;
+
+inline Slant slant_of(__global const float* s, uint2 place) {
+  const float x = s[MEAN_X], y = s[MEAN_Y], ex = s[EXTENT_X], ey = s[EXTENT_Y];
+  const float a = s[CONIC_A], c = s[CONIC_C];
+  Slant slant;
+  slant.per_a = 1.0f / a;
+  slant.tilt = -s[CONIC_B] * slant.per_a;
+  slant.lean = -s[CONIC_B] / c * ex;
+  slant.per_yy = s[CUT] / fmax(ey * ey, FLT_MIN);
+  slant.most = fma(1.0001f, s[CUT], 5e-7f * fma(a * ex, ex, c * ey * ey));
+  slant.spare = 1e-6f * fma(fabs(slant.tilt), ey + fabs(y), ex + fabs(x));
+  slant.left = (float)(PLACE_COLUMN(place) * TILE) + 0.5f - x;
+  slant.top = (float)(PLACE_ROW(place) * TILE) + 0.5f - y;
+  slant.columns = place.y & 0xffff;
+  return slant;
+}
+
+// The columns of the box, from x to before y, that the ellipse touches in one of its rows of tiles.
+inline int2 span_of_row(const Slant* s, int row) {
+  const float top = s->top + (float)(row * TILE), bottom = top + (TILE - 1);
+  const float up = clamp(s->lean, top, bottom), down = clamp(-s->lean, top, bottom);
+  const float half_up = sqrt(fmax(fma(-up * up, s->per_yy, s->most), 0.0f) * s->per_a);
+  const float half_down = sqrt(fmax(fma(-down * down, s->per_yy, s->most), 0.0f) * s->per_a);
+  const float right = fma(s->tilt, up, half_up) - s->left + s->spare;
+  const float left = fma(s->tilt, down, -half_down) - s->left - s->spare;
+  const float width = (float)(s->columns * TILE);
+  // What is not a number leaves nothing out.
+  const int end = !(right < width) ? s->columns : right >= 0 ? (int)right / TILE + 1 : 0;
+  const int start = !(left > TILE - 1) ? 0 : left < width ? (int)ceil(left) / TILE : s->columns;
+  return (int2)(min(start, end), end);
+}
+
+// Slots of a splat: of a BOX also those of tiles that its ellipse does not touch.
 inline int tiles_at(uint2 place) {
   if (place.x & MASKED) return popcount(place.y);
   return (place.y & 0xffff) * (place.y >> 16);

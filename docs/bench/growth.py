@@ -1,0 +1,158 @@
+"""Ways to grow: decibels against seconds, splats and bytes, from the same start.
+
+    python3 docs/bench/growth.py CAPTURE [CAPTURE ...] --seconds 120 --out docs/bench/growth.csv
+
+CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  A way is
+a row of WAYS below: the settings of training that it changes.  Every way of a capture has the same
+photos, first anchors, seed, cap and budget, and is looked at at the same shares of the run, never
+while a growing step is fresh.  seconds are those of training alone; psnr_db is the mean over all
+held-out photos of a modality, `mean` that of the modalities; splats are those at least 1/255
+opaque, the mean over the stops.  Ways take turns within a seed, so that what else the machine does
+spreads over all of them.
+"""
+
+import argparse
+import csv
+import shlex
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parents[1])]
+
+from rasterizer.device import open_device  # noqa: E402
+from rasterizer.project import LEAST_ALPHA  # noqa: E402
+from runtime_models.write_package import package_files, zip_files  # noqa: E402
+from scene.read_capture import read_capture  # noqa: E402
+from training.photos import choose_downscale, load_photos  # noqa: E402
+from training.settings import TrainSettings  # noqa: E402
+from training.train import Trainer  # noqa: E402
+
+WAYS = {
+    "none": {"grow": False},
+    "gradient": {"growth": "gradient"},
+    "absgrad": {"growth": "absgrad"},
+    "error": {"growth": "error"},
+    "gradient each": {"growth": "gradient", "grow_each": True},
+    "absgrad each": {"growth": "absgrad", "grow_each": True},
+    "error each": {"growth": "error", "grow_each": True},
+    "gradient replace": {"growth": "gradient", "grow_replace": 0.03},
+    "error each replace": {"growth": "error", "grow_each": True, "grow_replace": 0.03},
+    "gradient 3 grids": {"growth": "gradient", "grow_grids": 3},
+    "gradient coarse": {"growth": "gradient", "coarse": 2},
+    "gradient regularised": {"growth": "gradient", "opacity_share": 0.01, "scale_share": 1e-9},
+    "gradient rise": {"growth": "gradient", "rise": 100},
+    "gradient prune": {"growth": "gradient", "prune_weight": 0.1},
+}
+LOOKS = (0.25, 0.5, 0.75, 1.0)  # shares of the run
+COLUMNS = (
+    "capture", "way", "seed", "steps", "seconds", "anchors", "splats", "package_bytes", "modality",
+    "psnr_db",
+)  # fmt: skip
+
+
+def asked() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("captures", nargs="+")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
+    parser.add_argument("--iterations", type=int)
+    parser.add_argument("--anchors", type=int, default=4000, help="to start with at most")
+    parser.add_argument("--max-anchors", type=int, default=12000)
+    parser.add_argument("--max-mb", type=float)
+    parser.add_argument("--grow-every", type=int, default=100, help="steps")
+    parser.add_argument("--downscale", type=int)
+    parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
+    options = parser.parse_args()
+    if options.seconds is None and options.iterations is None:
+        parser.error("a run needs an end: give --seconds or --iterations")
+    return options
+
+
+def main() -> None:
+    options = asked()
+    settings = TrainSettings(
+        iterations=options.iterations, seconds=options.seconds, anchors=options.anchors,
+        max_anchors=options.max_anchors, max_mb=options.max_mb, downscale=options.downscale,
+        grow_every=options.grow_every,
+    )  # fmt: skip
+    device = open_device()
+    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
+        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
+        file.write(f"# python3 docs/bench/growth.py {shlex.join(words)}\n")
+        file.write(f"# {device.name}, {device.platform}\n")
+        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        rows.writeheader()
+        for name in options.captures:
+            capture = read_capture(made(name, Path(folder), options.size))
+            factor = options.downscale or choose_downscale(capture.photos)
+            photos = {
+                split: load_photos(capture, split, factor, settings.masks)
+                for split in ("train", "test")
+            }
+            for seed in options.seeds:
+                for way in options.ways:
+                    changed = replace(settings, seed=seed, **WAYS[way])
+                    for row in measured(Trainer(device, capture, changed, loaded=photos)):
+                        rows.writerow({"capture": Path(name).name, "way": way, "seed": seed} | row)
+                    file.flush()
+
+
+def made(name: str, folder: Path, size: int) -> Path:
+    """The folder of a capture, which is made first where the name is that of one of ours."""
+    if name == "balls":
+        from training.synthetic.balls import make_balls
+
+        make_balls(folder / name, size)
+    elif name == "workshop":
+        from training.synthetic.workshop import make_workshop
+
+        make_workshop(folder / name)
+    else:
+        return Path(name)
+    return folder / name
+
+
+def measured(trainer: Trainer) -> list[dict]:
+    """The rows of a run, looks by looks; what looking takes does not count as training."""
+    rows, looking, left = [], 0.0, list(LOOKS)
+    for now in trainer.steps():
+        if left and now.fraction >= left[0] and (trainer.settled or now.fraction >= 1):
+            start = time.perf_counter()
+            left = [share for share in left if share > now.fraction]
+            rows += look(trainer, trainer.elapsed - looking)
+            looking += time.perf_counter() - start
+    return rows
+
+
+def look(trainer: Trainer, seconds: float) -> list[dict]:
+    psnr = trainer.held_out_psnr(most=len(trainer.held_out))
+    shared = {
+        "steps": trainer.iteration,
+        "seconds": f"{seconds:.1f}",
+        "anchors": trainer.anchors_count,
+        "splats": alive(trainer),
+        "package_bytes": len(zip_files(package_files(trainer.model(), "float16"))),
+    }
+    psnr["mean"] = float(np.mean(list(psnr.values())))
+    return [shared | {"modality": name, "psnr_db": f"{db:.2f}"} for name, db in psnr.items()]
+
+
+def alive(trainer: Trainer) -> int:
+    """Splats that can be seen, the mean over the stops."""
+    counts = []
+    for stop in trainer.stops:
+        splats = trainer.step.decode(trainer.control(stop.name), np.zeros(3))
+        counts.append((trainer.device.download(splats.opacity) >= LEAST_ALPHA).sum())
+    return int(np.mean(counts))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+// A splat in front of a camera, and the way back from its axes to its scales and quaternion.
+#include "common/camera.cl"
+#include "common/lanes.cl"
+
+// Everything of a splat that both directions need.
+typedef struct {
+  floatn3 p;                     // mean in the camera, metres
+  floatn w, x, y, z;             // unit quaternion
+  floatn inverse_length;         // of the one given
+  floatn3 scale;
+  floatn3 turn_x, turn_y, turn_z;  // rows of the rotation camera_from_splat
+  floatn3 root_x, root_y, root_z;  // rows of turn diag(scale): covariance = root root^T
+  floatn3 row_x, row_y;          // rows of J root: the screen covariance is their Gram matrix
+  floatn jx, jxz, jy, jyz;       // Jacobian: d(px)/dx, d(px)/dz, d(py)/dy, d(py)/dz
+  floatn per_z, a, b, c, determinant;
+} Splat;
+
+inline floatn camera_row(__constant float* camera, int row, floatn3 v) {
+  __constant float* m = camera + 4 * row;
+  return m[0] * v.x + m[1] * v.y + m[2] * v.z + m[3];
+}
+
+inline floatn3 times3(floatn3 a, floatn3 b) { return make3(a.x * b.x, a.y * b.y, a.z * b.z); }
+
+inline Splat place(floatn3 mean, floatn3 scale, floatn qw, floatn qx, floatn qy, floatn qz,
+                   __constant float* camera, float low_pass) {
+  Splat s;
+  s.p.x = camera_row(camera, 0, mean);
+  s.p.y = camera_row(camera, 1, mean);
+  s.p.z = camera_row(camera, 2, mean);
+  s.scale = scale;
+  // By the largest entry first: neither tiny nor huge quaternions lose their length.
+  const floatn largest = fmax(fmax(fabs(qw), fabs(qx)), fmax(fabs(qy), fabs(qz)));
+  const floatn per = 1 / largest;  // not finite where there is no direction
+  s.w = qw * per;
+  s.x = qx * per;
+  s.y = qy * per;
+  s.z = qz * per;
+  const floatn inverse = 1 / sqrt(s.w * s.w + s.x * s.x + s.y * s.y + s.z * s.z);
+  s.w *= inverse;
+  s.x *= inverse;
+  s.y *= inverse;
+  s.z *= inverse;
+  s.inverse_length = inverse * per;
+  const floatn w = s.w, x = s.x, y = s.y, z = s.z;
+  const floatn3 r0 = make3(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y));
+  const floatn3 r1 = make3(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x));
+  const floatn3 r2 = make3(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y));
+  floatn3 turn[3];
+  for (int row = 0; row < 3; row++) {
+    const float m0 = camera[4 * row], m1 = camera[4 * row + 1], m2 = camera[4 * row + 2];
+    turn[row] = make3(m0 * r0.x + m1 * r1.x + m2 * r2.x, m0 * r0.y + m1 * r1.y + m2 * r2.y,
+                      m0 * r0.z + m1 * r1.z + m2 * r2.z);
+  }
+  s.turn_x = turn[0];
+  s.turn_y = turn[1];
+  s.turn_z = turn[2];
+  s.root_x = times3(s.turn_x, scale);
+  s.root_y = times3(s.turn_y, scale);
+  s.root_z = times3(s.turn_z, scale);
+
+  s.per_z = 1 / s.p.z;
+  const floatn tan_x = fmin(fmax(s.p.x * s.per_z, camera[LEAST_X]), camera[MOST_X]);
+  const floatn tan_y = fmin(fmax(s.p.y * s.per_z, camera[LEAST_Y]), camera[MOST_Y]);
+  s.jx = camera[CAMERA_FX] * s.per_z;
+  s.jy = camera[CAMERA_FY] * s.per_z;
+  s.jxz = -s.jx * tan_x;
+  s.jyz = -s.jy * tan_y;
+  s.row_x = blend3(s.jx, s.root_x, s.jxz, s.root_z);
+  s.row_y = blend3(s.jy, s.root_y, s.jyz, s.root_z);
+  const floatn a = dot3(s.row_x, s.row_x), c = dot3(s.row_y, s.row_y);
+  s.a = a + low_pass;
+  s.b = dot3(s.row_x, s.row_y);
+  s.c = c + low_pass;
+  // a c - b^2 cancels for long thin splats; |row_x x row_y|^2 is the same without the loss.
+  const floatn3 area = make3(s.row_x.y * s.row_y.z - s.row_x.z * s.row_y.y,
+                             s.row_x.z * s.row_y.x - s.row_x.x * s.row_y.z,
+                             s.row_x.x * s.row_y.y - s.row_x.y * s.row_y.x);
+  s.determinant = dot3(area, area) + low_pass * (a + c) + low_pass * low_pass;
+  return s;
+}
+
+// Gradients of the scales and of the quaternion given, from those of root's rows.
+inline void turn_backward(const Splat* s, __constant float* camera, floatn3 gx, floatn3 gy,
+                          floatn3 gz, floatn3* grad_scale, floatn* grad_wxyz) {
+  const floatn3 tx = times3(gx, s->turn_x), ty = times3(gy, s->turn_y), tz = times3(gz, s->turn_z);
+  *grad_scale = make3(tx.x + ty.x + tz.x, tx.y + ty.y + tz.y, tx.z + ty.z + tz.z);
+  const floatn3 ux = times3(gx, s->scale), uy = times3(gy, s->scale), uz = times3(gz, s->scale);
+  floatn3 g[3];  // rows of the gradient of the rotation world_from_splat
+  for (int row = 0; row < 3; row++)
+    g[row] = make3(camera[row] * ux.x + camera[4 + row] * uy.x + camera[8 + row] * uz.x,
+                   camera[row] * ux.y + camera[4 + row] * uy.y + camera[8 + row] * uz.y,
+                   camera[row] * ux.z + camera[4 + row] * uy.z + camera[8 + row] * uz.z);
+  const floatn w = s->w, x = s->x, y = s->y, z = s->z;
+  const floatn dw = 2 * (-z * g[0].y + y * g[0].z + z * g[1].x - x * g[1].z - y * g[2].x + x * g[2].y);
+  const floatn dx = 2 * (y * (g[0].y + g[1].x) + z * (g[0].z + g[2].x) - 2 * x * (g[1].y + g[2].z) +
+                         w * (g[2].y - g[1].z));
+  const floatn dy = 2 * (x * (g[0].y + g[1].x) + z * (g[1].z + g[2].y) - 2 * y * (g[0].x + g[2].z) +
+                         w * (g[0].z - g[2].x));
+  const floatn dz = 2 * (x * (g[0].z + g[2].x) + y * (g[1].z + g[2].y) - 2 * z * (g[0].x + g[1].y) +
+                         w * (g[1].x - g[0].y));
+  // Through q = given / |given| only what is across q remains.
+  const floatn along = dw * w + dx * x + dy * y + dz * z;
+  grad_wxyz[0] = (dw - along * w) * s->inverse_length;
+  grad_wxyz[1] = (dx - along * x) * s->inverse_length;
+  grad_wxyz[2] = (dy - along * y) * s->inverse_length;
+  grad_wxyz[3] = (dz - along * z) * s->inverse_length;
+}

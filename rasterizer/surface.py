@@ -1,0 +1,146 @@
+"""surface: how deep splats lie under their pixels: depth pictures, normals, and gradients of both.
+
+Depth is where a ray is halfway through a splat's ellipsoid, not the depth of its centre: a wall of
+flat splats is a wall from the side, too.  kernels/common/surface.cl has the formula.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rasterizer.bin import Tiles
+from rasterizer.device import Device
+from rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
+from rasterizer.raster import FORMS, Frame
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
+
+KERNELS = Path(__file__).parent / "kernels"
+SURFACE = 8  # floats a splat, as kernels/common/surface.cl names them
+WITH_DEPTH = {"SURFACE": 1}  # what the kernels of raster.py are built with for it
+
+
+@dataclass(frozen=True)
+class DepthFrame:
+    """A Frame with the depth that was blended into it."""
+
+    frame: Frame
+    surface: "Array"  # (N, 8) float32
+    metres: "Array"  # (H, W) float32, the sum of alpha T z: depth times coverage
+
+
+def surface(
+    device: Device, means, scales, wxyz, camera: Camera, projected: Projected,
+    form: str | None = None,
+) -> "Array":  # fmt: skip
+    """(N, 8) float32 of the splats that `project` left on the screen; device arrays."""
+    count = means.shape[0]
+    out, wide = device.empty((count, SURFACE)), WIDTH[form or device.kind]
+    kernel = device.program(KERNELS / "surface.cl", WIDTH=wide)["surface"]
+    device.launch(
+        kernel, -(-count // wide), GROUP,
+        count, float(camera.near), device.upload(camera.packed()), means, scales, wxyz,
+        projected.record, out,
+    )  # fmt: skip
+    return out
+
+
+def surface_backward(
+    device: Device, means, scales, wxyz, camera: Camera, projected: Projected, surfaces,
+    grad_surface, grads: tuple, form: str | None = None,
+) -> None:  # fmt: skip
+    """Adds to grads (means, scales, wxyz), as project_backward gave them, what depth says."""
+    count, wide = means.shape[0], WIDTH[form or device.kind]
+    kernel = device.program(KERNELS / "surface.cl", WIDTH=wide)["surface_backward"]
+    device.launch(
+        kernel, -(-count // wide), GROUP,
+        count, float(camera.near), device.upload(camera.packed()), means, scales, wxyz,
+        projected.record, surfaces, grad_surface, *grads,
+    )  # fmt: skip
+
+
+def surface_arena(
+    device: Device, mean_opacity, covariance, object_index, world_from_object, camera: Camera,
+    projected: Projected,
+) -> "Array":  # fmt: skip
+    """(N, 8) float32 of an arena as project_arena takes it; the records' colours become normals.
+
+    Normals have eye axes (x right, y up, z towards the eye) and length 1.
+    """
+    poses = np.reshape(np.asarray(world_from_object, np.float64), (-1, 4, 4))
+    rows = np.asarray(camera.camera_from_world, np.float64) @ poses  # (O, 4, 4)
+    count = mean_opacity.shape[0]
+    out = device.empty((count, SURFACE))
+    kernel = device.program(KERNELS / "surface_arena.cl")["surface_arena"]
+    device.launch(
+        kernel, count, GROUP,
+        count, float(camera.near), device.upload(camera.packed()),
+        device.upload(np.ascontiguousarray(rows[:, :3], np.float32).ravel()), mean_opacity,
+        covariance, object_index, projected.record, out,
+    )  # fmt: skip
+    return out
+
+
+def rasterize_depth(
+    device: Device,
+    projected: Projected,
+    tiles: Tiles,
+    surfaces: "Array",
+    size: tuple[int, int],
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    form: str | None = None,
+) -> DepthFrame:
+    """What `rasterize` draws, and depth."""
+    width, height = size
+    number = tiles.grid[0] * tiles.grid[1]
+    image, transmittance = device.empty((3, height, width)), device.empty((height, width))
+    ends, metres = device.empty(number, np.int32), device.empty((height, width))
+    file, group, _ = FORMS[form or device.kind]
+    device.launch(
+        device.program(file, **WITH_DEPTH)["rasterize"], number * group, group,
+        width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
+        *(float(c) for c in background), image, transmittance, ends, surfaces, metres,
+    )  # fmt: skip
+    return DepthFrame(Frame(image, transmittance, ends), surfaces, metres)
+
+
+def rasterize_depth_backward(
+    device: Device,
+    projected: Projected,
+    tiles: Tiles,
+    drawn: DepthFrame,
+    grad_image: "Array",
+    grad_transmittance: "Array",
+    grad_metres: "Array",
+    form: str | None = None,
+    absolute: bool = True,
+    error: "Array | None" = None,
+    weight: bool = False,
+) -> tuple["Array", "Array"]:
+    """Gradients of the records (N, 12), as rasterize_backward gives them, and of the surfaces."""
+    count, frame = projected.depth.shape[0], drawn.frame
+    _, height, width = frame.image.shape
+    first_slot = tiles.slots(device)
+    slots, depth_slots = (tiles.room(device, first_slot, n) for n in (RECORD, SURFACE))
+    file, _, group = FORMS[form or device.kind]
+    defines = WITH_DEPTH | ({"ABSOLUTE": 1} if absolute and error is None else {})
+    defines |= {"SHARE": 1} if error is not None else {}
+    defines |= {"WEIGHT": 1} if weight else {}
+    device.launch(
+        device.program(file, **defines)["rasterize_backward"],
+        tiles.grid[0] * tiles.grid[1] * group, group,
+        width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.instances, tiles.places,
+        first_slot, projected.record, frame.image, frame.transmittance, grad_image,
+        grad_transmittance, True, slots, *([] if error is None else [error]),
+        drawn.surface, drawn.metres, grad_metres, depth_slots,
+    )  # fmt: skip
+    grad_record, grad_surface = device.empty((count, RECORD)), device.empty((count, SURFACE))
+    for name, given, made in (
+        ("sum_slots", slots, grad_record), ("sum_surface", depth_slots, grad_surface),
+    ):  # fmt: skip
+        kernel = device.program(KERNELS / f"{name}.cl")[name]
+        device.launch(kernel, count, GROUP, count, tiles.places, first_slot, given, made)
+    return grad_record, grad_surface

@@ -1,0 +1,49 @@
+"""The slow twin of surface.py: rays through ellipsoids in plain numpy float64."""
+
+import numpy as np
+
+from rasterizer.project import Camera
+from rasterizer.reference import MAX_ALPHA, project_reference, rotations
+
+REACH = 6.0  # sigmas along the view within which a splat's depth is held
+
+
+def midpoint_depth(mean, covariance, rays, near: float) -> np.ndarray:
+    """(P,) metres: where rays (P, 3) with z = 1 are halfway through an ellipsoid, by its inverse.
+
+    mean (3,), covariance (3, 3): in the camera, z forward.
+    """
+    inverse = np.linalg.inv(covariance)
+    depth = (rays @ inverse @ mean) / np.einsum("pi,ij,pj->p", rays, inverse, rays)
+    reach = REACH * np.sqrt(covariance[2, 2])
+    return np.clip(depth, max(mean[2] - reach, near), mean[2] + reach)
+
+
+def render_depth_reference(
+    splats: tuple, camera: Camera, background=(0.0, 0.0, 0.0)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Image (3, H, W), transmittance and metres (H, W) of (means, scales, wxyz, opacity, color)."""
+    means, scales, wxyz = splats[:3]
+    record, depth = project_reference(*splats, camera)
+    camera_from_world = np.asarray(camera.camera_from_world, np.float64)
+    places = means @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+    axes = camera_from_world[:3, :3] @ rotations(wxyz) * scales[:, None, :]
+    width, height = camera.size
+    x, y = np.arange(width) + 0.5, np.arange(height)[:, None] + 0.5
+    x, y = (np.broadcast_to(a, (height, width)) for a in (x, y))
+    rays = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)], -1)
+    image, through = np.zeros((3, height, width)), np.ones((height, width))
+    metres = np.zeros((height, width))
+    for i in np.argsort(depth, kind="stable"):
+        mean_x, mean_y, a, b, c, opacity, *rgb, extent_x, _, cut = record[i]
+        if not extent_x > 0:
+            continue
+        dx, dy = x - mean_x, y - mean_y
+        r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
+        weight = np.where(r <= cut, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0) * through
+        drawn = weight > 0
+        held = midpoint_depth(places[i], axes[i] @ axes[i].T, rays[drawn], camera.near)
+        metres[drawn] += weight[drawn] * held
+        image += np.multiply.outer(rgb, weight)
+        through = through - weight
+    return image + through * np.asarray(background)[:, None, None], through, metres

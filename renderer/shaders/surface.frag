@@ -1,0 +1,24 @@
+// surface: alpha as in splat.frag; depth (surface.comp) or normal instead of the colour.
+in vec2 sigmas;
+flat in float opacity;
+flat in vec2 center;
+flat in vec4 depth_slope;
+flat in vec4 depth_square;
+flat in vec3 normal;
+uniform float min_alpha;
+uniform int output_kind;  // 0: depth, metres; 1: normal, eye axes
+out vec4 premultiplied;
+
+float depth_under(vec2 d) {
+    float l = dot(depth_slope.yz, d);
+    float q = depth_square.x * d.x * d.x + 2.0 * depth_square.y * d.x * d.y + depth_square.z * d.y * d.y;
+    float z = depth_slope.x * (1.0 + l) / max(1.0 + 2.0 * l + q, 1e-12);
+    return clamp(z, depth_slope.w, depth_square.w);
+}
+
+void main() {
+    float alpha = min(MAX_ALPHA, opacity * exp(-0.5 * dot(sigmas, sigmas)));
+    if (!(alpha >= min_alpha)) discard;
+    vec3 value = output_kind == 0 ? vec3(depth_under(gl_FragCoord.xy - center), 0.0, 0.0) : normal;
+    premultiplied = vec4(value * alpha, alpha);
+}

@@ -1,0 +1,108 @@
+"""Plain splats' whole step against finite differences in float64: every parameter, every degree."""
+
+import numpy as np
+import pytest
+
+from rasterizer.device import open_device
+from rasterizer.reference import finite_differences
+from scene.pose import View, look_at, perspective
+from training.drawing import camera_of
+from training.losses import ImageLoss
+from training.optimizer import Adam
+from training.plain_reference import decode_plain_reference
+from training.plain_step import GROUPS, REST, PlainEvidence, PlainStep
+from training.reference import step_loss_reference
+
+SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
+BACKGROUND = (0.2, 0.5, 0.9)
+SHARES = (0.2, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def device():
+    return open_device("cpu")
+
+
+def situation(seed: int, degree: int, count: int = 7):
+    """(parameters, view, rgba): a few large splats of strong harmonics, some colours below zero."""
+    rng = np.random.default_rng(seed)
+    parameters = {
+        "means": rng.uniform(-0.6, 0.6, (count, 3)),
+        "scales": np.log(rng.uniform(0.1, 0.3, (count, 3))),
+        "wxyz": rng.normal(size=(count, 4)),
+        "opacity": rng.normal(size=count),
+        "base": 2 * rng.normal(size=(count, 3)),
+        "rest": 0.6 * rng.normal(size=(count, REST[degree], 3)),
+    }
+    parameters = {name: values.astype(np.float32) for name, values in parameters.items()}
+    eye = look_at(np.array([0.5, 0.7, 3.0]), np.zeros(3))
+    view = View(eye, perspective(np.deg2rad(40), SIZE), 0.05, 100.0, SIZE)
+    rgba = rng.integers(0, 256, (SIZE[1], SIZE[0], 4)).astype(np.uint8)
+    rgba[..., 3] = 255
+    return parameters, view, rgba
+
+
+@pytest.mark.parametrize(
+    ("degree", "used", "seed"), [(0, 0, 0), (1, 3, 0), (2, 8, 1), (3, 15, 0), (3, 15, 2), (3, 3, 1)]
+)
+def test_every_gradient(device, degree, used, seed):
+    parameters, view, rgba = situation(seed, degree)
+    step = PlainStep(device, Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1))), degree)
+    step.used = used
+    loss = ImageLoss(device, SIZE)
+    target = loss.target(device.upload(rgba), BACKGROUND)
+    drawing = step.draw(view, BACKGROUND)
+    grads = step.gradients(drawing, loss, target, SHARES[0])
+    photo, camera, eye = rgba[..., :3] / 255, camera_of(view), view.world_from_eye.position
+    assert (device.download(drawing.splats.color) == 0).any()  # colours that are cut are there
+
+    def loss_with(name: str, values: np.ndarray) -> float:
+        splats = decode_plain_reference({**parameters, name: values}, eye, used)
+        return step_loss_reference(splats, camera, photo, BACKGROUND, SHARES)
+
+    assert grads.keys() == parameters.keys()
+    for name in GROUPS:
+        values = parameters[name].astype(np.float64)
+        if not values.size:
+            continue
+        found = device.download(grads[name])
+        wanted = finite_differences(lambda v, name=name: loss_with(name, v), values)
+        difference = np.abs(found - wanted).max() / np.abs(wanted).max()
+        assert difference < 1e-5, (name, difference)
+        if name == "rest":
+            assert (found[:, used:] == 0).all()  # what is not switched on stays
+
+
+@pytest.mark.parametrize("degree", [0, 3])
+def test_the_kernel_decodes_as_its_twin(device, degree):
+    for count in (1, 63, 64, 65):
+        parameters, view, _ = situation(3, degree, count)
+        adam = Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1)))
+        eye = view.world_from_eye.position
+        splats = PlainStep(device, adam, degree).decode(eye)
+        wanted = decode_plain_reference(parameters, eye, REST[degree])
+        for found, want in zip(splats.fields(), wanted, strict=True):
+            np.testing.assert_allclose(device.download(found), want, rtol=2e-6, atol=2e-6)
+
+
+def test_a_splat_that_is_not_a_number_is_not_drawn_as_black(device):
+    parameters, view, _ = situation(0, 3)
+    parameters["rest"][2] = np.nan
+    adam = Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1)))
+    step = PlainStep(device, adam, 3)
+    assert np.isnan(device.download(step.decode(np.zeros(3)).color)[2]).all()
+    drawing = step.draw(view, BACKGROUND)
+    assert np.isfinite(device.download(drawing.frame.image)).all()
+
+
+def test_evidence_is_the_mean_screen_gradient_of_what_was_seen(device):
+    parameters, view, rgba = situation(0, 1)
+    parameters["means"][4] = (0, 0, 50)  # behind the eye
+    step = PlainStep(device, Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1))), 1)
+    loss, evidence = ImageLoss(device, SIZE), PlainEvidence(device, 7)
+    target = loss.target(device.upload(rgba), BACKGROUND)
+    for _ in range(3):
+        step.gradients(step.draw(view, BACKGROUND), loss, target, 0.2, evidence)
+    sums = device.download(evidence.sums)
+    assert sums[4].tolist() == [0, 0] and (np.delete(sums[:, 1], 4) == 3).all()
+    assert (np.delete(sums[:, 0], 4) > 0).all()

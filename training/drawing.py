@@ -1,0 +1,95 @@
+"""Splats to a frame and a frame's gradients to splats, with depth where that is asked for."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+
+from rasterizer.bin import bin_tiles
+from rasterizer.project import Camera, project, project_backward
+from rasterizer.raster import rasterize, rasterize_backward
+from rasterizer.surface import (
+    DepthFrame,
+    rasterize_depth,
+    rasterize_depth_backward,
+    surface,
+    surface_backward,
+)
+from scene.pose import View
+from training.depth_loss import DepthWish
+from training.gaussians import Gaussians
+
+Color = tuple[float, float, float]
+Timed = Callable[[str], AbstractContextManager]  # of a pass, by its name
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn view with what the way back needs; device arrays."""
+
+    camera: Camera
+    splats: Gaussians
+    projected: object
+    tiles: object
+    frame: object
+    depth: DepthFrame | None = None  # the same frame with its depth, where that was asked for
+
+
+def camera_of(view: View) -> Camera:
+    return Camera(*view.pinhole(), view.size, view.near)
+
+
+def untimed(name: str) -> AbstractContextManager:
+    return nullcontext()
+
+
+def draw_splats(
+    device, splats: Gaussians, view: View, background: Color, with_depth: bool = False,
+    timed: Timed = untimed,
+) -> Drawing:  # fmt: skip
+    """The view of splats over a background."""
+    camera, depth = camera_of(view), None
+    with timed("project"):
+        projected = project(device, *splats.fields(), camera)
+    with timed("bin"):
+        tiles = bin_tiles(device, projected, view.size)
+    if not with_depth:
+        with timed("rasterize"):
+            frame = rasterize(device, projected, tiles, view.size, background)
+    else:
+        with timed("surface"):
+            surfaces = surface(device, *splats.fields()[:3], camera, projected)
+        with timed("rasterize"):
+            depth = rasterize_depth(device, projected, tiles, surfaces, view.size, background)
+            frame = depth.frame
+    return Drawing(camera, splats, projected, tiles, frame, depth)
+
+
+def splats_backward(
+    device, drawing: Drawing, grad_image, depth: DepthWish | None = None, timed: Timed = untimed,
+    **asked: object,
+) -> tuple[Gaussians, object]:  # fmt: skip
+    """Gradients of the splats and (N, 12) of the records by those of the image.
+
+    depth: what is to be learned from a depth photo, for a drawing that has depth.  asked: what
+    rasterize_backward is to tell beside them.
+    """
+    with timed("rasterize backward"):
+        if depth is None:
+            grad_record = rasterize_backward(
+                device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None, **asked
+            )
+        else:
+            by_metres, by_through = depth.loss.compare(drawing.depth, depth.target, depth.share)
+            grad_record, by_surface = rasterize_depth_backward(
+                device, drawing.projected, drawing.tiles, drawing.depth, grad_image, by_through,
+                by_metres, **asked,
+            )  # fmt: skip
+    fields, camera = drawing.splats.fields(), drawing.camera
+    with timed("project backward"):
+        grad = Gaussians(*project_backward(device, *fields, camera, drawing.projected, grad_record))
+        if depth is not None:
+            surface_backward(
+                device, *fields[:3], camera, drawing.projected, drawing.depth.surface, by_surface,
+                grad.fields()[:3],
+            )  # fmt: skip
+    return grad, grad_record

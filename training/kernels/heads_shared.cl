@@ -1,0 +1,73 @@
+// What both forms of the heads share: sizes, the folded bias, the ends of the backward pass.
+//
+// Defined by networks.py: FEATURES, HIDDEN (padded to 8), CONTROL, RAW (row of all raw outputs) and
+// for each head m OUTm (padded width), OUT_AT m (its place in a raw row), WEIGHTS_ATm.
+// The weights of one head lie as W1 [FEATURES + CONTROL + 3][HIDDEN], b1 [HIDDEN], then for each of
+// LAYERS - 1 middle layers W [HIDDEN][HIDDEN], b [HIDDEN], then W2 [HIDDEN][OUT], b2 [OUT]; the last
+// three rows of W1 meet the view direction, which only the last head (colour) takes, and that only
+// with VIEW_COLOR.  CONDITIONED has a bit for each head that sees Psi.  Rows that nothing meets and
+// padding are zero, get zero gradients and so stay zero.
+//
+// Psi(x) is one vector for all anchors, so W1_control . Psi + b1 is folded into one bias a step;
+// that is exact and halves the first layer.
+
+#define DIRECTION_ROW (FEATURES + CONTROL)
+#define INPUTS (FEATURES + CONTROL + 3)
+#define HIDDEN8 (HIDDEN / 8)
+#define FEATURES8 (FEATURES / 8)
+#define COLOR 4
+#define MIDDLE (LAYERS - 1)
+#define MIDDLE_SIZE ((HIDDEN + 1) * HIDDEN)
+#define MIDDLE_AT ((INPUTS + 1) * HIDDEN)  // in a head's weights
+#define LAST_AT (MIDDLE_AT + MIDDLE * MIDDLE_SIZE)
+#define UNITS_OF(a, m, l) ((((long)(a) * 5 + (m)) * LAYERS + (l)) * HIDDEN)  // in `hidden`
+
+__constant int OUT[5] = {OUT0, OUT1, OUT2, OUT3, OUT4};
+__constant int OUT_AT[5] = {OUT_AT0, OUT_AT1, OUT_AT2, OUT_AT3, OUT_AT4};
+__constant int WEIGHTS_AT[5] = {WEIGHTS_AT0, WEIGHTS_AT1, WEIGHTS_AT2, WEIGHTS_AT3, WEIGHTS_AT4};
+
+// Unit vector from the eye to an anchor (eq. 4) and 1 / distance; finite when they coincide.
+inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {
+  float3 d = (float3)(anchor[0], anchor[1], anchor[2]) - eye;
+  float inverse = 1.0f / fmax(sqrt(dot(d, d)), 1e-8f);
+  return (float4)(d * inverse, inverse);
+}
+
+// One work-item a hidden unit of a head: the folded bias, and both layers transposed, so that the
+// backward kernel never sums across a vector.
+__kernel void prepare_weights(__global const float *weights, __global const float *control,
+                              __global float *bias, __global float *first_t,
+                              __global float *middle_t, __global float *second_t) {
+  int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
+  __global const float *first = weights + WEIGHTS_AT[m];
+  __global const float *second = first + LAST_AT;
+  float sum = first[INPUTS * HIDDEN + j];
+  if (CONDITIONED >> m & 1)
+    for (int d = 0; d < CONTROL; d++) sum += control[d] * first[(FEATURES + d) * HIDDEN + j];
+  bias[m * HIDDEN + j] = sum;
+  for (int i = 0; i < FEATURES; i++)
+    first_t[(m * HIDDEN + j) * FEATURES + i] = first[i * HIDDEN + j];
+  for (int l = 0; l < MIDDLE; l++)
+    for (int i = 0; i < HIDDEN; i++)
+      middle_t[((m * MIDDLE + l) * HIDDEN + j) * HIDDEN + i] =
+          first[MIDDLE_AT + l * MIDDLE_SIZE + i * HIDDEN + j];
+  for (int c = 0; c < OUT[m]; c++)
+    second_t[OUT_AT[m] * HIDDEN + c * HIDDEN + j] = second[j * OUT[m] + c];
+}
+
+__kernel void sum_chunks(int chunks, __global const float *grad_chunks, __global float *grad) {
+  int i = get_global_id(0);
+  if (!(i < WEIGHTS)) return;
+  float sum = 0;
+  for (int c = 0; c < chunks; c++) sum += grad_chunks[(long)c * WEIGHTS + i];
+  grad[i] = sum;
+}
+
+// The rows of W1 that meet Psi: each is Psi[d] times the gradient of the bias it was folded into.
+__kernel void control_gradient(__global const float *control, __global float *grad) {
+  int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
+  __global float *first = grad + WEIGHTS_AT[m];
+  for (int d = 0; d < CONTROL; d++)
+    first[(FEATURES + d) * HIDDEN + j] =
+        CONDITIONED >> m & 1 ? control[d] * first[INPUTS * HIDDEN + j] : 0.0f;
+}

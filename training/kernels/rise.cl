@@ -1,0 +1,9 @@
+// The gradient of share * max(FAINT - opacity, 0) a splat: see rise.py.
+#define FAINT 0.02f
+
+__kernel void draw_up(int splats, float share, __global const float *opacity,
+                      __global float *grad_opacity) {
+  int i = get_global_id(0);
+  if (!(i < splats)) return;
+  if (opacity[i] < FAINT) grad_opacity[i] -= share;
+}
