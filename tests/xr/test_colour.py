@@ -54,7 +54,8 @@ def test_the_runtimes_own_compositor_shows_the_same_colour(stand, name):
         pytest.skip("no xvfb-run: apt install xvfb")
     environment = {**stand.environment, "XRT_COMPOSITOR_FORCE_XCB": "1"}
     del environment["XRT_COMPOSITOR_NULL"]
-    screen = ["xvfb-run", "-a", "-s", "-screen 0 1400x1000x24"]
+    # A display that starts anew when its last program goes refuses the next one now and then.
+    screen = ["xvfb-run", "-a", "-s", "-screen 0 1400x1000x24 -noreset"]
     done = subprocess.run(
         [*screen, sys.executable, PROGRAM.with_name("look_at_window.py"), name],
         env=environment, capture_output=True, text=True, timeout=90, stdin=subprocess.DEVNULL,

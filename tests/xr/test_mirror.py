@@ -21,7 +21,7 @@ def test_the_window_shows_the_left_eye(stand, tmp_path):
         pytest.skip("no xvfb-run: apt install xvfb")
     folder = tmp_path / "out"
     folder.mkdir()
-    screen = ["xvfb-run", "-a", "-s", f"-screen 0 {SIZE[0]}x{SIZE[1]}x24"]
+    screen = ["xvfb-run", "-a", "-s", f"-screen 0 {SIZE[0]}x{SIZE[1]}x24 -noreset"]
     done = subprocess.run(
         [*screen, sys.executable, PROGRAM, folder],
         env=stand.environment, capture_output=True, text=True, timeout=120,
