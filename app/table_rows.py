@@ -44,7 +44,8 @@ def mean_row(rows: list[Row], runs: list) -> Row:
     return type(rows[0])(
         rows[0].method, MEAN, mean("psnr_db", 3), mean("ssim", 5),
         sum(bytes_on_disk(run.file) for run in runs) / 1e6,
-        round(sum(run.seconds for run in runs), 1), sum(run.steps for run in runs),
+        round(sum(round(run.seconds, 1) for run in runs), 1),  # of what the rows above say
+        sum(run.steps for run in runs),
         round(mean("splats", 1)), sum(row.photos for row in rows), *more,
     )  # fmt: skip
 
