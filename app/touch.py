@@ -32,7 +32,7 @@ KEYS = (
     ("wheel, carrying", "farther, nearer"),
     ("Shift, carrying", "drag turns it, wheel rolls it"),
     ("X", "a ray at the mouse"),
-    ("C", "show colliders"),
+    ("J", "show colliders"),
 )
 
 
@@ -139,7 +139,7 @@ class Touch:
                 self.put_back()
             case glfw.KEY_X:
                 self.shoot()
-            case glfw.KEY_C:
+            case glfw.KEY_J:
                 self.marks.colliders = not self.marks.colliders
             case glfw.KEY_ESCAPE if self.hand is not None:
                 self.let_go()

@@ -239,7 +239,7 @@ def picture(viewer) -> np.ndarray:
 
 def test_colliders_are_seen_where_they_are(viewer):
     plain = picture(viewer)
-    press_key(viewer, glfw.KEY_C)
+    press_key(viewer, glfw.KEY_J)
     wires = picture(viewer)
     changed = np.abs(wires - plain).max(axis=2) > 20
     corners = np.array([on_screen(viewer, HALF * c + [0, 0.1, 0]) for c in CORNERS])
@@ -250,7 +250,7 @@ def test_colliders_are_seen_where_they_are(viewer):
     assert (green[:, 1] > green[:, 2]).mean() > 0.9  # it moves
     beside = changed[:, 280:left]
     assert not beside.any()
-    press_key(viewer, glfw.KEY_C)
+    press_key(viewer, glfw.KEY_J)
     assert np.array_equal(picture(viewer), plain)
 
 
@@ -269,7 +269,7 @@ def test_at_rest_the_loop_sleeps_though_things_may_move(viewer):
 
 def test_without_a_world_nothing_is_taken(viewer):
     viewer.stage.bodies.world = None
-    for event in (KeyDown(glfw.KEY_T, False), Press("left", 450, 300), KeyDown(glfw.KEY_C, False)):
+    for event in (KeyDown(glfw.KEY_T, False), Press("left", 450, 300), KeyDown(glfw.KEY_J, False)):
         assert not viewer.touch.take(event)
     run_frames(viewer, 2)
     assert viewer.touch.status() == ""
