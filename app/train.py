@@ -76,6 +76,10 @@ class Options:
     """An anchor that gives less to its pictures of every modality goes; pixels, for example 0.1."""
     prune_views: float | None = None
     """An anchor that is in a smaller share of all pictures goes, for example 0.01."""
+    points: str | None = None
+    """Where the first anchors stand: capture (COLMAP's points or the capture's own), depth (its
+    depth photos), hull (of masks or a known background), random, or a cloud: PLY, LAS, LAZ, NPZ in
+    the capture's world.  auto: the first of these that there is."""
     anchors: int | None = None
     """How many to start with at most, where --voxel is not given."""
     voxel: float | None = None
@@ -106,6 +110,21 @@ class Options:
     """Steps over which the networks' rates rise, for scenes of which all would vanish at once."""
     revive: float | None = None
     """Weight of a pull on splats that are absent, for example 0.01."""
+    control: int | None = None
+    """Numbers of the control encoding; the last one stands for x = 1."""
+    sigma: float | None = None
+    """Width of each in x: wide ones let what lies between two stops learn from both."""
+    between: Literal["none", "photos", "pictures", "splats"] | None = None
+    """How x between two stops is learned: from blends of photos taken from one place, from blends
+    of the model's own pictures, or by keeping splats on the straight way between the stops."""
+    between_share: float | None = None
+    """Of the steps, in which x lies between two stops."""
+    between_pull: float | None = None
+    """Weight of the pull of --between splats."""
+    thermal_smooth: float | None = None
+    """Weight of the roughness of thermal pictures, for example 0.6 (ThermalGaussian)."""
+    balance: str | None = None
+    """Steps of each modality beside the others', as RGB=3,Thermal=1.  Default: as many of each."""
     downscale: int | None = None
     """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
     coarse: int | None = None

@@ -2,8 +2,10 @@
 
 from dataclasses import asdict, dataclass, replace
 
+from training.between import CURES
 from training.density_strategy import strategy
 from training.networks import HeadLayout
+from training.schedule import balance_of
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class TrainSettings:
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
     voxel: float | None = None  # metres; None: from the points and `anchors`
+    points: str = "auto"  # first: auto | capture | depth | hull | random | the path of a cloud
     anchors: int = 6000  # to start with at most, where voxel is None
     max_anchors: int = 12000  # cap of growing
     max_mb: float | None = None  # the same as megabytes of the package on disk, from the start
@@ -71,6 +74,11 @@ class TrainSettings:
     rate_scale: float = 1.0  # times every learning rate
     rise: int = 0  # steps over which the networks' rates rise; after a fall it is 200
     revive: float = 0.0  # lambda of a pull on absent splats: mean max(0.02 - opacity, 0)
+    between: str = "none"  # how x between stops is learned: none | photos | pictures | splats
+    between_share: float = 0.25  # of the steps, in which it is
+    between_pull: float = 1.0  # lambda of the pull of splats
+    thermal_smooth: float = 0.0  # lambda of thermal pictures' roughness; ThermalGaussian: 0.6
+    balance: str = ""  # steps of a modality beside the others', as RGB=3,Thermal=1
 
     def __post_init__(self) -> None:
         """Raises ValueError naming the first number that cannot be."""
@@ -82,17 +90,24 @@ class TrainSettings:
             "depth_share": 0, "rise": 0, "revive": 0,
             "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,
             "coarse_until": 0, "grow_replace": 0, "prune_opacity": 0, "prune_weight": 0,
-            "prune_views": 0,
+            "prune_views": 0, "sigma": 1e-3, "between_share": 0, "between_pull": 0,
+            "thermal_smooth": 0,
         }  # fmt: skip
         for name, low in least.items():
             value = getattr(self, name)
             if value is not None and not low <= value < float("inf"):
                 raise ValueError(f"{name} is {value}; it has to be at least {low}.")
-        for name in ("ssim_share", "coarse_until", "grow_replace", "prune_views"):
+        shares = ("ssim_share", "coarse_until", "grow_replace", "prune_views", "between_share")
+        for name in shares:
             if not getattr(self, name) <= 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it is a share, 0 to 1.")
         if self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse is {self.coarse}; it has to be a power of two: 1, 2, 4 or 8.")
+        if self.between not in CURES:
+            raise ValueError(
+                f"There is no cure '{self.between}' of what lies between; use {', '.join(CURES)}."
+            )
+        balance_of(self.balance)
         strategy(self.growth)
         self.layout()
         if self.iterations is None and self.seconds is None:
