@@ -242,9 +242,7 @@ class Trainer:
             self.rise.pull, self.roughness.get(photo.modality, 0.0),
         )  # fmt: skip
 
-    def learn_at(
-        self, photo: LoadedPhoto, background: Color, way: Way | None
-    ) -> dict[str, object]:
+    def learn_at(self, photo: LoadedPhoto, background: Color, way: Way | None) -> dict[str, object]:
         """From the photo, or as the run's cure of what lies between two stops has it."""
         if way is None:
             return self.learn(photo, background)
