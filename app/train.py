@@ -144,6 +144,7 @@ def run(options: Options) -> int:
     from runtime_models.write_package import refuse_foreign
     from scene.read_capture import read_capture
     from training.checkpoint import checkpoint_path, read_checkpoint
+    from training.suspects import report, suspects
     from training.train import Trainer
 
     if options.model == "splats" or options.separate:
@@ -164,6 +165,8 @@ def run(options: Options) -> int:
     interrupted = train(trainer, checkpoint)
     save(trainer, options.out, checkpoint)
     say(summary(trainer, options.out, interrupted))
+    if not interrupted and (found := report(suspects(trainer))):
+        say(found)
     return INTERRUPTED if interrupted else 0
 
 
