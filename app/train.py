@@ -114,6 +114,9 @@ class Options:
     """Numbers of the control encoding; the last one stands for x = 1."""
     sigma: float | None = None
     """Width of each in x: wide ones let what lies between two stops learn from both."""
+    encoding: Literal["even", "stops"] | None = None
+    """stops: --control and --sigma by the capture: a number a stop, half as wide as stops lie
+    apart, so that what lies between two stops learns from both."""
     between: Literal["none", "photos", "pictures", "splats"] | None = None
     """How x between two stops is learned: from blends of photos taken from one place, from blends
     of the model's own pictures, or by keeping splats on the straight way between the stops."""

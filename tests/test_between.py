@@ -1,15 +1,21 @@
 """Between the stops: the measure of midpoints, each cure's gradients, and what it does to a run."""
 
+import csv
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import fit_scenes
 import numpy as np
 import pytest
 from test_training_gradients import LAYOUT, VOXEL, situation
 
+from app import cli
 from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from runtime_models.model import BadFile, Stop
+from runtime_models.read_scene import read_model
 from scene.capture import Capture
 from scene.pose import Pose, View, perspective
 from training.between import Between, Way, add, alike, blended, shared, straight_pull
@@ -23,6 +29,7 @@ from training.settings import TrainSettings
 from training.step import Step
 from training.train import Trainer
 
+ROOT = Path(__file__).resolve().parents[1]
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))
 SETTINGS = TrainSettings(iterations=200, grow=False, anchors=500)
 LAYOUTS = {
@@ -255,9 +262,9 @@ def judged(device, rig):
     def judge(**changed: object):
         key = tuple(changed.items())
         if key not in kept:
-            encoding = changed.pop("encoding", None)
+            psi = changed.pop("psi", None)
             trainer = Trainer(device, rig, replace(SETTINGS, **changed))
-            trainer.encoding = encoding or trainer.encoding
+            trainer.encoding = psi or trainer.encoding
             run(trainer)
             views = [p.view for p in trainer.held_out if p.modality == "RGB"]
             draw = draw_in_training(trainer, trainer.schedule.background)
@@ -271,7 +278,7 @@ def judged(device, rig):
     ("changed", "gain_db"),
     [
         ({"between": "photos"}, 4), ({"between": "pictures"}, 0.5),
-        ({"between": "splats", "between_pull": 0.1}, 3), ({"control": 2, "sigma": 0.5}, 2),
+        ({"between": "splats", "between_pull": 0.1}, 3), ({"encoding": "stops"}, 2),
     ],
 )  # fmt: skip
 def test_every_cure_brings_midpoints_nearer_to_the_blend(judged, changed, gain_db):
@@ -285,14 +292,27 @@ def test_every_cure_brings_midpoints_nearer_to_the_blend(judged, changed, gain_d
 
 def test_frequencies_fail_where_gaussians_hold(judged):
     plain, _ = judged()
-    wild, _ = judged(encoding=Frequencies(16))
+    wild, _ = judged(psi=Frequencies(16))
     assert wild.flash > 2 * plain.flash and wild.jump > 1.5 * plain.jump
     assert wild.blend_db < plain.blend_db - 2
 
 
+@pytest.mark.parametrize(
+    ("xs", "units", "sigma"),
+    [((0, 1), 2, 0.5), ((0, 0.5, 1), 3, 0.25), ((1, 0, 0.3), 4, 1 / 6), ((0.5,), 2, 0.5),
+     ((0, 0.001, 1), 64, 0.5 / 63)],
+)  # fmt: skip
+def test_an_encoding_for_the_stops_has_a_unit_for_each(xs, units, sigma):
+    stops = tuple(Stop(str(x), x) for x in xs)
+    fitted = replace(SETTINGS, encoding="stops").for_stops(stops)
+    assert (fitted.control, fitted.sigma) == (units, pytest.approx(sigma))
+    assert fitted.for_stops(stops) == fitted and SETTINGS.for_stops(stops) is SETTINGS
+
+
 @pytest.mark.parametrize("cure", ["photos", "pictures", "splats"])
 def test_the_same_seed_gives_the_same_bits_resumed_or_not(device, rig, tmp_path, cure):
-    settings = replace(SETTINGS, iterations=40, between=cure, between_share=0.5)
+    encoding = "stops" if cure == "splats" else "even"
+    settings = replace(SETTINGS, iterations=40, between=cure, between_share=0.5, encoding=encoding)
     whole = run(Trainer(device, rig, settings))
     part = run(Trainer(device, rig, settings), steps=17)
     write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
@@ -311,8 +331,46 @@ def test_growing_and_coarse_photos_go_with_it(device, rig):
 
 @pytest.mark.parametrize(
     "wrong", [{"between": "blend"}, {"between_share": 1.5}, {"between_share": -0.1},
-              {"between_pull": float("nan")}, {"sigma": 0.0}, {"thermal_smooth": -1}]
+              {"between_pull": float("nan")}, {"encoding": "wide"}, {"sigma": 0.0},
+              {"thermal_smooth": -1}]
 )  # fmt: skip
 def test_what_cannot_be_is_refused(wrong):
     with pytest.raises(ValueError, match=next(iter(wrong)).split("_")[0]):
         replace(SETTINGS, **wrong)
+
+
+def test_the_command_takes_them_and_refuses_what_the_capture_has_not(device, rig, tmp_path, capsys):
+    def train(capture: Capture, *words: str) -> int:
+        fixed = ["--iterations", "30", "--anchors", "300", "--out", str(tmp_path / "a.shift")]
+        return cli.main(["train", str(capture.folder), *fixed, *words])
+
+    assert train(rig, "--encoding", "stops", "--between", "photos", "--balance", "RGB=2") == 0
+    model = read_model(tmp_path / "a.shift")
+    assert (model.encoding.d, model.encoding.sigma, model.encoding.spacing) == (2, 0.5, 1)
+    settings = model.provenance["settings"]
+    assert (settings["between"], settings["balance"]) == ("photos", "RGB=2")
+    apart = fit_scenes.make_shapes(tmp_path / "apart", "shared", views=3, tests=1)
+    for words, told in (
+        (("--between", "photos"), "use --between pictures or splats"),
+        (("--balance", "Heat=2"), "balance names 'Heat'; the modalities are RGB, Thermal."),
+        (("--balance", "Heat"), "it is NAME=TURNS"),
+    ):
+        assert train(apart, *words) == 2
+        assert told in capsys.readouterr().err
+
+
+def test_the_program_of_the_table_at_a_tiny_size(rig, tmp_path):
+    program = [sys.executable, ROOT / "docs/bench/between.py", rig.folder]
+    program += ["--iterations", "40", "--anchors", "300", "--steps", "10", "--views", "2"]
+    program += ["--ways", "stops", "frequencies", "--out", tmp_path / "rows.csv"]
+    subprocess.run(program, check=True, timeout=120, cwd=tmp_path)
+    command, machine, *lines = (tmp_path / "rows.csv").read_text().splitlines()
+    assert command.startswith("# python3 docs/bench/between.py") and "PoCL" in machine
+    rows = list(csv.DictReader(lines))
+    where = ["RGB", "Thermal", "mean", "RGB to Thermal"]
+    assert [(row["way"], row["where"]) for row in rows] == [
+        (way, place) for way in ("stops", "frequencies") for place in where
+    ]
+    for row in rows:
+        assert bool(row["psnr_db"]) != bool(row["flash"])
+    assert float(rows[3]["jump"]) < float(rows[7]["jump"]) and rows[3]["sweep"]

@@ -1,7 +1,9 @@
 """Every number that a training run can be asked for; `preset` gives the two starting points."""
 
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 
+from runtime_models.model import Stop
 from training.between import CURES
 from training.density_strategy import strategy
 from training.networks import HeadLayout
@@ -26,6 +28,7 @@ class Rates:
 # iterations.  Short runs end best when they stay fast, long ones when they end ten times finer.
 SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, decay=0.1)
 LONG = Rates(0.04, 0.04, 0.04, 0.02, 0.08, 0.075, 0.01, decay=0.01)
+LEAST_GAP = 1 / 63  # of x between two stops: nearer ones share units of the encoding
 SHORT_RUN = 1000  # iterations
 # Paper, section 5.1; it states no decay.  Its anchor rate is in metres: 0.001, here in voxels.
 PAPER = Rates(0.001, 0.001, 0.0004, 0.0005, 0.008, 0.0075, 0.01, decay=0.1)
@@ -47,6 +50,7 @@ class TrainSettings:
     view_dependent: bool = True  # whether colour sees the direction from the eye
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
+    encoding: str = "even"  # Psi: so many units, so wide | stops: one a stop, half a gap wide
     voxel: float | None = None  # metres; None: from the points and `anchors`
     points: str = "auto"  # first: auto | capture | depth | hull | random | the path of a cloud
     anchors: int = 6000  # to start with at most, where voxel is None
@@ -103,6 +107,8 @@ class TrainSettings:
                 raise ValueError(f"{name} is {getattr(self, name)}; it is a share, 0 to 1.")
         if self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse is {self.coarse}; it has to be a power of two: 1, 2, 4 or 8.")
+        if self.encoding not in ("even", "stops"):
+            raise ValueError(f"There is no encoding '{self.encoding}'; use even or stops.")
         if self.between not in CURES:
             raise ValueError(
                 f"There is no cure '{self.between}' of what lies between; use {', '.join(CURES)}."
@@ -120,6 +126,19 @@ class TrainSettings:
             self.splats_per_anchor, self.features, self.hidden, self.control,
             self.layers, fixed, self.view_dependent,
         )  # fmt: skip
+
+    def for_stops(self, stops: tuple[Stop, ...]) -> "TrainSettings":
+        """With the encoding for a capture's stops.
+
+        `stops`: a unit for each place on the slider as far apart as the nearest two stops are.
+        What lies between two stops then learns from both, and no unit is left that saw no photo.
+        """
+        if self.encoding == "even":
+            return self
+        xs = sorted(stop.x for stop in stops)
+        gaps = [b - a for a, b in pairwise(xs)]
+        units = round(1 / max(min(gaps, default=1.0), LEAST_GAP)) + 1
+        return replace(self, control=units, sigma=0.5 / (units - 1))
 
     def rates(self, iterations: int) -> Rates:
         """The learning rates of a run of so many iterations."""

@@ -82,6 +82,7 @@ class Trainer:
 
         loaded: photos of the splits train and test, where they were read before.
         """
+        settings = settings.for_stops(capture.stops)
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
