@@ -354,6 +354,7 @@ def test_the_command_takes_them_and_refuses_what_the_capture_has_not(device, rig
         (("--between", "photos"), "use --between pictures or splats"),
         (("--balance", "Heat=2"), "balance names 'Heat'; the modalities are RGB, Thermal."),
         (("--balance", "Heat"), "it is NAME=TURNS"),
+        (("--encoding", "stops", "--sigma", "0.1"), "sets --control and --sigma itself"),
     ):
         assert train(apart, *words) == 2
         assert told in capsys.readouterr().err

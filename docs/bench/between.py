@@ -4,7 +4,8 @@
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot, or `rig`:
 balls whose modalities are photographed from the same places.  A way is a row of WAYS below: the
-settings of training that it changes.  Every way of a capture has the same photos, first anchors,
+settings of training that it changes; the last ones are about modalities that are not treated alike.
+Every way of a capture has the same photos, first anchors,
 seed and budget.  A row whose `where` is a stop has the mean PSNR over its held-out photos; a row
 "A to B" has the figures of training/midpoints.py over `--views` of them, and in `sweep` what the
 case of that name of `launch.py stability` says of the first one: "holds", or what fails.
@@ -53,6 +54,9 @@ WAYS = {
     "stops photos": {"encoding": "stops", "between": "photos"},
     "stops splats 0.1": {"encoding": "stops", "between": "splats", "between_pull": 0.1},
     FREQUENCIES: {},
+    "heat smooth 0.1": {"thermal_smooth": 0.1},
+    "heat smooth 0.6": {"thermal_smooth": 0.6},
+    "first twice": {"balance": "FIRST=2"},  # FIRST: the capture's first stop
 }
 COLUMNS = (
     "capture", "way", "seed", "steps", "seconds", "anchors", "where", "psnr_db", "apart", "flash",
@@ -109,6 +113,8 @@ def main() -> None:
             for seed in options.seeds:
                 for way in options.ways:
                     changed = replace(settings, seed=seed, **WAYS[way])
+                    first = capture.stops[0].name
+                    changed = replace(changed, balance=changed.balance.replace("FIRST", first))
                     try:
                         trainer = Trainer(device, capture, changed, loaded=photos)
                     except BadFile as error:  # photos of which no two share a place
