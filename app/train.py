@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 if TYPE_CHECKING:
+    from scene.capture import Capture
     from training.plain import PlainTrainer
     from training.settings import TrainSettings
     from training.train import Trainer
@@ -134,6 +135,9 @@ class Options:
     """Start with photos of 1/2, 1/4 or 1/8 of the sides; the next size comes step by step."""
     coarse_until: float | None = None
     """Share of the run after which the photos have all their pixels, 0 to 1."""
+    calibrate: str | None = None
+    """A modality whose cameras all sit a little beside their stated poses, as on a rig: that turn
+    and shift is found first, from the photos.  `eval` knows it from the package."""
     masks: Literal["object", "valid", "ignore"] | None = None
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None
@@ -147,9 +151,11 @@ def run(options: Options) -> int:
     from runtime_models.write_package import refuse_foreign
     from scene.read_capture import read_capture
     from training.checkpoint import checkpoint_path, read_checkpoint
+    from training.rig import with_found
     from training.suspects import report, suspects
     from training.train import Trainer
 
+    refuse_calibrating(options)
     if options.model == "splats" or options.separate:
         from app.train_baselines import run_baseline
 
@@ -162,7 +168,9 @@ def run(options: Options) -> int:
     capture = read_capture(options.capture)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
-    trainer = Trainer(device, capture, settings, resume)
+    if options.calibrate is not None:
+        settings = calibrated(device, capture, settings, options.calibrate)
+    trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
     say(describe(trainer))
     options.out.parent.mkdir(parents=True, exist_ok=True)
     interrupted = train(trainer, checkpoint)
@@ -171,6 +179,33 @@ def run(options: Options) -> int:
     if not interrupted and (found := report(suspects(trainer))):
         say(found)
     return INTERRUPTED if interrupted else 0
+
+
+def refuse_calibrating(options: Options) -> None:
+    """Raises UsageError where --calibrate would do nothing."""
+    from app.errors import UsageError
+
+    if options.calibrate is None:
+        return
+    if options.model == "splats" or options.separate:
+        raise UsageError("--calibrate needs the model that all modalities share; leave it out.")
+    if options.resume:
+        raise UsageError("--resume goes on with the checkpoint's offset; leave out --calibrate.")
+
+
+def calibrated(
+    device, capture: "Capture", settings: "TrainSettings", modality: str
+) -> "TrainSettings":
+    """The settings with the offset of a modality's cameras, which is looked for now."""
+    from training.rig import calibrate, noted
+
+    say(f"looking for the offset of the cameras of {modality} ...")
+    found = calibrate(device, capture, settings, modality)
+    say(
+        f"{modality}: cameras sit {found.turn_deg:.2f} degrees and {found.shift_m:.4f} m beside "
+        "their stated poses, each in its own axes; trained with that."
+    )
+    return replace(settings, rig=noted(modality, found))
 
 
 def settings_of(options: Options, before: dict | None) -> "TrainSettings":

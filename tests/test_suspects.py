@@ -30,6 +30,7 @@ def found_in(capture) -> list:
     return suspects(trainer)
 
 
+@pytest.mark.slow
 def test_no_good_photo_is_named(balls):
     assert found_in(balls) == []
 

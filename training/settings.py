@@ -75,6 +75,7 @@ class TrainSettings:
     coarse_until: float = 0.35  # of the run, from when on the photos have all their pixels
     masks: str = "object"  # object: nothing outside it | valid: unknown outside it | ignore
     background: str = "auto"  # auto: the capture's, else random where photos have alpha | black ...
+    rig: str = ""  # offsets of cameras that were found: JSON, a modality -> 16 numbers
     rate_scale: float = 1.0  # times every learning rate
     rise: int = 0  # steps over which the networks' rates rise; after a fall it is 200
     revive: float = 0.0  # lambda of a pull on absent splats: mean max(0.02 - opacity, 0)
