@@ -27,7 +27,7 @@ class Suspect:
         why = (
             "other brightness or colours explain it: check its exposure and white balance"
             if self.exposure
-            else "check its pose, and that it shows the same scene"
+            else "check its pose and that it shows the same scene; a close-up may need a longer run"
         )
         return (
             f"{self.name} ({self.modality}) fits with {self.psnr_db:.1f} dB, the others with "
@@ -63,7 +63,7 @@ def judge(
     spread = 1.4826 * float(np.median(np.abs(values - median)))
     limit = median - max(LEAST_DB, SPREADS * spread)
     out = [
-        Suspect(photo.name, modality, fit, median, bool(again >= limit))
+        Suspect(photo.name, modality, fit, median, bool(again >= limit and again - fit >= LEAST_DB))
         for photo, (fit, again) in zip(photos, fits, strict=True)
         if not fit >= limit
     ]
@@ -73,7 +73,8 @@ def judge(
 def suspects(trainer: Trainer) -> list[Suspect]:
     """Draws every training photo of a trained model once; those that stand out in their modality.
 
-    A model that is far from trained fits all photos badly, so none stands out.
+    A model that is far from trained fits all photos badly, so few stand out; but then close-ups,
+    which are learned last, do.
     """
     out = []
     for modality, photos in trainer.schedule.photos.items():
