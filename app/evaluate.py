@@ -45,6 +45,7 @@ def run(options: Options) -> int:
     from scene.read_capture import read_capture
     from scene.scene_file import is_scene_file
     from training.evaluate import evaluate_model, report
+    from training.rig import rig_of, with_found
     from training.vgg_distance import VggDistance
 
     started = time.perf_counter()
@@ -58,6 +59,7 @@ def run(options: Options) -> int:
     if options.modality is not None:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)
+    capture = with_found(capture, rig_of(model.provenance))
     scores = evaluate_model(
         open_device(), model, capture, options.downscale, options.masks, options.background,
         distance,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 if TYPE_CHECKING:
+    from scene.capture import Capture
     from training.plain import PlainTrainer
     from training.settings import TrainSettings
     from training.train import Trainer
@@ -76,6 +77,10 @@ class Options:
     """An anchor that gives less to its pictures of every modality goes; pixels, for example 0.1."""
     prune_views: float | None = None
     """An anchor that is in a smaller share of all pictures goes, for example 0.01."""
+    points: str | None = None
+    """Where the first anchors stand: capture (COLMAP's points or the capture's own), depth (its
+    depth photos), hull (of masks or a known background), random, or a cloud: PLY, LAS, LAZ, NPZ in
+    the capture's world.  auto: the first of these that there is."""
     anchors: int | None = None
     """How many to start with at most, where --voxel is not given."""
     voxel: float | None = None
@@ -106,12 +111,33 @@ class Options:
     """Steps over which the networks' rates rise, for scenes of which all would vanish at once."""
     revive: float | None = None
     """Weight of a pull on splats that are absent, for example 0.01."""
+    control: int | None = None
+    """Numbers of the control encoding; the last one stands for x = 1."""
+    sigma: float | None = None
+    """Width of each in x: wide ones let what lies between two stops learn from both."""
+    encoding: Literal["even", "stops"] | None = None
+    """stops: --control and --sigma by the capture: a number a stop, half as wide as stops lie
+    apart, so that what lies between two stops learns from both."""
+    between: Literal["none", "photos", "pictures", "splats"] | None = None
+    """How x between two stops is learned: from blends of photos taken from one place, from blends
+    of the model's own pictures, or by keeping splats on the straight way between the stops."""
+    between_share: float | None = None
+    """Of the steps, in which x lies between two stops."""
+    between_pull: float | None = None
+    """Weight of the pull of --between splats."""
+    thermal_smooth: float | None = None
+    """Weight of the roughness of thermal pictures, for example 0.6 (ThermalGaussian)."""
+    balance: str | None = None
+    """Steps of each modality beside the others', as RGB=3,Thermal=1.  Default: as many of each."""
     downscale: int | None = None
     """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
     coarse: int | None = None
     """Start with photos of 1/2, 1/4 or 1/8 of the sides; the next size comes step by step."""
     coarse_until: float | None = None
     """Share of the run after which the photos have all their pixels, 0 to 1."""
+    calibrate: str | None = None
+    """A modality whose cameras all sit a little beside their stated poses, as on a rig: that turn
+    and shift is found first, from the photos.  `eval` knows it from the package."""
     masks: Literal["object", "valid", "ignore"] | None = None
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None
@@ -125,8 +151,11 @@ def run(options: Options) -> int:
     from runtime_models.write_package import refuse_foreign
     from scene.read_capture import read_capture
     from training.checkpoint import checkpoint_path, read_checkpoint
+    from training.rig import with_found
+    from training.suspects import report, suspects
     from training.train import Trainer
 
+    refuse_calibrating(options)
     if options.model == "splats" or options.separate:
         from app.train_baselines import run_baseline
 
@@ -139,13 +168,44 @@ def run(options: Options) -> int:
     capture = read_capture(options.capture)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
-    trainer = Trainer(device, capture, settings, resume)
+    if options.calibrate is not None:
+        settings = calibrated(device, capture, settings, options.calibrate)
+    trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
     say(describe(trainer))
     options.out.parent.mkdir(parents=True, exist_ok=True)
     interrupted = train(trainer, checkpoint)
     save(trainer, options.out, checkpoint)
     say(summary(trainer, options.out, interrupted))
+    if not interrupted and (found := report(suspects(trainer))):
+        say(found)
     return INTERRUPTED if interrupted else 0
+
+
+def refuse_calibrating(options: Options) -> None:
+    """Raises UsageError where --calibrate would do nothing."""
+    from app.errors import UsageError
+
+    if options.calibrate is None:
+        return
+    if options.model == "splats" or options.separate:
+        raise UsageError("--calibrate needs the model that all modalities share; leave it out.")
+    if options.resume:
+        raise UsageError("--resume goes on with the checkpoint's offset; leave out --calibrate.")
+
+
+def calibrated(
+    device, capture: "Capture", settings: "TrainSettings", modality: str
+) -> "TrainSettings":
+    """The settings with the offset of a modality's cameras, which is looked for now."""
+    from training.rig import calibrate, noted
+
+    say(f"looking for the offset of the cameras of {modality} ...")
+    found = calibrate(device, capture, settings, modality)
+    say(
+        f"{modality}: cameras sit {found.turn_deg:.2f} degrees and {found.shift_m:.4f} m beside "
+        "their stated poses, each in its own axes; trained with that."
+    )
+    return replace(settings, rig=noted(modality, found))
 
 
 def settings_of(options: Options, before: dict | None) -> "TrainSettings":
@@ -168,6 +228,8 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
                 f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
                 f"{known[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
             )
+    if asked.get("encoding") == "stops" and asked.keys() & {"control", "sigma"}:
+        raise UsageError("--encoding stops sets --control and --sigma itself; leave them out.")
     if "seconds" in asked and "iterations" not in asked:
         asked["iterations"] = None
     elif "iterations" in asked and "seconds" not in asked:

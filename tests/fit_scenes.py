@@ -47,10 +47,13 @@ def over_white(rays):
     return radiance
 
 
-def make_shapes(folder: Path, which: str, size: int = 48, views: int = 14, tests: int = 4):
-    """The capture "shared" or "apart" in `folder`, over white."""
+def make_shapes(
+    folder: Path, which: str, size: int = 48, views: int = 14, tests: int = 4, rig: bool = False
+) -> Capture:
+    """The capture "shared" or "apart" in `folder`, over white; rig: both stops from each place."""
     photos = []
     for number, (stop, solids, light) in enumerate(SHAPES[which]):
+        number = 0 if rig else number
         (folder / stop.name).mkdir(parents=True, exist_ok=True)
         here = Place.of(list(solids))
         for split, count, seed in (("train", views, number), ("test", tests, 50 + number)):

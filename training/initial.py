@@ -1,13 +1,17 @@
 """Where the first anchors stand: at points, on a visual hull, or in the cameras' common view."""
 
+from pathlib import Path
+
 import numpy as np
 
 from runtime_models.model import BadFile
 from scene.capture import Capture
 from scene.pose import View
 from training.photos import LoadedPhoto
+from training.point_sources import CLOUDS, cloud_points, depth_points
 
-COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of the box that is carved
+SOURCES = ("auto", "capture", "depth", "hull", "random")  # or a file: see CLOUDS
+COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of a cube of the carved box's volume
 HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
 FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
 BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
@@ -87,11 +91,13 @@ def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | Non
 def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
     """(P, 3) centres of the surface cells of a box that no silhouette shows as background.
 
-    photos: (view, silhouette).  The box from `low` to `high` has side^3 cells.
+    photos: (view, silhouette).  The box from `low` to `high` has about side^3 cells, all cubes:
+    in cells that are long one way, points would be nearest to each other the other way.
     """
-    axis = (np.arange(side) + 0.5) / side
-    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
-    points = low + (high - low) * grid
+    edge = float(np.prod((high - low) / side)) ** (1 / 3)  # metres
+    counts = np.maximum(np.rint((high - low) / edge), 1).astype(int)
+    axes = [(np.arange(count) + 0.5 - count / 2) * edge for count in counts]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + (low + high) / 2
     solid, seen = np.ones(len(points), bool), np.zeros(len(points), int)
     for view, shape in photos:
         left = np.flatnonzero(solid)
@@ -100,7 +106,7 @@ def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) ->
         solid[left[inside]] = shape[row, column]
         seen[left[inside]] += 1
     solid &= seen >= max(2, len(photos) // 4)
-    cells = np.pad(solid.reshape(side, side, side), 1)
+    cells = np.pad(solid.reshape(counts), 1)
     buried = np.ones_like(cells)
     for shift in (-1, 1):
         for dimension in range(3):
@@ -167,15 +173,23 @@ def filler_points(
 
 
 def initial_points(
-    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
+    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto"
 ) -> tuple[np.ndarray, str]:
-    """(P, 3) metres and where they come from: points, hull or random.  Raises BadFile."""
-    if capture.points is not None and len(capture.points):
+    """(P, 3) metres and in words where they come from.  Raises BadFile.
+
+    source: one of SOURCES, or the path of a cloud; auto takes the first of these that there is:
+    the capture's own points, depth photos, the visual hull, random ones.
+    """
+    if source not in SOURCES:
+        return seen_cloud(Path(source), capture, photos, rng)
+    if source in ("auto", "capture") and capture.points is not None and len(capture.points):
         points = np.asarray(capture.points, np.float64)
-        if capture.background is not None or any(p.see_through for p in photos):
-            return points, "points"
-        return np.concatenate([points, filler_points(points, photos, rng)]), "points and guesses"
-    hull = hull_points(photos, capture.background)
+        return with_guesses(points, "points", capture, photos, rng)
+    if source in ("auto", "depth"):
+        points = depth_points(photos, rng)
+        if len(points):
+            return with_guesses(points, "depth photos", capture, photos, rng)
+    hull = hull_points(photos, capture.background) if source in ("auto", "hull") else None
     if hull is not None and len(hull):
         return hull, "hull"
     if hull is not None and any(p.see_through for p in photos):
@@ -183,7 +197,51 @@ def initial_points(
             f"{capture.folder}: the masks have no volume in common; check that masks and poses "
             "belong together, or train with --masks ignore."
         )
+    if source not in ("auto", "random"):
+        lacking = {
+            "capture": "has no points of its own (COLMAP's points3D, or 'points' in its JSON)",
+            "depth": "has no depth photos that know anything",
+            "hull": "has neither masks nor a known background, so that nothing can be carved",
+        }[source]
+        raise BadFile(f"{capture.folder} {lacking}; take other --points, or leave them out.")
+    return random_points(photos, rng), "random"
+
+
+def with_guesses(
+    points: np.ndarray, origin: str, capture: Capture, photos: list[LoadedPhoto],
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, str]:  # fmt: skip
+    """The points, and guesses beside them where the photos have no known background."""
+    if capture.background is not None or any(p.see_through for p in photos):
+        return points, origin
+    return np.concatenate([points, filler_points(points, photos, rng)]), f"{origin} and guesses"
+
+
+def seen_cloud(
+    path: Path, capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
+) -> tuple[np.ndarray, str]:
+    """What the photos see of a cloud file: scanners see farther than what was photographed."""
+    if path.suffix.lower() not in CLOUDS:
+        raise BadFile(
+            f"--points {path}: give {', '.join(SOURCES)}, or a file that ends in "
+            f"{', '.join(CLOUDS)}."
+        )
+    points, count = cloud_points(path, capture, rng)
+    seen = np.zeros(len(points), bool)
+    for photo in photos:
+        seen |= pixel_of(photo.view, points)[1]
+    if not seen.any():
+        raise BadFile(
+            f"{path}: no photo sees any of its {count:,} points; they must be in the world and the "
+            "metres of the capture's poses."
+        )
+    origin = f"{path.name} ({seen.sum():,} of {count:,} points)"
+    return with_guesses(points[seen], origin, capture, photos, rng)
+
+
+def random_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.ndarray:
+    """(P, 3) anywhere in the place that the cameras look at together."""
     centre, half = common_box([p.view for p in photos])
     cloud = centre + half * rng.uniform(-1, 1, (RANDOM_POINTS, 3))
     watched = sum(pixel_of(p.view, cloud)[1] for p in photos) >= max(1, len(photos) // 3)
-    return (cloud[watched] if watched.any() else cloud), "random"
+    return cloud[watched] if watched.any() else cloud

@@ -34,6 +34,7 @@ class PlainSettings:
     seed: int = 0
     sh_degree: int = 3  # of the colours: 0 to 3
     voxel: float | None = None  # metres between the first splats; None: from points and `splats`
+    points: str = "auto"  # as in TrainSettings
     splats: int = 10000  # to start with at most, where voxel is None
     max_splats: int = 60000  # cap of growing; what an anchor model draws at most by default
     grow: bool = True

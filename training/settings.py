@@ -1,9 +1,13 @@
 """Every number that a training run can be asked for; `preset` gives the two starting points."""
 
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 
+from runtime_models.model import Stop
+from training.between import CURES
 from training.density_strategy import strategy
 from training.networks import HeadLayout
+from training.schedule import balance_of
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,7 @@ class Rates:
 # iterations.  Short runs end best when they stay fast, long ones when they end ten times finer.
 SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, decay=0.1)
 LONG = Rates(0.04, 0.04, 0.04, 0.02, 0.08, 0.075, 0.01, decay=0.01)
+LEAST_GAP = 1 / 63  # of x between two stops: nearer ones share units of the encoding
 SHORT_RUN = 1000  # iterations
 # Paper, section 5.1; it states no decay.  Its anchor rate is in metres: 0.001, here in voxels.
 PAPER = Rates(0.001, 0.001, 0.0004, 0.0005, 0.008, 0.0075, 0.01, decay=0.1)
@@ -45,7 +50,9 @@ class TrainSettings:
     view_dependent: bool = True  # whether colour sees the direction from the eye
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
+    encoding: str = "even"  # Psi: so many units, so wide | stops: one a stop, half a gap wide
     voxel: float | None = None  # metres; None: from the points and `anchors`
+    points: str = "auto"  # first: auto | capture | depth | hull | random | the path of a cloud
     anchors: int = 6000  # to start with at most, where voxel is None
     max_anchors: int = 12000  # cap of growing
     max_mb: float | None = None  # the same as megabytes of the package on disk, from the start
@@ -68,9 +75,15 @@ class TrainSettings:
     coarse_until: float = 0.35  # of the run, from when on the photos have all their pixels
     masks: str = "object"  # object: nothing outside it | valid: unknown outside it | ignore
     background: str = "auto"  # auto: the capture's, else random where photos have alpha | black ...
+    rig: str = ""  # offsets of cameras that were found: JSON, a modality -> 16 numbers
     rate_scale: float = 1.0  # times every learning rate
     rise: int = 0  # steps over which the networks' rates rise; after a fall it is 200
     revive: float = 0.0  # lambda of a pull on absent splats: mean max(0.02 - opacity, 0)
+    between: str = "none"  # how x between stops is learned: none | photos | pictures | splats
+    between_share: float = 0.25  # of the steps, in which it is
+    between_pull: float = 1.0  # lambda of the pull of splats
+    thermal_smooth: float = 0.0  # lambda of thermal pictures' roughness; ThermalGaussian: 0.6
+    balance: str = ""  # steps of a modality beside the others', as RGB=3,Thermal=1
 
     def __post_init__(self) -> None:
         """Raises ValueError naming the first number that cannot be."""
@@ -82,17 +95,26 @@ class TrainSettings:
             "depth_share": 0, "rise": 0, "revive": 0,
             "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,
             "coarse_until": 0, "grow_replace": 0, "prune_opacity": 0, "prune_weight": 0,
-            "prune_views": 0,
+            "prune_views": 0, "sigma": 1e-3, "between_share": 0, "between_pull": 0,
+            "thermal_smooth": 0,
         }  # fmt: skip
         for name, low in least.items():
             value = getattr(self, name)
             if value is not None and not low <= value < float("inf"):
                 raise ValueError(f"{name} is {value}; it has to be at least {low}.")
-        for name in ("ssim_share", "coarse_until", "grow_replace", "prune_views"):
+        shares = ("ssim_share", "coarse_until", "grow_replace", "prune_views", "between_share")
+        for name in shares:
             if not getattr(self, name) <= 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it is a share, 0 to 1.")
         if self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse is {self.coarse}; it has to be a power of two: 1, 2, 4 or 8.")
+        if self.encoding not in ("even", "stops"):
+            raise ValueError(f"There is no encoding '{self.encoding}'; use even or stops.")
+        if self.between not in CURES:
+            raise ValueError(
+                f"There is no cure '{self.between}' of what lies between; use {', '.join(CURES)}."
+            )
+        balance_of(self.balance)
         strategy(self.growth)
         self.layout()
         if self.iterations is None and self.seconds is None:
@@ -105,6 +127,19 @@ class TrainSettings:
             self.splats_per_anchor, self.features, self.hidden, self.control,
             self.layers, fixed, self.view_dependent,
         )  # fmt: skip
+
+    def for_stops(self, stops: tuple[Stop, ...]) -> "TrainSettings":
+        """With the encoding for a capture's stops.
+
+        `stops`: a unit for each place on the slider as far apart as the nearest two stops are.
+        What lies between two stops then learns from both, and no unit is left that saw no photo.
+        """
+        if self.encoding == "even":
+            return self
+        xs = sorted(stop.x for stop in stops)
+        gaps = [b - a for a, b in pairwise(xs)]
+        units = round(1 / max(min(gaps, default=1.0), LEAST_GAP)) + 1
+        return replace(self, control=units, sigma=0.5 / (units - 1))
 
     def rates(self, iterations: int) -> Rates:
         """The learning rates of a run of so many iterations."""

@@ -15,6 +15,7 @@ from training.losses import ImageLoss, Target, regularise
 from training.networks import HeadLayout, Heads
 from training.optimizer import Adam
 from training.rise import draw_up
+from training.smooth import smooth_picture
 
 
 class Step:
@@ -61,11 +62,14 @@ class Step:
         evidence: Evidence | None = None,
         depth: DepthWish | None = None,
         revive: float = 0.0,
+        smooth: float = 0.0,
     ) -> dict[str, object]:
         """Gradients of the loss by weights, anchors and features, as the optimiser names them."""
         device, adam = self.device, self.adam
         with self.timed("loss"):
             grad_image = loss.compare(drawing.frame.image, target, ssim_share)
+            if smooth:
+                smooth_picture(device, drawing.frame.image, grad_image, smooth)
         asked = {} if evidence is None else evidence.asks(drawing.frame.image, target)
         grad, grad_record = splats_backward(device, drawing, grad_image, depth, self.timed, **asked)
         with self.timed("density"):

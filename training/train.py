@@ -8,6 +8,7 @@ import numpy as np
 
 from runtime_models.model import AnchorModel, BadFile, ControlEncoding
 from scene.capture import Capture
+from training.between import Between, Way, add, blended, own_blend, straight_pull
 from training.coarse import Coarse
 from training.density import Evidence, Watch
 from training.density_budget import most_anchors, within
@@ -29,7 +30,7 @@ from training.photos import (
     load_photos,
 )
 from training.rise import Rise, after_fall
-from training.schedule import Budget, Schedule, choose_background
+from training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
 from training.settings import Rates, TrainSettings
 from training.step import Step
 
@@ -81,6 +82,7 @@ class Trainer:
 
         loaded: photos of the splits train and test, where they were read before.
         """
+        settings = settings.for_stops(capture.stops)
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
@@ -94,7 +96,11 @@ class Trainer:
             if not found:
                 raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
         background = choose_background(settings.background, capture.background)
-        self.schedule = Schedule(by_modality, settings.seed, background)
+        turns = turns_of(balance_of(settings.balance), list(by_modality))
+        self.schedule = Schedule(by_modality, settings.seed, background, turns)
+        self.between = Between(
+            settings.between, settings.between_share, settings.seed, self.stops, by_modality
+        )
         self.encoding = ControlEncoding(
             settings.control, 1 / max(settings.control - 1, 1), settings.sigma
         )
@@ -107,6 +113,8 @@ class Trainer:
         self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
         self.targets, self.photo_factor = Targets(device), 1
         self.rise = Rise(settings.rise, 0, settings.revive)
+        thermal = [stop.name for stop in self.stops if stop.kind == "thermal"]
+        self.roughness = dict.fromkeys(thermal, settings.thermal_smooth)
         self.contrast: dict[tuple, float] = {}
         if resume is None:
             self.start(photos)
@@ -121,7 +129,7 @@ class Trainer:
         """Anchors, features and weights of a new run."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        points, self.origin = initial_points(self.capture, photos, rng)
+        points, self.origin = initial_points(self.capture, photos, rng, settings.points)
         most = min(settings.anchors, self.most_anchors)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         anchors = within(voxel_centres(points, self.voxel), self.most_anchors, settings.max_mb)
@@ -207,6 +215,8 @@ class Trainer:
                 self.step.update(self.learn(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
                 self.guard.expect(modality, loss, self.visible(), self.shown(photo, background))
+                if self.between.middle is not None:
+                    self.learn_at(photo, background, self.between.middle)
         self.adam.load(before)
         self.evidence.load(evidence)
 
@@ -230,14 +240,45 @@ class Trainer:
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
             settings.opacity_share, settings.scale_share, self.evidence, depth,
-            self.rise.pull,
+            self.rise.pull, self.roughness.get(photo.modality, 0.0),
+        )  # fmt: skip
+
+    def learn_at(self, photo: LoadedPhoto, background: Color, way: Way | None) -> dict[str, object]:
+        """From the photo, or as the run's cure of what lies between two stops has it."""
+        if way is None:
+            return self.learn(photo, background)
+        if self.between.replaces:
+            return self.learn_between(photo, way)
+        eye, pull = photo.view.world_from_eye.position, self.settings.between_pull
+        more = straight_pull(self.step, way, self.encoding, eye, self.voxel, pull)
+        grads = self.learn(photo, background)
+        add(self.device, grads, more)
+        return grads
+
+    def learn_between(self, photo: LoadedPhoto, way: Way) -> dict[str, object]:
+        """From a blend of what two stops show, at an x between them."""
+        if self.between.cure == "photos":
+            pair = (self.coarse.photo(p, self.photo_factor) for p in self.between.pair(way))
+            photo = blended(*pair, way.share)
+        background = self.schedule.background_of(self.iteration, photo)
+        if self.between.cure == "pictures":
+            photo = own_blend(self.step, photo, way, self.encoding, background)
+        loss = self.targets.loss(photo)
+        target = loss.target(self.device.upload(photo.rgba), background, photo.weight)
+        self.drawing = self.step.draw(photo.view, self.encoding.encode(way.x), background)
+        settings = self.settings
+        return self.step.gradients(
+            self.drawing, loss, target, settings.ssim_share, settings.opacity_share,
+            settings.scale_share, revive=self.rise.pull,
         )  # fmt: skip
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""
         photo = self.next_photo()
         background = self.schedule.background_of(self.iteration, photo)
-        grads = self.learn(photo, background)
+        way = self.between.way(self.iteration)
+        grads = self.learn_at(photo, background, way)
+        at_stop = way is None or not self.between.replaces
         fraction = self.budget.fraction(self.iteration, self.elapsed)
         if self.rise.going(self.iteration):
             self.adam.set_rates(self.all_rates())
@@ -245,7 +286,7 @@ class Trainer:
         self.iteration += 1
         loss, fell_back = None, False
         rounds = -(-self.iteration // len(self.stops))
-        if rounds % GUARD_EVERY == 0:  # every modality in turn, however many there are
+        if rounds % GUARD_EVERY == 0 and at_stop:  # every modality in turn, however many there are
             loss = self.targets.loss(photo).value()
             fell_back = self.look_after(photo, background, loss)
         if self.run_length is None and self.iteration == PACE_STEPS:

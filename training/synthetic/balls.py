@@ -141,14 +141,16 @@ def save_depth(path: Path, metres: np.ndarray) -> Path:
 
 
 def make_balls(
-    folder: Path, size: int = 200, views: int = 40, test_views: int = 8, depth: bool = False
-) -> Capture:
+    folder: Path, size: int = 200, views: int = 40, test_views: int = 8, depth: bool = False,
+    rig: bool = False,
+) -> Capture:  # fmt: skip
     """Writes the capture into `folder` (size x size pixels, that many views a modality).
 
-    depth: each photo gets a depth photo.
+    depth: each photo gets a depth photo.  rig: both modalities are photographed from each place.
     """
     here, photos = place(), []
     for number, stop in enumerate(STOPS):
+        number = 0 if rig else number
         (folder / stop.name.lower()).mkdir(parents=True, exist_ok=True)
         for split, count, seed in (
             ("train", views, number),

@@ -1,0 +1,188 @@
+"""What lies between the stops: cures beside what they cost at the stops and gain between them.
+
+    python3 docs/bench/between.py CAPTURE [CAPTURE ...] --seconds 120 --out docs/bench/between.csv
+
+CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot, or `rig`:
+balls whose modalities are photographed from the same places.  A way is a row of WAYS below: the
+settings of training that it changes; the last ones are about modalities that are not treated alike.
+Every way of a capture has the same photos, first anchors,
+seed and budget.  A row whose `where` is a stop has the mean PSNR over its held-out photos; a row
+"A to B" has the figures of training/midpoints.py over `--views` of them, and in `sweep` what the
+case of that name of `launch.py stability` says of the first one: "holds", or what fails.
+"""
+
+import argparse
+import csv
+import shlex
+import sys
+import tempfile
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE.parents[1])]
+
+from app.stability_cases.motion import SIGMA, Span  # noqa: E402
+from rasterizer.device import open_device  # noqa: E402
+from runtime_models.model import BadFile  # noqa: E402
+from scene.capture import Capture  # noqa: E402
+from scene.pose import View  # noqa: E402
+from scene.read_capture import read_capture  # noqa: E402
+from training.midpoints import (  # noqa: E402
+    Frequencies,
+    Midpoints,
+    between,
+    draw_in_training,
+)
+from training.photos import BLACK, choose_downscale, load_photos  # noqa: E402
+from training.settings import TrainSettings  # noqa: E402
+from training.train import Trainer  # noqa: E402
+
+FREQUENCIES = "frequencies"
+WAYS = {
+    "narrow": {},
+    "sigma 0.08": {"sigma": 0.08},
+    "sigma 0.15": {"sigma": 0.15},
+    "stops": {"encoding": "stops"},
+    "photos": {"between": "photos"},
+    "pictures": {"between": "pictures"},
+    "splats 0.1": {"between": "splats", "between_pull": 0.1},
+    "splats 1": {"between": "splats", "between_pull": 1.0},
+    "stops photos": {"encoding": "stops", "between": "photos"},
+    "stops splats 0.1": {"encoding": "stops", "between": "splats", "between_pull": 0.1},
+    FREQUENCIES: {},
+    "heat smooth 0.1": {"thermal_smooth": 0.1},
+    "heat smooth 0.6": {"thermal_smooth": 0.6},
+    "first twice": {"balance": "FIRST=2"},  # FIRST: the capture's first stop
+}
+COLUMNS = (
+    "capture", "way", "seed", "steps", "seconds", "anchors", "where", "psnr_db", "apart", "flash",
+    "emptied", "blend_db", "jump", "around", "sweep",
+)  # fmt: skip
+FIGURES = {"apart": 4, "flash": 5, "emptied": 4, "blend_db": 2, "jump": 2, "around": 3}  # digits
+
+
+def spans(capture: Capture) -> list[tuple]:
+    """Neighbouring stops."""
+    return list(pairwise(sorted(capture.stops, key=lambda stop: stop.x)))
+
+
+def asked() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("captures", nargs="+")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
+    parser.add_argument("--iterations", type=int)
+    parser.add_argument("--anchors", type=int, default=4000, help="to start with at most")
+    parser.add_argument("--max-anchors", type=int, default=12000)
+    parser.add_argument("--downscale", type=int)
+    parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
+    parser.add_argument("--views", type=int, default=4, help="to look from")
+    parser.add_argument("--steps", type=int, default=50, help="of x between two stops")
+    options = parser.parse_args()
+    if options.seconds is None and options.iterations is None:
+        parser.error("a run needs an end: give --seconds or --iterations")
+    return options
+
+
+def main() -> None:
+    options = asked()
+    settings = TrainSettings(
+        iterations=options.iterations, seconds=options.seconds, anchors=options.anchors,
+        max_anchors=options.max_anchors, downscale=options.downscale,
+    )  # fmt: skip
+    device = open_device()
+    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
+        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
+        file.write(f"# python3 docs/bench/between.py {shlex.join(words)}\n")
+        file.write(f"# {device.name}, {device.platform}\n")
+        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        rows.writeheader()
+        for name in options.captures:
+            capture = read_capture(made(name, Path(folder), options.size))
+            factor = options.downscale or choose_downscale(capture.photos)
+            photos = {
+                split: load_photos(capture, split, factor, settings.masks)
+                for split in ("train", "test")
+            }
+            for seed in options.seeds:
+                for way in options.ways:
+                    changed = replace(settings, seed=seed, **WAYS[way])
+                    first = capture.stops[0].name
+                    changed = replace(changed, balance=changed.balance.replace("FIRST", first))
+                    try:
+                        trainer = Trainer(device, capture, changed, loaded=photos)
+                    except BadFile as error:  # photos of which no two share a place
+                        sys.stderr.write(f"{name}, {way}: {error}\n")
+                        continue
+                    if way == FREQUENCIES:
+                        trainer.encoding = Frequencies(changed.control)
+                    for row in measured(trainer, options):
+                        rows.writerow({"capture": Path(name).name, "way": way, "seed": seed} | row)
+                    file.flush()
+
+
+def made(name: str, folder: Path, size: int) -> Path:
+    """The folder of a capture, which is made first where the name is that of one of ours."""
+    from training.synthetic.balls import make_balls
+    from training.synthetic.workshop import make_workshop
+
+    if name == "balls":
+        make_balls(folder / name, size)
+    elif name == "rig":
+        make_balls(folder / name, size, rig=True)
+    elif name == "workshop":
+        make_workshop(folder / name)
+    else:
+        return Path(name)
+    return folder / name
+
+
+def measured(trainer: Trainer, options: argparse.Namespace) -> list[dict]:
+    """The rows of a run."""
+    for _ in trainer.steps():
+        pass
+    shared = {
+        "steps": trainer.iteration,
+        "seconds": f"{trainer.elapsed:.1f}",
+        "anchors": trainer.anchors_count,
+    }
+    psnr = trainer.held_out_psnr(most=len(trainer.held_out))
+    psnr["mean"] = float(np.mean(list(psnr.values())))
+    rows = [shared | {"where": name, "psnr_db": f"{db:.2f}"} for name, db in psnr.items()]
+    draw = draw_in_training(trainer, trainer.schedule.background or BLACK)
+    for low, high in spans(trainer.capture):
+        seen = [p.view for p in trainer.held_out if p.modality == low.name][: options.views]
+        found = between(draw, seen, low.x, high.x, options.steps)
+        rows.append(
+            shared
+            | {"where": f"{low.name} to {high.name}"}
+            | told(found)
+            | {"sweep": sweep(trainer, seen[0], low.x, high.x, options.steps)}
+        )
+    return rows
+
+
+def told(found: Midpoints) -> dict[str, str]:
+    return {name: f"{getattr(found, name):.{digits}f}" for name, digits in FIGURES.items()}
+
+
+def sweep(trainer: Trainer, view: View, low: float, high: float, steps: int) -> str:
+    """What the sweep of `launch.py stability` says of this way between two stops."""
+    draw, frames = draw_in_training(trainer, BLACK), {}
+    for x in np.linspace(low, high, steps + 1):
+        image, cover = draw(view, float(x))
+        frames[float(x)] = np.concatenate([image, cover[..., None]], axis=2), image
+    # What has no Gaussians is held to those of the paper, as layers are.
+    findings = Span(frames, low, high, getattr(trainer.encoding, "sigma", SIGMA)).findings()
+    failed = [row.figure.partition(",")[0] for row in findings if not row.holds]
+    return "; ".join(failed) or "holds"
+
+
+if __name__ == "__main__":
+    main()

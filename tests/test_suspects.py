@@ -1,0 +1,73 @@
+"""Photos with wrong poses or another exposure are named; good ones are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from rasterizer.device import open_device
+from scene.pose import Pose
+from scene.read_capture import read_capture
+from training.rig import moved_by, offset_view
+from training.settings import TrainSettings
+from training.suspects import judge, recolored, report, suspects
+from training.synthetic.balls import make_balls
+from training.train import Trainer
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("balls")
+    make_balls(folder, size=64, views=20, test_views=1)
+    return read_capture(folder)
+
+
+def found_in(capture) -> list:
+    trainer = Trainer(open_device("cpu"), capture, TrainSettings(iterations=240, anchors=2500))
+    for _ in trainer.steps():
+        pass
+    return suspects(trainer)
+
+
+@pytest.mark.slow
+def test_no_good_photo_is_named(balls):
+    assert found_in(balls) == []
+
+
+def test_wrong_poses_and_another_exposure_are_named(balls, tmp_path):
+    photos = list(balls.photos)
+    wrong = {3, 11}  # two of twenty poses of RGB: 8 degrees beside
+    turn = moved_by(np.array([0.0, np.deg2rad(8), 0, 0, 0, 0]))
+    for at in wrong:
+        photos[at] = replace(photos[at], view=offset_view(photos[at].view, turn))
+    dark = np.asarray(Image.open(photos[7].path).convert("RGB")) * 0.45
+    Image.fromarray(dark.astype(np.uint8)).save(tmp_path / "dark.png")
+    photos[7] = replace(photos[7], path=tmp_path / "dark.png")
+    assert all(isinstance(photos[at].view.world_from_eye, Pose) for at in wrong)
+    found = found_in(replace(balls, photos=tuple(photos)))
+    by_name = {suspect.name: suspect for suspect in found}
+    assert set(by_name) == {str(photos[at].path) for at in (*wrong, 7)}
+    assert by_name[str(photos[7].path)].exposure
+    assert not any(by_name[str(photos[at].path)].exposure for at in wrong)
+    assert str(photos[3].path) in report(found)
+
+
+def test_few_photos_and_even_spreads_name_none(balls):
+    assert judge("RGB", [None] * 4, [(30, 30), (30, 30), (30, 30), (5, 5)]) == []
+    even = np.linspace(20, 30, 11)
+    assert judge("RGB", [None] * 11, [(v, v) for v in even]) == []
+
+
+def test_recoloring_undoes_an_exposure_and_nothing_else():
+    random = np.random.default_rng(0)
+    photo = random.uniform(0, 1, (9, 8, 3))
+    np.testing.assert_allclose(recolored(0.5 * photo + 0.1, photo, None), photo, atol=1e-9)
+    other = random.uniform(0, 1, (9, 8, 3))
+    assert np.abs(recolored(other, photo, None) - photo).mean() > 0.1
+    weight = np.zeros((9, 8))
+    weight[:4] = 1
+    spoilt = 0.5 * photo
+    spoilt[4:] = 0.9
+    again = recolored(spoilt, photo, weight)
+    np.testing.assert_allclose(again[:4], photo[:4], atol=1e-9)
