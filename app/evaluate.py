@@ -94,9 +94,11 @@ def print_table(result: dict) -> None:
     vgg = ["VGG distance"] if "vgg_file" in result else []
     depth = any("depth_error" in score for score in result["modalities"].values())
     more = [*vgg, *(["depth error %"] if depth else [])]
-    table = Table("modality", "PSNR dB", "SSIM", *more, "photos", "splats alive")
+    table = Table("modality", "PSNR dB", "median", "worst", "SSIM", *more, "photos", "splats alive")
     for name, score in result["modalities"].items():
-        row = [f"{score['psnr_db']:.2f}", f"{score['ssim']:.4f}"]
+        worst, db = min(score["psnr_db_each"].items(), key=lambda pair: pair[1])
+        row = [f"{score['psnr_db']:.2f}", f"{score['median_db']:.2f}", f"{db:.1f} {worst}"]
+        row.append(f"{score['ssim']:.4f}")
         row += [f"{score['vgg_distance']:.4f}"] if vgg else []
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")

@@ -202,7 +202,8 @@ def rows_of(
             options.masks or "object", options.background or "auto", distance,
         )[stop.name]  # fmt: skip
         rows.append(kind(
-            method, stop.name, round(score.psnr_db, 3), round(score.ssim, 5),
+            method, stop.name, round(score.psnr_db, 3), round(score.median_db, 3),
+            round(score.ssim, 5),
             bytes_on_disk(made.file) / 1e6, round(made.seconds, 1), made.steps, score.alive,
             score.photos, *([round(score.vgg, 5)] if distance else []),
         ))  # fmt: skip

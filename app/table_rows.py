@@ -20,6 +20,7 @@ class Row:
     method: str
     modality: str  # MEAN: over all modalities, with the bytes and seconds of all files together
     psnr_db: float
+    median_db: float  # of the photos' PSNR: one that nothing can explain does not move it
     ssim: float
     mb: float  # 1e6 bytes on disk of the file that shows this modality
     seconds: float  # of training that file
@@ -42,7 +43,7 @@ def mean_row(rows: list[Row], runs: list) -> Row:
 
     more = [mean("vgg_distance", 5)] if isinstance(rows[0], VggRow) else []
     return type(rows[0])(
-        rows[0].method, MEAN, mean("psnr_db", 3), mean("ssim", 5),
+        rows[0].method, MEAN, mean("psnr_db", 3), mean("median_db", 3), mean("ssim", 5),
         sum(bytes_on_disk(run.file) for run in runs) / 1e6,
         round(sum(round(run.seconds, 1) for run in runs), 1),  # of what the rows above say
         sum(run.steps for run in runs),
@@ -78,14 +79,14 @@ def row_of(cells: list[str]) -> str:
 def cells(rows: list[Row]) -> tuple[list[str], list[list[str]]]:
     """Column names and lines as the paper has them: a method is named where its lines begin."""
     vgg = [] if not rows or not isinstance(rows[0], VggRow) else ["VGG distance"]
-    columns = ["method", "modality", "PSNR dB", "SSIM", *vgg, "splats", "MB", "seconds"]
+    columns = ["method", "modality", "PSNR dB", "median", "SSIM", *vgg, "splats", "MB", "seconds"]
     lines, before = [], ""
     for row in rows:
         more = [f"{row.vgg_distance:.4f}"] if vgg else []
         name, before = NAMES[row.method] if row.method != before else "", row.method
         whole = row.method != "joint" or row.modality == MEAN  # one file for all: told once
         size = [f"{row.mb:.2f}", f"{row.seconds:.1f}"] if whole else ["", ""]
-        likeness = [f"{row.psnr_db:.2f}", f"{row.ssim:.4f}", *more]
+        likeness = [f"{row.psnr_db:.2f}", f"{row.median_db:.2f}", f"{row.ssim:.4f}", *more]
         lines.append([name, row.modality, *likeness, f"{row.splats:,}", *size])
     return columns, lines
 

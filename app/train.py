@@ -208,6 +208,10 @@ def calibrated(
     return replace(settings, rig=noted(modality, found))
 
 
+# What a checkpoint was trained with that does not say it: these were the defaults before.
+OLD = {"encoding": "even", "growth": "gradient"}
+
+
 def settings_of(options: Options, before: dict | None) -> "TrainSettings":
     """The preset with what was asked for; or those of a checkpoint, with another budget.
 
@@ -219,7 +223,7 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
     names = {f.name for f in fields(TrainSettings)} - {"preset"}
     asked = {n: getattr(options, n) for n in names & {f.name for f in fields(options)}}
     asked = {n: value for n, value in asked.items() if value is not None}
-    settings = preset(options.preset) if before is None else TrainSettings(**before)
+    settings = preset(options.preset) if before is None else TrainSettings(**(OLD | before))
     if before is not None:
         known = settings.as_dict()  # an older checkpoint may not have all of them
         other = sorted(n for n in asked if n not in BUDGET and asked[n] != known[n])
@@ -230,6 +234,8 @@ def settings_of(options: Options, before: dict | None) -> "TrainSettings":
             )
     if asked.get("encoding") == "stops" and asked.keys() & {"control", "sigma"}:
         raise UsageError("--encoding stops sets --control and --sigma itself; leave them out.")
+    if before is None and asked.keys() & {"control", "sigma"}:
+        asked["encoding"] = "even"
     if "seconds" in asked and "iterations" not in asked:
         asked["iterations"] = None
     elif "iterations" in asked and "seconds" not in asked:

@@ -148,7 +148,7 @@ def test_without_a_file_the_column_is_absent_and_the_reason_is_told(balls, tmp_p
 
 
 def made(method: str, psnr: float, mb: float, seconds: float = 10.0) -> Row:
-    return Row(method, MEAN, psnr, 0.9, mb, seconds, 100, 5, 4)
+    return Row(method, MEAN, psnr, psnr, 0.9, mb, seconds, 100, 5, 4)
 
 
 def test_the_verdict_is_arithmetic():
@@ -167,12 +167,12 @@ def test_the_mean_counts_one_file_once(tmp_path):
     (tmp_path / "a").write_bytes(b"x" * 2_000_000)
     (tmp_path / "b").write_bytes(b"x" * 500_000)
     rows = [
-        VggRow("splats", "RGB", 30.0, 0.8, 2.0, 7.0, 70, 1000, 3, 0.1),
-        VggRow("splats", "Thermal", 35.0, 0.9, 0.5, 3.0, 30, 501, 5, 0.3),
+        VggRow("splats", "RGB", 30.0, 31.0, 0.8, 2.0, 7.0, 70, 1000, 3, 0.1),
+        VggRow("splats", "Thermal", 35.0, 34.0, 0.9, 0.5, 3.0, 30, 501, 5, 0.3),
     ]
     runs = [Run(tmp_path / "a", 7.0, 70), Run(tmp_path / "b", 3.0, 30)]
     mean = mean_row(rows, runs)
-    assert mean == VggRow("splats", MEAN, 32.5, 0.85, 2.5, 10.0, 100, 750, 8, 0.2)
+    assert mean == VggRow("splats", MEAN, 32.5, 32.5, 0.85, 2.5, 10.0, 100, 750, 8, 0.2)
     assert mean_row(rows, runs[:1]).mb == 2.0
 
 

@@ -27,8 +27,14 @@ class Score:
     ssim: float
     photos: int
     alive: int  # splats of this stop that are not absent
+    each: dict[str, float]  # PSNR of every photo, dB, by its path in the capture
     vgg: float | None = None  # training.vgg_distance; None: not measured
     depth_error: float | None = None  # of photos with depth: Painter.depth_error
+
+    @property
+    def median_db(self) -> float:
+        """Of all photos: what a single one that nothing can explain does not move."""
+        return float(np.median(list(self.each.values())))
 
 
 class Painter:
@@ -131,15 +137,23 @@ def evaluate_model(
         pairs = [(painter.picture(p.view, behind), p.over(behind), p.weight) for p in mine]
         errors = [e for p in mine if (e := painter.depth_error(p)) is not None]
         if pairs:
+            each = [float(psnr(*pair)) for pair in pairs]
             scores[stop.name] = Score(
-                float(np.mean([psnr(*pair) for pair in pairs])),
+                float(np.mean(each)),
                 float(np.mean([ssim(*pair) for pair in pairs])),
                 len(pairs),
                 alive,
+                {name_in(capture, p): db for p, db in zip(mine, each, strict=True)},
                 None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
                 float(np.mean(errors)) if errors else None,
             )
     return scores
+
+
+def name_in(capture: Capture, photo: LoadedPhoto) -> str:
+    """A photo's path as seen from its capture."""
+    path = Path(photo.name)
+    return path.relative_to(capture.folder).as_posix() if path.is_absolute() else photo.name
 
 
 def bytes_on_disk(path: Path) -> int:
@@ -153,7 +167,13 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
     """What `eval --json` writes; `started` is time.perf_counter() at the beginning."""
     return {
         "modalities": {
-            name: {"psnr_db": round(s.psnr_db, 4), "ssim": round(s.ssim, 5), "photos": s.photos}
+            name: {
+                "psnr_db": round(s.psnr_db, 4),
+                "median_db": round(s.median_db, 4),
+                "ssim": round(s.ssim, 5),
+                "photos": s.photos,
+                "psnr_db_each": {photo: round(db, 3) for photo, db in s.each.items()},
+            }
             | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})
             | ({} if s.depth_error is None else {"depth_error": round(s.depth_error, 5)})
             for name, s in scores.items()

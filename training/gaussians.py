@@ -45,10 +45,11 @@ class Activation:
 
     def forward(self, raw, anchors) -> Gaussians:
         self.resize(len(anchors))
+        rows = self.device.kind == "cpu"  # an anchor a work-item, else a splat
+        items = self.count if rows else self.count * self.layout.splats
         self.device.launch(
-            self.kernels["activate"], self.count * self.layout.splats, 64,
-            self.count * self.layout.splats, self.reach, self.unit, raw, anchors,
-            *self.splats.fields(),
+            self.kernels["activate_rows" if rows else "activate"], items, 16 if rows else 64,
+            items, self.reach, self.unit, raw, anchors, *self.splats.fields(),
         )  # fmt: skip
         return self.splats
 

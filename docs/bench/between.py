@@ -42,21 +42,23 @@ from training.settings import TrainSettings  # noqa: E402
 from training.train import Trainer  # noqa: E402
 
 FREQUENCIES = "frequencies"
+EVEN = {"encoding": "even", "growth": "gradient"}
+STOPS = {"encoding": "stops", "growth": "gradient"}
 WAYS = {
-    "narrow": {},
-    "sigma 0.08": {"sigma": 0.08},
-    "sigma 0.15": {"sigma": 0.15},
-    "stops": {"encoding": "stops"},
-    "photos": {"between": "photos"},
-    "pictures": {"between": "pictures"},
-    "splats 0.1": {"between": "splats", "between_pull": 0.1},
-    "splats 1": {"between": "splats", "between_pull": 1.0},
-    "stops photos": {"encoding": "stops", "between": "photos"},
-    "stops splats 0.1": {"encoding": "stops", "between": "splats", "between_pull": 0.1},
-    FREQUENCIES: {},
-    "heat smooth 0.1": {"thermal_smooth": 0.1},
-    "heat smooth 0.6": {"thermal_smooth": 0.6},
-    "first twice": {"balance": "FIRST=2"},  # FIRST: the capture's first stop
+    "narrow": EVEN,
+    "sigma 0.08": EVEN | {"sigma": 0.08},
+    "sigma 0.15": EVEN | {"sigma": 0.15},
+    "stops": STOPS,
+    "photos": EVEN | {"between": "photos"},
+    "pictures": EVEN | {"between": "pictures"},
+    "splats 0.1": EVEN | {"between": "splats", "between_pull": 0.1},
+    "splats 1": EVEN | {"between": "splats", "between_pull": 1.0},
+    "stops photos": STOPS | {"between": "photos"},
+    "stops splats 0.1": STOPS | {"between": "splats", "between_pull": 0.1},
+    FREQUENCIES: EVEN,
+    "heat smooth 0.1": EVEN | {"thermal_smooth": 0.1},
+    "heat smooth 0.6": EVEN | {"thermal_smooth": 0.6},
+    "first twice": EVEN | {"balance": "FIRST=2"},  # FIRST: the capture's first stop
 }
 COLUMNS = (
     "capture", "way", "seed", "steps", "seconds", "anchors", "where", "psnr_db", "apart", "flash",

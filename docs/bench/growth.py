@@ -34,13 +34,18 @@ from training.settings import TrainSettings  # noqa: E402
 from training.train import Trainer  # noqa: E402
 
 WAYS = {
-    "none": {"grow": False},
+    "none": {"growth": "gradient", "grow": False},
     "gradient": {"growth": "gradient"},
     "absgrad": {"growth": "absgrad"},
     "error": {"growth": "error"},
     "gradient each": {"growth": "gradient", "grow_each": True},
     "absgrad each": {"growth": "absgrad", "grow_each": True},
     "error each": {"growth": "error", "grow_each": True},
+    "absgrad replace": {"growth": "absgrad", "grow_replace": 0.03},
+    "absgrad 3 grids": {"growth": "absgrad", "grow_grids": 3},
+    "absgrad half": {"growth": "absgrad", "grow_threshold": 3e-4},
+    "absgrad coarse": {"growth": "absgrad", "coarse": 2},
+    "absgrad prune": {"growth": "absgrad", "prune_weight": 0.1},
     "gradient replace": {"growth": "gradient", "grow_replace": 0.03},
     "error each replace": {"growth": "error", "grow_each": True, "grow_replace": 0.03},
     "gradient 3 grids": {"growth": "gradient", "grow_grids": 3},

@@ -26,6 +26,32 @@ __kernel void activate(int splats, float reach, float unit, __global const float
   opacity[i] = tanh(h[OUT_AT3 + k]);
 }
 
+#define PADDED(n) (((n) + 7) / 8 * 8)
+
+// The same for a CPU, one work-item an anchor: its row of raw outputs in vectors of eight.
+__kernel void activate_rows(int anchors_count, float reach, float unit, __global const float *raw,
+                            __global const float *anchors, __global float *means,
+                            __global float *scales, __global float *wxyz,
+                            __global float *opacity, __global float *color) {
+  int a = get_global_id(0);
+  if (!(a < anchors_count)) return;
+  __global const float *h = raw + a * RAW;
+  float3 anchor = vload3(a, anchors);
+  float offset[PADDED(3 * SPLATS)], scale[PADDED(3 * SPLATS)], shade[PADDED(3 * SPLATS)];
+  float solid[PADDED(SPLATS)];
+  for (int c = 0; c < PADDED(3 * SPLATS) / 8; c++) {
+    vstore8(reach * tanh(vload8(c, h + OUT_AT0)), c, offset);
+    vstore8(unit * exp(clamp(vload8(c, h + OUT_AT1), LOWEST, HIGHEST)), c, scale);
+    vstore8(1.0f / (1.0f + exp(-vload8(c, h + OUT_AT4))), c, shade);
+  }
+  for (int c = 0; c < PADDED(SPLATS) / 8; c++) vstore8(tanh(vload8(c, h + OUT_AT3)), c, solid);
+  for (int k = 0; k < SPLATS; k++) vstore3(anchor + vload3(k, offset), a * SPLATS + k, means);
+  for (int c = 0; c < 3 * SPLATS; c++) scales[3 * SPLATS * a + c] = scale[c];
+  for (int c = 0; c < 3 * SPLATS; c++) color[3 * SPLATS * a + c] = shade[c];
+  for (int c = 0; c < 4 * SPLATS; c++) wxyz[4 * SPLATS * a + c] = h[OUT_AT2 + c];
+  for (int k = 0; k < SPLATS; k++) opacity[a * SPLATS + k] = solid[k];
+}
+
 // One work-item an anchor: its splats' gradients become the row of raw gradients, and those of the
 // means also add up to the anchor's own.
 __kernel void activate_backward(int anchors_count, float reach, float unit,
@@ -43,11 +69,14 @@ __kernel void activate_backward(int anchors_count, float reach, float unit,
   __global float *g = grad_raw + a * RAW;
   for (int c = 0; c < RAW; c++) g[c] = 0;
   float3 anchor = 0;
+  float bends[PADDED(3 * SPLATS)];
+  for (int c = 0; c < PADDED(3 * SPLATS) / 8; c++)
+    vstore8(tanh(vload8(c, h + OUT_AT0)), c, bends);
   for (int k = 0; k < SPLATS; k++) {
     int i = a * SPLATS + k;
     anchor += vload3(i, grad_means);
     for (int c = 0; c < 3; c++) {
-      float bent = tanh(h[OUT_AT0 + 3 * k + c]), s = h[OUT_AT1 + 3 * k + c];
+      float bent = bends[3 * k + c], s = h[OUT_AT1 + 3 * k + c];
       float shade = color[3 * i + c];
       g[OUT_AT0 + 3 * k + c] = grad_means[3 * i + c] * reach * (1.0f - bent * bent);
       g[OUT_AT1 + 3 * k + c] =

@@ -3,22 +3,44 @@
 #include "heads_shared.cl"
 #define BLOCK 8  // anchors that share one pass over the weights in the backward kernel
 
+// What four rows `in` of `takes` numbers add to two vectors of a layer's outputs, and to one: with
+// two there are enough sums on their way to hide how long each multiply-add takes.
+inline void add_pair(float8 sum[4][2], const float *in, int stride, int takes,
+                     __global const float *weights, int gives) {
+  for (int i = 0; i < takes; i++) {
+    float8 low = vload8(0, weights + i * gives), high = vload8(1, weights + i * gives);
+    for (int b = 0; b < 4; b++) {
+      sum[b][0] += in[b * stride + i] * low;
+      sum[b][1] += in[b * stride + i] * high;
+    }
+  }
+}
+
+inline void add_one(float8 sum[4][2], const float *in, int stride, int takes,
+                    __global const float *weights, int gives) {
+  for (int i = 0; i < takes; i++) {
+    float8 w = vload8(0, weights + i * gives);
+    for (int b = 0; b < 4; b++) sum[b][0] += in[b * stride + i] * w;
+  }
+}
+
 // A middle layer of head m for four anchors, in place; l counts hidden layers, so it is 1 or more.
 inline void middle_forward(float unit[4][HIDDEN], const int a[4], int m, int l,
                            __global const float *weights, __global float *hidden) {
   float next[4][HIDDEN];
-  for (int j = 0; j < HIDDEN8; j++) {
-    float8 h[4];
-    for (int b = 0; b < 4; b++) h[b] = vload8(j, weights + HIDDEN * HIDDEN);
-    for (int i = 0; i < HIDDEN; i++) {
-      float8 w = vload8(j, weights + i * HIDDEN);
-      for (int b = 0; b < 4; b++) h[b] += unit[b][i] * w;
-    }
-    for (int b = 0; b < 4; b++) {
-      h[b] = fmax(h[b], (float8)(0.0f));
-      vstore8(h[b], j, next[b]);
-      vstore8(h[b], j, hidden + UNITS_OF(a[b], m, l));
-    }
+  for (int j = 0; j < HIDDEN8; j += 2) {
+    int wide = min(2, HIDDEN8 - j);
+    float8 h[4][2];
+    for (int b = 0; b < 4; b++)
+      for (int v = 0; v < wide; v++) h[b][v] = vload8(j + v, weights + HIDDEN * HIDDEN);
+    if (wide == 2) add_pair(h, unit[0], HIDDEN, HIDDEN, weights + 8 * j, HIDDEN);
+    else add_one(h, unit[0], HIDDEN, HIDDEN, weights + 8 * j, HIDDEN);
+    for (int b = 0; b < 4; b++)
+      for (int v = 0; v < wide; v++) {
+        float8 y = fmax(h[b][v], (float8)(0.0f));
+        vstore8(y, j + v, next[b]);
+        vstore8(y, j + v, hidden + UNITS_OF(a[b], m, l));
+      }
   }
   for (int b = 0; b < 4; b++)
     for (int j = 0; j < HIDDEN8; j++) vstore8(vload8(j, next[b]), j, unit[b]);
@@ -44,35 +66,39 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
     __global const float *first = weights + WEIGHTS_AT[m];
     __global const float *second = first + LAST_AT;
     float unit[4][HIDDEN];
-    for (int j = 0; j < HIDDEN8; j++) {
-      float8 h[4];
-      for (int b = 0; b < 4; b++) h[b] = vload8(j, bias + m * HIDDEN);
-      for (int i = 0; i < FEATURES; i++) {
-        float8 w = vload8(j, first + i * HIDDEN);
-        for (int b = 0; b < 4; b++) h[b] += feature[b][i] * w;
+    for (int j = 0; j < HIDDEN8; j += 2) {
+      int wide = min(2, HIDDEN8 - j), looks = m == COLOR && VIEW_COLOR ? 3 : 0;
+      __global const float *by_feature = first + 8 * j;
+      __global const float *by_direction = by_feature + DIRECTION_ROW * HIDDEN;
+      float8 h[4][2];
+      for (int b = 0; b < 4; b++)
+        for (int v = 0; v < wide; v++) h[b][v] = vload8(j + v, bias + m * HIDDEN);
+      if (wide == 2) {
+        add_pair(h, feature[0], FEATURES, FEATURES, by_feature, HIDDEN);
+        add_pair(h, direction[0], 3, looks, by_direction, HIDDEN);
+      } else {
+        add_one(h, feature[0], FEATURES, FEATURES, by_feature, HIDDEN);
+        add_one(h, direction[0], 3, looks, by_direction, HIDDEN);
       }
-      if (m == COLOR && VIEW_COLOR)
-        for (int i = 0; i < 3; i++) {
-          float8 w = vload8(j, first + (DIRECTION_ROW + i) * HIDDEN);
-          for (int b = 0; b < 4; b++) h[b] += direction[b][i] * w;
+      for (int b = 0; b < 4; b++)
+        for (int v = 0; v < wide; v++) {
+          float8 y = fmax(h[b][v], (float8)(0.0f));
+          vstore8(y, j + v, unit[b]);
+          vstore8(y, j + v, hidden + UNITS_OF(a[b], m, 0));
         }
-      for (int b = 0; b < 4; b++) {
-        h[b] = fmax(h[b], (float8)(0.0f));
-        vstore8(h[b], j, unit[b]);
-        vstore8(h[b], j, hidden + UNITS_OF(a[b], m, 0));
-      }
     }
     for (int l = 1; l < LAYERS; l++)
       middle_forward(unit, a, m, l, first + MIDDLE_AT + (l - 1) * MIDDLE_SIZE, hidden);
     int outs = OUT[m];
-    for (int c = 0; c < outs / 8; c++) {
-      float8 y[4];
-      for (int b = 0; b < 4; b++) y[b] = vload8(c, second + HIDDEN * outs);
-      for (int j = 0; j < HIDDEN; j++) {
-        float8 w = vload8(c, second + j * outs);
-        for (int b = 0; b < 4; b++) y[b] += unit[b][j] * w;
-      }
-      for (int b = 0; b < 4; b++) vstore8(y[b], c, raw + a[b] * RAW + OUT_AT[m]);
+    for (int c = 0; c < outs / 8; c += 2) {
+      int wide = min(2, outs / 8 - c);
+      float8 y[4][2];
+      for (int b = 0; b < 4; b++)
+        for (int v = 0; v < wide; v++) y[b][v] = vload8(c + v, second + HIDDEN * outs);
+      if (wide == 2) add_pair(y, unit[0], HIDDEN, HIDDEN, second + 8 * c, outs);
+      else add_one(y, unit[0], HIDDEN, HIDDEN, second + 8 * c, outs);
+      for (int b = 0; b < 4; b++)
+        for (int v = 0; v < wide; v++) vstore8(y[b][v], c + v, raw + a[b] * RAW + OUT_AT[m]);
     }
   }
 }
