@@ -2,7 +2,9 @@
 
 from dataclasses import asdict, dataclass
 
-from training.settings import SHORT_RUN
+
+
+SHORT_RUN = 1000  # iterations
 
 
 @dataclass(frozen=True)
