@@ -2,8 +2,6 @@
 
 from dataclasses import asdict, dataclass
 
-
-
 SHORT_RUN = 1000  # iterations
 
 

@@ -159,6 +159,7 @@ def preset(name: str) -> TrainSettings:
     if name == "paper":
         return replace(
             TrainSettings(), preset="paper", iterations=30000, encoding="even",
-            splats_per_anchor=10, max_anchors=100_000, anchors=100_000, opacity_share=0.01, scale_share=1e-9,
+            splats_per_anchor=10, max_anchors=100_000, anchors=100_000, opacity_share=0.01,
+            scale_share=1e-9,
         )  # fmt: skip
     raise ValueError(f"There is no preset '{name}'; use fast or paper.")
