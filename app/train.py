@@ -153,7 +153,7 @@ def run(options: Options) -> int:
     from scene.read_capture import read_capture
     from training.checkpoint import checkpoint_path, read_checkpoint
     from training.rig import with_found
-    from training.suspects import report, suspects
+    from training.suspects import hopeless, report, suspects
     from training.train import Trainer
 
     refuse_calibrating(options)
@@ -180,7 +180,7 @@ def run(options: Options) -> int:
         interrupted = train(trainer, checkpoint)
     save(trainer, options.out, checkpoint)
     say(summary(trainer, options.out, interrupted))
-    if not interrupted and (found := report(suspects(trainer))):
+    if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
         say(found)
     return INTERRUPTED if interrupted else 0
 

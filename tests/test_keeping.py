@@ -15,9 +15,9 @@ from runtime_models.read_scene import read_model
 from scene.capture import Capture
 from training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from training.doubts import FEW, usable
-from training.guard import IN_A_ROW, PATIENT, Guard
 from training.photos import load_photos
 from training.settings import TrainSettings
+from training.suspects import hopeless
 from training.synthetic.balls import make_balls
 from training.train import Trainer
 
@@ -162,10 +162,12 @@ def test_few_photos_and_missing_masks_are_spoken_of(balls):
     assert usable(some, "valid") == (some, []) and usable(some, "ignore") == (some, [])
 
 
-def test_a_fog_that_goes_has_time_at_rates_to_be_trusted():
-    for visible, trusted, looks in ((0.8, True, PATIENT), (0.8, False, IN_A_ROW),
-                                    (0.0, True, IN_A_ROW)):  # fmt: skip
-        guard = Guard({})
-        guard.expect("RGB", 1.0, 1.0, 1.0)
-        seen = [guard.healthy("RGB", 0.5, visible, 0.1, trusted) for _ in range(looks)]
-        assert seen == [True] * (looks - 1) + [False]
+def test_a_scene_that_shows_nothing_is_called_that(balls):
+    trainer = Trainer(open_device(), balls, TrainSettings(iterations=150, anchors=600))
+    state = trainer.adam.state()
+    assert "RGB, Thermal: the pictures are no nearer" in hopeless(trainer)
+    for _ in trainer.steps():
+        pass
+    assert hopeless(trainer) == ""
+    trainer.adam.load(state)
+    assert hopeless(trainer)

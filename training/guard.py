@@ -5,8 +5,6 @@ import numpy as np
 LEAST_VISIBLE = 0.01  # of the largest share of splats that this modality has had on screen
 LEAST_SHOWN = 0.3  # of the contrast to the background that the photo has, or the first picture had
 IN_A_ROW = 3  # looks that show nothing: one alone may be a camera inside of something
-PATIENT = 40  # such looks where splats are on screen at rates to be trusted: first points that lie
-# anywhere are a fog, which goes before the things come
 PROBATION = 8  # looks after falling back, over which the mean loss has to come down to ...
 GAINED = 0.6  # ... this share of an untrained model's
 EVERY = 5  # rounds between looks; a round is one step of every modality
@@ -40,18 +38,12 @@ class Guard:
         self.most[modality] = (max(before[0], visible), max(before[1], min(shown, 1.0)))
         self.first_loss.setdefault(modality, loss)
 
-    def healthy(
-        self, modality: str, loss: float, visible: float, shown: float, trusted: bool = False
-    ) -> bool:
-        """Whether the run may go on.  After falling back, that takes a falling loss as well.
-
-        trusted: the rates are not above those of the preset.
-        """
+    def healthy(self, modality: str, loss: float, visible: float, shown: float) -> bool:
+        """Whether the run may go on.  After falling back, that takes a falling loss as well."""
         self.expect(modality, loss, visible, shown)
         most_visible, most_shown = self.most[modality]
-        there = visible > LEAST_VISIBLE * most_visible
-        self.empty = 0 if there and shown > LEAST_SHOWN * most_shown else self.empty + 1
-        most_empty = PATIENT if there and trusted else IN_A_ROW
+        enough = visible > LEAST_VISIBLE * most_visible and shown > LEAST_SHOWN * most_shown
+        self.empty = 0 if enough else self.empty + 1
         improves = True
         if self.patience:
             self.patience -= 1
@@ -60,7 +52,7 @@ class Guard:
             if len(self.gains) == PROBATION:
                 improves = bool(np.mean(self.gains) < GAINED)
                 self.gains = None
-        return bool(np.isfinite(loss)) and self.empty < most_empty and improves
+        return bool(np.isfinite(loss)) and self.empty < IN_A_ROW and improves
 
     @property
     def sure(self) -> bool:

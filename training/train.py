@@ -320,8 +320,7 @@ class Trainer:
     def look_after(self, photo: LoadedPhoto, background: Color, loss: float) -> bool:
         """The guard's look at the last step; True when it turned the run back."""
         shown = self.shown(photo, background)
-        trusted = self.rate_scale <= 1
-        if self.guard.healthy(photo.modality, loss, self.visible(), shown, trusted):
+        if self.guard.healthy(photo.modality, loss, self.visible(), shown):
             last = photo.modality == self.stops[-1].name
             if self.iteration >= self.next_snapshot and last and self.guard.sure:
                 self.guard.remember(self.adam.state())

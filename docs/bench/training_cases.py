@@ -103,10 +103,15 @@ class Case:
     change: Change = untouched
     judge: Callable[[Outcome], str] = by_loss
     options: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()  # options of the run of the untouched capture
+    share: float = 1.0  # of the steps of the others: what is kept needs no good picture
     fault: Callable[[int], AbstractContextManager] = no_fault
     resumed: bool = False  # whether a second command goes on
     out: str = "scene.shift"  # below a folder of the case's own
+
+    @property
+    def nothing_done(self) -> bool:
+        """Whether the untouched capture itself is the case."""
+        return self.change is untouched and not self.options and self.fault is no_fault
 
 
 def written(changed: Capture, case: str) -> Path:
@@ -292,7 +297,6 @@ def interrupted(trainer: Trainer) -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-OBJECT = ("--masks", "object")
 SHARED = ("--fixed", "offset,scale,rotation,opacity")
 CASES = (
     *(
@@ -312,8 +316,6 @@ CASES = (
          uneven_exposure),
     Case("turntable", "tankard", "the background does not turn with the object; with masks"),
     Case("turntable, no masks", "tankard", "the same without a mask", partial(without_masks, 1.0)),
-    Case("turntable, masks ignored", "tankard", "the same with `--masks ignore`",
-         options=("--masks", "ignore")),
     Case("masks missing", "tankard", "no mask for a third of the photos",
          partial(without_masks, 1 / 3)),
     Case("mask file missing", "tankard", "one mask is named, and not there", mask_file_gone,
@@ -329,17 +331,17 @@ CASES = (
     Case("NaN in points", "balls", "every 7th point of the capture", nan_in_points, refused),
     Case("NaN in photos", "balls", "1 % of the pixels of floating-point photos", nan_in_photos),
     Case("memory full at the start", "balls", "the device gives no memory", judge=refused,
-         fault=partial(full_memory, None)),
-    Case("memory full", "balls", "the device gives no more after 60 % of the run", judge=kept,
+         share=0.3, fault=partial(full_memory, None)),
+    Case("memory full", "balls", "the device gives no more after 60 % of the run", judge=kept, share=0.3,
          fault=partial(full_memory, 0.6)),
-    Case("NaN at the end", "balls", "in the weights, before the last step", judge=kept,
-         fault=partial(at_step, 0.999, partial(nan_into, "weights"))),
+    Case("NaN at the end", "balls", "in the weights, before the last step", judge=kept, share=0.3,
+         fault=partial(at_step, 0.996, partial(nan_into, "weights"))),
     Case("disk gone", "balls", "a file takes the place of `--out`'s folder after half of the run",
-         judge=elsewhere, fault=partial(at_step, 0.5, gone), out="gone/scene.shift"),
+         judge=elsewhere, share=0.3, fault=partial(at_step, 0.5, gone), out="gone/scene.shift"),
     Case("disk full", "balls", "no file can be written after half of the run", judge=refused,
-         fault=full_disk),
+         share=0.3, fault=full_disk),
     Case("nowhere to write", "balls", "`--out` below a file that is no folder", judge=refused,
-         out="points.npz/scene.shift"),
-    Case("Ctrl-C", "balls", "after half of the run, then `--resume`", judge=kept,
+         share=0.3, out="points.npz/scene.shift"),
+    Case("Ctrl-C", "balls", "after half of the run, then `--resume`", judge=kept, share=0.3,
          fault=partial(at_step, 0.5, interrupted), resumed=True),
 )  # fmt: skip

@@ -41,7 +41,7 @@ from training.schedule import choose_background  # noqa: E402
 from training.synthetic.balls import make_balls  # noqa: E402
 
 HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
-ANCHORS = ("--anchors", "1500", "--max-anchors", "3000")
+ANCHORS = ("--anchors", "1000", "--max-anchors", "2000")
 MOST_SAID = 5  # sentences a row
 USUAL = (" held out; ", " done after ", "PoCL")  # in lines of every run
 
@@ -74,7 +74,7 @@ class Bench:
     iterations: int
     size: int
     captures: dict[str, Capture]
-    untouched: dict[tuple, dict[str, float]]
+    untouched: dict[tuple, tuple[list[str], dict[str, float]]]
 
     def capture(self, name: str) -> Capture | str:
         """The untouched capture, or in words why it is not there."""
@@ -91,11 +91,12 @@ class Bench:
 
     def run(self, case: Case, capture: Path, out: Path) -> tuple[int, list[str]]:
         """`launch.py train` of a changed capture: (exit code, what it said)."""
-        words = ["train", str(capture), "--out", str(out), "--iterations", str(self.iterations)]
+        steps = round(case.share * self.iterations)
+        words = ["train", str(capture), "--out", str(out), "--iterations", str(steps)]
         start = [*words, *ANCHORS, *case.options]
         said = io.StringIO()
         with contextlib.redirect_stderr(said):
-            with case.fault(self.iterations):
+            with case.fault(steps):
                 code = launch(start)
             if case.resumed:
                 code = launch([*words, "--resume"])
@@ -117,21 +118,23 @@ class Bench:
             ]))  # fmt: skip
         return found
 
-    def reference(self, case: Case, capture: Capture) -> dict[str, float]:
-        """What the same training makes of the untouched capture."""
-        key = (case.capture, case.beside)
+    def reference(self, case: Case, capture: Capture) -> tuple[list[str], dict[str, float]]:
+        """What as long a training of the untouched capture says and reaches."""
+        key = (case.capture, case.share)
         if key not in self.untouched:
             out = self.folder / f"untouched-{len(self.untouched)}.shift"
-            plain = Case("untouched", case.capture, "", options=case.beside)
-            self.run(plain, capture.folder, out)
-            self.untouched[key] = self.fits(out, capture)
+            plain = Case("untouched", case.capture, "", share=case.share)
+            _, said = self.run(plain, capture.folder, out)
+            self.untouched[key] = said, self.fits(out, capture)
         return self.untouched[key]
 
     def row(self, case: Case) -> list[str]:
         whole = self.capture(case.capture)
         if isinstance(whole, str):
             return [case.name, case.done, "", "", "", whole]
-        before = self.reference(case, whole)
+        said, before = self.reference(case, whole)
+        if case.nothing_done:
+            return cells(case, Outcome(0, said, before, before, [], whole.folder))
         place = self.folder / "out" / case.name
         place.mkdir(parents=True)
         (place / "points.npz").write_bytes(b"")
@@ -141,10 +144,15 @@ class Bench:
         outcome = Outcome(code, said, self.fits(place / case.out, whole), before, wrong,
                           place / case.out)  # fmt: skip
         tell(f"{case.name}: {time.perf_counter() - started:.0f} s, exit code {code}")
-        more = len(said) - MOST_SAID
-        shown = [*said[:MOST_SAID], *([f"... {more} more"] if more > 0 else [])]
-        cells = [decibels(outcome.db), decibels(before), "<br>".join(shown) or "nothing"]
-        return [case.name, case.done, *cells, case.judge(outcome)]
+        return cells(case, outcome)
+
+
+def cells(case: Case, outcome: Outcome) -> list[str]:
+    more = len(outcome.said) - MOST_SAID
+    shown = [*outcome.said[:MOST_SAID], *([f"... {more} more"] if more > 0 else [])]
+    said = "<br>".join(shown) or "nothing"
+    db = [decibels(outcome.db), decibels(outcome.before)]
+    return [case.name, case.done, *db, said, case.judge(outcome)]
 
 
 def decibels(found: dict[str, float] | None) -> str:
