@@ -147,12 +147,13 @@ class Options:
 
 
 def run(options: Options) -> int:
+    from app.keeping import kept_when_memory_ends, memory_for_training, refuse_place, save
     from rasterizer.device import open_device
     from runtime_models.write_package import refuse_foreign
     from scene.read_capture import read_capture
     from training.checkpoint import checkpoint_path, read_checkpoint
     from training.rig import with_found
-    from training.suspects import report, suspects
+    from training.suspects import hopeless, report, suspects
     from training.train import Trainer
 
     refuse_calibrating(options)
@@ -161,7 +162,8 @@ def run(options: Options) -> int:
 
         return run_baseline(options)
     refuse_plain_options(options)
-    refuse_foreign(options.out)  # now, not after the training
+    refuse_place(options.out)  # now, not after the training
+    refuse_foreign(options.out)
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options, resume[1]["settings"] if resume else None)
@@ -170,13 +172,15 @@ def run(options: Options) -> int:
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-    trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
-    say(describe(trainer))
+    with memory_for_training():
+        trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
+    say("\n".join([describe(trainer), *trainer.doubts]))
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    interrupted = train(trainer, checkpoint)
+    with kept_when_memory_ends(trainer, options.out, checkpoint):
+        interrupted = train(trainer, checkpoint)
     save(trainer, options.out, checkpoint)
     say(summary(trainer, options.out, interrupted))
-    if not interrupted and (found := report(suspects(trainer))):
+    if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
         say(found)
     return INTERRUPTED if interrupted else 0
 
@@ -297,8 +301,8 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
     """
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
+    from app.keeping import save_on_the_way
     from app.progress import progress_bar
-    from training.checkpoint import write_checkpoint
 
     columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
     look, saved = 1 / LOOKS, time.monotonic()
@@ -317,13 +321,15 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
             if now.fell_back:
                 bar.console.print(
                     f"step {now.iteration}: the picture was lost; back to the last good state "
-                    "with half the learning rates"
+                    "with half the learning rates",
+                    soft_wrap=True,
                 )
             if now.fraction >= look and trainer.settled:
                 look += 1 / LOOKS
                 bar.update(task, psnr=decibels(trainer.held_out_psnr()))
             if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
-                write_checkpoint(checkpoint, *trainer.checkpoint())
+                if failed := save_on_the_way(trainer, checkpoint):
+                    bar.console.print(failed, soft_wrap=True)
                 saved = time.monotonic()
             if asked and trainer.settled:
                 return True
@@ -332,15 +338,6 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
 
 def decibels(psnr: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.2f} dB" for name, value in psnr.items())
-
-
-def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
-    """The package first, then the checkpoint; neither is ever half-written."""
-    from runtime_models.write_package import write_package
-    from training.checkpoint import write_checkpoint
-
-    write_package(trainer.model(), out)
-    write_checkpoint(checkpoint, *trainer.checkpoint())
 
 
 def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:

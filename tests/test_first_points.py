@@ -1,13 +1,16 @@
 """train --points: where the first anchors stand, by what was asked for."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import laspy
 import numpy as np
 import pytest
 
 from runtime_models.model import BadFile
+from scene import las_run
 from scene.capture import Capture
+from scene.las_run import las_points
 from scene.pose import View, look_at, perspective
 from scene.read_capture import read_capture
 from scene.read_las import read_las
@@ -131,15 +134,15 @@ def write_las(path, points: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("ending", ["las", "laz"])
-def test_laser_clouds_are_read_and_thinned(tmp_path, ending, monkeypatch):
+def test_laser_clouds_are_read_and_thinned(tmp_path, ending):
     path, points = tmp_path / f"a.{ending}", RNG(0).uniform(-2, 2, (1001, 3))
     write_las(path, points)
     found, count = read_las(path, 10**6)
     assert count == 1001
     np.testing.assert_allclose(found, points, atol=6e-5)
+    np.testing.assert_allclose(read_las(path, 300)[0], points[::4], atol=6e-5)
     for chunk in (64, 100, 1000, 1001, 1002):  # whatever the pieces, every 4th
-        monkeypatch.setattr("scene.read_las.CHUNK", chunk)
-        np.testing.assert_allclose(read_las(path, 300)[0], points[::4], atol=6e-5)
+        np.testing.assert_allclose(las_points(path, 300, chunk)[0], points[::4], atol=6e-5)
 
 
 @pytest.mark.parametrize("ending", ["las", "laz"])
@@ -147,7 +150,7 @@ def test_cut_and_mangled_laser_clouds_are_one_sentence(tmp_path, ending):
     path = tmp_path / f"a.{ending}"
     write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
     whole, random = path.read_bytes(), RNG(1)
-    for number in range(80):
+    for number in range(80 if ending == "las" else 12):  # each LAZ takes a process
         data = bytearray(whole)
         if number % 2:
             data = data[: int(random.integers(len(whole)))]
@@ -160,6 +163,31 @@ def test_cut_and_mangled_laser_clouds_are_one_sentence(tmp_path, ending):
             assert found.ndim == 2
         except BadFile as error:
             assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    "end", ["os.abort()", "[0] * 10**11", "while True: pass", "raise SystemExit"]
+)
+def test_a_decoder_that_ends_its_process_is_one_sentence(tmp_path, end, monkeypatch):
+    path, script = tmp_path / "a.laz", tmp_path / "las_run.py"
+    write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
+    text = Path(las_run.__file__).read_text().replace("SECONDS, BYTES = 5", "SECONDS, BYTES = 1")
+    script.write_text(text.replace("    import laspy\n", f"    {end}\n", 1))
+    monkeypatch.setattr("scene.read_las.__file__", str(tmp_path / "read_las.py"))
+    with pytest.raises(BadFile, match="no LAZ that can be unpacked; copy it again"):
+        read_las(path, 1000)
+
+
+def test_a_chunk_table_of_nonsense_is_one_sentence(tmp_path):
+    """Of a million chunks, of 2^24 bytes: laszip's decoder takes all memory or panics."""
+    path = tmp_path / "a.laz"
+    write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
+    whole = path.read_bytes()
+    at = int.from_bytes(whole[int.from_bytes(whole[96:100], "little") :][:8], "little")
+    for number in (1 << 20, 0xFFFFFFFF):
+        path.write_bytes(whole[: at + 4] + number.to_bytes(4, "little") + whole[at + 8 :])
+        with pytest.raises(BadFile, match="copy it again"):
+            read_las(path, 1000)
 
 
 def test_a_cloud_keeps_what_photos_see_in_the_capture_s_axes(tmp_path, balls, photos):

@@ -18,9 +18,13 @@ def checkpoint_path(out: Path) -> Path:
 def write_checkpoint(path: Path, state: dict[str, np.ndarray], notes: dict) -> None:
     """All arrays and notes in one file, never half-written."""
     temporary = path.with_name(path.name + ".partial")
-    with open(temporary, "wb") as file:
-        np.savez(file, notes=np.array(json.dumps(notes)), **state)
-    os.replace(temporary, path)
+    try:
+        with open(temporary, "wb") as file:
+            np.savez(file, notes=np.array(json.dumps(notes)), **state)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict]:

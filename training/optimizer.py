@@ -63,9 +63,17 @@ class Adam:
         return out
 
     def load(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from a `state`; the groups may have another number of rows than before."""
+        """Go on from a `state`; the groups may have another number of rows than before.
+
+        Where memory does not suffice, everything stays as it was.
+        """
+        there = {
+            (name, part): self.device.upload(
+                np.ascontiguousarray(state[f"{name}.{part}"], np.float32)
+            )
+            for name in self.groups
+            for part in ("value", "mean", "square")
+        }
         self.steps = int(state["steps"])
-        for name, group in self.groups.items():
-            for part in ("value", "mean", "square"):
-                array = np.ascontiguousarray(state[f"{name}.{part}"], np.float32)
-                setattr(group, part, self.device.upload(array))
+        for (name, part), array in there.items():
+            setattr(self.groups[name], part, array)

@@ -25,6 +25,7 @@ class LoadedPhoto:
     weight: np.ndarray | None  # (H, W) float32, what counts; None = everything
     name: str  # of the file
     depth: np.ndarray | None = None  # (H, W) float32 metres along the view, 0 = not known
+    masked: bool = False  # whether it came with a mask or an alpha channel
 
     @property
     def see_through(self) -> bool:
@@ -64,7 +65,8 @@ def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
         seen = rgba[..., 3] >= 128 if weight is None else weight >= 0.5
         depth = np.where(seen, depth, np.float32(0))
     view = photo.view.resized(size)
-    return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth)
+    masked = mask is not None
+    return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth, masked)
 
 
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:

@@ -12,6 +12,7 @@ LEAST_DB = 4.0  # below the median of its modality: what the worst of good photo
 SPREADS = 4.0  # of the deviations from that median, as standard deviations of a normal spread
 FEWEST = 5  # photos of a modality: among fewer none stands out
 SHOWN = 20  # names at most
+LOOKED_AT = 8  # photos of a modality that tell whether there is any picture
 STEEP = (0.4, 2.5)  # contrast that another exposure or white balance may have
 
 
@@ -70,6 +71,36 @@ def judge(
     return sorted(out, key=lambda suspect: suspect.psnr_db)
 
 
+def drawn(trainer: Trainer, photo: LoadedPhoto) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W, 3) what the model shows of a photo, and the photo, over the same background."""
+    background = trainer.schedule.background or (0.5, 0.5, 0.5)
+    drawing = trainer.step.draw(photo.view, trainer.control(photo.modality), background)
+    image = trainer.device.download(drawing.frame.image).transpose(1, 2, 0)
+    return image, photo.over(background)
+
+
+def hopeless(trainer: Trainer) -> str:
+    """One sentence where pictures are no nearer to the photos than a sheet of one colour is."""
+    lost = []
+    for modality, photos in trainer.schedule.photos.items():
+        won = []
+        for photo in photos[:: -(-len(photos) // LOOKED_AT)]:
+            image, wanted = drawn(trainer, photo)
+            each = np.ones(wanted.shape[:2]) if photo.weight is None else photo.weight
+            mean = np.average(wanted.reshape(-1, 3), axis=0, weights=each.ravel())
+            flat = np.broadcast_to(mean, wanted.shape)
+            won.append(psnr(image, wanted, photo.weight) - psnr(flat, wanted, photo.weight))
+        if not np.median(won) > 0:
+            lost.append(modality)
+    if not lost:
+        return ""
+    return (
+        f"{', '.join(lost)}: the pictures are no nearer to the photos than one colour all over; "
+        "train longer, take other --points (hull where the background is known), or a smaller "
+        "--rate-scale, and check that photos and poses belong together."
+    )
+
+
 def suspects(trainer: Trainer) -> list[Suspect]:
     """Draws every training photo of a trained model once; those that stand out in their modality.
 
@@ -80,10 +111,7 @@ def suspects(trainer: Trainer) -> list[Suspect]:
     for modality, photos in trainer.schedule.photos.items():
         fits = []
         for photo in photos:
-            background = trainer.schedule.background or (0.5, 0.5, 0.5)
-            drawing = trainer.step.draw(photo.view, trainer.control(modality), background)
-            image = trainer.device.download(drawing.frame.image).transpose(1, 2, 0)
-            wanted = photo.over(background)
+            image, wanted = drawn(trainer, photo)
             again = recolored(image, wanted, photo.weight)
             fits.append((psnr(image, wanted, photo.weight), psnr(again, wanted, photo.weight)))
         out += judge(modality, photos, fits)

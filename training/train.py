@@ -14,6 +14,7 @@ from training.density import Evidence, Watch
 from training.density_budget import most_anchors, within
 from training.density_grow import changed
 from training.density_strategy import strategy
+from training.doubts import usable
 from training.drawing import Color
 from training.export import model_of
 from training.guard import EVERY as GUARD_EVERY
@@ -91,6 +92,7 @@ class Trainer:
             loaded[split] if loaded else load_photos(capture, split, self.factor, settings.masks)
             for split in ("train", "test")
         )
+        photos, self.doubts = usable(photos, settings.masks)
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:
@@ -325,11 +327,24 @@ class Trainer:
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
         self.rise = after_fall(self.iteration, self.rate_scale / 2, self.rise)
-        looks = self.rise.steps if self.rise.since == self.iteration else 0
-        self.adam.load(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
-        self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
+        looks = self.rise.steps if self.rise.since == self.iteration else 0  # one a stop and round
+        self.go_on_from(self.guard.fall_back(looks // GUARD_EVERY))
         self.rate_scale /= 2
         return True
+
+    def go_on_from(self, state: dict[str, np.ndarray]) -> None:
+        """Another state, of perhaps other anchors; all as it was where memory does not suffice."""
+        count = len(state["anchors.value"])
+        evidence = Evidence(self.device, self.layout, count, self.watch)
+        self.adam.load(state)
+        self.evidence = evidence
+
+    def mend(self) -> bool:
+        """Back to the last good state where the run died after the guard's last look."""
+        good = all(np.isfinite(array).all() for array in self.adam.state().values())
+        if not good:
+            self.go_on_from(self.guard.snapshots[-1])
+        return not good
 
     def grow(self) -> None:
         """New anchors where they are needed; anchors that show nothing go."""
@@ -338,8 +353,7 @@ class Trainer:
             for s in self.stops
         ]
         now, budget = self.adam.state(), self.most_anchors
-        self.adam.load(changed(now, means, self.evidence, self.voxel, budget, self.settings))
-        self.evidence = Evidence(self.device, self.layout, self.anchors_count, self.watch)
+        self.go_on_from(changed(now, means, self.evidence, self.voxel, budget, self.settings))
         self.grown_at = self.iteration
 
     def steps_to_go(self) -> int:

@@ -1,15 +1,25 @@
-"""What first points are worth: `--points` by held-out PSNR, a row a source and modality.
+"""What first points are worth: `--points` by held-out PSNR, a row a source, seed and modality.
 
-    python docs/bench/points.py CAPTURE ... [--clouds SCAN.las ...] --out docs/bench/points.csv
-        [--iterations 1000] [--seeds 2] [--anchors 6000]
+    python3 docs/bench/points.py CAPTURE ... [--scan CAPTURE FILE ...] --out docs/bench/points.csv
+        [--iterations 600] [--seeds 1 2] [--anchors 6000] [--densities 2000 10000 100000]
 
-Sources that a capture does not have are rows without figures, with the program's sentence.
+CAPTURE is a folder of posed photos, or `workshop`: the demo's bench, made on the spot in small with
+depth photos and a scan of its surfaces (2 mm of noise).  --scan: PLY or NPZ files that together are
+the scan of a capture.  Of a scan as many points as --densities says are written as LAS, so that
+the same surfaces come measured sparsely and densely.  Sources that a capture does not have are rows
+without figures, with the program's sentence.  first_db is the PSNR after 100 steps, the mean of the
+modalities.
 """
 
 import argparse
+import csv
+import shlex
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
@@ -18,67 +28,135 @@ from rasterizer.device import open_device  # noqa: E402
 from runtime_models.model import BadFile  # noqa: E402
 from scene.capture import Capture  # noqa: E402
 from scene.read_capture import read_capture  # noqa: E402
+from scene.read_points import read_points  # noqa: E402
 from training.initial import SOURCES  # noqa: E402
 from training.photos import choose_downscale, load_photos  # noqa: E402
 from training.settings import TrainSettings  # noqa: E402
 from training.train import Trainer  # noqa: E402
 
-COLUMNS = "capture,points,seed,modality,psnr_db,seconds,first_anchors,anchors,voxel_m,origin"
+COLUMNS = (
+    "capture", "points", "seed", "modality", "psnr_db", "first_db", "seconds", "first_anchors",
+    "anchors", "voxel_m", "origin",
+)  # fmt: skip
+EARLY = 100  # steps before first_db
+WORKSHOP = {"size": (192, 144), "views": 36, "test_views": 8}
+SCAN_NOISE = 0.002  # metres
 
 
-def show(row: list) -> str:
-    text = ",".join(f"{v:.4f}" if isinstance(v, float) else str(v).replace(",", ";") for v in row)
-    print(text, flush=True)  # noqa: T201
-    return text
+def workshop(folder: Path) -> tuple[Path, np.ndarray]:
+    """The demo's bench with depth photos, and points of a scan of it, closed and opened."""
+    from scene.write_capture import write_capture
+    from training.synthetic.balls import DEPTH_UNIT, save_depth
+    from training.synthetic.tracer import depth_under, surface_points
+    from training.synthetic.workshop import dome, make_workshop, place
+
+    capture, photos = make_workshop(folder, **WORKSHOP, processes=1), []
+    for photo in capture.photos:
+        here, _ = place(photo.modality == "Opened")
+        beside = folder / "depth" / photo.modality.lower() / photo.path.name
+        depth = save_depth(beside, depth_under(here, photo.view))
+        photos.append(replace(photo, depth=depth, depth_unit=DEPTH_UNIT))
+    write_capture(replace(capture, photos=tuple(photos)))
+    scans = [
+        surface_points(place(opened)[0], dome(24, 0.4, capture.photos[0].view.size),
+                       50_000, SCAN_NOISE, 7 + opened)[0]
+        for opened in (False, True)
+    ]  # fmt: skip
+    return folder, np.concatenate(scans)
 
 
-def one_run(device, capture: Capture, loaded: dict, settings: TrainSettings) -> list[str]:
-    name = capture.folder.name
-    start = [name, Path(settings.points).name, settings.seed]
+def write_las(path: Path, points: np.ndarray) -> None:
+    import laspy
+
+    cloud = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
+    cloud.header.scales, cloud.header.offsets = np.full(3, 1e-5), points.mean(axis=0)
+    cloud.x, cloud.y, cloud.z = points.T
+    cloud.write(path)
+
+
+def scans_of(points: np.ndarray, densities: list[int], folder: Path) -> dict[str, Path]:
+    """Files of as many of the points as each density says, at random."""
+    order = np.random.default_rng(0).permutation(len(points))
+    out = {}
+    for count in densities:
+        some = points[order[:count]]
+        path = folder / f"scan-{len(some)}.las"
+        write_las(path, some.astype(np.float64))
+        out[f"scan of {len(some):,} points"] = path
+    return out
+
+
+def one_run(device, capture: Capture, loaded: dict, settings: TrainSettings) -> list[dict]:
+    """A row a modality; one with the program's sentence where there are no such points."""
     try:
         trainer = Trainer(device, capture, settings, loaded=loaded)
     except BadFile as error:
-        return [show([*start, "", "", "", "", "", "", error])]
-    first = trainer.anchors_count
-    for _ in trainer.steps():
-        pass
-    end = [trainer.elapsed, first, trainer.anchors_count, trainer.voxel, trainer.origin]
-    psnr = trainer.held_out_psnr(most=len(trainer.held_out))
-    return [show([*start, modality, db, *end]) for modality, db in psnr.items()]
+        return [{"origin": str(error).replace(str(capture.folder), capture.folder.name)}]
+    first, early = trainer.anchors_count, None
+    for now in trainer.steps():
+        if now.iteration == EARLY:
+            early = float(np.mean(list(held_out(trainer).values())))
+    shared = {
+        "first_db": "" if early is None else f"{early:.2f}", "seconds": f"{trainer.elapsed:.1f}",
+        "first_anchors": first, "anchors": trainer.anchors_count,
+        "voxel_m": f"{trainer.voxel:.4g}", "origin": trainer.origin,
+    }  # fmt: skip
+    psnr = held_out(trainer)
+    psnr["mean"] = float(np.mean(list(psnr.values())))
+    return [shared | {"modality": name, "psnr_db": f"{db:.2f}"} for name, db in psnr.items()]
 
 
-def measure(folder: Path, sources: list[str], settings: TrainSettings, seeds: int) -> list[str]:
-    """Every source in turn, seed by seed, so that a busy machine slows all of them alike."""
-    capture, device = read_capture(folder), open_device()
-    factor = settings.downscale or choose_downscale(capture.photos)
-    loaded = {s: load_photos(capture, s, factor, settings.masks) for s in ("train", "test")}
-    return [
-        row
-        for seed in range(seeds)
-        for source in sources
-        for row in one_run(device, capture, loaded, replace(settings, points=source, seed=seed))
-    ]
+def held_out(trainer: Trainer) -> dict[str, float]:
+    return trainer.held_out_psnr(most=len(trainer.held_out))
+
+
+def asked() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("captures", nargs="+")
+    parser.add_argument("--scan", nargs="+", action="append", default=[])
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--iterations", type=int, default=600)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--anchors", type=int, default=6000)
+    parser.add_argument("--densities", type=int, nargs="+", default=[2_000, 10_000, 100_000])
+    parser.add_argument("--downscale", type=int, help="of captures that are folders")
+    return parser.parse_args()
+
+
+def command() -> str:
+    """As it was typed, without the places where the files lie."""
+    return shlex.join(Path(w).name if Path(w).exists() else w for w in sys.argv[1:])
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("captures", nargs="+", type=Path)
-    parser.add_argument("--clouds", nargs="*", default=[])
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--iterations", type=int, default=1000)
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--anchors", type=int, default=6000)
-    parser.add_argument("--downscale", type=int)
-    asked = parser.parse_args()
-    settings = TrainSettings(
-        iterations=asked.iterations, anchors=asked.anchors, downscale=asked.downscale
-    )
-    rows = [show(COLUMNS.split(","))]
-    for folder in asked.captures:
-        sources = [*(s for s in SOURCES if s != "auto"), *asked.clouds]
-        rows += measure(folder, sources, settings, asked.seeds)
-    if asked.out is not None:
-        asked.out.write_text("\n".join(rows) + "\n")
+    options, device = asked(), open_device()
+    scans = {files[0]: [Path(f) for f in files[1:]] for files in options.scan}
+    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
+        file.write(f"# python3 docs/bench/points.py {command()}\n")
+        file.write(f"# {device.name}, {device.platform}\n")
+        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
+        rows.writeheader()
+        for name in options.captures:
+            there, points = Path(name), None
+            if name == "workshop":
+                there, points = workshop(Path(folder) / name)
+            elif name in scans:
+                points = np.concatenate([read_points(path)[0] for path in scans[name]])
+            clouds = {} if points is None else scans_of(points, options.densities, Path(folder))
+            sources = {source: source for source in SOURCES if source != "auto"} | clouds
+            settings = TrainSettings(
+                iterations=options.iterations, anchors=options.anchors,
+                downscale=None if name == "workshop" else options.downscale,
+            )  # fmt: skip
+            capture = read_capture(there)
+            factor = settings.downscale or choose_downscale(capture.photos)
+            loaded = {s: load_photos(capture, s, factor, "object") for s in ("train", "test")}
+            for seed in options.seeds:
+                for words, source in sources.items():
+                    changed = replace(settings, points=str(source), seed=seed)
+                    for row in one_run(device, capture, loaded, changed):
+                        rows.writerow({"capture": there.name, "points": words, "seed": seed} | row)
+                    file.flush()
 
 
 if __name__ == "__main__":

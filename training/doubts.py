@@ -1,0 +1,34 @@
+"""What is doubtful about the photos of a capture before they are trained on, in words."""
+
+from training.photos import LoadedPhoto
+
+FEW = 12  # training photos of a modality, up to which what lies between them is a guess
+
+
+def usable(photos: list[LoadedPhoto], masks: str) -> tuple[list[LoadedPhoto], list[str]]:
+    """The photos to train on, and a sentence for each thing that a person should know.
+
+    masks: that of TrainSettings.  Where a mask says that nothing lies outside of the object, a
+    photo without one shows the contrary: such photos are left out while they are the smaller part
+    of their modality.
+    """
+    kept, doubts = list(photos), []
+    for name in dict.fromkeys(photo.modality for photo in photos):
+        mine = [photo for photo in kept if photo.modality == name]
+        bare = [photo for photo in mine if not photo.masked]
+        if masks == "object" and 0 < len(bare) < len(mine):
+            out = 2 * len(bare) < len(mine)
+            if out:
+                kept = [p for p in kept if p.modality != name or p.masked]
+                mine = [p for p in mine if p.masked]
+            what = "are left out" if out else "count as a whole, with what lies behind the object"
+            doubts.append(
+                f"{name}: {len(bare)} photos without a mask, for example {bare[0].name}, {what}; "
+                "make masks for them, or train with --masks ignore."
+            )
+        if len(mine) <= FEW:
+            doubts.append(
+                f"{name} has {len(mine)} training photos only: seen from elsewhere it will be a "
+                "guess; 30 and more from all around are a good capture."
+            )
+    return kept, doubts
