@@ -13,7 +13,6 @@ from splat_scenes import (
     stereo_views,
 )
 
-from rasterizer.device import NoDevice
 from renderer.classify import classify
 from renderer.debug import object_poses
 from renderer.reference import (
@@ -23,7 +22,6 @@ from renderer.reference import (
     reference_image,
     reference_reasons,
 )
-from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from runtime_models.formats import read_plain
 from runtime_models.model import SplatLayers
@@ -95,15 +93,6 @@ def check_counts(told: dict, want: dict, name: str) -> None:
 def decoded_all(scene: Scene) -> Scene:
     """Nothing hidden: what never showed was never decoded, and counts as absent."""
     return Scene(tuple(replace(thing, visible=True) for thing in scene.objects))
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def test_the_opacity_of_one_splat_is_what_the_formula_says():

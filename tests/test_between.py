@@ -12,7 +12,6 @@ import pytest
 from test_training_gradients import LAYOUT, VOXEL, situation
 
 from app import cli
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from runtime_models.model import BadFile, Stop
 from runtime_models.read_scene import read_model
@@ -37,11 +36,6 @@ LAYOUTS = {
     "2 layers": replace(LAYOUT, layers=2),
     "scale fixed": replace(LAYOUT, fixed=("scale",)),
 }
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")

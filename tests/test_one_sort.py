@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
@@ -25,15 +24,6 @@ from tests.splat_scenes import alone, front_view, psnr_db, random_layers, stereo
 
 VIEW = front_view((128, 96))
 SIZES = (8, 127, 128, 129, 255, 256, 257)  # of the first object: where blocks of kernels end
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:

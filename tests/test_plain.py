@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import rotations
 from runtime_models.model import BadFile, Stop
 from runtime_models.plain_splats import PlainSplats
@@ -34,11 +33,6 @@ from training.synthetic.balls import STOPS, make_balls
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_every=20, sh_degree=2)
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")

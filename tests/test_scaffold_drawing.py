@@ -48,15 +48,6 @@ def in_scene(model, pose: Pose = IDENTITY, **how) -> Scene:
     return Scene((SceneObject("scaffold", model, pose, **how),))
 
 
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as opened:
-            yield opened
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-
-
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings):
     renderer.settings = RenderSettings(**settings)
     renderer.update(scene)

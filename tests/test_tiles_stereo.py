@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
@@ -13,15 +12,6 @@ from scene.pose import Pose, View, look_at
 from tests.splat_scenes import alone, front_view, one_splat, psnr_db, stereo_views, two_objects
 
 APART = 0.064  # metres between the eyes
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def draw(renderer: Renderer, scene, views: list[View], **settings) -> list[np.ndarray]:

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from runtime_models.evaluate import evaluate
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
@@ -25,11 +24,6 @@ from training.train import Trainer
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = TrainSettings(iterations=200, grow=False, anchors=2000)
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")

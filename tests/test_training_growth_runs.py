@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from runtime_models.write_package import write_package
 from scene.capture import Capture
 from training.checkpoint import read_checkpoint, write_checkpoint
@@ -24,11 +23,6 @@ WAYS = {
     "error": {"growth": "error", "grow_each": True, "grow_replace": 0.05, "prune_views": 0.01},
     "coarse": {"coarse": 4, "coarse_until": 0.5},
 }
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import fit_scenes
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from runtime_models.model import Stop
 from training.checkpoint import read_checkpoint, write_checkpoint
@@ -16,11 +15,6 @@ from training.settings import TrainSettings
 from training.train import Trainer
 
 SETTINGS = TrainSettings(iterations=450, grow=False, anchors=600)
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")
