@@ -10,6 +10,7 @@ from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from scene.pose import Pose, View
 from scene.scene import Scene, SceneObject
+from tests.frames import draw_told
 from tests.object_scenes import (
     CYCLE,
     UPRIGHT,
@@ -27,11 +28,9 @@ SIZES = (8, 127, 128, 129, 255, 256, 257)  # of the first object: where blocks o
 
 
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
-    renderer.settings = RenderSettings(**settings)
-    renderer.update(scene)
-    stats = renderer.draw(views)
+    pictures, stats = draw_told(renderer, scene, views, **settings)
     assert stats.sorts == (1 if settings.get("stereo_sort") != "each" else len(views))
-    return [renderer.image(i).copy() for i in range(len(views))]
+    return pictures
 
 
 def interleaved(count: int = 3000, parts: int = 2, coefficients: int = 16) -> list:
