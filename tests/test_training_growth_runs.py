@@ -11,6 +11,7 @@ import pytest
 
 from runtime_models.write_package import write_package
 from scene.capture import Capture
+from tests.training_runs import bits
 from training.checkpoint import read_checkpoint, write_checkpoint
 from training.settings import TrainSettings
 from training.synthetic.balls import make_balls
@@ -36,11 +37,6 @@ def run(trainer: Trainer, steps: int | None = None) -> Trainer:
         if steps is not None and now.iteration >= steps:
             break
     return trainer
-
-
-def bits(trainer: Trainer) -> list[bytes]:
-    state, _ = trainer.checkpoint()
-    return [name.encode() + state[name].tobytes() for name in sorted(state)]
 
 
 @pytest.mark.parametrize("way", WAYS)

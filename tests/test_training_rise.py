@@ -8,6 +8,7 @@ import pytest
 
 from rasterizer.reference import finite_differences
 from runtime_models.model import Stop
+from tests.training_runs import bits, run
 from training.checkpoint import read_checkpoint, write_checkpoint
 from training.gaussians import Gaussians
 from training.rise import AFTER_A_FALL, FAINT, LEAST_RATE, PULL, Rise, after_fall, draw_up
@@ -27,18 +28,6 @@ def apart(tmp_path_factory):
         )
         patch.setitem(fit_scenes.SHAPES, "alone", alone)
         return fit_scenes.make_shapes(tmp_path_factory.mktemp("apart"), "alone")
-
-
-def run(trainer: Trainer, steps: int | None = None) -> Trainer:
-    for now in trainer.steps():
-        if steps is not None and now.iteration >= steps:
-            break
-    return trainer
-
-
-def bits(trainer: Trainer) -> list[bytes]:
-    state, _ = trainer.checkpoint()
-    return [name.encode() + state[name].tobytes() for name in sorted(state)]
 
 
 def test_rates_rise_quadratically_and_only_those_of_the_networks():
