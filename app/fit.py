@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from app.train_options import ModelOptions, PhotoOptions, SizeOptions
+
 if TYPE_CHECKING:
     from training.fit import Need
     from training.need import Measured, Verdict
 
 
 @dataclass(frozen=True)
-class Options:
-    """Take away what a scene does not need: train without one part after the other, and compare
-    the held-out photos.  The options say how large a model it starts from.
-    """
+class TrialOptions:
+    """The trials: of what, into what, how long, and what they may lose."""
 
     capture: Annotated[Path, tyro.conf.Positional]
     """A folder of posed photos, as of train."""
@@ -45,30 +45,20 @@ class Options:
     """Add and remove anchors between 10 % and 60 % of each training."""
     max_anchors: int | None = None
     """Cap of growing."""
-    anchors: int | None = None
-    """How many to start with at most, where --voxel is not given."""
-    voxel: float | None = None
-    """Metres between anchors at the start."""
-    splats_per_anchor: int | None = None
-    """k."""
-    features: int | None = None
-    """F, numbers an anchor."""
-    hidden: int | None = None
-    """Width of the five networks."""
-    layers: int | None = None
-    """Hidden layers of the five networks, 1 to 3."""
+
+
+@dataclass(frozen=True)
+class Options(PhotoOptions, SizeOptions, ModelOptions, TrialOptions):
+    """Take away what a scene does not need: train without one part after the other, and compare
+    the held-out photos.  The options say how large a model it starts from.
+    """
+
     fixed: str | None = None
     """Networks that do not see x from the start, as offset,scale,rotation."""
-    view_dependent: bool | None = None
-    """Whether colour depends on where one looks from."""
-    downscale: int | None = None
-    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
     masks: Literal["object", "valid", "ignore"] | None = None
     """What a mask means, as of train."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None
     """Colour behind everything, as of train."""
-    device: Literal["cpu", "gpu"] | None = None
-    """Insist on one kind of OpenCL device."""
 
 
 TRIAL = 600  # steps

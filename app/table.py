@@ -10,6 +10,7 @@ import tyro
 from app.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
 from app.train import INTERRUPTED, say
 from app.train import Options as TrainOptions
+from app.train_options import PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
     from scene.capture import Capture
@@ -22,11 +23,8 @@ PLACES = {
 
 
 @dataclass(frozen=True)
-class Options:
-    """Train a capture in three ways with the same budget and compare them on held-out photos.
-
-    The form is that of the paper's Tables 1 and 2: method by modality.
-    """
+class MethodOptions:
+    """The methods: of what, into what, how long, and how large each may become."""
 
     capture: Annotated[Path, tyro.conf.Positional]
     """A folder of posed photos; each modality needs held-out ones."""
@@ -55,14 +53,14 @@ class Options:
     """Cap of growing plain splats, a modality."""
     sh_degree: int | None = None
     """Of plain splats' colours: 0 to 3.  Default: 3."""
-    downscale: int | None = None
-    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
-    masks: Literal["object", "valid", "ignore"] | None = None
-    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
-    background: Literal["auto", "random", "black", "white", "gray"] | None = None
-    """Colour behind everything.  auto: the capture's, else random where photos have masks."""
-    device: Literal["cpu", "gpu"] | None = None
-    """Insist on one kind of OpenCL device."""
+
+
+@dataclass(frozen=True)
+class Options(PhotoOptions, SizeOptions, MethodOptions):
+    """Train a capture in three ways with the same budget and compare them on held-out photos.
+
+    The form is that of the paper's Tables 1 and 2: method by modality.
+    """
 
 
 def run(options: Options) -> int:

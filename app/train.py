@@ -5,11 +5,13 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
+
+from app.train_options import ModelOptions, PhotoOptions, SizeOptions, settings_of
 
 if TYPE_CHECKING:
     from scene.capture import Capture
@@ -20,12 +22,11 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # exit code
 SAVE_EVERY = 60.0  # seconds between checkpoints
 LOOKS = 10  # at held-out photos in a run
-BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
 
 
 @dataclass(frozen=True)
-class Options:
-    """Train a shape-shifting scene.  Where nothing is said, the preset decides."""
+class RunOptions:
+    """The run: of what, into what, how long, and how the anchors grow."""
 
     capture: Annotated[Path, tyro.conf.Positional]
     """A folder of posed photos: COLMAP, transforms.json or cameras.json."""
@@ -81,22 +82,12 @@ class Options:
     """Where the first anchors stand: capture (COLMAP's points or the capture's own), depth (its
     depth photos), hull (of masks or a known background), random, or a cloud: PLY, LAS, LAZ, NPZ in
     the capture's world.  auto: the first of these that there is."""
-    anchors: int | None = None
-    """How many to start with at most, where --voxel is not given."""
-    voxel: float | None = None
-    """Metres between anchors at the start."""
-    splats_per_anchor: int | None = None
-    """k."""
-    features: int | None = None
-    """F, numbers an anchor."""
-    hidden: int | None = None
-    """Width of the five networks."""
-    layers: int | None = None
-    """Hidden layers of the five networks, 1 to 3."""
-    fixed: str | None = None
-    """Networks that do not see x, as offset,scale,rotation: all stops share what they give."""
-    view_dependent: bool | None = None
-    """Whether colour depends on where one looks from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossOptions:
+    """What the training pulls at, how fast, and what it sees of the slider."""
+
     ssim_share: float | None = None
     """lambda: (1 - lambda) L1 + lambda D-SSIM.  Equation 8 read literally has 0.8."""
     opacity_share: float | None = None
@@ -129,8 +120,12 @@ class Options:
     """Weight of the roughness of thermal pictures, for example 0.6 (ThermalGaussian)."""
     balance: str | None = None
     """Steps of each modality beside the others', as RGB=3,Thermal=1.  Default: as many of each."""
-    downscale: int | None = None
-    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureOptions:
+    """Which photos, of what size and seen from where."""
+
     coarse: int | None = None
     """Start with photos of 1/2, 1/4 or 1/8 of the sides; the next size comes step by step."""
     coarse_until: float | None = None
@@ -138,12 +133,11 @@ class Options:
     calibrate: str | None = None
     """A modality whose cameras all sit a little beside their stated poses, as on a rig: that turn
     and shift is found first, from the photos.  `eval` knows it from the package."""
-    masks: Literal["object", "valid", "ignore"] | None = None
-    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
-    background: Literal["auto", "random", "black", "white", "gray"] | None = None
-    """Colour behind everything.  auto: the capture's, else random where photos have masks."""
-    device: Literal["cpu", "gpu"] | None = None
-    """Insist on one kind of OpenCL device."""
+
+
+@dataclass(frozen=True)
+class Options(PhotoOptions, PictureOptions, SizeOptions, LossOptions, ModelOptions, RunOptions):
+    """Train a shape-shifting scene.  Where nothing is said, the preset decides."""
 
 
 def run(options: Options) -> int:
@@ -210,44 +204,6 @@ def calibrated(
         "their stated poses, each in its own axes; trained with that."
     )
     return replace(settings, rig=noted(modality, found))
-
-
-# What a checkpoint was trained with that does not say it: these were the defaults before.
-OLD = {"encoding": "even", "growth": "gradient"}
-
-
-def settings_of(options: Options, before: dict | None) -> "TrainSettings":
-    """The preset with what was asked for; or those of a checkpoint, with another budget.
-
-    Raises UsageError, also when a resumed run is asked for anything but another budget.
-    """
-    from app.errors import UsageError
-    from training.settings import TrainSettings, preset
-
-    names = {f.name for f in fields(TrainSettings)} - {"preset"}
-    asked = {n: getattr(options, n) for n in names & {f.name for f in fields(options)}}
-    asked = {n: value for n, value in asked.items() if value is not None}
-    settings = preset(options.preset) if before is None else TrainSettings(**(OLD | before))
-    if before is not None:
-        known = settings.as_dict()  # an older checkpoint may not have all of them
-        other = sorted(n for n in asked if n not in BUDGET and asked[n] != known[n])
-        if other:
-            raise UsageError(
-                f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
-                f"{known[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
-            )
-    if asked.get("encoding") == "stops" and asked.keys() & {"control", "sigma"}:
-        raise UsageError("--encoding stops sets --control and --sigma itself; leave them out.")
-    if before is None and asked.keys() & {"control", "sigma"}:
-        asked["encoding"] = "even"
-    if "seconds" in asked and "iterations" not in asked:
-        asked["iterations"] = None
-    elif "iterations" in asked and "seconds" not in asked:
-        asked["seconds"] = None
-    try:
-        return replace(settings, **asked)
-    except ValueError as error:
-        raise UsageError(str(error)) from None
 
 
 def refuse_plain_options(options: Options) -> None:

@@ -40,3 +40,24 @@ def data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no real captures beside the project ({folder.name} is absent)")
     return folder
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    """One that draws tiles, for all tests of a module; skips where there is no OpenCL device."""
+    from rasterizer.device import NoDevice
+    from renderer.renderer import Renderer
+
+    try:
+        with Renderer(None) as made:
+            yield made
+    except NoDevice as reason:
+        pytest.skip(str(reason))
+
+
+@pytest.fixture(scope="module")
+def device():
+    """The OpenCL device that training is tested on."""
+    from rasterizer.device import open_device
+
+    return open_device("cpu")

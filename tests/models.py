@@ -1,10 +1,12 @@
 """Small random models that tests share."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp, Stop
+from runtime_models.write_package import write_package
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0, "thermal", "ironbow", (15.0, 95.0), "°C"))
 HEAD = {
@@ -78,3 +80,10 @@ def run_in_numpy(mlp: Mlp, rows: np.ndarray) -> np.ndarray:
             "exp": np.exp,
         }[mlp.head]
     return mlp.gain * head(value)
+
+
+def random_package(folder: Path, anchors: int, **kind) -> Path:
+    """The file of a random model in a folder."""
+    path = folder / "random.shift"
+    write_package(make_random_model(anchors, **kind), path)
+    return path

@@ -6,18 +6,12 @@ import fit_scenes
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from runtime_models.model import BadFile
 from training.schedule import Schedule, balance_of, turns_of
 from training.settings import TrainSettings
 from training.smooth import roughness, smooth_picture
 from training.train import Trainer
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def test_turns_are_read_out_of_a_sentence():

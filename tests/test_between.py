@@ -12,12 +12,12 @@ import pytest
 from test_training_gradients import LAYOUT, VOXEL, situation
 
 from app import cli
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from runtime_models.model import BadFile, Stop
 from runtime_models.read_scene import read_model
 from scene.capture import Capture
 from scene.pose import Pose, View, perspective
+from tests.training_runs import bits, run
 from training.between import Between, Way, add, alike, blended, shared, straight_pull
 from training.checkpoint import read_checkpoint, write_checkpoint
 from training.evaluate import Painter
@@ -37,11 +37,6 @@ LAYOUTS = {
     "2 layers": replace(LAYOUT, layers=2),
     "scale fixed": replace(LAYOUT, fixed=("scale",)),
 }
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")
@@ -240,18 +235,6 @@ def test_gradients_are_added_in_place(device, count):
 
 
 # Runs.
-
-
-def run(trainer: Trainer, steps: int | None = None) -> Trainer:
-    for now in trainer.steps():
-        if steps is not None and now.iteration >= steps:
-            break
-    return trainer
-
-
-def bits(trainer: Trainer) -> list[bytes]:
-    state, _ = trainer.checkpoint()
-    return [name.encode() + state[name].tobytes() for name in sorted(state)]
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,7 @@ from app.errors import UsageError
 from app.subject import Subject
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
-from runtime_models.write_package import write_package
-from tests.models import make_random_model
+from tests.models import make_random_model, random_package
 from tests.test_cli import assert_refused, launch
 
 EXACT = BudgetRow("exact", RenderSettings(), 20.0, 200.0)
@@ -180,8 +179,7 @@ def test_measured_once_for_each_thing_that_matters(cache, monkeypatch):
 
 def test_render_within_a_budget(tmp_path, cache):
     """The first run measures and says what it chose; the second finds the chart and agrees."""
-    scene = tmp_path / "random.shift"
-    write_package(make_random_model(40), scene)
+    scene = random_package(tmp_path, 40)
     words = ("render", scene, "--context", "none", "--size", "40x30", "--overwrite",
              "--out", tmp_path / "out", "--target-ms", 1e6)  # fmt: skip
     told = [launch(*words) for _ in range(2)]
@@ -200,8 +198,7 @@ def test_render_within_a_budget(tmp_path, cache):
 
 
 def test_bench_says_what_it_chose(tmp_path, cache):
-    scene = tmp_path / "random.shift"
-    write_package(make_random_model(40), scene)
+    scene = random_package(tmp_path, 40)
     words = ("bench", scene, "--context", "none", "--size", "40x30", "--quality-size", "40x30",
              "--frames", 2, "--sweep", 2, "--json", "-")  # fmt: skip
     done = launch(*words, "--target-ms", 1e-6, "--floor-db", 1)
@@ -223,8 +220,7 @@ def test_refused_on_the_command_line(tmp_path):
 
 
 def test_unknown_settings_and_targets_are_refused(tmp_path):
-    scene = tmp_path / "random.shift"
-    write_package(make_random_model(5), scene)
+    scene = random_package(tmp_path, 5)
     bench = ("bench", scene, "--context", "none")
     assert_refused(launch(*bench, "--settings", "fast"), "there is no setting 'fast'")
     assert_refused(launch(*bench, "--settings", "rgba8"), "changes nothing in tiles")

@@ -21,7 +21,7 @@ from app.pareto import pareto_front
 from app.subject import Subject
 from runtime_models.write_package import write_package
 from scene.framing import frame_points, model_points
-from tests.models import make_random_model
+from tests.models import make_random_model, random_package
 from tests.test_cli import assert_refused, launch
 
 NUMBER = st.one_of(st.integers(0, 4).map(float), st.floats())
@@ -29,9 +29,7 @@ NUMBER = st.one_of(st.integers(0, 4).map(float), st.floats())
 
 @pytest.fixture
 def package(tmp_path):
-    path = tmp_path / "random.shift"
-    write_package(make_random_model(40), path)
-    return path
+    return random_package(tmp_path, 40)
 
 
 def brute_front(points):

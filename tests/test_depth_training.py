@@ -34,11 +34,6 @@ from training.train import Trainer
 SHARE = 0.7
 
 
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
-
-
 def depth_photo(seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     depth = rng.uniform(2, 4, SIZE[::-1]).astype(np.float32)

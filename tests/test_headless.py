@@ -10,18 +10,15 @@ from PIL import Image
 from app import cli, headless, touch_film
 from app.subject import Subject
 from runtime_models.model import BadFile
-from runtime_models.write_package import write_package
 from scene.framing import default_view, frame_points, model_points
-from tests.models import make_random_model
+from tests.models import make_random_model, random_package
 
 QUICK = ["--size", "48x32", "--frames", "2", "--sweep", "2"]
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("scene") / "random.shift"
-    write_package(make_random_model(40), path)
-    return path
+    return random_package(tmp_path_factory.mktemp("scene"), 40)
 
 
 def run(*arguments):

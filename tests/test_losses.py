@@ -3,16 +3,10 @@
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from training.gaussians import Gaussians
 from training.losses import ImageLoss, regularise
 from training.metrics import psnr, ssim, weighted_mean
 from training.reference import image_loss_reference
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def photo_and_image(width, height, seed=0):

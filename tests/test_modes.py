@@ -10,9 +10,8 @@ import pytest
 from PIL import Image
 
 from app.bench import command_line
-from runtime_models.write_package import write_package
 from scene.pose import look_at
-from tests.models import make_random_model
+from tests.models import random_package
 from tests.test_cli import assert_refused, launch
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,9 +23,7 @@ BENCH_KEYS = {
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("scene") / "random.shift"
-    write_package(make_random_model(60), path)
-    return path
+    return random_package(tmp_path_factory.mktemp("scene"), 60)
 
 
 def test_info_json_is_alone_on_standard_output(scene):

@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from runtime_models.evaluate import evaluate
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
 from runtime_models.read_package import read_files
@@ -19,11 +18,6 @@ from training.reference import activate_reference, directions, head_inputs, head
 FORMS = ("cpu", "gpu")
 VOXEL = 0.05
 EYE = np.array([2.0, 1.0, 1.5])
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def model(layout: HeadLayout, count: int, seed: int = 0):

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from scene.pose import Pose, View
 from scene.scene import Scene, SceneObject
+from tests.frames import draw_told
 from tests.object_scenes import (
     CYCLE,
     UPRIGHT,
@@ -27,21 +27,10 @@ VIEW = front_view((128, 96))
 SIZES = (8, 127, 128, 129, 255, 256, 257)  # of the first object: where blocks of kernels end
 
 
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-
-
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
-    renderer.settings = RenderSettings(**settings)
-    renderer.update(scene)
-    stats = renderer.draw(views)
+    pictures, stats = draw_told(renderer, scene, views, **settings)
     assert stats.sorts == (1 if settings.get("stereo_sort") != "each" else len(views))
-    return [renderer.image(i).copy() for i in range(len(views))]
+    return pictures
 
 
 def interleaved(count: int = 3000, parts: int = 2, coefficients: int = 16) -> list:

@@ -12,20 +12,17 @@ from app.png16 import write_png16
 from renderer.settings import RenderSettings
 from renderer.surface_reference import reference_surface
 from runtime_models.read_scene import read_model
-from runtime_models.write_package import write_package
 from scene.framing import default_view
 from scene.scene import Scene, SceneObject
 from scene.stereo import stereo_pair
-from tests.models import make_random_model
+from tests.models import random_package
 
 NO_GL = ["--context", "none", "--size", "60x44"]
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("scene") / "random.shift"
-    write_package(make_random_model(60, k=4), path)
-    return path
+    return random_package(tmp_path_factory.mktemp("scene"), 60, k=4)
 
 
 def render(*arguments):

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import rotations
 from runtime_models.model import BadFile, Stop
 from runtime_models.plain_splats import PlainSplats
@@ -17,6 +16,7 @@ from runtime_models.read_layer_list import LIST
 from runtime_models.read_scene import describe, read_model
 from runtime_models.write_layer_list import layer_name, write_layer_list
 from scene.read_capture import read_capture
+from tests.training_runs import run
 from training.evaluate import evaluate_model
 from training.plain import PlainTrainer, first_scales, one_modality, seen_colors
 from training.plain_density import (
@@ -37,20 +37,8 @@ SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_ever
 
 
 @pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
-
-
-@pytest.fixture(scope="module")
 def balls(tmp_path_factory):
     return make_balls(tmp_path_factory.mktemp("balls"), size=100, views=16, test_views=3)
-
-
-def run(trainer: PlainTrainer, steps: int | None = None) -> PlainTrainer:
-    for now in trainer.steps():
-        if steps is not None and now.iteration >= steps:
-            break
-    return trainer
 
 
 @pytest.fixture(scope="module")

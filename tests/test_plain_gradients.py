@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from scene.pose import View, look_at, perspective
 from training.drawing import camera_of
@@ -16,11 +15,6 @@ from training.reference import step_loss_reference
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
 BACKGROUND = (0.2, 0.5, 0.9)
 SHARES = (0.2, 0.0, 0.0)
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def situation(seed: int, degree: int, count: int = 7):

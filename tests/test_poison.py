@@ -6,21 +6,11 @@ import pytest
 from poison_judge import is_precise, judge
 from splat_scenes import alone, front_view, random_layers
 
-from rasterizer.device import NoDevice
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 
 SEEDS = 600
 MANY = 20_000
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def good_picture(renderer: Renderer) -> np.ndarray:

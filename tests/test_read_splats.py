@@ -8,7 +8,7 @@ import pytest
 from runtime_models.evaluate import Evaluator
 from runtime_models.formats import read_plain as read_ply
 from runtime_models.model import BadFile
-from runtime_models.plain_splats import PlainSplats, Reading
+from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import read_layers
 from runtime_models.read_scene import describe, read_model
 from runtime_models.read_splat import ROW
@@ -16,21 +16,9 @@ from runtime_models.rotation import covariance
 from runtime_models.spherical_harmonics import shade
 from runtime_models.turn import turn_half
 from runtime_models.write_ply import write_ply
+from tests.ply_files import some_splats
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
-
-
-def some_splats(count=20, coefficients=16, seed=0):
-    rng = np.random.default_rng(seed)
-    wxyz = rng.normal(size=(count, 4))
-    arrays = (
-        rng.normal(size=(count, 3)),
-        rng.uniform(0.01, 1, (count, 3)),
-        wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
-        rng.uniform(0.01, 0.99, count),
-        rng.normal(size=(count, coefficients, 3)),
-    )
-    return PlainSplats(*(a.astype(np.float32) for a in arrays))
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 9, 16])

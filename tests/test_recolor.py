@@ -3,26 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from rasterizer.device import NoDevice
 from renderer.recolor import Colored, centre_of, color_key, reach_of, seen_anchors
-from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from scene.pose import Pose, View, look_at
 from tests.splat_scenes import alone, front_view, psnr_db, random_layers, random_model, stereo_views
 
 TURNED = Pose(np.array([0.1, 0.2, 0.3]), np.array([0.8, 0, 0.6, 0]))
 NARROW = (-0.08, 0.12, -0.1, 0.05)
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def looking(yaw: float, size=(96, 72), tangents=NARROW) -> View:

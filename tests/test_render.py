@@ -19,23 +19,20 @@ from app.errors import UsageError
 from renderer.palette import palette_colors
 from renderer.reference import reference_image
 from runtime_models.read_scene import read_model
-from runtime_models.write_package import write_package
 from scene.framing import default_view
 from scene.metrics import psnr
 from scene.pose import look_at
 from scene.read_cameras import read_cameras
 from scene.scene import Scene, SceneObject
 from scene.stereo import stereo_pair
-from tests.models import make_random_model
+from tests.models import random_package
 
 TINY = ["--size", "40x30", "--context", "none"]
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("scene") / "random.shift"
-    write_package(make_random_model(50, k=4), path)
-    return path
+    return random_package(tmp_path_factory.mktemp("scene"), 50, k=4)
 
 
 def render(*arguments):

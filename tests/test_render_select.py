@@ -6,21 +6,18 @@ from PIL import Image
 
 from app import cli
 from runtime_models.read_scene import read_model
-from runtime_models.write_package import write_package
 from scene.control import Sweep, control_of, snap
 from scene.framing import default_view
 from scene.read_selector import read_selector
 from scene.scene import Scene, SceneObject
-from tests.models import STOPS, make_random_model
+from tests.models import STOPS, random_package
 
 TINY = ["--size", "40x30", "--context", "none", "--camera", "front"]
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
-    path = tmp_path_factory.mktemp("scene") / "random.shift"
-    write_package(make_random_model(50, k=4), path)
-    return path
+    return random_package(tmp_path_factory.mktemp("scene"), 50, k=4)
 
 
 def render(*arguments) -> int:

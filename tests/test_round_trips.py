@@ -26,12 +26,6 @@ SIZE = (240, 160)
 
 
 @pytest.fixture(scope="module")
-def renderer():
-    with Renderer(None) as renderer:
-        yield renderer
-
-
-@pytest.fixture(scope="module")
 def leg(data) -> PlainSplats:
     """Part of a real scene of degree 3, with the places and sizes that training leaves."""
     path = data / "anatomy_leg_ml3dgs" / "layer2.ply"

@@ -10,7 +10,6 @@ from rasterizer.tint import tint
 from renderer.false_colors import FalseColors, false_colors, tinted
 from renderer.palette import apply_palette, palette_colors, thermal_blend, thermal_weights
 from renderer.reference import reference_image
-from renderer.renderer import Renderer
 from runtime_models.evaluate import evaluate
 from runtime_models.model import Stop
 from scene.control import control_of
@@ -23,15 +22,6 @@ VIEW = front_view((160, 120))
 BALL = Sphere(centre=(0.2, 0, 0), radius=0.5, x=1.0, border=0.4)
 ASIDE = Pose(np.array([0.4, 0.1, 0]), np.array([0.8, 0, 0.6, 0]))
 STOPS = (Stop("RGB", 0.0), Stop("Hot", 0.5, "thermal", "ironbow"), Stop("Open", 1.0))
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def scene_of(model, **changes) -> Scene:

@@ -14,8 +14,6 @@ from app.compare_sides import open_side
 from app.errors import UsageError
 from app.opening import ReadingOptions
 from app.subject import Subject, open_subject
-from rasterizer.device import NoDevice
-from renderer.renderer import Renderer
 from runtime_models.formats import read_plain
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
@@ -52,15 +50,6 @@ def scene(tmp_path) -> Path:
     path = folder / "several.scene.json"
     path.write_text(json.dumps({"objects": objects}))
     return path
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def drawn(renderer, scene: Scene, view) -> np.ndarray:

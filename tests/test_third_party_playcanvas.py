@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_round_trips import compare, renderer, rows  # noqa: F401  (a fixture)
+from test_round_trips import compare, rows
 
 from runtime_models.formats import read_plain
 from runtime_models.plain_splats import PlainSplats
@@ -63,11 +63,7 @@ def degree(splats: PlainSplats, number: int) -> PlainSplats:
 @pytest.mark.parametrize("number", [0, 3])
 @pytest.mark.parametrize("form", ["compressed.ply", "sog"])
 def test_what_gaussforge_writes_shows_the_same_to_us_and_to_it(
-    renderer,  # noqa: F811
-    leg,
-    tmp_path,
-    form,
-    number,
+    renderer, leg, tmp_path, form, number
 ):
     splats = degree(leg, number)
     plain = tmp_path / "plain.ply"

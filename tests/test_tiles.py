@@ -18,7 +18,6 @@ from splat_scenes import (
     two_objects,
 )
 
-from rasterizer.device import NoDevice
 from renderer.palette import palette_colors
 from renderer.recolor import color_key
 from renderer.reference import reference_image
@@ -33,22 +32,13 @@ from tests.models import without_control
 AWAY = View(look_at((0, 0, 9), (0, 0, 20)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (32, 16))
 
 
-@pytest.fixture(scope="module")
-def opened():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-
-
 @pytest.fixture
-def renderer(opened):
+def renderer(renderer):
     """One renderer for all tests, empty and with default settings at the start of each."""
-    opened.settings = RenderSettings()
-    opened.update(Scene(()))
-    opened.draw([AWAY])
-    return opened
+    renderer.settings = RenderSettings()
+    renderer.update(Scene(()))
+    renderer.draw([AWAY])
+    return renderer
 
 
 def drawn(renderer: Renderer, scene: Scene, view: View) -> np.ndarray:

@@ -4,22 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_counts, reference_image
 from renderer.renderer import Renderer
 from renderer.settings import CULL_REASONS, RenderSettings
 from scene.scene import Scene
 from tests.gl.test_culls import FRONT, LIMITS, SCENES, THRESHOLDS
 from tests.splat_scenes import alone, front_view, psnr_db, stereo_views, two_objects
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
 
 
 def counts(renderer: Renderer, scene: Scene, views: list, settings: RenderSettings) -> dict:

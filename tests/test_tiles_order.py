@@ -15,15 +15,6 @@ from scene.scene import Scene, SceneObject
 from tests.splat_scenes import alone, front_view, psnr_db, random_layers, stereo_views, two_objects
 
 
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-
-
 def orbit(degrees: float, size=(120, 90)) -> View:
     angle = np.radians(degrees)
     eye = 4 * np.array([np.sin(angle), 0.2, np.cos(angle)])

@@ -5,30 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
 from scene.pose import Pose, View, look_at
+from tests.frames import draw
 from tests.splat_scenes import alone, front_view, one_splat, psnr_db, stereo_views, two_objects
 
 APART = 0.064  # metres between the eyes
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-
-
-def draw(renderer: Renderer, scene, views: list[View], **settings) -> list[np.ndarray]:
-    renderer.settings = RenderSettings(**settings)
-    renderer.update(scene)
-    renderer.draw(views)
-    return [renderer.image(i).copy() for i in range(len(views))]
 
 
 def eyes(tangents: tuple, right_tangents: tuple | None = None, cant: float = 0.0) -> list[View]:

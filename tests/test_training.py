@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from runtime_models.evaluate import evaluate
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
 from runtime_models.write_package import write_package
 from scene.capture import Capture
+from tests.training_runs import run
 from training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from training.evaluate import evaluate_model
 from training.settings import TrainSettings
@@ -28,21 +28,8 @@ SETTINGS = TrainSettings(iterations=200, grow=False, anchors=2000)
 
 
 @pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
-
-
-@pytest.fixture(scope="module")
 def balls(tmp_path_factory) -> Capture:
     return make_balls(tmp_path_factory.mktemp("balls"), size=100, views=20, test_views=4)
-
-
-def run(trainer: Trainer, steps: int | None = None) -> Trainer:
-    """Train to the end of the budget, or for so many steps."""
-    for now in trainer.steps():
-        if steps is not None and now.iteration >= steps:
-            break
-    return trainer
 
 
 def same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:

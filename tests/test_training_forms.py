@@ -16,7 +16,6 @@ from test_training_gradients import (
     situation,
 )
 
-from rasterizer.device import open_device
 from scene.capture import Capture
 from training.losses import ImageLoss
 from training.networks import HeadLayout, Heads, blocks_of_weights, initial_weights, padded
@@ -28,11 +27,6 @@ from training.synthetic.balls import make_balls
 from training.train import Trainer
 
 SETTINGS = TrainSettings(iterations=40, anchors=300, grow=False)
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from scene.pose import View, look_at, perspective
 from training.drawing import camera_of
@@ -27,11 +26,6 @@ VOXEL = 0.5
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
 BACKGROUND = (0.2, 0.5, 0.9)
 SHARES = (0.2, 0.05, 0.03)  # D-SSIM, lambda_alpha, lambda_S
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def situation(seed: int, layout: HeadLayout = LAYOUT):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
-from rasterizer.device import open_device
 from rasterizer.reference import render_reference
 from runtime_models.model import BadFile, ControlEncoding, Stop
 from runtime_models.write_package import write_package
@@ -27,11 +26,6 @@ from training.step import Step
 
 RNG = np.random.default_rng
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0))
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def learned(device, watch: Watch, weight: np.ndarray | None = None):

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from runtime_models.write_package import write_package
 from scene.capture import Capture
+from tests.training_runs import bits
 from training.checkpoint import read_checkpoint, write_checkpoint
 from training.settings import TrainSettings
 from training.synthetic.balls import make_balls
@@ -27,11 +27,6 @@ WAYS = {
 
 
 @pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
-
-
-@pytest.fixture(scope="module")
 def balls(tmp_path_factory) -> Capture:
     return make_balls(tmp_path_factory.mktemp("balls"), size=100, views=20, test_views=2)
 
@@ -42,11 +37,6 @@ def run(trainer: Trainer, steps: int | None = None) -> Trainer:
         if steps is not None and now.iteration >= steps:
             break
     return trainer
-
-
-def bits(trainer: Trainer) -> list[bytes]:
-    state, _ = trainer.checkpoint()
-    return [name.encode() + state[name].tobytes() for name in sorted(state)]
 
 
 @pytest.mark.parametrize("way", WAYS)

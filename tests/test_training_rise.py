@@ -6,9 +6,9 @@ import fit_scenes
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from runtime_models.model import Stop
+from tests.training_runs import bits, run
 from training.checkpoint import read_checkpoint, write_checkpoint
 from training.gaussians import Gaussians
 from training.rise import AFTER_A_FALL, FAINT, LEAST_RATE, PULL, Rise, after_fall, draw_up
@@ -16,11 +16,6 @@ from training.settings import TrainSettings
 from training.train import Trainer
 
 SETTINGS = TrainSettings(iterations=450, grow=False, anchors=600)
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 @pytest.fixture(scope="module")
@@ -33,18 +28,6 @@ def apart(tmp_path_factory):
         )
         patch.setitem(fit_scenes.SHAPES, "alone", alone)
         return fit_scenes.make_shapes(tmp_path_factory.mktemp("apart"), "alone")
-
-
-def run(trainer: Trainer, steps: int | None = None) -> Trainer:
-    for now in trainer.steps():
-        if steps is not None and now.iteration >= steps:
-            break
-    return trainer
-
-
-def bits(trainer: Trainer) -> list[bytes]:
-    state, _ = trainer.checkpoint()
-    return [name.encode() + state[name].tobytes() for name in sorted(state)]
 
 
 def test_rates_rise_quadratically_and_only_those_of_the_networks():

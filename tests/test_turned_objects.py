@@ -6,13 +6,12 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_image
-from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
-from scene.pose import Pose, View
+from scene.pose import Pose
 from scene.scene import IDENTITY, Scene, SceneObject
 from scene.selector import Box, HalfSpace, Lens, Sphere
+from tests.frames import draw
 from tests.object_scenes import ODD, put, turned_view
 from tests.splat_scenes import (
     alone,
@@ -28,22 +27,6 @@ VIEW = front_view((120, 90))
 HERE = Pose(np.array([0.2, -0.1, 0.3]), ODD)
 SAME = 85  # dB at least: one picture by two ways through float32 (quads round their records)
 APART = 45  # dB at most, where a step was left out
-
-
-@pytest.fixture(scope="module")
-def renderer():
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-
-
-def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
-    renderer.settings = RenderSettings(**settings)
-    renderer.update(scene)
-    renderer.draw(views)
-    return [renderer.image(i).copy() for i in range(len(views))]
 
 
 def cloud(degree: int):

@@ -4,9 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from rasterizer.device import open_device
 from rasterizer.reference import render_reference
 from runtime_models.evaluate import evaluate
 from runtime_models.model import Mlp
@@ -19,11 +17,6 @@ from training.witness import likeness, most_pixels, shared_outlines
 
 SIZE = (40, 30)
 SHAPE = ("offset", "scale", "rotation", "opacity")
-
-
-@pytest.fixture(scope="module")
-def device():
-    return open_device("cpu")
 
 
 def photo_of(modality: str, azimuth: float, seed: int) -> LoadedPhoto:

@@ -3,8 +3,6 @@
 The yardstick: what an anchor model saves and gains is told beside this.
 """
 
-import time
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -18,14 +16,13 @@ from training.drawing import Color
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import choose_voxel, initial_points, pixel_of, voxel_centres
-from training.metrics import psnr
 from training.optimizer import Adam
 from training.photos import BLACK, LoadedPhoto, Targets, choose_downscale, load_photos
 from training.plain_density import changed_splats, decide, extent_of, reset_opacity
 from training.plain_settings import PlainRates, PlainSettings
 from training.plain_step import REST, PlainEvidence, PlainStep
+from training.run import SETTLE, Run
 from training.schedule import Budget, Schedule, choose_background
-from training.train import PACE_STEPS, SETTLE, Progress
 
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
 DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
@@ -74,10 +71,10 @@ def group_rates(rates: PlainRates, extent: float) -> dict[str, np.ndarray]:
     return {name: np.array([rate], np.float32) for name, rate in each.items() if name != "decay"}
 
 
-class PlainTrainer:
+class PlainTrainer(Run):
     """One run over a capture of one modality.  `steps` trains; `splats` gives what there is."""
 
-    unit = "splats"
+    unit, counted = "splats", "means"
 
     def __init__(self, device, capture: Capture, settings: PlainSettings) -> None:
         self.device, self.capture, self.settings = device, capture, settings
@@ -121,26 +118,8 @@ class PlainTrainer:
     def count(self) -> int:
         return len(self.adam["means"])
 
-    @property
-    def settled(self) -> bool:
-        """Whether the last change of the splats lies far enough back for the picture to count."""
-        return self.iteration - self.grown_at >= SETTLE
-
-    def rates(self) -> PlainRates:
-        return self.settings.rates(self.run_length or 0)
-
     def all_rates(self) -> dict[str, np.ndarray]:
         return group_rates(self.rates(), self.extent)
-
-    def steps(self) -> Iterator[Progress]:
-        """Train until the budget is used; yields after every step."""
-        self.warm_up()
-        clock = time.perf_counter()
-        while self.budget.fraction(self.iteration, self.elapsed) < 1:
-            loss, fell_back = self.one_step()
-            self.elapsed = time.perf_counter() - clock
-            fraction = self.budget.fraction(self.iteration, self.elapsed)
-            yield Progress(self.iteration, fraction, loss, self.count, fell_back)
 
     def warm_up(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted."""
@@ -183,9 +162,7 @@ class PlainTrainer:
         if self.iteration % GUARD_EVERY == 0:
             loss = self.targets.loss(photo).value()
             fell_back = self.look_after(loss)
-        if self.run_length is None and self.iteration == PACE_STEPS:
-            self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
-            self.adam.set_rates(self.all_rates())
+        self.find_pace()
         if self.settings.grow and GROW_FROM <= fraction <= GROW_UNTIL:
             if self.steps_to_go() >= SETTLE:
                 self.change()
@@ -195,10 +172,6 @@ class PlainTrainer:
         """How many more the budget allows, as fast as they have been."""
         done = self.budget.fraction(self.iteration, self.elapsed)
         return self.iteration * (1 - done) / max(done, 1e-9)
-
-    def visible(self) -> float:
-        """The share of all splats that the last drawing has on screen."""
-        return float((self.device.view(self.drawing.projected.record)[:, 9] > 0).mean())
 
     def look_after(self, loss: float) -> bool:
         """The guard's look at the last step; True when it turned the run back."""
@@ -235,9 +208,8 @@ class PlainTrainer:
         """Mean PSNR in dB over the first held-out photos, as they are trained."""
         background, values = self.schedule.background or BLACK, []
         for photo in self.held_out[:most]:
-            frame = self.step.draw(photo.view, background).frame
-            image = self.device.download(frame.image).transpose(1, 2, 0)
-            values.append(psnr(image, photo.over(background), photo.weight))
+            drawing = self.step.draw(photo.view, background)
+            values.append(self.psnr_of(drawing, photo, background))
         return {self.stop.name: float(np.mean(values))} if values else {}
 
     def splats(self) -> PlainSplats:

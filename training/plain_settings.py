@@ -2,6 +2,8 @@
 
 from dataclasses import asdict, dataclass
 
+from training.settings import refuse_numbers
+
 SHORT_RUN = 1000  # iterations
 
 
@@ -57,12 +59,7 @@ class PlainSettings:
             "depth_share": 0,
             "rate_scale": 0,
         }  # fmt: skip
-        for name, low in least.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value < float("inf"):
-                raise ValueError(f"{name} is {value}; it has to be at least {low}.")
-        if not self.ssim_share <= 1:
-            raise ValueError(f"ssim_share is {self.ssim_share}; it is a share, 0 to 1.")
+        refuse_numbers(self, least, ("ssim_share",))
         if not self.sh_degree <= 3:
             raise ValueError(f"sh_degree is {self.sh_degree}; harmonics go up to degree 3.")
         if self.iterations is None and self.seconds is None:

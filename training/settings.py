@@ -35,6 +35,17 @@ SHORT_RUN = 4000  # iterations
 PAPER = Rates(0.001, 0.001, 0.0004, 0.0005, 0.008, 0.0075, 0.01, decay=0.1)
 
 
+def refuse_numbers(settings: object, least: dict[str, float], shares: tuple[str, ...]) -> None:
+    """Raises ValueError naming the first number below its least, not finite, or no share."""
+    for name, low in least.items():
+        value = getattr(settings, name)
+        if value is not None and not low <= value < float("inf"):
+            raise ValueError(f"{name} is {value}; it has to be at least {low}.")
+    for name in shares:
+        if not getattr(settings, name) <= 1:
+            raise ValueError(f"{name} is {getattr(settings, name)}; it is a share, 0 to 1.")
+
+
 @dataclass(frozen=True)
 class TrainSettings:
     """What is written into a package's provenance and checked when a run is resumed."""
@@ -99,14 +110,8 @@ class TrainSettings:
             "prune_views": 0, "sigma": 1e-3, "between_share": 0, "between_pull": 0,
             "thermal_smooth": 0,
         }  # fmt: skip
-        for name, low in least.items():
-            value = getattr(self, name)
-            if value is not None and not low <= value < float("inf"):
-                raise ValueError(f"{name} is {value}; it has to be at least {low}.")
         shares = ("ssim_share", "coarse_until", "grow_replace", "prune_views", "between_share")
-        for name in shares:
-            if not getattr(self, name) <= 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it is a share, 0 to 1.")
+        refuse_numbers(self, least, shares)
         if self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse is {self.coarse}; it has to be a power of two: 1, 2, 4 or 8.")
         if self.encoding not in ("even", "stops"):

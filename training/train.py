@@ -1,9 +1,5 @@
 """The training loop: a Capture in, step after step, and at any moment an AnchorModel out."""
 
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 import numpy as np
 
 from runtime_models.model import AnchorModel, BadFile, ControlEncoding
@@ -20,7 +16,6 @@ from training.export import model_of
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import choose_voxel, initial_points, voxel_centres
-from training.metrics import psnr
 from training.networks import HeadLayout, initial_weights, padded
 from training.optimizer import Adam
 from training.photos import (
@@ -31,26 +26,14 @@ from training.photos import (
     load_photos,
 )
 from training.rise import Rise, after_fall
+from training.run import SETTLE, Run
 from training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
 from training.settings import Rates, TrainSettings
 from training.step import Step
 
 GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
-SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
-PACE_STEPS = 20  # steps after which the length of a timed run is known
 EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background
 FEATURE_SPREAD = 0.1  # standard deviation of the first features
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a step has to say."""
-
-    iteration: int  # steps done
-    fraction: float  # of the budget, 0..1
-    loss: float | None  # every few steps
-    anchors: int
-    fell_back: bool = False  # the guard turned the run back
 
 
 def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str, np.ndarray]:
@@ -66,10 +49,10 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
     }
 
 
-class Trainer:
+class Trainer(Run):
     """One run.  `steps` trains; `model` may be called between any two steps."""
 
-    unit = "anchors"  # what Progress counts
+    unit = counted = "anchors"
 
     def __init__(
         self,
@@ -177,14 +160,6 @@ class Trainer:
     def anchors_count(self) -> int:
         return len(self.adam["anchors"])
 
-    @property
-    def settled(self) -> bool:
-        """Whether the last growing lies far enough back for the picture to count."""
-        return self.iteration - self.grown_at >= SETTLE
-
-    def rates(self) -> Rates:
-        return self.settings.rates(self.run_length or 0)
-
     def all_rates(self) -> dict[str, np.ndarray]:
         rates = parameter_rates(self.layout, self.rates(), self.voxel)
         return self.rise.rates(rates, self.iteration)
@@ -192,17 +167,6 @@ class Trainer:
     def control(self, modality: str) -> np.ndarray:
         x = next(s.x for s in self.stops if s.name == modality)
         return self.encoding.encode(x)
-
-    def steps(self) -> Iterator[Progress]:
-        """Train until the budget is used; yields after every step."""
-        self.warm_up()
-        clock = time.perf_counter() - self.elapsed
-        self.elapsed = time.perf_counter() - clock
-        while self.budget.fraction(self.iteration, self.elapsed) < 1:
-            loss, fell_back = self.one_step()
-            self.elapsed = time.perf_counter() - clock
-            fraction = self.budget.fraction(self.iteration, self.elapsed)
-            yield Progress(self.iteration, fraction, loss, self.anchors_count, fell_back)
 
     def warm_up(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted.
@@ -291,17 +255,11 @@ class Trainer:
         if rounds % GUARD_EVERY == 0 and at_stop:  # every modality in turn, however many there are
             loss = self.targets.loss(photo).value()
             fell_back = self.look_after(photo, background, loss)
-        if self.run_length is None and self.iteration == PACE_STEPS:
-            self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
-            self.adam.set_rates(self.all_rates())
+        self.find_pace()
         if self.settings.grow and self.iteration % self.settings.grow_every == 0:
             if GROW_FROM <= fraction <= GROW_UNTIL and self.steps_to_go() >= SETTLE:
                 self.grow()
         return loss, fell_back
-
-    def visible(self) -> float:
-        """The share of all splats that the last drawing has on screen."""
-        return float((self.device.view(self.drawing.projected.record)[:, 9] > 0).mean())
 
     def shown(self, photo: LoadedPhoto, background: Color) -> float:
         """Contrast of the last drawing to its background, over that of its photo."""
@@ -370,8 +328,7 @@ class Trainer:
             values = []
             for photo in photos:
                 drawing = self.step.draw(photo.view, self.control(stop.name), background)
-                image = self.device.download(drawing.frame.image).transpose(1, 2, 0)
-                values.append(psnr(image, photo.over(background), photo.weight))
+                values.append(self.psnr_of(drawing, photo, background))
             if values:
                 out[stop.name] = float(np.mean(values))
         return out

@@ -12,10 +12,7 @@ case of that name of `launch.py stability` says of the first one: "holds", or wh
 """
 
 import argparse
-import csv
-import shlex
 import sys
-import tempfile
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -25,20 +22,20 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
+from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
+
 from app.stability_cases.motion import SIGMA, Span  # noqa: E402
 from rasterizer.device import open_device  # noqa: E402
 from runtime_models.model import BadFile  # noqa: E402
 from scene.capture import Capture  # noqa: E402
 from scene.pose import View  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
 from training.midpoints import (  # noqa: E402
     Frequencies,
     Midpoints,
     between,
     draw_in_training,
 )
-from training.photos import BLACK, choose_downscale, load_photos  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
+from training.photos import BLACK  # noqa: E402
 from training.train import Trainer  # noqa: E402
 
 FREQUENCIES = "frequencies"
@@ -72,77 +69,24 @@ def spans(capture: Capture) -> list[tuple]:
     return list(pairwise(sorted(capture.stops, key=lambda stop: stop.x)))
 
 
-def asked() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("captures", nargs="+")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
-    parser.add_argument("--iterations", type=int)
-    parser.add_argument("--anchors", type=int, default=4000, help="to start with at most")
-    parser.add_argument("--max-anchors", type=int, default=12000)
-    parser.add_argument("--downscale", type=int)
-    parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
+def main() -> None:
+    parser = parser_of(__doc__, WAYS)
     parser.add_argument("--views", type=int, default=4, help="to look from")
     parser.add_argument("--steps", type=int, default=50, help="of x between two stops")
-    options = parser.parse_args()
-    if options.seconds is None and options.iterations is None:
-        parser.error("a run needs an end: give --seconds or --iterations")
-    return options
-
-
-def main() -> None:
-    options = asked()
-    settings = TrainSettings(
-        iterations=options.iterations, seconds=options.seconds, anchors=options.anchors,
-        max_anchors=options.max_anchors, downscale=options.downscale,
-    )  # fmt: skip
-    device = open_device()
-    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
-        file.write(f"# python3 docs/bench/between.py {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        rows.writeheader()
-        for name in options.captures:
-            capture = read_capture(made(name, Path(folder), options.size))
-            factor = options.downscale or choose_downscale(capture.photos)
-            photos = {
-                split: load_photos(capture, split, factor, settings.masks)
-                for split in ("train", "test")
-            }
-            for seed in options.seeds:
-                for way in options.ways:
-                    changed = replace(settings, seed=seed, **WAYS[way])
-                    first = capture.stops[0].name
-                    changed = replace(changed, balance=changed.balance.replace("FIRST", first))
-                    try:
-                        trainer = Trainer(device, capture, changed, loaded=photos)
-                    except BadFile as error:  # photos of which no two share a place
-                        sys.stderr.write(f"{name}, {way}: {error}\n")
-                        continue
-                    if way == FREQUENCIES:
-                        trainer.encoding = Frequencies(changed.control)
-                    for row in measured(trainer, options):
-                        rows.writerow({"capture": Path(name).name, "way": way, "seed": seed} | row)
-                    file.flush()
-
-
-def made(name: str, folder: Path, size: int) -> Path:
-    """The folder of a capture, which is made first where the name is that of one of ours."""
-    from training.synthetic.balls import make_balls
-    from training.synthetic.workshop import make_workshop
-
-    if name == "balls":
-        make_balls(folder / name, size)
-    elif name == "rig":
-        make_balls(folder / name, size, rig=True)
-    elif name == "workshop":
-        make_workshop(folder / name)
-    else:
-        return Path(name)
-    return folder / name
+    options, device = asked(parser), open_device()
+    with table(options, COLUMNS, device) as add:
+        for turn in turns(options, settings_of(options), WAYS):
+            first = turn.capture.stops[0].name
+            balance = turn.settings.balance.replace("FIRST", first)
+            changed = replace(turn.settings, balance=balance)
+            try:
+                trainer = Trainer(device, turn.capture, changed, loaded=turn.photos)
+            except BadFile as error:  # photos of which no two share a place
+                sys.stderr.write(f"{turn.about['capture']}, {turn.about['way']}: {error}\n")
+                continue
+            if turn.about["way"] == FREQUENCIES:
+                trainer.encoding = Frequencies(changed.control)
+            add(turn.about | row for row in measured(trainer, options))
 
 
 def measured(trainer: Trainer, options: argparse.Namespace) -> list[dict]:

@@ -11,11 +11,7 @@ opaque, the mean over the stops.  Ways take turns within a seed, so that what el
 spreads over all of them.
 """
 
-import argparse
-import csv
-import shlex
 import sys
-import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -25,12 +21,11 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
+from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
+
 from rasterizer.device import open_device  # noqa: E402
 from rasterizer.project import LEAST_ALPHA  # noqa: E402
 from runtime_models.write_package import package_files, zip_files  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
-from training.photos import choose_downscale, load_photos  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
 from training.train import Trainer  # noqa: E402
 
 WAYS = {
@@ -61,68 +56,16 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def asked() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("captures", nargs="+")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
-    parser.add_argument("--iterations", type=int)
-    parser.add_argument("--anchors", type=int, default=4000, help="to start with at most")
-    parser.add_argument("--max-anchors", type=int, default=12000)
+def main() -> None:
+    parser = parser_of(__doc__, WAYS)
     parser.add_argument("--max-mb", type=float)
     parser.add_argument("--grow-every", type=int, default=100, help="steps")
-    parser.add_argument("--downscale", type=int)
-    parser.add_argument("--ways", nargs="+", choices=list(WAYS), default=list(WAYS))
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--size", type=int, default=200, help="pixels of the photos of balls")
-    options = parser.parse_args()
-    if options.seconds is None and options.iterations is None:
-        parser.error("a run needs an end: give --seconds or --iterations")
-    return options
-
-
-def main() -> None:
-    options = asked()
-    settings = TrainSettings(
-        iterations=options.iterations, seconds=options.seconds, anchors=options.anchors,
-        max_anchors=options.max_anchors, max_mb=options.max_mb, downscale=options.downscale,
-        grow_every=options.grow_every,
-    )  # fmt: skip
-    device = open_device()
-    with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
-        file.write(f"# python3 docs/bench/growth.py {shlex.join(words)}\n")
-        file.write(f"# {device.name}, {device.platform}\n")
-        rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        rows.writeheader()
-        for name in options.captures:
-            capture = read_capture(made(name, Path(folder), options.size))
-            factor = options.downscale or choose_downscale(capture.photos)
-            photos = {
-                split: load_photos(capture, split, factor, settings.masks)
-                for split in ("train", "test")
-            }
-            for seed in options.seeds:
-                for way in options.ways:
-                    changed = replace(settings, seed=seed, **WAYS[way])
-                    for row in measured(Trainer(device, capture, changed, loaded=photos)):
-                        rows.writerow({"capture": Path(name).name, "way": way, "seed": seed} | row)
-                    file.flush()
-
-
-def made(name: str, folder: Path, size: int) -> Path:
-    """The folder of a capture, which is made first where the name is that of one of ours."""
-    if name == "balls":
-        from training.synthetic.balls import make_balls
-
-        make_balls(folder / name, size)
-    elif name == "workshop":
-        from training.synthetic.workshop import make_workshop
-
-        make_workshop(folder / name)
-    else:
-        return Path(name)
-    return folder / name
+    options, device = asked(parser), open_device()
+    settings = replace(settings_of(options), max_mb=options.max_mb, grow_every=options.grow_every)
+    with table(options, COLUMNS, device) as add:
+        for turn in turns(options, settings, WAYS):
+            trainer = Trainer(device, turn.capture, turn.settings, loaded=turn.photos)
+            add(turn.about | row for row in measured(trainer))
 
 
 def measured(trainer: Trainer) -> list[dict]:

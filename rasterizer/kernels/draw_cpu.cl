@@ -8,7 +8,6 @@
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
-#define HALF_LOG2E 0.72134752044f
 
 #define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
                          0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)

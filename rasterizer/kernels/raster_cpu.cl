@@ -5,10 +5,7 @@
 // Reads: tile_start (tiles + 1), instances, record.  Early stop: blocks whose transmittance is
 // below STOP everywhere are dropped from the mask every BATCH instances; a tile ends with its last.
 #include "common/vector.cl"
-#include "common/tiles.cl"
-#ifdef SURFACE
-#include "common/surface.cl"
-#endif
+#include "common/raster.cl"
 #define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
 #define BLOCK_H 2
 #define DOWN (TILE / BLOCK_H)   // blocks in a column
@@ -17,8 +14,6 @@
 #define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
 #define SHIFT_H 1                // log2 of BLOCK_H
 #define BATCH 32
-#define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
-#define HALF_LOG2E 0.72134752044f
 
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
@@ -129,14 +124,7 @@ inline Depth8 depth_under(const float8 f, float8 dx, float8 dy) {
 #endif
 
 // SURFACE: with a depth a splat (surface.cl), metres become the sum of alpha T z.
-__kernel void rasterize(int width, int height, int tiles_x, __global const int* tile_start,
-                        __global const int* instances, __global const float* record, float red,
-                        float green, float blue, __global float* image,
-                        __global float* transmittance, __global int* tile_end
-#ifdef SURFACE
-                        , __global const float* surface, __global float* metres
-#endif
-                        ) {
+__kernel void rasterize(RASTERIZE_TAKES) {
   const int tile = get_global_id(0);
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
 #ifdef SURFACE
@@ -218,22 +206,7 @@ __kernel void rasterize(int width, int height, int tiles_x, __global const int* 
 // which needs no division to get T back.  Each instance writes its 12 numbers to its own slot.
 // For growing: ABSOLUTE sums |gradient of the mean| in slots 9 and 10, or SHARE sums alpha T times
 // an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is defined.
-__kernel void rasterize_backward(int width, int height, int tiles_x,
-                                 __global const int* tile_start, __global const int* tile_end,
-                                 __global const int* instances, __global const uint2* places,
-                                 __global const int* first_slot, __global const float* record,
-                                 __global const float* image, __global const float* transmittance,
-                                 __global const float* grad_image,
-                                 __global const float* grad_transmittance, int with_transmittance,
-                                 __global float* slots
-#ifdef SHARE
-                                 , __global const float* error
-#endif
-#ifdef SURFACE
-                                 , __global const float* surface, __global const float* metres,
-                                 __global const float* grad_metres, __global float* depth_slots
-#endif
-                                 ) {
+__kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
   const int tile = get_global_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;

@@ -1,12 +1,6 @@
 // raster, GPU form: one work-group a tile of 16x16 pixels; same inputs and outputs as raster_cpu.cl.
-#include "common/tiles.cl"
-#ifdef SURFACE
-#include "common/surface.cl"
-#endif
+#include "common/raster.cl"
 #define PIXELS (TILE * TILE)
-#ifndef STOP       // drawing for the screen says where it stops
-#define STOP 1e-5f  // so that the gradients stay within 1e-5 of those without a stop
-#endif
 #define LANES 32  // of the backward pass: splats in flight
 
 #ifdef SURFACE  // as in raster_cpu.cl
@@ -27,13 +21,7 @@ inline Depth depth_under(const float8 f, float dx, float dy) {
 
 // A work-item owns a pixel; the group loads 256 splats at a time to local memory.
 __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
-    int width, int height, int tiles_x, __global const int* tile_start,
-    __global const int* instances, __global const float* record, float red, float green,
-    float blue, __global float* image, __global float* transmittance, __global int* tile_end
-#ifdef SURFACE
-    , __global const float* surface, __global float* metres
-#endif
-    ) {
+    RASTERIZE_TAKES) {
 #ifdef SURFACE
   __local int splat_of[PIXELS];
   float depth = 0;
@@ -100,19 +88,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
 // that every pixel sees the splats in order and no two items hold a pixel at once: no atomics, no
 // sums across items.  Formulas as in raster_cpu.cl.
 __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backward(
-    int width, int height, int tiles_x, __global const int* tile_start,
-    __global const int* tile_end, __global const int* instances, __global const uint2* places,
-    __global const int* first_slot, __global const float* record, __global const float* image,
-    __global const float* transmittance, __global const float* grad_image,
-    __global const float* grad_transmittance, int with_transmittance, __global float* slots
-#ifdef SHARE
-    , __global const float* error
-#endif
-#ifdef SURFACE
-    , __global const float* surface, __global const float* metres,
-    __global const float* grad_metres, __global float* depth_slots
-#endif
-    ) {
+    RASTERIZE_BACKWARD_TAKES) {
   __local float T[PIXELS], rest[PIXELS], grad_r[PIXELS], grad_g[PIXELS], grad_b[PIXELS];
 #ifdef SHARE
   __local float wrong[PIXELS];

@@ -7,8 +7,10 @@ import moderngl
 import numpy as np
 import pytest
 
+from rasterizer.device import NoDevice
 from renderer.context import NoContext, open_context
 from renderer.gpu import Gpu
+from renderer.renderer import Renderer
 from runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
@@ -46,6 +48,17 @@ def ctx(session_gpu: Gpu) -> Iterator[moderngl.Context]:
 @pytest.fixture
 def gpu(ctx: moderngl.Context, session_gpu: Gpu) -> Gpu:
     return session_gpu
+
+
+@pytest.fixture(scope="module", params=["quads", "tiles"])
+def renderer(request, session_gpu: Gpu) -> Iterator[Renderer]:
+    """One of either drawing with a target of floats; a module may have its own instead."""
+    with session_gpu.ctx:
+        try:
+            with Renderer(session_gpu.ctx, request.param, target="rgba32f") as made:
+                yield made
+        except NoDevice as reason:
+            pytest.skip(str(reason))
 
 
 def f32(array: np.ndarray) -> np.ndarray:

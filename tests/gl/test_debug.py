@@ -1,12 +1,10 @@
 """Debug pictures of quads and tiles: their numbers are the frame's, their dots are in place."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.classify import classify
 from renderer.debug import (
     DEBUG_NAMES,
@@ -34,24 +32,8 @@ from tests.splat_scenes import (
     two_objects,
 )
 
+pytestmark = pytest.mark.usefixtures("ctx")
 NAMES = ("drawn", *CULL_REASONS)
-
-
-@pytest.fixture(scope="module", params=["quads", "tiles"])
-def renderer(request, session_gpu) -> Iterator[Renderer]:
-    with session_gpu.ctx:
-        try:
-            with Renderer(session_gpu.ctx, request.param, target="rgba32f") as made:
-                yield made
-        except NoDevice as reason:
-            pytest.skip(str(reason))
-
-
-@pytest.fixture(autouse=True)
-def current(session_gpu) -> Iterator[None]:
-    with session_gpu.ctx as ctx:
-        yield
-        assert ctx.error == "GL_NO_ERROR"
 
 
 def shown(renderer: Renderer, scene: Scene, views: list[View], **settings):

@@ -17,6 +17,8 @@ from tests.test_one_sort import (  # noqa: F401  collected here with this module
     test_wherever_the_second_object_begins,
 )
 
+pytestmark = pytest.mark.usefixtures("ctx")
+
 
 @pytest.fixture(scope="module", params=["gl", "numpy"])
 def renderer(request, session_gpu):
@@ -25,10 +27,3 @@ def renderer(request, session_gpu):
         Renderer(session_gpu.ctx, "quads", "auto", request.param, "rgba32f") as made,
     ):
         yield made
-
-
-@pytest.fixture(autouse=True)
-def current(session_gpu):
-    with session_gpu.ctx as ctx:
-        yield
-        assert ctx.error == "GL_NO_ERROR"

@@ -9,6 +9,7 @@ from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from scene.pose import Pose, View
+from tests.frames import draw
 from tests.splat_scenes import (
     alone,
     front_view,
@@ -18,7 +19,6 @@ from tests.splat_scenes import (
     two_objects,
 )
 from tests.test_tiles_stereo import (  # noqa: F401  collected here with this module's renderer
-    draw,
     eyes,
     test_a_shared_order_is_a_sort_for_each_eye_bit_for_bit,
     test_a_view_of_nothing_beside_one_of_something,
@@ -43,13 +43,10 @@ def renderer(request, session_gpu):
 
 
 @pytest.fixture(autouse=True)
-def current(request, session_gpu):
+def current(request, ctx):
     if "renderer" in request.fixturenames and "[pair" in request.node.name:
         if "bit_for_bit" in request.node.name or "each_for_itself" in request.node.name:
             pytest.skip("two views in one draw are rounded otherwise: see test_one_draw_is_two")
-    with session_gpu.ctx as ctx:
-        yield
-        assert ctx.error == "GL_NO_ERROR"
 
 
 SETTINGS = {

@@ -1,5 +1,7 @@
 """Whole frames by both drawing back ends on a GL context: against the reference, and each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from splat_scenes import (
@@ -164,13 +166,16 @@ def pixels(framebuffer) -> np.ndarray:
     return raw.reshape(height, width, 4)[::-1, :, :3]
 
 
+def heated() -> SplatLayers:
+    """A cloud that becomes thermal along the slider."""
+    cloud, stops = random_layers(2000), (Stop("rgb", 0.0), Stop("heat", 1.0, "thermal", "ironbow"))
+    return replace(cloud, stops=stops)
+
+
 @pytest.mark.parametrize("drawing", DRAWINGS)
 def test_presented_is_what_resolved_says_with_and_without_palette(opened, ctx, drawing):
     renderer, view = opened(drawing, target="rgba32f"), front_view((80, 50))
-    cloud = random_layers(2000)
-    stops = (Stop("rgb", 0.0), Stop("heat", 1.0, "thermal", "ironbow"))
-    fields = (cloud.means, cloud.scales, cloud.wxyz, cloud.opacity, cloud.sh, cloud.layer)
-    scene = alone(SplatLayers(*fields, stops), x=0.0)
+    scene = alone(heated(), x=0.0)
     renderer.settings = RenderSettings(background=(0.2, 0.1, 0.3))
     shown = ctx.framebuffer([ctx.texture((80, 50), 4, dtype="f4")])
     images = []
@@ -317,10 +322,7 @@ def test_software_gl_takes_the_cpu_back_ends(opened, ctx):
 def test_eight_bits_show_what_resolved_says(opened, ctx, drawing):
     """Where the framebuffer is a window's size and format tiles hand over bytes, upright."""
     renderer, view = opened(drawing, target="rgba32f"), front_view((83, 50))
-    cloud = random_layers(2000)
-    stops = (Stop("rgb", 0.0), Stop("heat", 1.0, "thermal", "ironbow"))
-    fields = (cloud.means, cloud.scales, cloud.wxyz, cloud.opacity, cloud.sh, cloud.layer)
-    model = SplatLayers(*fields, stops)
+    model = heated()
     renderer.settings = RenderSettings(background=(0.2, 0.1, 0.3))
     same, larger, floats = (
         ctx.simple_framebuffer((83, 50)),

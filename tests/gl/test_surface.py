@@ -1,12 +1,10 @@
 """Depth, normals and coverage: both drawings against rays through ellipsoids in float64."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
@@ -26,22 +24,7 @@ from tests.splat_scenes import (
     two_objects,
 )
 
-
-@pytest.fixture(scope="module", params=["quads", "tiles"])
-def renderer(request, session_gpu) -> Iterator[Renderer]:
-    with session_gpu.ctx:
-        try:
-            with Renderer(session_gpu.ctx, request.param, target="rgba32f") as made:
-                yield made
-        except NoDevice as reason:
-            pytest.skip(str(reason))
-
-
-@pytest.fixture(autouse=True)
-def current(session_gpu) -> Iterator[None]:
-    with session_gpu.ctx as ctx:
-        yield
-        assert ctx.error == "GL_NO_ERROR"
+pytestmark = pytest.mark.usefixtures("ctx")
 
 
 def surface_of(renderer: Renderer, scene: Scene, view: View, **settings):

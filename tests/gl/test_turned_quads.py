@@ -15,6 +15,8 @@ from tests.test_turned_objects import (  # noqa: F401  collected here with this 
     test_what_swings_about_the_eye_into_the_view_has_its_colours,
 )
 
+pytestmark = pytest.mark.usefixtures("ctx")
+
 
 @pytest.fixture(scope="module", params=["gl", "onnxruntime"])
 def renderer(request, session_gpu):
@@ -23,10 +25,3 @@ def renderer(request, session_gpu):
         Renderer(session_gpu.ctx, "quads", request.param, "numpy", "rgba32f") as made,
     ):
         yield made
-
-
-@pytest.fixture(autouse=True)
-def current(session_gpu):
-    with session_gpu.ctx as ctx:
-        yield
-        assert ctx.error == "GL_NO_ERROR"

@@ -29,14 +29,7 @@ def light(display: np.ndarray) -> np.ndarray:
     ],
 )
 def test_a_known_colour_arrives_in_both_eyes(stand, name, linear, within):
-    done = subprocess.run(
-        [sys.executable, PROGRAM, name, "3"],
-        env=stand.environment, capture_output=True, text=True, timeout=60,
-        stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-3000:]
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith('{"format"')]
-    told = json.loads(line)
+    told = stand.tell(PROGRAM, name, "3")
     assert (told["format"], told["linear"]) == (name, linear)
     assert told["states"][-3:] == ["STOPPING", "IDLE", "EXITING"] and told["shown"] >= 3
     display = np.array(PATCHES) / WHITE

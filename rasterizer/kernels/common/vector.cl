@@ -1,5 +1,6 @@
 // Vector rows of a CPU: LANES floats at once.  Defines: floatv, intv, exp2v, sum helpers.
 #define LANES 8
+#define HALF_LOG2E 0.72134752044f  // log2(e) / 2: exponents of 2 out of halves of squares
 #ifdef __has_builtin  // clang, which PoCL and other CPU drivers are made of
 #define PREFETCH(address) __builtin_prefetch(address)
 #else

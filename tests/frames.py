@@ -1,0 +1,23 @@
+"""One frame of a renderer with settings of its own, as tests of every drawing ask for it."""
+
+import numpy as np
+
+from renderer.renderer import Renderer
+from renderer.settings import FrameStats, RenderSettings
+from scene.pose import View
+from scene.scene import Scene
+
+
+def draw_told(
+    renderer: Renderer, scene: Scene, views: list[View], **settings
+) -> tuple[list[np.ndarray], FrameStats]:
+    """(a picture a view, what the frame says of itself)."""
+    renderer.settings = RenderSettings(**settings)
+    renderer.update(scene)
+    stats = renderer.draw(views)
+    return [renderer.image(i).copy() for i in range(len(views))], stats
+
+
+def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
+    """A picture a view."""
+    return draw_told(renderer, scene, views, **settings)[0]

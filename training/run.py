@@ -1,0 +1,94 @@
+"""What a run of anchors and one of plain splats have in common: budget, pace, looks at photos."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rasterizer.device import Device
+from training.drawing import Color, Drawing
+from training.metrics import psnr
+from training.optimizer import Adam
+from training.photos import LoadedPhoto
+from training.plain_settings import PlainRates, PlainSettings
+from training.schedule import Budget
+from training.settings import Rates, TrainSettings
+
+SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
+PACE_STEPS = 20  # steps after which the length of a timed run is known
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a step has to say."""
+
+    iteration: int  # steps done
+    fraction: float  # of the budget, 0..1
+    loss: float | None  # every few steps
+    anchors: int
+    fell_back: bool = False  # the guard turned the run back
+
+
+class Run(ABC):
+    """A run that an optimiser makes step by step.  Who derives from it sets what is named here."""
+
+    unit: str  # what Progress counts ...
+    counted: str  # ... and the group of the optimiser that has a row for each
+    device: Device
+    settings: TrainSettings | PlainSettings
+    budget: Budget
+    adam: Adam
+    drawing: Drawing  # the last one
+    iteration: int  # steps done
+    elapsed: float  # seconds
+    grown_at: int  # iteration of the last change of what is counted
+    run_length: int | None  # iterations in all; None until a timed run's is known
+
+    @abstractmethod
+    def warm_up(self) -> None:
+        """Compile every kernel for every photo size, outside of the time that is counted."""
+
+    @abstractmethod
+    def one_step(self) -> tuple[float | None, bool]:
+        """(loss or None, whether the guard turned back)."""
+
+    @abstractmethod
+    def all_rates(self) -> dict[str, np.ndarray]:
+        """Learning rates of every group, as the optimiser takes them."""
+
+    def steps(self) -> Iterator[Progress]:
+        """Train until the budget is used; yields after every step."""
+        self.warm_up()
+        clock = time.perf_counter() - self.elapsed
+        self.elapsed = time.perf_counter() - clock
+        while self.budget.fraction(self.iteration, self.elapsed) < 1:
+            loss, fell_back = self.one_step()
+            self.elapsed = time.perf_counter() - clock
+            fraction = self.budget.fraction(self.iteration, self.elapsed)
+            yield Progress(self.iteration, fraction, loss, len(self.adam[self.counted]), fell_back)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last growing lies far enough back for the picture to count."""
+        return self.iteration - self.grown_at >= SETTLE
+
+    def rates(self) -> Rates | PlainRates:
+        """The settings' learning rates for a run of this length."""
+        return self.settings.rates(self.run_length or 0)
+
+    def find_pace(self) -> None:
+        """A timed run's length follows from its first steps, and its rates from the length."""
+        if self.run_length is None and self.iteration == PACE_STEPS:
+            self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
+            self.adam.set_rates(self.all_rates())
+
+    def visible(self) -> float:
+        """The share of all splats that the last drawing has on screen."""
+        return float((self.device.view(self.drawing.projected.record)[:, 9] > 0).mean())
+
+    def psnr_of(self, drawing: Drawing, photo: LoadedPhoto, background: Color) -> float:
+        """Decibels of a drawing against its photo."""
+        image = self.device.download(drawing.frame.image).transpose(1, 2, 0)
+        return psnr(image, photo.over(background), photo.weight)
