@@ -285,8 +285,8 @@ class Trainer(Run):
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
         self.rise = after_fall(self.iteration, self.rate_scale / 2, self.rise)
-        looks = self.rise.steps if self.rise.since == self.iteration else 0  # one a stop and round
-        self.go_on_from(self.guard.fall_back(looks // GUARD_EVERY))
+        looks = self.rise.steps if self.rise.since == self.iteration else 0
+        self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
         self.rate_scale /= 2
         return True
 
