@@ -20,7 +20,8 @@ class ModelOptions:
     """How large an anchor model is and what its networks see."""
 
     anchors: int | None = None
-    """How many to start with at most, where --voxel is not given."""
+    """How many to start with at most, where --voxel is not given; where hulls are carved, for each
+    modality's own."""
     voxel: float | None = None
     """Metres between anchors at the start."""
     splats_per_anchor: int | None = None

@@ -58,7 +58,7 @@ def rod_photos(half: np.ndarray) -> list[LoadedPhoto]:
 
 def test_cells_of_a_long_thin_hull_are_cubes():
     half = np.array([0.07, 0.8, 0.06])
-    points = hull_points(rod_photos(half), None)
+    (points,) = hull_points(rod_photos(half), None)
     gaps = [np.diff(np.unique(points[:, axis].round(9))) for axis in range(3)]
     np.testing.assert_allclose(np.concatenate(gaps), gaps[0][0], rtol=1e-6)
     voxel = choose_voxel(points, 10**6, RNG(0))
@@ -87,7 +87,7 @@ def off_surface(p: np.ndarray) -> np.ndarray:
 
 
 def test_depth_photos_give_points_on_the_surfaces(balls, photos):
-    points, origin = initial_points(balls, photos, RNG(0), "depth")
+    points, origin, _ = initial_points(balls, photos, RNG(0), "depth")
     assert origin == "depth photos"  # the background is known: no guesses
     assert len(points) == sum(int((p.depth > 0).sum()) for p in photos)
     assert off_surface(points).max() < 2e-4  # metres: two steps of the depth photos
@@ -193,7 +193,7 @@ def test_a_chunk_table_of_nonsense_is_one_sentence(tmp_path):
 def test_a_cloud_keeps_what_photos_see_in_the_capture_s_axes(tmp_path, balls, photos):
     far = np.array([[500.0, 0, 0], [0, 500, 0]])
     write_las(tmp_path / "scan.las", np.concatenate([balls.points[::10], far]))
-    points, origin = initial_points(balls, photos, RNG(0), str(tmp_path / "scan.las"))
+    points, origin, _ = initial_points(balls, photos, RNG(0), str(tmp_path / "scan.las"))
     count = len(balls.points[::10])
     assert origin == f"scan.las ({count:,} of {count + 2:,} points)"
     np.testing.assert_allclose(points, balls.points[::10], atol=1e-3)

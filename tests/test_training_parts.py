@@ -67,7 +67,7 @@ def sphere_photos(background, alpha: bool) -> list[LoadedPhoto]:
 @pytest.mark.parametrize("alpha", [True, False])
 def test_the_visual_hull_of_a_ball_is_nearly_a_ball(tmp_path, alpha):
     capture = Capture(tmp_path, (Stop("RGB", 0.0),), (), background=(1.0, 1.0, 1.0))
-    points, origin = initial_points(capture, sphere_photos((1, 1, 1), alpha), RNG(0))
+    points, origin, _ = initial_points(capture, sphere_photos((1, 1, 1), alpha), RNG(0))
     radius = np.linalg.norm(points, axis=1)
     assert origin == "hull" and len(points) > 500
     assert 0.44 < np.percentile(radius, 5) and np.percentile(radius, 95) < 0.62
@@ -75,7 +75,7 @@ def test_the_visual_hull_of_a_ball_is_nearly_a_ball(tmp_path, alpha):
 
 def test_photos_that_tell_nothing_give_random_points_where_cameras_look(tmp_path):
     capture = Capture(tmp_path, (Stop("RGB", 0.0),), ())
-    points, origin = initial_points(capture, sphere_photos((1, 1, 1), False), RNG(0))
+    points, origin, _ = initial_points(capture, sphere_photos((1, 1, 1), False), RNG(0))
     assert origin == "random" and len(points) > 1000
     assert np.abs(points).max() < 4 and np.abs(np.median(points, axis=0)).max() < 0.2
 

@@ -1,6 +1,7 @@
 """Where the first anchors stand: at points, on a visual hull, or in the cameras' common view."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -125,19 +126,18 @@ def visual_hull(photos: list[tuple], centre: np.ndarray, half: float) -> np.ndar
     return carved(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
 
 
-def hull_points(photos: list[LoadedPhoto], background: tuple | None) -> np.ndarray | None:
-    """(P, 3) the hulls of every modality together, since one may hide what another shows.
+def hull_points(photos: list[LoadedPhoto], background: tuple | None) -> list[np.ndarray]:
+    """(P, 3) the hull of each modality, since one may hide what another shows.
 
-    None where no photo tells object from background.
+    Empty where no photo tells object from background.
     """
     centre, half = common_box([p.view for p in photos])
-    found = None
+    found = []
     for modality in dict.fromkeys(p.modality for p in photos):
         shapes = [(p.view, silhouette(p, background)) for p in photos if p.modality == modality]
         shapes = [(view, shape) for view, shape in shapes if shape is not None]
         if shapes:
-            hull = visual_hull(shapes, centre, half)
-            found = hull if found is None else np.concatenate([found, hull])
+            found.append(visual_hull(shapes, centre, half))
     return found
 
 
@@ -172,27 +172,48 @@ def filler_points(
     return np.concatenate(found) if found else np.zeros((0, 3))
 
 
+class First(NamedTuple):
+    """Where a run starts."""
+
+    points: np.ndarray  # (P, 3) metres
+    origin: str  # of them, in words
+    shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
+
+
+def first_voxel(first: First, most: int, rng: np.random.Generator, cap: int) -> float:
+    """What leaves every shape `most` anchors at most and all of them together `cap`, metres.
+
+    Where modalities have shapes of their own, each needs as many anchors as it would need alone.
+    """
+    voxel = min(choose_voxel(shape, most, rng) for shape in first.shapes)
+    if len(voxel_centres(first.points, voxel)) <= cap:
+        return voxel
+    return choose_voxel(first.points, cap, rng)
+
+
 def initial_points(
     capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto"
-) -> tuple[np.ndarray, str]:
-    """(P, 3) metres and in words where they come from.  Raises BadFile.
+) -> First:
+    """The first points, from the best source that there is.  Raises BadFile.
 
     source: one of SOURCES, or the path of a cloud; auto takes the first of these that there is:
     the capture's own points, depth photos, the visual hull, random ones.
     """
+    hulls = []
     if source not in SOURCES:
-        return seen_cloud(Path(source), capture, photos, rng)
+        return as_one(seen_cloud(Path(source), capture, photos, rng))
     if source in ("auto", "capture") and capture.points is not None and len(capture.points):
         points = np.asarray(capture.points, np.float64)
-        return with_guesses(points, "points", capture, photos, rng)
+        return as_one(with_guesses(points, "points", capture, photos, rng))
     if source in ("auto", "depth"):
         points = depth_points(photos, rng)
         if len(points):
-            return with_guesses(points, "depth photos", capture, photos, rng)
-    hull = hull_points(photos, capture.background) if source in ("auto", "hull") else None
-    if hull is not None and len(hull):
-        return hull, "hull"
-    if hull is not None and any(p.see_through for p in photos):
+            return as_one(with_guesses(points, "depth photos", capture, photos, rng))
+    if source in ("auto", "hull"):
+        hulls = hull_points(photos, capture.background)
+    if shapes := tuple(hull for hull in hulls if len(hull)):
+        return First(np.concatenate(shapes), "hull", shapes)
+    if hulls and any(p.see_through for p in photos):
         raise BadFile(
             f"{capture.folder}: the masks have no volume in common; check that masks and poses "
             "belong together, or train with --masks ignore."
@@ -204,7 +225,13 @@ def initial_points(
             "hull": "has neither masks nor a known background, so that nothing can be carved",
         }[source]
         raise BadFile(f"{capture.folder} {lacking}; take other --points, or leave them out.")
-    return random_points(photos, rng), "random"
+    return as_one((random_points(photos, rng), "random"))
+
+
+def as_one(found: tuple[np.ndarray, str]) -> First:
+    """Points that all modalities start from alike."""
+    points, origin = found
+    return First(points, origin, (points,))
 
 
 def with_guesses(

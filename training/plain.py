@@ -98,7 +98,7 @@ class PlainTrainer(Run):
         """Round, faint splats at the first points, in the colours of the photos."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        points, self.origin = initial_points(self.capture, photos, rng, settings.points)
+        points, self.origin, _ = initial_points(self.capture, photos, rng, settings.points)
         most = min(settings.splats, settings.max_splats)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         means = voxel_centres(points, self.voxel)

@@ -65,7 +65,7 @@ class TrainSettings:
     encoding: str = "stops"  # Psi: one unit a stop, half a gap wide | even: `control`, `sigma`
     voxel: float | None = None  # metres; None: from the points and `anchors`
     points: str = "auto"  # first: auto | capture | depth | hull | random | the path of a cloud
-    anchors: int = 6000  # to start with at most, where voxel is None
+    anchors: int = 6000  # to start with at most, each carved shape, where voxel is None
     max_anchors: int = 12000  # cap of growing
     max_mb: float | None = None  # the same as megabytes of the package on disk, from the start
     grow: bool = True

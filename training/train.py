@@ -15,7 +15,7 @@ from training.drawing import Color
 from training.export import model_of
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
-from training.initial import choose_voxel, initial_points, voxel_centres
+from training.initial import first_voxel, initial_points, voxel_centres
 from training.networks import HeadLayout, initial_weights, padded
 from training.optimizer import Adam
 from training.photos import (
@@ -114,10 +114,12 @@ class Trainer(Run):
         """Anchors, features and weights of a new run."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        points, self.origin = initial_points(self.capture, photos, rng, settings.points)
-        most = min(settings.anchors, self.most_anchors)
-        self.voxel = settings.voxel or choose_voxel(points, most, rng)
-        anchors = within(voxel_centres(points, self.voxel), self.most_anchors, settings.max_mb)
+        first = initial_points(self.capture, photos, rng, settings.points)
+        self.origin, most = first.origin, min(settings.anchors, self.most_anchors)
+        self.voxel = settings.voxel or first_voxel(first, most, rng, self.most_anchors)
+        anchors = within(
+            voxel_centres(first.points, self.voxel), self.most_anchors, settings.max_mb
+        )
         features = np.zeros((len(anchors), padded(settings.features)), np.float32)
         features[:, : settings.features] = (
             rng.normal(size=(len(anchors), settings.features)) * FEATURE_SPREAD

@@ -39,6 +39,7 @@ WAYS = {
     "absgrad replace": {"growth": "absgrad", "grow_replace": 0.03},
     "absgrad 3 grids": {"growth": "absgrad", "grow_grids": 3},
     "absgrad half": {"growth": "absgrad", "grow_threshold": 3e-4},
+    "absgrad each half": {"growth": "absgrad", "grow_each": True, "grow_threshold": 3e-4},
     "absgrad coarse": {"growth": "absgrad", "coarse": 2},
     "absgrad prune": {"growth": "absgrad", "prune_weight": 0.1},
     "gradient replace": {"growth": "gradient", "grow_replace": 0.03},
