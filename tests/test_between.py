@@ -31,7 +31,7 @@ from training.train import Trainer
 
 ROOT = Path(__file__).resolve().parents[1]
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))
-SETTINGS = TrainSettings(iterations=200, grow=False, anchors=500)
+SETTINGS = TrainSettings(encoding="even", iterations=200, grow=False, anchors=500)
 LAYOUTS = {
     "as usual": LAYOUT,
     "2 layers": replace(LAYOUT, layers=2),
@@ -332,6 +332,9 @@ def test_the_command_takes_them_and_refuses_what_the_capture_has_not(device, rig
     assert (model.encoding.d, model.encoding.sigma, model.encoding.spacing) == (2, 0.5, 1)
     settings = model.provenance["settings"]
     assert (settings["between"], settings["balance"]) == ("photos", "RGB=2")
+    assert train(rig, "--sigma", "0.1") == 0  # an encoding of one's own is even
+    model = read_model(tmp_path / "a.shift")
+    assert (model.encoding.d, model.encoding.sigma) == (16, 0.1)
     apart = fit_scenes.make_shapes(tmp_path / "apart", "shared", views=3, tests=1)
     for words, told in (
         (("--between", "photos"), "use --between pictures or splats"),

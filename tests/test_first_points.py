@@ -15,7 +15,14 @@ from scene.pose import View, look_at, perspective
 from scene.read_capture import read_capture
 from scene.read_las import read_las
 from training import point_sources
-from training.initial import carved, choose_voxel, hull_points, initial_points, voxel_centres
+from training.initial import (
+    carved,
+    choose_voxel,
+    first_voxel,
+    hull_points,
+    initial_points,
+    voxel_centres,
+)
 from training.photos import LoadedPhoto, load_photos
 from training.synthetic.balls import make_balls
 
@@ -54,6 +61,21 @@ def rod_photos(half: np.ndarray) -> list[LoadedPhoto]:
         rgba[..., 3] = 255 * inside
         out.append(LoadedPhoto(view, "RGB", rgba, None, f"{turn:.2f}"))
     return out
+
+
+def test_shapes_of_their_own_get_as_many_anchors_as_alone():
+    thick = rod_photos(np.array([0.3, 0.5, 0.3]))
+    thin = [replace(p, modality="bone") for p in rod_photos(np.array([0.07, 0.4, 0.06]))]
+    capture = Capture(Path("rods"), (), ())
+    one, other, both = (initial_points(capture, p, RNG(0)) for p in (thick, thin, thick + thin))
+    assert (one.origin, len(one.shapes), len(both.shapes)) == ("hull", 1, 2)
+    voxels = [first_voxel(first, 1000, RNG(0), 10**6) for first in (one, other)]
+    together = first_voxel(both, 1000, RNG(0), 10**6)
+    assert together == pytest.approx(min(voxels), rel=0.05) and voxels[1] < 0.8 * voxels[0]
+    count = len(voxel_centres(both.points, together))
+    assert count > 1500 and len(voxel_centres(other.points, together)) <= 1000
+    capped = first_voxel(both, 1000, RNG(0), 1200)
+    assert 1100 < len(voxel_centres(both.points, capped)) <= 1200
 
 
 def test_cells_of_a_long_thin_hull_are_cubes():

@@ -22,7 +22,7 @@ from training.networks import HeadLayout
 from training.optimizer import Adam
 from training.photos import LoadedPhoto, choose_downscale, load_photos
 from training.schedule import Budget, Schedule, choose_background
-from training.settings import PAPER, TrainSettings, preset
+from training.settings import LONG, PAPER, SHORT, TrainSettings, preset
 
 RNG = np.random.default_rng
 
@@ -201,7 +201,8 @@ def test_presets():
     paper = preset("paper")
     assert paper.rates(30000) is PAPER and paper.splats_per_anchor == 10
     assert (paper.features, paper.control, paper.sigma) == (16, 16, 0.04)
-    assert preset("fast").rates(600) is not preset("fast").rates(2000)
+    assert paper.encoding == "even" and preset("fast").encoding == "stops"
+    assert preset("fast").rates(4000) is SHORT and preset("fast").rates(4001) is LONG
     with pytest.raises(ValueError, match="no preset 'slow'"):
         preset("slow")
 

@@ -1,7 +1,7 @@
 """One shape-shifting model beside separate models and plain splats: dB against seconds and bytes.
 
     python3 docs/bench/baselines.py CAPTURE [CAPTURE ...] --seconds 60 240 900 --sizes 0.1 0.3 1 \
-        --out WORK --csv docs/bench/baselines.csv [--vgg FILE]
+        --out WORK --csv docs/bench/baselines.csv [--methods joint] [--vgg FILE]
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  Each
 budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the last
@@ -27,6 +27,7 @@ from training.plain_settings import PlainSettings  # noqa: E402
 from training.settings import TrainSettings  # noqa: E402
 
 KNOWN = ("balls", "workshop")
+METHODS = ("joint", "separate", "splats", "spz")
 
 
 def main() -> int:
@@ -34,6 +35,9 @@ def main() -> int:
     parser.add_argument("captures", nargs="+")
     parser.add_argument("--seconds", type=float, nargs="+", required=True)
     parser.add_argument("--sizes", type=float, nargs="*", default=[])
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
+    parser.add_argument("--anchors", type=int, default=TrainSettings().anchors)
+    parser.add_argument("--max-anchors", type=int, default=TrainSettings().max_anchors)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--csv", type=Path, required=True)
     parser.add_argument("--vgg", type=Path)
@@ -42,12 +46,12 @@ def main() -> int:
     rows, head = [], [command_of(asked)]
     for name in asked.captures:
         folder = made(name, asked.out)
-        for seconds, size, methods in plan(asked.seconds, asked.sizes):
+        for seconds, size, methods in plan(asked.seconds, asked.sizes, asked.methods):
             out = asked.out / folder.name / f"{seconds:g} s size {size:g}"
             out.mkdir(parents=True, exist_ok=True)
             options = Options(
                 folder, out, seconds=seconds, methods=methods, vgg=asked.vgg,
-                downscale=asked.downscale, **caps(size),
+                downscale=asked.downscale, **caps(size, asked),
             )  # fmt: skip
             if code := run(options):
                 return code
@@ -59,18 +63,22 @@ def main() -> int:
     return 0
 
 
-def plan(seconds: list[float], sizes: list[float]) -> list[tuple[float, float, tuple[str, ...]]]:
+def plan(
+    seconds: list[float], sizes: list[float], methods: list[str]
+) -> list[tuple[float, float, tuple[str, ...]]]:
     """(seconds, size, methods) of every table."""
-    whole = [(budget, 1.0, ("joint", "separate", "splats", "spz")) for budget in sorted(seconds)]
-    rest = [(max(seconds), size, ("joint", "splats", "spz")) for size in sorted(sizes) if size != 1]
+    asked = tuple(method for method in METHODS if method in methods)
+    whole = [(budget, 1.0, asked) for budget in sorted(seconds)]
+    sized = tuple(method for method in asked if method != "separate")
+    rest = [(max(seconds), size, sized) for size in sorted(sizes) if size != 1]
     return [*whole, *rest]
 
 
-def caps(size: float) -> dict[str, int]:
-    """Starts and caps of anchors and plain splats at a share of the defaults."""
-    shifting, plain = TrainSettings(), PlainSettings()
+def caps(size: float, asked: argparse.Namespace) -> dict[str, int]:
+    """Starts and caps of anchors and plain splats at a share of what was asked for."""
+    plain = PlainSettings()
     numbers = {
-        "anchors": shifting.anchors, "max_anchors": shifting.max_anchors,
+        "anchors": asked.anchors, "max_anchors": asked.max_anchors,
         "splats": plain.splats, "max_splats": plain.max_splats,
     }  # fmt: skip
     return {name: max(round(size * number), 1) for name, number in numbers.items()}
@@ -104,6 +112,11 @@ def command_of(asked: argparse.Namespace) -> str:
     words = [f"python3 docs/bench/baselines.py {names}"]
     words += [f"--seconds {' '.join(f'{s:g}' for s in asked.seconds)}"]
     words += [f"--sizes {' '.join(f'{s:g}' for s in asked.sizes)}"] if asked.sizes else []
+    words += [f"--methods {' '.join(asked.methods)}"] if asked.methods != METHODS else []
+    usual = TrainSettings()
+    words += [f"--anchors {asked.anchors}"] if asked.anchors != usual.anchors else []
+    caps_differ = asked.max_anchors != usual.max_anchors
+    words += [f"--max-anchors {asked.max_anchors}"] if caps_differ else []
     words += [f"--downscale {asked.downscale}"] if asked.downscale else []
     words += [f"--vgg {asked.vgg.name}"] if asked.vgg else []
     return " ".join([*words, "--out WORK --csv FILE"])
