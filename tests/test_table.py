@@ -271,7 +271,9 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     spec.loader.exec_module(program)
     words = [str(balls.folder), "--seconds", "0.3", "--sizes", "0.02", "--downscale", "2"]
     words += ["--out", str(tmp_path / "work"), "--csv", str(tmp_path / "rows.csv")]
-    monkeypatch.setattr(program, "caps", lambda size: {"anchors": 60, "splats": round(99 * size)})
+    monkeypatch.setattr(
+        program, "caps", lambda size, asked: {"anchors": 60, "splats": round(99 * size)}
+    )
     monkeypatch.setattr(sys, "argv", ["baselines.py", *words])
     assert program.main() == 0
     lines = (tmp_path / "rows.csv").read_text().splitlines()
@@ -280,4 +282,6 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     assert len(rows) == 4 * 3 + 3 * 3 and {row["size"] for row in rows} == {"1.0", "0.02"}
     assert program.main() == 0
     assert (tmp_path / "rows.csv").read_text().splitlines() == lines
-    assert program.plan([60, 9], [1, 0.1])[-1] == (60, 0.1, ("joint", "splats", "spz"))
+    plan = program.plan([60, 9], [1, 0.1], program.METHODS)
+    assert plan[-1] == (60, 0.1, ("joint", "splats", "spz"))
+    assert program.plan([9], [], ["joint"]) == [(9, 1.0, ("joint",))]
