@@ -156,6 +156,10 @@ def test_few_photos_and_missing_masks_are_spoken_of(balls):
     some = [replace(p, masked=i % 4 > 0) for i, p in enumerate(many)]
     kept, doubts = usable(some, "object")
     assert len(kept) == 27 and all(p.masked for p in kept) and "9 photos" in doubts[0]
+    fewer = [p for p in photos if p.modality == "Thermal"]
+    assert usable(many + fewer, "ignore")[1][0].endswith(
+        "of RGB, it can share them: --fixed offset,scale,rotation,opacity."
+    )
     most = [replace(p, masked=i % 4 == 0) for i, p in enumerate(many)]
     kept, doubts = usable(most, "object")
     assert len(kept) == len(most) and "count as a whole" in doubts[0]

@@ -2,7 +2,7 @@
 
 from training.photos import LoadedPhoto
 
-FEW = 12  # training photos of a modality, up to which what lies between them is a guess
+FEW = 10  # training photos of a modality, up to which what lies between them is a guess
 
 
 def usable(photos: list[LoadedPhoto], masks: str) -> tuple[list[LoadedPhoto], list[str]]:
@@ -27,8 +27,16 @@ def usable(photos: list[LoadedPhoto], masks: str) -> tuple[list[LoadedPhoto], li
                 "make masks for them, or train with --masks ignore."
             )
         if len(mine) <= FEW:
+            more = [p.modality for p in photos if p.modality != name]
+            shared = max(set(more), key=more.count, default=name)
             doubts.append(
                 f"{name} has {len(mine)} training photos only: seen from elsewhere it will be a "
                 "guess; 30 and more from all around are a good capture."
+                + (
+                    f"  If it shows the shapes of {shared}, it can share them: "
+                    "--fixed offset,scale,rotation,opacity."
+                    if more.count(shared) > FEW
+                    else ""
+                )
             )
     return kept, doubts

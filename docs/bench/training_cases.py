@@ -25,7 +25,7 @@ from training.rig import moved_by, offset_view
 from training.train import Trainer
 
 REFUSED, FAULT, INTERRUPTED = 2, 3, 130  # exit codes
-POOR = 3.0  # dB below the untouched capture, the mean of the modalities
+POOR = 3.0  # dB below the untouched capture, of the modality that loses most
 SMALL_FILE = 20_000  # bytes that fit on the disk that is full
 
 
@@ -40,8 +40,8 @@ class Outcome:
 
     @property
     def loss(self) -> float:
-        """dB below the untouched capture, the mean of the modalities."""
-        return float(np.mean([self.before[name] - self.db[name] for name in self.db]))
+        """dB below the untouched capture, of the modality that loses most."""
+        return max(self.before[name] - self.db[name] for name in self.db)
 
 
 Change = Callable[[Capture, str], tuple[Path, list[str]]]  # (capture, case) -> its JSON, who
@@ -111,7 +111,8 @@ class Case:
     @property
     def nothing_done(self) -> bool:
         """Whether the untouched capture itself is the case."""
-        return self.change is untouched and not self.options and self.fault is no_fault
+        plain = self.change is untouched and self.fault is no_fault
+        return plain and not self.options and self.out == "scene.shift"
 
 
 def written(changed: Capture, case: str) -> Path:
