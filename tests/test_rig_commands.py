@@ -80,7 +80,7 @@ def test_separate_models_keep_it(folders, asked, tmp_path):
     rigs = [json.loads(rig_of(read_package(file).provenance)) for file in files]
     assert len(rigs) == 2
     np.testing.assert_allclose(rigs[1]["Thermal"], PLANTED.ravel(), atol=1e-8)
-    wrong, right = (decibels(files[1], folder, tmp_path, "Thermal") for folder in folders)
+    right, wrong = (decibels(files[1], folder, tmp_path, "Thermal") for folder in folders)
     assert wrong > right + 0.5  # its package moves both; only the wrong ones come right
 
 
