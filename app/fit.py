@@ -55,6 +55,8 @@ class Options(PhotoOptions, SizeOptions, ModelOptions, TrialOptions):
 
     fixed: str | None = None
     """Networks that do not see x from the start, as offset,scale,rotation."""
+    calibrate: str | None = None
+    """A modality whose cameras' offset is found first, as of train."""
     masks: Literal["object", "valid", "ignore"] | None = None
     """What a mask means, as of train."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None
@@ -68,11 +70,12 @@ def run(options: Options) -> int:
     from app.bench import write_json
     from app.errors import UsageError
     from app.progress import progress_bar
-    from app.train import say, settings_of
+    from app.train import calibrated, say, settings_of
     from rasterizer.device import open_device
     from runtime_models.write_package import refuse_foreign, write_package
     from scene.read_capture import read_capture
     from training.fit import Fit
+    from training.rig import with_found
 
     if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
         raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")
@@ -83,7 +86,10 @@ def run(options: Options) -> int:
     if options.final_iterations is not None or options.final_seconds is not None:
         longer = {"iterations": options.final_iterations, "seconds": options.final_seconds}
         last = settings_of(replace(options, **longer), None)
-    capture = read_capture(options.capture)
+    capture, device = read_capture(options.capture), open_device(options.device)
+    if options.calibrate is not None:
+        settings = calibrated(device, capture, settings, options.calibrate)
+        capture = with_found(capture, settings.rig)
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
 
@@ -91,8 +97,7 @@ def run(options: Options) -> int:
             bar.update(task, description=what, completed=done)
 
         fit = Fit(
-            open_device(options.device), capture, settings, options.tolerance_db, options.seeds,
-            tell, last=last,
+            device, capture, settings, options.tolerance_db, options.seeds, tell, last=last,
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]

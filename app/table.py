@@ -1,7 +1,7 @@
 """launch.py table: one shape-shifting model beside separate models and plain splats."""
 
 import os
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -53,6 +53,8 @@ class MethodOptions:
     """Cap of growing plain splats, a modality."""
     sh_degree: int | None = None
     """Of plain splats' colours: 0 to 3.  Default: 3."""
+    calibrate: str | None = None
+    """A modality whose cameras' offset is found first, for all methods alike; as of train."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ def run(options: Options) -> int:
     from app.errors import UsageError
     from rasterizer.device import open_device
     from scene.read_capture import read_capture
+    from training.rig import with_found
     from training.vgg_distance import VggDistance
 
     if options.seconds is None and options.iterations is None:
@@ -85,6 +88,8 @@ def run(options: Options) -> int:
     head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
     table = RowsFile(options.out / "table.csv", VggRow if distance else Row, head)
     say(head[1])
+    rig = offset_of(device, capture, options)
+    capture = with_found(capture, rig)
     for method in sorted(set(options.methods), key=list(PLACES).index):
         if any(row.method == method and row.modality == MEAN for row in table.rows):
             say(f"{NAMES[method]}: already in {table.path}")
@@ -93,7 +98,7 @@ def run(options: Options) -> int:
         if method == "spz":
             runs = pack_splats(capture, options.out, table.rows)
         else:
-            runs = train_method(method, device, capture, options)
+            runs = train_method(method, device, capture, options, rig)
         if runs is None:
             say(f"{options.out}: interrupted; the same command goes on with this method.")
             return INTERRUPTED
@@ -122,8 +127,27 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
                 refuse_small(*(max(round(side / factor), 1) for side in photo.view.size))
 
 
-def train_method(method: str, device, capture: "Capture", options: Options) -> dict | None:
-    """A Run of app.train_baselines for each modality; None where Ctrl-C ended it early."""
+def offset_of(device, capture: "Capture", options: Options) -> str:
+    """TrainSettings.rig of what --calibrate finds, once for all methods: it is kept in --out."""
+    from app.chart_rows import write_text
+    from app.train import calibrated, settings_of
+
+    if options.calibrate is None:
+        return ""
+    kept = options.out / "rig.json"
+    if not kept.exists():
+        settings = settings_of(train_options("joint", options), None)
+        write_text(kept, calibrated(device, capture, settings, options.calibrate).rig)
+    return kept.read_text(encoding="utf-8")
+
+
+def train_method(
+    method: str, device, capture: "Capture", options: Options, rig: str
+) -> dict | None:
+    """A Run of app.train_baselines for each modality; None where Ctrl-C ended it early.
+
+    rig: of TrainSettings, what the capture's cameras were moved by.
+    """
     from app.train import describe, settings_of, train
     from app.train_baselines import Run, plain_settings, train_separate, train_splats
     from runtime_models.write_package import refuse_foreign, write_package
@@ -133,10 +157,11 @@ def train_method(method: str, device, capture: "Capture", options: Options) -> d
     if method == "splats":
         outcome = train_splats(device, capture, plain_settings(asked), out)
     elif method == "separate":
-        outcome = train_separate(device, capture, settings_of(asked, None), out)
+        settings = replace(settings_of(asked, None), rig=rig)
+        outcome = train_separate(device, capture, settings, out)
     else:
         refuse_foreign(out)
-        trainer = Trainer(device, capture, settings_of(asked, None))
+        trainer = Trainer(device, capture, replace(settings_of(asked, None), rig=rig))
         say(describe(trainer))
         if train(trainer, None):
             return None
@@ -175,7 +200,8 @@ def train_options(method: str, options: Options) -> TrainOptions:
     strange = {"splats": ("anchors", "max_anchors")}.get(
         method, ("splats", "max_splats", "sh_degree")
     )
-    asked = {n: getattr(options, n) for n in shared if n not in strange}
+    shared -= {"calibrate", *strange}  # what it finds is the same for all methods
+    asked = {n: getattr(options, n) for n in shared}
     model = "splats" if method == "splats" else "anchors"
     return TrainOptions(**asked, model=model, separate=method == "separate")
 

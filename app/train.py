@@ -180,13 +180,16 @@ def run(options: Options) -> int:
 
 
 def refuse_calibrating(options: Options) -> None:
-    """Raises UsageError where --calibrate would do nothing."""
+    """Raises UsageError where --calibrate would do nothing, or could not be kept."""
     from app.errors import UsageError
 
     if options.calibrate is None:
         return
-    if options.model == "splats" or options.separate:
-        raise UsageError("--calibrate needs the model that all modalities share; leave it out.")
+    if options.model == "splats":
+        raise UsageError(
+            "--calibrate: PLY files of plain splats cannot keep the offset that eval needs; leave "
+            "it out with --model splats."
+        )
     if options.resume:
         raise UsageError("--resume goes on with the checkpoint's offset; leave out --calibrate.")
 
@@ -195,13 +198,22 @@ def calibrated(
     device, capture: "Capture", settings: "TrainSettings", modality: str
 ) -> "TrainSettings":
     """The settings with the offset of a modality's cameras, which is looked for now."""
-    from training.rig import calibrate, noted
+    from app.progress import progress_bar
+    from training.rig import noted
+    from training.rig_search import calibrate
 
     say(f"looking for the offset of the cameras of {modality} ...")
-    found = calibrate(device, capture, settings, modality)
+    with progress_bar() as bar:
+        task = bar.add_task("compiling kernels", total=1.0)
+
+        def tell(what: str, done: float) -> None:
+            bar.update(task, description=what, completed=done)
+
+        found = calibrate(device, capture, settings, modality, tell=tell)
     say(
         f"{modality}: cameras sit {found.turn_deg:.2f} degrees and {found.shift_m:.4f} m beside "
-        "their stated poses, each in its own axes; trained with that."
+        "their stated poses, each in its own axes; its photos fit "
+        f"{found.gain_db:.1f} dB better so.  Trained with that."
     )
     return replace(settings, rig=noted(modality, found))
 

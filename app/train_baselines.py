@@ -5,7 +5,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.errors import UsageError
-from app.train import INTERRUPTED, Options, decibels, describe, say, settings_of, train
+from app.train import (
+    INTERRUPTED,
+    Options,
+    calibrated,
+    decibels,
+    describe,
+    say,
+    settings_of,
+    train,
+)
 
 if TYPE_CHECKING:
     from scene.capture import Capture
@@ -47,6 +56,7 @@ class Outcome:
 def run_baseline(options: Options) -> int:
     from rasterizer.device import open_device
     from scene.read_capture import read_capture
+    from training.rig import with_found
 
     if options.resume:
         raise UsageError(
@@ -58,6 +68,9 @@ def run_baseline(options: Options) -> int:
     settings = plain_settings(options) if options.model == "splats" else settings_of(options, None)
     capture, device = read_capture(options.capture), open_device(options.device)
     say(f"{device.name}, {device.platform}")
+    if options.calibrate is not None:
+        settings = calibrated(device, capture, settings, options.calibrate)
+        capture = with_found(capture, settings.rig)
     train_all = train_splats if options.model == "splats" else train_separate
     outcome = train_all(device, capture, settings, options.out)
     say(word_on(outcome, capture, options.out))

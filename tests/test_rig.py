@@ -12,14 +12,10 @@ from scene.capture import Capture
 from scene.pose import View, look_at, perspective
 from training.drawing import camera_of, draw_splats, splats_backward
 from training.gaussians import Gaussians
-from training.rig import (
-    calibrate,
-    moved_by,
-    offset_view,
-    pose_gradient,
-    rig_of,
-    with_found,
-)
+from training.photos import LoadedPhoto
+from training.rig import moved_by, offset_view, pose_gradient, rig_of, told, with_found
+from training.rig_search import STAGES, calibrate, descend, factors_of, reference_of
+from training.rig_solve import Frozen
 from training.settings import TrainSettings
 from training.synthetic.balls import make_balls
 
@@ -69,6 +65,94 @@ def test_the_gradient_by_the_pose_is_that_of_differences():
     np.testing.assert_allclose(by_pose, exact, atol=1e-4 * np.abs(exact).max())
 
 
+def loaded(view: View, picture: np.ndarray, weight: np.ndarray | None = None) -> LoadedPhoto:
+    opaque = np.full((*picture.shape, 1), 255, np.uint8)
+    gray = np.clip(np.rint(255 * picture), 0, 255).astype(np.uint8)
+    rgba = np.concatenate([gray[..., None].repeat(3, axis=2), opaque], axis=2)
+    return LoadedPhoto(view, "Thermal", rgba, weight, "some.png")
+
+
+def views_about(count: int, size: tuple[int, int]) -> list[View]:
+    turns = np.arange(count) * 2.4
+    eyes = np.stack([1.9 * np.sin(turns), 0.4 + turns / 9, 1.9 * np.cos(turns)], axis=1)
+    pinhole = perspective(0.8, size)
+    return [View(look_at(eye, (0, 0.02, 0)), pinhole, 0.05, 50.0, size) for eye in eyes]
+
+
+def some_frozen(count: int, photos: int, size: tuple[int, int]) -> tuple[Frozen, tuple]:
+    """Splats, and photos of noise that they are to show; one photo counts by halves."""
+    random, device = RNG(4), open_device("cpu")
+    splats = some_splats(random, count)
+    shape = tuple(device.upload(np.float32(a)) for a in splats[:4])
+    noise = [
+        loaded(view, random.random(size[::-1]), random.random(size[::-1]) if i == 0 else None)
+        for i, view in enumerate(views_about(photos, size))
+    ]
+    return Frozen(device, shape, noise, 0.2, 1.9), splats
+
+
+def error_of(frozen: Frozen, splats: tuple, gray: np.ndarray, step: np.ndarray) -> float:
+    """Half the mean square error by the plain renderer, in float64."""
+    error, color = 0.0, gray[:, None].repeat(3, axis=1)
+    for photo, weight in zip(frozen.photos, frozen.weights, strict=True):
+        camera = camera_of(offset_view(photo.view, step))
+        picture, through = render_reference((*splats[:4], color), camera)[:2]
+        missing = picture[0] + frozen.behind * through - photo.rgba[..., 0] / 255
+        error += 0.5 * (weight * missing**2).sum()
+    return error / frozen.values
+
+
+def test_the_slope_by_the_offset_is_that_of_differences():
+    frozen, splats = some_frozen(25, 2, (26, 22))
+    frozen.gray = RNG(6).random(25)
+    frozen.stand(np.eye(4))
+    cost, slope = frozen.slope()
+    exact = finite_differences(
+        lambda six: error_of(frozen, splats, frozen.gray, frozen.step(six)), np.zeros(6), 1e-5
+    ).ravel()
+    assert cost == pytest.approx(error_of(frozen, splats, frozen.gray, np.eye(4)), rel=1e-5)
+    np.testing.assert_allclose(slope, exact, atol=2e-4 * np.abs(exact).max())
+
+
+def test_the_brightness_is_that_of_least_squares():
+    frozen, _ = some_frozen(14, 3, (26, 22))
+    frozen.stand(moved_by(np.full(6, 0.02)))
+    pictures = []
+
+    def keep(i: int, picture: np.ndarray) -> np.ndarray:
+        pictures.append(picture.copy())
+        return picture * 0
+
+    for one in np.eye(14):
+        frozen.answered(one, 0.0, keep)
+    frozen.answered(np.zeros(14), frozen.behind, keep)
+    columns = np.reshape(pictures[:-3], (14, 3, -1)).reshape(14, -1).T
+    wanted = (np.array(frozen.wanted) - pictures[-3:]).ravel()
+    root = np.sqrt([np.broadcast_to(w, (22, 26)) for w in frozen.weights]).ravel()
+    best = np.linalg.lstsq(columns * root[:, None], wanted * root, rcond=None)[0]
+    frozen.solve(40)
+    np.testing.assert_allclose(frozen.gray, best, atol=1e-3 * np.abs(best).max())
+
+
+@pytest.mark.parametrize("seed", [0, 1, None])
+def test_where_the_shape_is_right_the_offset_is_found_exactly(seed):
+    random, device, size = RNG(8), open_device("cpu"), (64, 48)
+    splats = some_splats(random, 60)
+    splats[1][:] *= 0.4
+    shape = tuple(device.upload(np.float32(a)) for a in splats[:4])
+    six = np.zeros(6) if seed is None else RNG(seed).normal(size=6) * np.repeat([0.02, 0.02], 3)
+    true, gray = moved_by(six), splats[4][:, :1].repeat(3, axis=1)
+    photos = []
+    for view in views_about(12, size):
+        camera = camera_of(offset_view(view, true))
+        photos.append(loaded(view, render_reference((*splats[:4], gray), camera)[0][0]))
+    frozen = Frozen(device, shape, photos, 0.0, 1.9)
+    offset, _ = descend(frozen, np.eye(4), None, 25)
+    left = told(np.linalg.inv(true) @ offset)
+    assert left.turn_deg < 0.02
+    assert left.shift_m < 1e-3
+
+
 @pytest.fixture(scope="module")
 def balls(tmp_path_factory) -> Capture:
     return make_balls(tmp_path_factory.mktemp("balls"), size=80, views=20, test_views=1)
@@ -77,8 +161,8 @@ def balls(tmp_path_factory) -> Capture:
 def test_the_same_seed_finds_the_same_offset(balls):
     small = replace(balls, photos=balls.photos[::4])
     settings = TrainSettings(anchors=500, downscale=2)
-    device = open_device("cpu")
-    first, second = (calibrate(device, small, settings, "Thermal", 40) for _ in range(2))
+    device, stages = open_device("cpu"), tuple(replace(s, tries=2) for s in STAGES[:2])
+    first, second = (calibrate(device, small, settings, "Thermal", 40, stages) for _ in range(2))
     np.testing.assert_array_equal(first.offset, second.offset)
     assert 0 < first.turn_deg < 10
     np.testing.assert_allclose(first.offset[:3, :3] @ first.offset[:3, :3].T, np.eye(3), atol=1e-9)
@@ -87,6 +171,9 @@ def test_the_same_seed_finds_the_same_offset(balls):
 def test_a_modality_that_is_not_there_or_alone_is_refused(balls):
     with pytest.raises(BadFile, match="no modality 'X-ray' to calibrate; it has RGB, Thermal"):
         calibrate(None, balls, TrainSettings(), "X-ray")
+    no_photos = replace(balls, photos=tuple(p for p in balls.photos if p.modality == "RGB"))
+    with pytest.raises(BadFile, match="'Thermal' has no training photos"):
+        calibrate(None, no_photos, TrainSettings(), "Thermal")
     alone = replace(balls, stops=balls.stops[:1])
     with pytest.raises(BadFile, match="is its only modality"):
         calibrate(None, alone, TrainSettings(), "RGB")
@@ -114,3 +201,23 @@ def test_without_an_offset_nothing_moves(balls):
     assert with_found(balls, rig_of({})) is balls
     assert with_found(balls, rig_of({"settings": [1]})) is balls
     assert rig_of({"settings": {"rig": "x"}}) == "x"
+
+
+def test_light_is_what_others_are_held_to(balls):
+    assert reference_of(balls, "Thermal").name == "RGB"
+    assert reference_of(balls, "RGB").name == "Thermal"
+    x_ray = replace(balls.stops[1], name="X-ray", x=0.9)
+    three = replace(balls, stops=(*balls.stops, x_ray))
+    assert reference_of(three, "X-ray").name == "RGB"
+    assert reference_of(replace(three, stops=three.stops[1:]), "X-ray").name == "Thermal"
+
+
+def test_both_modalities_are_read_with_pixels_of_one_angle(balls):
+    assert factors_of(balls, "Thermal", "RGB", 1) == (1, 1)
+    assert factors_of(balls, "Thermal", "RGB", 3) == (3, 3)
+    larger = tuple(
+        replace(p, view=p.view.resized((480, 480))) if p.modality == "RGB" else p
+        for p in balls.photos
+    )
+    assert factors_of(replace(balls, photos=larger), "Thermal", "RGB", 1) == (1, 6)
+    assert factors_of(replace(balls, photos=larger), "RGB", "Thermal", 1) == (2, 1)

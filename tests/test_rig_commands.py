@@ -1,0 +1,106 @@
+"""--calibrate of train, table and fit: what was found goes for all that they do, and is kept."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from app import fit, table
+from app.errors import UsageError
+from app.evaluate import Options as EvalOptions
+from app.evaluate import run as evaluate
+from app.train import Options as TrainOptions
+from app.train import run as train
+from runtime_models.read_package import read_package
+from scene.write_capture import write_capture
+from training import rig_search
+from training.rig import moved_by, offset_capture, rig_of, told
+from training.synthetic.balls import make_balls
+
+PLANTED = moved_by(np.array([0.1, -0.2, 0.05, 0.1, 0.05, -0.1]))
+SMALL = {"anchors": 300, "iterations": 20, "device": "cpu"}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """A capture, and the same with cameras of Thermal beside where they stood."""
+    right, wrong = (
+        make_balls(tmp_path_factory.mktemp(name), size=48, views=8, test_views=2)
+        for name in ("right", "wrong")
+    )
+    write_capture(offset_capture(wrong, "Thermal", np.linalg.inv(PLANTED)))
+    return right.folder, wrong.folder
+
+
+@pytest.fixture
+def asked(monkeypatch) -> list[str]:
+    """What was looked for; the planted offset is found at once."""
+    found = []
+
+    def calibrate(device, capture, settings, modality, **more):
+        found.append(modality)
+        return told(PLANTED, 3.0)
+
+    monkeypatch.setattr(rig_search, "calibrate", calibrate)
+    return found
+
+
+def decibels(path, capture, tmp_path, modality: str) -> float:
+    told_here = tmp_path / "eval.json"
+    assert evaluate(EvalOptions(path, capture, modality=modality, json=told_here)) == 0
+    return json.loads(told_here.read_text())["modalities"][modality]["psnr_db"]
+
+
+def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path):
+    rows = []
+    for folder, calibrate in zip(folders, (None, "Thermal"), strict=True):
+        out = tmp_path / folder.name
+        options = table.Options(
+            folder, out, methods=("joint", "separate", "splats"), splats=300, calibrate=calibrate,
+            **SMALL,
+        )  # fmt: skip
+        assert table.run(options) == 0
+        lines = (out / "table.csv").read_text().splitlines()
+        rows.append([float(row["psnr_db"]) for row in csv.DictReader(lines[3:])])
+    assert len(rows[0]) == 9 and asked == ["Thermal"]
+    np.testing.assert_allclose(rows[1], rows[0], atol=0.1)
+    assert "--calibrate Thermal" in lines[0]
+    assert table.run(options) == 0 and asked == ["Thermal"]  # it is kept
+    shown = decibels(out / "joint.shift", folders[1], tmp_path, "Thermal")
+    assert shown == pytest.approx(rows[0][1], abs=0.1)
+
+
+def test_separate_models_keep_it(folders, asked, tmp_path):
+    options = TrainOptions(
+        folders[1], tmp_path / "out", separate=True, calibrate="Thermal", grow=False, **SMALL
+    )
+    assert train(options) == 0 and asked == ["Thermal"]
+    files = sorted((tmp_path / "out").glob("*.shift"))
+    rigs = [json.loads(rig_of(read_package(file).provenance)) for file in files]
+    assert len(rigs) == 2
+    np.testing.assert_allclose(rigs[1]["Thermal"], PLANTED.ravel(), atol=1e-8)
+    right, wrong = (decibels(files[1], folder, tmp_path, "Thermal") for folder in folders)
+    assert wrong > right + 0.5  # its package moves both; only the wrong ones come right
+
+
+def test_fit_keeps_it(folders, asked, tmp_path, monkeypatch):
+    from training.fit import Fit
+
+    monkeypatch.setattr("training.fit.PARTS", ())
+    monkeypatch.setattr(Fit.__init__, "__defaults__", ((), None))
+    monkeypatch.setattr(Fit, "clean", lambda self: None)
+    out = tmp_path / "fit.shift"
+    options = fit.Options(folders[1], out, calibrate="Thermal", seeds=1, grow=False, **SMALL)
+    assert fit.run(options) == 0 and asked == ["Thermal"]
+    kept = json.loads(rig_of(read_package(out).provenance))
+    np.testing.assert_allclose(kept["Thermal"], PLANTED.ravel(), atol=1e-8)
+
+
+def test_what_cannot_keep_an_offset_says_so(tmp_path):
+    options = TrainOptions(tmp_path, tmp_path / "out", model="splats", calibrate="Thermal")
+    with pytest.raises(UsageError, match="PLY files of plain splats cannot keep the offset"):
+        train(options)
+    options = TrainOptions(tmp_path, tmp_path / "out.shift", resume=True, calibrate="Thermal")
+    with pytest.raises(UsageError, match="--resume goes on with the checkpoint's offset"):
+        train(options)
