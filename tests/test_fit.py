@@ -18,6 +18,7 @@ from training.settings import TrainSettings
 
 SMALL = TrainSettings(
     iterations=250,
+    encoding="even",  # tells two stops apart within fewer steps than one unit a stop does
     rate_scale=0.5,
     grow=False,
     anchors=400,

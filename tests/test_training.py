@@ -24,7 +24,8 @@ from training.synthetic.balls import make_balls
 from training.train import Trainer
 
 ROOT = Path(__file__).resolve().parents[1]
-SETTINGS = TrainSettings(iterations=200, grow=False, anchors=2000)
+# An even encoding tells two stops apart within fewer steps than one unit a stop does.
+SETTINGS = TrainSettings(iterations=200, grow=False, anchors=2000, encoding="even")
 
 
 @pytest.fixture(scope="module")
