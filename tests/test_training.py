@@ -139,12 +139,15 @@ def test_the_package_draws_what_was_trained(trained, device, balls, tmp_path):
         assert 0 < score.alive <= model.splat_count and 0.5 < score.ssim < 1
 
 
-def test_growing_does_not_end_lower(device, balls, trained):
-    settings = replace(SETTINGS, grow=True, grow_every=25, max_anchors=3000)
-    grown = run(Trainer(device, balls, settings))
-    assert grown.anchors_count <= 3000 and grown.anchors_count != trained.anchors_count
+def test_growing_ends_higher(device, balls):
+    settings = replace(SETTINGS, iterations=400)  # after 200 steps the newcomers still cost
+    plain = run(Trainer(device, balls, settings))
+    growing = replace(settings, grow=True, grow_every=25, max_anchors=3000)
+    grown = run(Trainer(device, balls, growing))
+    assert plain.anchors_count < grown.anchors_count <= 3000
+    before = plain.held_out_psnr(most=99)
     for name, psnr in grown.held_out_psnr(most=99).items():
-        assert psnr > trained.held_out_psnr(most=99)[name] - 0.5, name
+        assert psnr > before[name] + 0.1, name
 
 
 def train_command(*arguments) -> list[str]:
