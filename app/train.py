@@ -101,7 +101,7 @@ class LossOptions:
     rise: int | None = None
     """Steps over which the networks' rates rise, for scenes of which all would vanish at once."""
     revive: float | None = None
-    """Weight of a pull on splats that are absent, for example 0.01."""
+    """Weight of a pull on splats that are absent; 0: none. Default: 0.05."""
     control: int | None = None
     """Numbers of the control encoding; the last one stands for x = 1."""
     sigma: float | None = None

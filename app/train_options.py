@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
 # What a checkpoint was trained with that does not say it: these were the defaults once.
-OLD = {"encoding": "even", "growth": "gradient"}
+OLD = {"encoding": "even", "growth": "gradient", "revive": 0.0}
 
 
 @dataclass(frozen=True, kw_only=True)

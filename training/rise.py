@@ -50,7 +50,7 @@ def after_fall(iteration: int, rate_scale: float, before: Rise) -> Rise:
     Rates of more than once those of the preset are taken to be what it died of: they are halved
     first, and only then it is the start that is made gentler.
     """
-    return Rise(AFTER_A_FALL, iteration, PULL) if rate_scale <= 1 else before
+    return Rise(AFTER_A_FALL, iteration, max(PULL, before.pull)) if rate_scale <= 1 else before
 
 
 def draw_up(device, splats: Gaussians, grad: Gaussians, pull: float) -> None:
