@@ -8,26 +8,44 @@ from pathlib import Path
 # Installed as shapeshift.app.cli, the folders' flat imports need the package's folder on the path.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-# command: (module of app/, what it does); each module has `Options` and `run(options) -> int`
+# command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
-    "view": ("desktop", "open a scene in a window"),
-    "render": ("render", "draw a scene into PNG files, no window needed"),
-    "bench": ("bench", "frame times and image error, no window needed"),
-    "chart": ("chart", "what each shortcut saves in time and costs in the picture"),
-    "stability": ("stability", "the cases where splat renderers fail, each held to a bound"),
-    "lint": ("lint", "what is wrong with a file, and what opening it repairs"),
-    "info": ("info", "what is in a scene"),
-    "compare": ("compare", "two scenes, stops or folders of pictures: PSNR, SSIM, differences"),
-    "export": ("export", "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat"),
-    "cameras": ("cameras", "list a file of cameras, or convert it"),
-    "simulate": ("simulate", "a scene file in motion: hands and rays of a script, told as lines"),
-    "vr": ("headset", "a scene in a headset: walk into it and touch it"),
-    "train": ("train", "posed photos of several modalities to a scene"),
-    "fit": ("fit", "the smallest scene that shows a capture as well as the largest, and why"),
-    "eval": ("evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
-    "table": ("table", "one model beside separate ones and plain splats: dB, bytes, seconds"),
-    "demo": ("demo", "make the bundled demo again: ray-trace its capture, train it"),
-    "headless": ("headless", "draw the bundled demo into pictures and time it"),
+    "view": ("viewer.desktop", "open a scene in a window"),
+    "render": ("commands.render", "draw a scene into PNG files, no window needed"),
+    "bench": ("commands.bench", "frame times and image error, no window needed"),
+    "chart": ("charts.chart", "what each shortcut saves in time and costs in the picture"),
+    "stability": (
+        "commands.stability",
+        "the cases where splat renderers fail, each held to a bound",
+    ),
+    "lint": ("commands.lint", "what is wrong with a file, and what opening it repairs"),
+    "info": ("commands.info", "what is in a scene"),
+    "compare": (
+        "commands.compare",
+        "two scenes, stops or folders of pictures: PSNR, SSIM, differences",
+    ),
+    "export": (
+        "commands.export",
+        "a scene at one x as .ply, .compressed.ply, .spz, .glb or .splat",
+    ),
+    "cameras": ("commands.cameras", "list a file of cameras, or convert it"),
+    "simulate": (
+        "commands.simulate",
+        "a scene file in motion: hands and rays of a script, told as lines",
+    ),
+    "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
+    "train": ("training.train", "posed photos of several modalities to a scene"),
+    "fit": (
+        "training.fit",
+        "the smallest scene that shows a capture as well as the largest, and why",
+    ),
+    "eval": ("training.evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
+    "table": (
+        "training.table",
+        "one model beside separate ones and plain splats: dB, bytes, seconds",
+    ),
+    "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
+    "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
 BAD_INPUT = 2  # exit code
 FAULT = 3

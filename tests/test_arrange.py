@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import arrange
-from app.files import opened_scene
-from app.opened import Found, Source, read_files
-from app.stage import Stage
+from app.viewer import arrange
+from app.viewer.files import opened_scene
+from app.viewer.opened import Found, Source, read_files
+from app.viewer.stage import Stage
 from runtime_models.model import BadFile, SplatLayers, Stop
 from scene import collider_files, edits
 from scene.camera_list import CameraReading

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.exported import Look, Part, bake_part
+from app.commands.exported import Look, Part, bake_part
 from renderer.false_colors import tinted
 from renderer.renderer import Renderer
 from runtime_models.bake import BLOCK, LEAST_ALPHA, bake, fit_rows, recolored, spread_directions

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app import bench, cli, measure
+from app import cli, measure
+from app.commands import bench
 from app.errors import UsageError
 from app.subject import Subject
 from renderer.reference import reference_image

@@ -10,9 +10,9 @@ import pytest
 
 import scene.collider_files
 import scene.physics
-from app.bodies import Bodies
-from app.document import Document, key_of
-from app.opened import Source
+from app.viewer.bodies import Bodies
+from app.viewer.document import Document, key_of
+from app.viewer.opened import Source
 from runtime_models.model import BadFile, SplatLayers, Stop
 from scene import edits
 from scene.collider import Collider

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app import budget_chart, cli
-from app.budget import Budget, choose, least_scale, read_budget
-from app.budget_chart import BudgetRow, Drawn, budget_rows, read_rows, steady, store_rows
+from app import cli
+from app.charts import budget_chart
+from app.charts.budget import Budget, choose, least_scale, read_budget
+from app.charts.budget_chart import BudgetRow, Drawn, budget_rows, read_rows, steady, store_rows
 from app.errors import UsageError
 from app.subject import Subject
 from renderer.renderer import Renderer

@@ -5,7 +5,7 @@ from itertools import product
 
 import pytest
 
-from app.chart_settings import (
+from app.charts.chart_settings import (
     EXACT,
     NOT_READ,
     SETTINGS,
@@ -15,7 +15,7 @@ from app.chart_settings import (
     settings_of,
     told_changes,
 )
-from app.comparison import exact
+from app.charts.comparison import exact
 from app.errors import UsageError
 from renderer.settings import RenderSettings
 

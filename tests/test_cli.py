@@ -47,7 +47,7 @@ def test_a_file_alone_is_opened_in_the_viewer():
 
 def test_every_command_is_there_and_has_help():
     for name, (module, _) in cli.COMMANDS.items():
-        assert (ROOT / "app" / f"{module}.py").exists(), name
+        assert (ROOT / "app" / f"{module.replace('.', '/')}.py").exists(), name
         done = launch(name, "--help")
         assert done.returncode == 0, done.stderr
         assert "usage" in done.stdout.lower()

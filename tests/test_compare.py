@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 from test_output_folder import put, splats
 
-from app.compare import Options, choose_views, run
-from app.compare_sheet import amplification, difference_picture, sheet
-from app.compare_sides import (
+from app.commands.compare import Options, choose_views, run
+from app.commands.compare_sheet import amplification, difference_picture, sheet
+from app.commands.compare_sides import (
     PictureSide,
     SceneSide,
     match_pictures,
@@ -100,7 +100,7 @@ def test_the_same_place_in_the_world_is_compared_whatever_the_zero(tmp_path, cap
     a = open_side(str(tmp_path / "a.ply"), ReadingOptions())
     (model,) = a.subject.models
     shifted = replace(model, means=model.means - np.float32([3, 0, -2]), origin=(3.0, 0.0, -2.0))
-    from app.compare import drawn_pairs
+    from app.commands.compare import drawn_pairs
 
     options = Options("a", "b", size=SMALL)
     for pair in drawn_pairs(options, a, SceneSide("b", Subject.of(shifted, 0.0))):

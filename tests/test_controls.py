@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from app.controls import MAX_RADII, MIN_RADII, POLE, Camera, Push
-from app.stage import Stage
+from app.viewer.controls import MAX_RADII, MIN_RADII, POLE, Camera, Push
+from app.viewer.stage import Stage
 from runtime_models.model import Stop
 from scene.control import EASES, MODES, Sweep, ease, snap, unease
 from scene.framing import fit_distance, orbit_path

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import demo
+from app.training import demo
 from runtime_models.evaluate import evaluate
 from runtime_models.read_package import read_package
 from training.synthetic.workshop import STOPS

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.evaluate import print_table
+from app.training.evaluate import print_table
 from rasterizer.device import open_device
 from rasterizer.reference import finite_differences
 from rasterizer.surface_reference import render_depth_reference

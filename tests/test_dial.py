@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.dial import LEAST_SCALE, Dial
+from app.viewer.dial import LEAST_SCALE, Dial
 from renderer.settings import RenderSettings
 
 

@@ -106,7 +106,8 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
     near = read_model(scenes / "plain.ply")
     places = {"one.ply": (4e6, 1e6, -3e6), "two.ply": (4e6 + 3, 1e6, -3e6)}
     monkeypatch.setattr(
-        "app.export.open_model", lambda path, options: replace(near, origin=places[path.name])
+        "app.commands.export.open_model",
+        lambda path, options: replace(near, origin=places[path.name]),
     )
     both = (tmp_path / "one.ply", tmp_path / "two.ply")
     for path in both:
@@ -122,7 +123,7 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
 def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     model = read_model(scenes / "plain.ply")
     labelled = replace(model, labels=np.arange(40, dtype=np.int32) % 3)
-    monkeypatch.setattr("app.export.open_model", lambda path, options: labelled)
+    monkeypatch.setattr("app.commands.export.open_model", lambda path, options: labelled)
     assert export(scenes / "plain.ply", "--out", tmp_path / "a.ply", "--label", 2) == 0
     np.testing.assert_allclose(read_plain(tmp_path / "a.ply").means, model.means[2::3], atol=1e-6)
     refused(
@@ -135,7 +136,7 @@ def test_what_a_format_has_no_place_for_is_said(scenes, tmp_path, capsys, monkey
     model = read_model(scenes / "plain.ply")
     more = {"labels": np.arange(40, dtype=np.int32) % 3, "extra": {"error": np.ones(40, "f4")}}
     rich = replace(model, antialiased=True, **more)
-    monkeypatch.setattr("app.export.open_model", lambda path, options: rich)
+    monkeypatch.setattr("app.commands.export.open_model", lambda path, options: rich)
     out = tmp_path / f"a{writer.ending}"
     assert export(scenes / "plain.ply", "--out", out) == 0
     said, back = capsys.readouterr().err, read_plain(out)

@@ -13,12 +13,12 @@ from camera_files import cameras
 from PIL import Image
 
 from app import cli
-from app.files import told_of
-from app.opened import Opener, means_cameras, read_files
+from app.panels.status_line import bytes_text, scene_words
 from app.paths import config_folder, plain, plain_path
-from app.recent import FILE, MOST, RecentFiles
-from app.stage import Stage, scene_of
-from app.status_line import bytes_text, scene_words
+from app.viewer.files import told_of
+from app.viewer.opened import Opener, means_cameras, read_files
+from app.viewer.recent import FILE, MOST, RecentFiles
+from app.viewer.stage import Stage, scene_of
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_scene import read_model

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app import fit as command
 from app.errors import UsageError
+from app.training import fit as command
 from rasterizer.device import open_device
 from runtime_models.model import HEADS, BadFile
 from runtime_models.read_package import read_package

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli, headless, touch_film
+from app import cli
+from app.commands import headless, touch_film
 from app.subject import Subject
 from runtime_models.model import BadFile
 from scene.framing import default_view, frame_points, model_points

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app import headset
 from app.cli import main
-from app.headset import DEMO, NO_HEADSET, Options, interrupting
-from app.worn_scene import BACKGROUND, open_worn
+from app.headset import headset
+from app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
+from app.headset.worn_scene import BACKGROUND, open_worn
 from vr.instance import Lost, NoHeadset
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture
 def viewer(monkeypatch) -> list:
     """What the viewer would be opened with; there is a display."""
-    from app import desktop
+    from app.viewer import desktop
 
     opened = []
     monkeypatch.setenv("DISPLAY", ":99")

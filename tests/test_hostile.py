@@ -85,7 +85,7 @@ def test_hostile_files_are_one_sentence_and_do_nothing(tmp_path, monkeypatch, na
 
 @pytest.mark.parametrize("ending", [".png", ".webp", ".jpg", ".bmp", ".tif"])
 def test_pictures_that_are_none_or_bombs(tmp_path, ending):
-    from app.compare_sides import read_picture
+    from app.commands.compare_sides import read_picture
 
     Image.new("RGB", (40, 30)).save(tmp_path / f"a{ending}")
     data = (tmp_path / f"a{ending}").read_bytes()
@@ -159,7 +159,7 @@ ON_THE_COMMAND_LINE = (
 def test_the_command_line_says_one_line_and_ends_with_2(tmp_path, name):
     path = CASES[name](tmp_path)
     before = listing(tmp_path)
-    commands = ["info"] + ["lint"] * (ROOT / "app" / "lint.py").is_file()
+    commands = ["info"] + ["lint"] * (ROOT / "app" / "commands" / "lint.py").is_file()
     for command in commands:
         end = launch(command, path)
         assert end.returncode == 2, end.stderr

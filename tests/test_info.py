@@ -61,7 +61,7 @@ def test_the_table_says_the_same(tmp_path, capsys):
 
 
 def test_names_with_brackets_are_no_markup(capsys):
-    from app.info import print_table
+    from app.commands.info import print_table
 
     print_table({"stops": [{"name": "[red]a[/b]", "x": 0.5, "kind": "rgb"}], "bytes": 1234567})
     table = capsys.readouterr().out

@@ -9,7 +9,7 @@ import pytest
 
 from app.cli import main
 from app.errors import UsageError
-from app.keeping import last_of, refuse_place
+from app.training.keeping import last_of, refuse_place
 from rasterizer.device import open_device
 from runtime_models.read_scene import read_model
 from scene.capture import Capture

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.bench import command_line
+from app.commands.bench import command_line
 from scene.pose import look_at
 from tests.models import random_package
 from tests.test_cli import assert_refused, launch

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from app import cli
-from app.outputs import as_steps, choose_unit, summary
-from app.png16 import write_png16
+from app.commands.outputs import as_steps, choose_unit, summary
+from app.commands.png16 import write_png16
 from renderer.settings import RenderSettings
 from renderer.surface_reference import reference_surface
 from runtime_models.read_scene import read_model

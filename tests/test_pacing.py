@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from app.pacing import AUTO, FIXED, LATE, PART, PRICED, QUALITIES, Pacing, StereoChart
-from app.quick_chart import QUICK, QuickRow
+from app.charts.quick_chart import QUICK, QuickRow
+from app.headset.pacing import AUTO, FIXED, LATE, PART, PRICED, QUALITIES, Pacing, StereoChart
 from renderer.settings import RenderSettings
 from scene.pose import Pose, View, look_at
 from scene.scene import Scene

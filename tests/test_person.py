@@ -8,7 +8,7 @@ from test_simulation import item, reaction
 from test_world import real
 from vr_frames import at, frame, hand, tilted
 
-from app.person import Person
+from app.headset.person import Person
 from vr.stance import resized, underfoot
 from vr.standing import Standing
 

@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.comparison import MOST_DB, REST_S, Comparison, exact, is_exact, measure_error, shortcuts
-from app.dial import Dial
-from app.quick_chart import QUICK, QuickChart, turned
-from app.readings import FEWEST, Meter
-from app.shown import Shown, Wish, rested
+from app.charts.comparison import (
+    MOST_DB,
+    REST_S,
+    Comparison,
+    exact,
+    is_exact,
+    measure_error,
+    shortcuts,
+)
+from app.charts.quick_chart import QUICK, QuickChart, turned
+from app.viewer.dial import Dial
+from app.viewer.readings import FEWEST, Meter
+from app.viewer.shown import Shown, Wish, rested
 from renderer.settings import FrameStats, RenderSettings
 from scene.pose import View, look_at
 from scene.scene import Scene
@@ -111,7 +119,7 @@ def test_a_picture_is_compared_once_after_it_has_rested():
 
 
 def make_shown(drawing: str = "tiles (test)"):
-    from app.readings import Readings
+    from app.viewer.readings import Readings
 
     renderer, readings = KnownRenderer(drawing), Readings(drawing=drawing)
     return renderer, readings, Shown(renderer, readings)

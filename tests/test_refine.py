@@ -10,11 +10,11 @@ import pytest
 from splat_scenes import one_splat
 from test_streamed import COUNTS, write_streamed
 
-import app.refine as refine
+import app.viewer.refine as refine
 from app.opening import ReadingOptions
-from app.refine import Refiner, attach_refiner
-from app.sections import Hooks
-from app.stage import Stage
+from app.viewer.refine import Refiner, attach_refiner
+from app.viewer.sections import Hooks
+from app.viewer.stage import Stage
 from runtime_models.model import BadFile
 
 LONGEST_S = 10.0

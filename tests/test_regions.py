@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from models import make_random_model
 
-from app.outlines import on_screen, segments
-from app.regions import KINDS, Region, Regions, brushed, region_of, selector_of
-from app.stage import Stage
+from app.viewer.outlines import on_screen, segments
+from app.viewer.regions import KINDS, Region, Regions, brushed, region_of, selector_of
+from app.viewer.stage import Stage
 from runtime_models.model import SplatLayers, Stop
 from scene.pose import Pose, View, look_at
 from scene.scene import SceneObject

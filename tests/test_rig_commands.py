@@ -6,12 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from app import fit, table
 from app.errors import UsageError
-from app.evaluate import Options as EvalOptions
-from app.evaluate import run as evaluate
-from app.train import Options as TrainOptions
-from app.train import run as train
+from app.training import fit, table
+from app.training.evaluate import Options as EvalOptions
+from app.training.evaluate import run as evaluate
+from app.training.train import Options as TrainOptions
+from app.training.train import run as train
 from runtime_models.read_package import read_package
 from scene.write_capture import write_capture
 from training import rig_search

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import budget_chart
-from app.budget_chart import BudgetRow
+from app.charts import budget_chart
+from app.charts.budget_chart import BudgetRow
+from app.commands.info import Options as Info
+from app.commands.info import run as info
+from app.commands.lint import Options as Lint
+from app.commands.lint import run as lint
+from app.commands.render import Options, run
 from app.errors import UsageError
-from app.evaluate import Options as Evaluate
-from app.evaluate import run as evaluate
-from app.info import Options as Info
-from app.info import run as info
-from app.lint import Options as Lint
-from app.lint import run as lint
 from app.opening import ReadingOptions, open_model
-from app.render import Options, run
+from app.training.evaluate import Options as Evaluate
+from app.training.evaluate import run as evaluate
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from runtime_models.model import BadFile

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from app.commands.simulate import Options, run
 from app.errors import UsageError
-from app.simulate import Options, run
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
 
@@ -131,7 +131,7 @@ def test_a_collider_that_is_none_names_its_object(tmp_path):
 
 def test_ctrl_c_leaves_whole_lines(tmp_path):
     """After some steps the user has had enough."""
-    from app import simulate
+    from app.commands import simulate
     from scene.simulation import Simulation
 
     step, count = Simulation.step, 0

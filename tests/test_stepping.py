@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from camera_files import NAMES, cameras, views
 
-from app.controls import Camera, Push
-from app.stepping import FLIGHT_S, Steps, between, fitted, picture_box
+from app.viewer.controls import Camera, Push
+from app.viewer.stepping import FLIGHT_S, Steps, between, fitted, picture_box
 from scene.camera_list import CameraList
 from scene.framing import orbit_path
 from scene.pose import Pose, look_at

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app import cli
-from app.chart_stage import side_by_side
-from app.compare_sides import open_side
+from app.charts.chart_stage import side_by_side
+from app.commands.compare_sides import open_side
 from app.errors import UsageError
 from app.opening import ReadingOptions
 from app.subject import Subject, open_subject

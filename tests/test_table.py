@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from app.errors import UsageError
-from app.evaluate import Options as EvalOptions
-from app.evaluate import run as evaluate
-from app.table import Options, command_line, run, train_options
-from app.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
-from app.train import Options as TrainOptions
-from app.train import run as run_training
-from app.train_baselines import Run, plain_settings, share_of
+from app.training.evaluate import Options as EvalOptions
+from app.training.evaluate import run as evaluate
+from app.training.table import Options, command_line, run, train_options
+from app.training.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
+from app.training.train import Options as TrainOptions
+from app.training.train import run as run_training
+from app.training.train_baselines import Run, plain_settings, share_of
 from runtime_models.model import BadFile
 from runtime_models.read_scene import read_model
 from tests.test_vgg_distance import write_small

@@ -176,7 +176,7 @@ def test_a_real_file_upside_down_is_its_own_picture_turned(data):
 
 @pytest.mark.parametrize("reading", [Reading(up="-Y"), Reading(flip=True), Reading(up="+Z")])
 def test_packages_have_one_way_up(reading):
-    from app.headless import DEMO
+    from app.commands.headless import DEMO
 
     with pytest.raises(BadFile, match=r"is a package, and \+Y is up .*--up and --flip"):
         read_model(DEMO, reading)
@@ -187,7 +187,7 @@ def test_packages_have_one_way_up(reading):
 def test_the_option_takes_an_axis_with_its_sign(words):
     import tyro
 
-    from app.info import Options
+    from app.commands.info import Options
 
     options = tyro.cli(Options, args=["scene.ply", *words])
     assert options.reading().up == words[-1][-2:]

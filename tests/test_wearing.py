@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.headset import DEMO, Options
-from app.headset_report import Report
-from app.pacing import Pacing
-from app.wearing import LONGEST_STEP_S, Wearing
-from app.worn_scene import open_worn
+from app.headset.headset import DEMO, Options
+from app.headset.headset_report import Report
+from app.headset.pacing import Pacing
+from app.headset.wearing import LONGEST_STEP_S, Wearing
+from app.headset.worn_scene import open_worn
 from renderer.settings import FrameStats, RenderSettings
 from scene.pose import Pose, View
 from scene.scene import IDENTITY

@@ -8,9 +8,9 @@ import pytest
 from splat_scenes import random_layers
 from vr_hands import a_frame, hand_at
 
-from app.pacing import Pacing
-from app.person import Person
-from app.worn_panel import HINT, WornPanel, grant, sliders_of, stops_of
+from app.headset.pacing import Pacing
+from app.headset.person import Person
+from app.headset.worn_panel import HINT, WornPanel, grant, sliders_of, stops_of
 from runtime_models.model import Stop
 from scene.reactions import State
 from scene.scene_file import SceneFile, SceneItem
@@ -51,7 +51,7 @@ def a_world() -> World:
 
 
 class Wearing(SimpleNamespace):
-    """What of app.wearing.Wearing the panel meets."""
+    """What of app.headset.wearing.Wearing the panel meets."""
 
     def __init__(self) -> None:
         world, pace = a_world(), SimpleNamespace(dropped=0)

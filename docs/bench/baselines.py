@@ -20,9 +20,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from app.chart_rows import RowsFile, write_text  # noqa: E402
-from app.table import Options, run  # noqa: E402
-from app.table_rows import Row, VggRow  # noqa: E402
+from app.charts.chart_rows import RowsFile, write_text  # noqa: E402
+from app.training.table import Options, run  # noqa: E402
+from app.training.table_rows import Row, VggRow  # noqa: E402
 from training.plain_settings import PlainSettings  # noqa: E402
 from training.settings import TrainSettings  # noqa: E402
 

@@ -20,7 +20,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from app.exported import Look, Part, bake_part, export  # noqa: E402
+from app.commands.exported import Look, Part, bake_part, export  # noqa: E402
 from renderer.renderer import Renderer  # noqa: E402
 from runtime_models.model import SplatLayers, Stop  # noqa: E402
 from runtime_models.plain_splats import PlainSplats  # noqa: E402

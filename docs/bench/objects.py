@@ -26,7 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from app.chart_stage import Walk, arc  # noqa: E402
+from app.charts.chart_stage import Walk, arc  # noqa: E402
 from renderer.context import NoContext, open_context  # noqa: E402
 from renderer.renderer import Renderer  # noqa: E402
 from runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402

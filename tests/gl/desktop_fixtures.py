@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from desktop_stand import PlainRenderer, read_stub, run_frames
 
-from app.desktop import Options, Viewer
-from app.stage import Stage
-from app.window import Window
+from app.viewer.desktop import Options, Viewer
+from app.viewer.stage import Stage
+from app.viewer.window import Window
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
 
-from app.desktop import Options, Viewer
-from app.files import opened_scene
-from app.opened import Found, Source, read_files
-from app.outlines import pixels
-from app.stage import Stage
+from app.viewer.desktop import Options, Viewer
+from app.viewer.files import opened_scene
+from app.viewer.opened import Found, Source, read_files
+from app.viewer.outlines import pixels
+from app.viewer.stage import Stage
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_ply import write_ply
 from scene.camera_list import CameraReading

@@ -9,9 +9,9 @@ import pytest
 from desktop_stand import read_stub, run_frames, until_opened
 from PIL import Image
 
-from app import hands
-from app.stage import Stage
-from app.window import DoubleClick, Drag, Drop, KeyDown, Wheel
+from app.viewer import hands
+from app.viewer.stage import Stage
+from app.viewer.window import DoubleClick, Drag, Drop, KeyDown, Wheel
 from renderer.settings import RenderSettings
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer

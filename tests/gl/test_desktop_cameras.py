@@ -9,8 +9,8 @@ import pytest
 from camera_files import NAMES, assert_same, cameras
 from desktop_stand import run_frames, until_opened
 
-from app.recent import RecentFiles
-from app.window import Drag, Drop, KeyDown, Wheel
+from app.viewer.recent import RecentFiles
+from app.viewer.window import Drag, Drop, KeyDown, Wheel
 from scene.read_cameras import read_camera_list
 from scene.write_cameras import write_cameras
 

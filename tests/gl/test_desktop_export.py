@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from desktop_stand import ball, run_frames
 
-from app.export_panel import EVERYTHING, REGIONS, attach_export
+from app.panels.export_panel import EVERYTHING, REGIONS, attach_export
 from runtime_models.formats import read_plain
 from runtime_models.write_plain import WRITERS
 
@@ -96,7 +96,7 @@ def test_what_goes_wrong_is_in_the_box_and_leaves_nothing(viewer, panel, monkeyp
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("app.export_panel.export", full)
+    monkeypatch.setattr("app.panels.export_panel.export", full)
     panel.start()
     finish(viewer, panel)
     assert "No space left" in viewer.stage.problem and not exported(viewer)
@@ -111,7 +111,7 @@ def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
     from threading import Event
 
     go = Event()
-    monkeypatch.setattr("app.export_panel.export", lambda *_: go.wait(20) and ball())
+    monkeypatch.setattr("app.panels.export_panel.export", lambda *_: go.wait(20) and ball())
     panel.start()
     run_frames(viewer, 3)
     assert panel.running and panel.poll()

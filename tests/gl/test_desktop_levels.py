@@ -10,10 +10,10 @@ from sog_scenes import write_folder
 from test_desktop_program import start
 from test_streamed import random_sog, rewrite, write_streamed
 
-from app.desktop import Options, Viewer
-from app.opened import Source
-from app.refine import Refiner, attach_refiner
-from app.stage import Stage, scene_of
+from app.viewer.desktop import Options, Viewer
+from app.viewer.opened import Source
+from app.viewer.refine import Refiner, attach_refiner
+from app.viewer.stage import Stage, scene_of
 from renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures display and window

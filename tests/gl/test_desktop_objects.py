@@ -21,10 +21,10 @@ from objects_stand import (
     viewer_is_over,
 )
 
-from app.arrange import place, steer
-from app.gizmo import MOVE, OFF, TURN
-from app.opened import Found, Source
-from app.window import Drop
+from app.viewer.arrange import place, steer
+from app.viewer.gizmo import MOVE, OFF, TURN
+from app.viewer.opened import Found, Source
+from app.viewer.window import Drop
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_ply import write_ply

@@ -11,13 +11,13 @@ import pytest
 from desktop_stand import ball
 from PIL import Image
 
-from app.window import Window
+from app.viewer.window import Window
 from renderer.context import NoContext
 from scene.pose import look_at
 
 pytest_plugins = ["desktop_fixtures"]  # its fixture display
 ROOT = Path(__file__).resolve().parents[2]
-ACCENT = np.array([242, 161, 69])  # app/theme.py
+ACCENT = np.array([242, 161, 69])  # app/panels/theme.py
 
 
 def start(display: str | None, *arguments, code: str | None = None) -> subprocess.CompletedProcess:
@@ -119,7 +119,7 @@ def test_a_region_a_debug_view_and_a_budget_from_the_command_line(display, scene
 
 def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_file, tmp_path):
     code = (
-        "import sys\nfrom app import window, cli\n"
+        "import sys\nfrom app import cli; from app.viewer import window\n"
         "def crash(self, event=None):\n    raise ZeroDivisionError('the callback broke')\n"
         "window.Window._note = crash\n"
         "old = window.Window.begin_frame\n"
@@ -136,7 +136,7 @@ def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_fi
 
 def test_no_context_is_the_error_of_the_window(monkeypatch):
     monkeypatch.setattr(
-        "app.window.GlfwWindow", lambda **_: (_ for _ in ()).throw(ValueError("no"))
+        "app.viewer.window.GlfwWindow", lambda **_: (_ for _ in ()).throw(ValueError("no"))
     )
     with pytest.raises(NoContext, match=r"no window with OpenGL 4.3 could be opened \(no\)"):
         Window("a", (10, 10))

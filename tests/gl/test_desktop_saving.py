@@ -8,8 +8,8 @@ import pytest
 from desktop_stand import ball, run_frames, until_opened
 from objects_stand import CTRL, NAMES, SHIFT, TOUCH, key, names
 
-from app.arrange import steer
-from app.opened import read_files
+from app.viewer.arrange import steer
+from app.viewer.opened import read_files
 from scene import edits
 from scene.camera_list import CameraReading
 from scene.read_scene_file import read_scene_file

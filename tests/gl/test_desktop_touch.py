@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
 
-from app.bodies import made_of
-from app.desktop import Options, Viewer
-from app.document import Document
-from app.opened import Source
-from app.stage import Stage
-from app.touch import HAND
-from app.touch_panel import pad_object, pad_of, side_names
-from app.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
+from app.panels.touch_panel import pad_object, pad_of, side_names
+from app.viewer.bodies import made_of
+from app.viewer.desktop import Options, Viewer
+from app.viewer.document import Document
+from app.viewer.opened import Source
+from app.viewer.stage import Stage
+from app.viewer.touch import HAND
+from app.viewer.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
 from scene.collider import Collider, box_around
 from scene.edits import History
 from scene.reactions import Reaction, State, TwoAxes

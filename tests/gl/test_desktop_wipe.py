@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from desktop_stand import ball, run_frames
 
-from app.compare_sides import SceneSide
-from app.desktop import Options, Viewer
-from app.stage import Stage
+from app.commands.compare_sides import SceneSide
 from app.subject import Subject
-from app.window import Drag, KeyDown, Press, Release
-from app.wipe import KEYS, Wipe
+from app.viewer.desktop import Options, Viewer
+from app.viewer.stage import Stage
+from app.viewer.window import Drag, KeyDown, Press, Release
+from app.viewer.wipe import KEYS, Wipe
 from renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
@@ -93,10 +93,10 @@ def test_it_can_be_switched_off(stand):
 
 
 def test_at_rest_the_likeness_is_told_once(stand, monkeypatch):
-    import app.comparison
+    import app.charts.comparison
 
     viewer, wipe, _ = stand
-    monkeypatch.setattr(app.comparison, "REST_S", 0.0)
+    monkeypatch.setattr(app.charts.comparison, "REST_S", 0.0)
     viewer.stage.set_x(0, 0.5)
     run_frames(viewer, 4)
     assert wipe.status().startswith("A to B ") and wipe.status().endswith(" dB")
@@ -129,14 +129,14 @@ def test_a_scene_file_is_drawn_where_it_says_beside_itself_at_another_x(window, 
 
 
 def test_the_panel_lists_its_keys(stand, monkeypatch):
-    import app.panel
+    import app.panels.panel
 
     viewer, _, _ = stand
     listed = []
-    monkeypatch.setattr(app.panel, "section", lambda name, *_, **__: name == "Keys")
-    monkeypatch.setattr(app.panel, "rows", lambda pairs, share: listed.append(tuple(pairs)))
+    monkeypatch.setattr(app.panels.panel, "section", lambda name, *_, **__: name == "Keys")
+    monkeypatch.setattr(app.panels.panel, "rows", lambda pairs, share: listed.append(tuple(pairs)))
     viewer.overlay = True
     run_frames(viewer, 1)
     (keys,) = listed
-    assert keys[: len(app.panel.KEYS)] == app.panel.KEYS
+    assert keys[: len(app.panels.panel.KEYS)] == app.panels.panel.KEYS
     assert keys[-len(KEYS) :] == KEYS and {k for k, _ in KEYS} == {", .", "C"}

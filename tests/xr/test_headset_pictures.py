@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.worn_scene import BACKGROUND
+from app.headset.worn_scene import BACKGROUND
 from renderer.reference import reference_image
 from scene.pose import Pose, View
 from scene.read_scene_file import read_scene_file

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.mirror import SIZE
+from app.headset.mirror import SIZE
 
 PROGRAM = Path(__file__).with_name("look_at_mirror.py")
 

@@ -1,0 +1,1 @@
+"""What settings save and cost: measured, drawn, and chosen by for a budget."""

@@ -1,0 +1,198 @@
+"""launch.py chart: what every named setting saves in time and costs in the picture."""
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.opening import ReadingOptions
+
+MOST_FRAMES = 1000
+PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Price at least 24 settings: frame time and image error beside those of the exact one.
+
+    Writes rows.csv, chart.svg and chart.png.  Rows that are there are kept: Ctrl-C loses nothing.
+    """
+
+    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
+    """Packages, .ply, .splat, folders of PLY layers or scene files; several stand side by side."""
+    out: Annotated[Path, tyro.conf.arg(name="out")] = Path("out/chart")
+    """Folder for rows.csv and the chart."""
+    cameras: Path | None = None
+    """Views to measure from, any file that render's --camera takes; default: an arc about the
+    scene, 0.75 degrees a frame."""
+    size: str = "1280x720"
+    """WIDTHxHEIGHT in pixels."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Drawing back end: GL quads or OpenCL tiles."""
+    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
+    """Where GL comes from."""
+    frames: int = 0
+    """Views on the arc; default 32, with --quick 8."""
+    x: float | None = None
+    """Control value on the path, 0 to 1, of all objects; default: the first stop of the first
+    scene, and with a scene file what it says for each object."""
+    quick: bool = False
+    """About ten settings, fewer frames, no SSIM."""
+    decode: bool = False
+    """Instead: decode time against anchors, all five networks and colour alone (no scene)."""
+
+
+def run(options: Options) -> int:
+    from app.drawing import make_folder, parse_size
+    from app.errors import UsageError
+
+    size = parse_size(options.size)
+    if options.decode:
+        if options.scenes:
+            raise UsageError("--decode takes no scene; leave it out, or leave --decode out.")
+        from app.charts.decode_chart import run_decode
+
+        make_folder(options.out)
+        return run_decode(options.out, options.context, command_line(options))
+    if not options.scenes:
+        raise UsageError("name a scene to chart, or add --decode.")
+    if not 0 <= options.frames <= MOST_FRAMES or options.frames == 1:
+        raise UsageError(f"--frames is {options.frames}, expected 2 to {MOST_FRAMES}.")
+    if options.x is not None and not 0 <= options.x <= 1:
+        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    subjects = read_subjects(options)
+    cameras = read_views(options, subjects[0], size)
+    make_folder(options.out)
+    return measure_and_draw(options, subjects, cameras, size)
+
+
+def read_subjects(options: Options) -> list:
+    """The scenes in order; one that is named twice is read once and shared."""
+    from app.subject import open_subject
+
+    known = {path: open_subject(path, options) for path in dict.fromkeys(options.scenes)}
+    return [known[path] for path in options.scenes]
+
+
+def read_views(options: Options, subject, size: tuple[int, int]) -> list:
+    from app.camera_files import named_cameras
+    from app.errors import UsageError
+
+    if options.cameras is None:
+        return []
+    if options.frames:
+        raise UsageError("--cameras gives the number of frames; leave --frames out.")
+    cameras = named_cameras(str(options.cameras), options.scenes[0], options, size)
+    return list(subject.sees(cameras).views[:MOST_FRAMES])
+
+
+def measure_and_draw(options: Options, subjects: list, cameras: list, size: tuple) -> int:
+    from app.charts.budget_chart import Drawn, keep_chart
+    from app.charts.chart_measure import ChartRow, Pricing, open_pair
+    from app.charts.chart_picture import draw_chart
+    from app.charts.chart_rows import RowsFile
+    from app.charts.chart_settings import settings_of
+    from app.charts.chart_stage import QUICK, Walk, digest, make_stage
+
+    x = options.x
+    if x is None and not any(subject.file for subject in subjects):
+        x = subjects[0].x  # scenes side by side show one stop
+    walk = QUICK if options.quick else Walk()
+    walk = replace(walk, frames=options.frames or walk.frames)
+    stage = make_stage(subjects, x, size, walk, cameras)
+    contents = [s.scene if s.file else s.scene.objects[0].model for s in subjects]
+    told = scene_line(options, stage, digest(contents, cameras))
+    with open_pair(options.context, options.drawing) as (renderers, ctx):
+        pricing = Pricing(renderers, ctx, stage, subjects[0].background)
+        on_cpu = draws_on_cpu(pricing.drawing, ctx)
+        head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
+        file = RowsFile(options.out / "rows.csv", ChartRow, head)
+        measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
+        if len(subjects) == 1 and not (options.quick or cameras):
+            drawn = Drawn(subjects[0], x, size)
+            keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
+    title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
+    front = draw_chart(file.rows, title, options.out, on_cpu)
+    print_front(front, len(file.rows), options.out)
+    return 0
+
+
+def draws_on_cpu(drawing: str, ctx) -> bool:
+    """Whether the processor makes the pixels: then its time is what a frame costs."""
+    from rasterizer.device import open_device
+    from renderer.context import is_software
+
+    return open_device().kind == "cpu" if drawing == "tiles" else is_software(ctx)
+
+
+def measure_rows(pricing, file, settings, pictures: bool) -> None:
+    """Adds the rows that the file lacks, one after the other, with progress on stderr."""
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    from app.progress import progress_bar
+
+    known = {row.name for row in file.rows}
+    missing = [named for named in settings if named.name not in known]
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(),
+               MofNCompleteColumn(), Remaining())  # fmt: skip
+    with progress_bar(*columns) as progress:
+        task = progress.add_task("", total=len(settings), completed=len(settings) - len(missing))
+        for named in missing:
+            progress.update(task, description=named.name)
+            file.add(pricing.row(named, pictures))
+            progress.advance(task)
+
+
+def command_line(options: Options) -> str:
+    """What makes these rows again, with file names alone: they are read on other machines."""
+    words = ["python3 launch.py chart", *(path.name for path in options.scenes)]
+    plain = Options()
+    for name in ("cameras", "size", "drawing", "context", "frames", "x", "mode"):
+        value = getattr(options, name)
+        if value != getattr(plain, name):
+            words.append(f"--{name} {value.name if isinstance(value, Path) else value}")
+    words += [f"--{name}" for name in ("quick", "decode") if getattr(options, name)]
+    return " ".join([*words, "--out DIR"])
+
+
+def machine_line(ctx) -> str:
+    """Processor, cores, drivers and versions, as they matter for a time."""
+    from app.measure import gl_renderer, machine
+
+    told = machine(ctx) | {"gl": gl_renderer(ctx)}
+    versions = PARTS[4:]
+    words = [f"{told['processor']}, {told['cores']} cores", f"OpenCL {told['opencl']}",
+             f"GL {told['gl']}", *(f"{name} {told[name]}" for name in versions)]  # fmt: skip
+    return "; ".join(words)
+
+
+def scene_line(options: Options, stage, contents: str) -> str:
+    """What was drawn: names, splats, contents, and what near and far are there."""
+    from collections import Counter
+
+    from app.charts.chart_stage import WARM_UP
+
+    names = Counter(path.name for path in options.scenes)
+    words = [name if n == 1 else f"{n} x {name}" for name, n in names.items()]
+    far = stage.distances
+    return (
+        f"{' + '.join(words)} ({stage.scene.splat_count:,} splats); contents {contents}; "
+        f"{len(stage.path) - WARM_UP} views; near {far.near:g} m, far {far.far:g} m"
+    )
+
+
+def print_front(front: list, count: int, out: Path) -> None:
+    """The settings that nothing beats, on stderr."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table("nothing is both faster and more alike", "ms", "x exact", "dB", "SSIM")
+    for row in front:
+        ssim = f"{row.ssim:.4f}" if row.ssim == row.ssim else "-"
+        table.add_row(row.name, f"{row.ms:.2f}", f"{row.ratio:.3f}", f"{row.db:.1f}", ssim)
+    Console(stderr=True, highlight=False).print(table)
+    print(f"{count} settings in {out / 'rows.csv'}; {out / 'chart.png'} shows them.",
+          file=sys.stderr)  # fmt: skip

@@ -1,0 +1,183 @@
+"""Prices one setting: its frames in turns with exact ones, from two renderers of the same scene."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from app.charts.chart_settings import Named, render_settings, told_changes
+from app.charts.chart_stage import WARM_UP, Stage
+from app.charts.comparison import MOST_DB, exact
+from renderer.renderer import Renderer
+from renderer.settings import FrameStats, RenderSettings
+from scene.metrics import psnr, ssim
+from scene.pose import View
+from scene.stereo import stereo_pair
+
+SSIM_PATH, SSIM_SWEEP = 3, 2  # pictures whose SSIM is taken: it costs more than a frame does
+
+
+@dataclass(frozen=True)
+class ChartRow:
+    """One setting on one scene, as rows.csv has it."""
+
+    name: str
+    eyes: int
+    ms: float  # median frame of the path
+    p95_ms: float
+    exact_ms: float  # median of the exact frames drawn in turns with them
+    ratio: float  # ms / exact_ms
+    cpu_ms: float  # of the process, all threads, a frame (mean)
+    exact_cpu_ms: float
+    psnr_db: float  # worst picture of the path against the exact one
+    psnr_mean_db: float
+    sweep_psnr_db: float  # worst over x
+    sweep_psnr_mean_db: float
+    ssim: float  # worst of a few pictures of path and sweep
+    ssim_mean: float
+    drawn: int  # splats of a frame (mean)
+    splats: int
+    sorts: float  # a frame (mean)
+    changes: str  # fields that differ from RenderSettings()
+
+    @property
+    def db(self) -> float:
+        """The worst that was seen, over path and sweep."""
+        return float(np.min([self.psnr_db, self.sweep_psnr_db]))  # NaN stays NaN
+
+
+class Pricing:
+    """Two renderers that hold the same scene: one stays exact, the other takes every setting.
+
+    One renderer would forget its order and its colours at each change of the settings.
+    """
+
+    def __init__(
+        self, renderers: tuple[Renderer, Renderer], ctx: moderngl.Context | None, stage: Stage,
+        background: tuple[float, float, float],
+    ) -> None:  # fmt: skip
+        self._exact, self._trial = renderers
+        self._ctx, self._stage, self._background = ctx, stage, background
+        self.drawing = self._exact.backends["drawing"].split()[0]
+        self._exact.settings = exact(RenderSettings(background=background), self.drawing)
+
+    def settings(self, named: Named) -> RenderSettings:
+        return render_settings(named, self._background, self.drawing, self._stage.distances)
+
+    def row(self, named: Named, pictures: bool = True) -> ChartRow:
+        """Measures one setting; without `pictures` no SSIM is taken."""
+        self._trial.settings = self.settings(named)
+        path = self._path(named, pictures)
+        sweep, sweep_ssim = self._sweep(named, pictures)
+        alike = path.ssim + sweep_ssim or [float("nan")]
+        times = (
+            np.median(path.ms),
+            np.percentile(path.ms, 95),
+            np.median(path.exact_ms),
+            np.median(path.ms) / np.median(path.exact_ms),
+            np.mean(path.cpu_ms),
+            np.mean(path.exact_cpu_ms),
+        )
+        likeness = (np.min(path.db), np.mean(path.db), np.min(sweep), np.mean(sweep))
+        return ChartRow(
+            named.name,
+            named.eyes,
+            *map(_rounded, (*times, *likeness, np.min(alike), np.mean(alike))),
+            round(np.mean([stats.drawn for stats in path.stats])),
+            path.stats[0].splats,
+            _rounded(np.mean([stats.sorts for stats in path.stats])),
+            told_changes(self._trial.settings),
+        )
+
+    def _path(self, named: Named, pictures: bool) -> "_Frames":
+        """Every view of the path exactly and as set; who comes first changes every frame."""
+        out = _Frames()
+        counted = len(self._stage.path) - WARM_UP
+        compared = set(np.linspace(0, counted - 1, SSIM_PATH).astype(int)) if pictures else set()
+        for number, view in enumerate(self._stage.path, -WARM_UP):
+            trial_views = self._views(view, named.eyes)
+            exact_views = trial_views[: named.beside_eyes or named.eyes]
+            jobs = [(self._exact, exact_views), (self._trial, trial_views)]
+            done = [self._timed(*job) for job in (jobs if number % 2 else jobs[::-1])]
+            (exact_ms, exact_cpu, _), (ms, cpu, stats) = done if number % 2 else done[::-1]
+            if number < 0:
+                continue
+            out.ms.append(ms)
+            out.exact_ms.append(exact_ms)
+            out.cpu_ms.append(cpu)
+            out.exact_cpu_ms.append(exact_cpu)
+            out.stats.append(stats)
+            self._compare(len(exact_views), number in compared, out.db, out.ssim)
+        return out
+
+    def _sweep(self, named: Named, pictures: bool) -> tuple[list[float], list[float]]:
+        """PSNR at every x, SSIM at a few, from the middle of the path; then back to the scene."""
+        xs, views = self._stage.xs, self._views(self._stage.middle, named.eyes)
+        exact_views = views[: named.beside_eyes or named.eyes]
+        compared = set(np.linspace(0, len(xs) - 1, SSIM_SWEEP + 2).astype(int)[1:-1])
+        decibels, alike = [], []
+        # The last x once before: the jump from the end of the path is no motion of the sweep.
+        for number, x in enumerate((xs[-1], *xs), -1):
+            for renderer, seen in ((self._exact, exact_views), (self._trial, views)):
+                renderer.update(self._stage.at(x))
+                renderer.draw(seen)
+            if number >= 0:
+                with_ssim = pictures and number in compared
+                self._compare(len(exact_views), with_ssim, decibels, alike)
+        return decibels, alike
+
+    def _views(self, view: View, eyes: int) -> list[View]:
+        return [view] if eyes == 1 else stereo_pair(view, self._stage.eye_distance)
+
+    def _timed(self, renderer: Renderer, views: list[View]) -> tuple[float, float, FrameStats]:
+        """Wall ms, CPU ms of the process and stats of a whole frame."""
+        start, start_cpu = time.perf_counter(), time.process_time()
+        renderer.update(self._stage.scene)
+        stats = renderer.draw(views)
+        if self._ctx is not None:
+            self._ctx.finish()
+        cpu = (time.process_time() - start_cpu) * 1e3
+        return (time.perf_counter() - start) * 1e3, cpu, stats
+
+    def _compare(self, views: int, with_ssim: bool, db: list[float], alike: list[float]) -> None:
+        """Adds the worse eye's PSNR, and its SSIM, of what both renderers have just drawn."""
+        pairs = [(self._exact.resolved(i), self._trial.resolved(i)) for i in range(views)]
+        db.append(float(np.min([MOST_DB, *(psnr(*pair) for pair in pairs)])))  # NaN stays NaN
+        if with_ssim:
+            alike.append(float(np.min([ssim(*pair) for pair in pairs])))
+
+
+class _Frames:
+    """What was measured along the path."""
+
+    def __init__(self) -> None:
+        self.ms: list[float] = []
+        self.exact_ms: list[float] = []
+        self.cpu_ms: list[float] = []
+        self.exact_cpu_ms: list[float] = []
+        self.stats: list[FrameStats] = []
+        self.db: list[float] = []
+        self.ssim: list[float] = []
+
+
+def _rounded(value: float) -> float:
+    """Four digits: more of a time mean nothing, and files stay readable."""
+    return float(f"{value:.4g}")
+
+
+@contextmanager
+def open_pair(context: str, drawing: str) -> Iterator[tuple]:
+    """((Renderer, Renderer), context or None): two of the same kind in one context."""
+    from app.drawing import open_renderer
+
+    with open_renderer(context, drawing) as (first, ctx):
+        with twin_of(first, ctx) as second:
+            yield (first, second), ctx
+
+
+def twin_of(renderer: Renderer, ctx: moderngl.Context | None) -> Renderer:
+    """Another renderer with the same back ends."""
+    return Renderer(ctx, renderer.backends["drawing"].split()[0])

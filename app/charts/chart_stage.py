@@ -1,0 +1,140 @@
+"""What a chart is measured on: scenes side by side, a path of the camera, a sweep of x."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+
+import numpy as np
+
+from app.charts.chart_settings import Distances
+from app.charts.quick_chart import turned
+from app.subject import Subject
+from scene.framing import frame_points, framing_view, scene_points
+from scene.pose import Pose, View
+from scene.scene import IDENTITY, Scene
+
+WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
+GAP = 1.05  # of the sum of two radii, between neighbours
+NEAR_PART, FAR_PART = 0.6, 0.9  # of the splats, see distances_of
+DISTANCE_VIEWS = 5
+EYE_DISTANCE = 0.032  # of the framed radius: a thing of 2 m radius is seen by a person's eyes
+
+
+@dataclass(frozen=True)
+class Walk:
+    """How the camera and x move."""
+
+    frames: int = 32  # on an arc about the scene
+    sweep: int = 7  # values of x from 0 to 1
+    step: float = 0.75  # degrees between two frames: 45 a second at 60 Hz, a brisk hand
+
+
+QUICK = Walk(frames=8, sweep=3, step=2.0)  # as wide an arc as kept colours need to show
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Everything that is drawn for one row of a chart."""
+
+    scene: Scene
+    path: tuple[View, ...]  # warm-up first: WARM_UP views that do not count
+    xs: tuple[float, ...]  # of the sweep, seen from the middle of the path
+    distances: Distances
+    eye_distance: float  # metres, of rows with two eyes
+
+    @property
+    def middle(self) -> View:
+        return self.path[WARM_UP + (len(self.path) - WARM_UP) // 2]
+
+    def at(self, x: float) -> Scene:
+        """The scene with every object at control value x."""
+        return Scene(tuple(replace(thing, x=x) for thing in self.scene.objects))
+
+
+def make_stage(
+    subjects: Sequence[Subject],
+    x: float | None,
+    size: tuple[int, int],
+    walk: Walk,
+    cameras: Sequence[View] = (),
+) -> Stage:
+    """`subjects` in a row along x, seen from an arc before them or from the views of `cameras`.
+
+    x: of all objects; None: each at its own.
+    """
+    scene = side_by_side(subjects, x)
+    points = scene_points(scene)
+    centre, radius = frame_points(*points)
+    if cameras:
+        counted = tuple(cameras)
+        path = (counted[0],) * WARM_UP + counted
+    else:
+        first = subjects[0].view(size) if len(subjects) == 1 else framing_view(*points, size)
+        path = arc(first, centre, walk)
+    xs = tuple(np.linspace(0, 1, walk.sweep).tolist())
+    return Stage(scene, path, xs, distances_of(points, path), EYE_DISTANCE * radius)
+
+
+def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
+    """Views about the vertical axis through `centre`, `first` in the middle of those that count."""
+    step, half = np.radians(walk.step), walk.frames // 2
+    return tuple(turned(first, centre, step * (i - half)) for i in range(-WARM_UP, walk.frames))
+
+
+def side_by_side(subjects: Sequence[Subject], x: float | None) -> Scene:
+    """Along the world's x, framed radii touching; the first stays where it is."""
+    things, at, before = [], 0.0, None
+    for subject in subjects:
+        centre, radius = subject.bounds()
+        if before is None:
+            pose, left = IDENTITY, float(centre[0])
+        else:
+            at += GAP * (before + radius)
+            pose = Pose(np.array([left + at - centre[0], 0.0, 0.0]), IDENTITY.wxyz)
+        before = radius
+        things += subject.at(x, pose).objects
+    return Scene(tuple(things))
+
+
+def distances_of(points: tuple[np.ndarray, np.ndarray], path: Sequence[View]) -> Distances:
+    """tau_dist in this scene's own scale, metres.
+
+    near and far: within them lie 60 % and 90 % of the splats, in the median over views of the path.
+    The paper's 20 and 40 m are such parts of its scenes, and mean nothing in one of 2 m.
+    """
+    means, opacity = points
+    seen = means[np.isfinite(means).all(axis=1) & (opacity > 0)]
+    if not len(seen):
+        return Distances(1.0, 2.0)
+    eyes = [path[i].world_from_eye.position for i in
+            np.linspace(0, len(path) - 1, DISTANCE_VIEWS).astype(int)]  # fmt: skip
+    parts = [np.quantile(np.linalg.norm(seen - eye, axis=1), (NEAR_PART, FAR_PART)) for eye in eyes]
+    near, far = np.median(parts, axis=0)
+    return Distances(float(f"{near:.4g}"), float(f"{far:.4g}"))
+
+
+def digest(*things: object) -> str:
+    """16 hex digits of what models hold: equal contents, equal digits, wherever they came from."""
+    hasher = hashlib.sha256()
+    for thing in things:
+        _feed(hasher, thing)
+    return hasher.hexdigest()[:16]
+
+
+def _feed(hasher, thing: object) -> None:
+    if is_dataclass(thing):
+        for each in fields(thing):
+            if each.name != "provenance":  # where it came from draws nothing
+                _feed(hasher, getattr(thing, each.name))
+    elif isinstance(thing, np.ndarray):
+        hasher.update(f"{thing.dtype}{thing.shape}".encode())
+        hasher.update(np.ascontiguousarray(thing).tobytes())
+    elif isinstance(thing, dict):
+        for name in sorted(thing):
+            _feed(hasher, (name, thing[name]))
+    elif isinstance(thing, list | tuple):
+        hasher.update(f"[{len(thing)}".encode())
+        for each in thing:
+            _feed(hasher, each)
+    else:
+        hasher.update(repr(thing).encode())

@@ -1,0 +1,167 @@
+"""The paper's Figure 10 here: decode time against anchors, all five networks and colour alone."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from app.charts.chart_rows import RowsFile
+from runtime_models.model import AnchorModel
+
+ANCHORS = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000)
+MOST_RUNS, LEAST_RUNS = 9, 3
+RUN_S = 2.0  # of one figure, unless LEAST_RUNS take longer
+BACK_ENDS = ("onnxruntime", "GL compute")
+LOOKS = {"onnxruntime": ("#d55e00", "o"), "GL compute": ("#0072b2", "s")}
+
+
+@dataclass(frozen=True)
+class DecodeRow:
+    """One number of anchors with one back end; times until the splats lie in the arena."""
+
+    back_end: str
+    anchors: int
+    splats: int
+    all_ms: float  # median: offset, scale, rotation, opacity and colour, as after a change of x
+    color_ms: float  # median: the colour network alone, as after a change of the view
+    runs: int
+
+
+def run_decode(folder: Path, context: str, command: str) -> int:
+    """Writes decode.csv, decode.svg and decode.png; rows that are there are kept."""
+    from app.charts.chart import machine_line
+    from app.commands.headless import DEMO
+    from app.drawing import open_renderer
+    from app.progress import tracked
+    from runtime_models.read_scene import read_model
+
+    model = read_model(DEMO)
+    with open_renderer(context, "auto") as (_, ctx):
+        head = (command, machine_line(ctx), f"networks of {DEMO.name}: {told_networks(model)}")
+        file = RowsFile(folder / "decode.csv", DecodeRow, head)
+        known = {(row.back_end, row.anchors) for row in file.rows}
+        wanted = [(name, n) for name in BACK_ENDS if ctx or name != "GL compute" for n in ANCHORS]
+        missing = [job for job in wanted if job not in known]
+        for name, anchors in tracked(missing, "decoding"):
+            file.add(decode_row(name, ctx, with_anchors(model, anchors)))
+    draw_decode(file.rows, folder)
+    print(f"{len(file.rows)} rows in {folder / 'decode.csv'}; {folder / 'decode.png'} shows them.",
+          file=sys.stderr)  # fmt: skip
+    return 0
+
+
+def told_networks(model: AnchorModel) -> str:
+    """Widths, as a reader needs them: the time follows them."""
+    hidden = " ".join(str(len(bias)) for bias in model.networks["color"].biases[:-1])
+    return (
+        f"{model.features.shape[1]} features, {model.encoding.d} of Psi(x), hidden {hidden}, "
+        f"{model.splats_per_anchor} splats an anchor"
+    )
+
+
+def with_anchors(model: AnchorModel, count: int) -> AnchorModel:
+    """The same networks for `count` anchors: those of the model over and over."""
+    rows = np.arange(count) % len(model.anchors)
+    return replace(model, anchors=model.anchors[rows], features=model.features[rows])
+
+
+def decode_row(back_end: str, ctx, model: AnchorModel) -> DecodeRow:
+    """Times one model; x and the eye change each time, so that nothing is found ready."""
+    with opened(back_end, ctx, model) as (geometry, colors, finish):
+        counter = iter(range(1_000_000))
+
+        def color(x: float = 0.5) -> None:
+            colors(0, x, np.array([0.01 * next(counter), 0.0, 3.0]))
+            finish()
+
+        def everything() -> None:
+            x = next(counter) / 1_000
+            geometry(0, x)
+            color(x)
+
+        everything()  # first use compiles
+        all_ms, color_ms = timed(everything), timed(color)
+    return DecodeRow(back_end, len(model.anchors), model.splat_count,
+                     _short(median(all_ms)), _short(median(color_ms)), len(all_ms))  # fmt: skip
+
+
+@contextmanager
+def opened(back_end: str, ctx, model: AnchorModel) -> Iterator[tuple[Callable, Callable, Callable]]:
+    """(geometry, colour, finish) of one model in an arena of its own; finish waits for both."""
+    if back_end == "onnxruntime":
+        from renderer.tiles import TilesDrawing
+
+        drawing = TilesDrawing()
+        drawing.allocate([model])
+        try:
+            yield drawing.decode_geometry, drawing.decode_color, drawing.device.queue.finish
+        finally:
+            drawing.close()
+        return
+    from renderer.buffers import Arena
+    from renderer.decode import Decoder
+    from renderer.gpu import Gpu
+
+    gpu = Gpu(ctx)
+    arena = Arena(gpu, [model.splat_count])
+    try:
+        with Decoder(gpu, arena, [model], "gl") as decoder:
+            yield decoder.geometry, decoder.color, ctx.finish
+    finally:
+        arena.release()
+        gpu.release()
+
+
+def timed(job: Callable[[], None]) -> list[float]:
+    """ms of each of LEAST_RUNS to MOST_RUNS runs, RUN_S long together where that lies between."""
+    times: list[float] = []
+    while len(times) < LEAST_RUNS or (len(times) < MOST_RUNS and sum(times) < RUN_S * 1e3):
+        start = time.perf_counter()
+        job()
+        times.append((time.perf_counter() - start) * 1e3)
+    return times
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.4g}")
+
+
+def draw_decode(rows: list[DecodeRow], folder: Path) -> None:
+    """Both axes logarithmic: time grows as the anchors do, and the gap is the ratio."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    from app.charts.chart_picture import INK, PALE, WIDTH, save_figure
+
+    figure = Figure((WIDTH, 4.2), layout="constrained", facecolor="white")
+    axis = figure.subplots()
+    for name, (color, marker) in LOOKS.items():
+        mine = sorted((row for row in rows if row.back_end == name), key=lambda row: row.anchors)
+        for field, style, told in (("all_ms", "-", "all five networks"),
+                                   ("color_ms", "--", "colour alone")):  # fmt: skip
+            if mine:
+                axis.plot([row.anchors for row in mine], [getattr(row, field) for row in mine],
+                          style, color=color, marker=marker, ms=4.5, lw=1.5,
+                          label=f"{name}, {told}")  # fmt: skip
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xticks(ANCHORS, [f"{n // 1000}k" for n in ANCHORS])
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_xlabel("anchors", fontsize=9, color=INK)
+    axis.set_ylabel("decode, ms (median)", fontsize=9, color=INK)
+    splats = rows[0].splats // rows[0].anchors
+    axis.set_title(f"A change of x and a change of the view, {splats} splats an anchor",
+                   fontsize=10, color=INK)  # fmt: skip
+    axis.tick_params(labelsize=8, colors=INK)
+    axis.grid(color=PALE, lw=0.6, which="major")
+    axis.set_axisbelow(True)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
+    axis.legend(fontsize=8, frameon=True, edgecolor=PALE)
+    save_figure(figure, folder / "decode")

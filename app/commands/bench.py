@@ -1,0 +1,201 @@
+"""launch.py bench: frame times and image error of a scene, without a window."""
+
+import json
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.opening import ReadingOptions
+
+STANDARD_OUTPUT = Path("-")
+LARGEST_RESULT = 1_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Time frames on an orbit and an x sweep, and measure the image error beside them."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
+    json: Path | None = None
+    """Write the result here; - writes it to standard output."""
+    frames: int = 60
+    """Frames of the orbit, mono and stereo each (after 3 that do not count)."""
+    sweep: int = 200
+    """Values of x in the sweep from 0 to 1 (after 3 that do not count)."""
+    size: str = "640x360"
+    """WIDTHxHEIGHT in pixels."""
+    x: float | None = None
+    """Control value of the orbit, 0 to 1, of all objects; default: the first stop, and in a scene
+    file what it says for each."""
+    quality_size: str = "256x144"
+    """Size of the images that are compared with the float64 reference."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Drawing back end: GL quads or OpenCL tiles."""
+    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
+    """Where GL comes from."""
+    settings: str = ""
+    """A setting by its name in the chart, such as "sort every 4"; wrong names list them all."""
+    target: Literal["", "rgba8", "rgba16f", "rgba32f"] = ""
+    """What quads blend into; default rgba16f, or what --settings says."""
+    target_ms: float | None = None
+    """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
+    machine; measured once, in seconds, and kept."""
+    floor_db: float | None = None
+    """Never below this PSNR against the exact picture, whatever the budget; default 35."""
+
+
+def run(options: Options) -> int:
+    from app.charts.budget import read_budget
+    from app.drawing import open_renderer, parse_size
+    from app.errors import UsageError
+    from app.measure import Measure
+    from app.subject import open_subject
+
+    size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
+    quality_size = parse_size(options.quality_size, "--quality-size")
+    check_counts(options)
+    if options.x is not None and not 0 <= options.x <= 1:
+        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    if budget and (options.settings or options.target):
+        raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
+    if options.json not in (None, STANDARD_OUTPUT):
+        check_result_path(options.json)
+    subject = open_subject(options.scene, options)
+    with open_renderer(options.context, options.drawing) as (renderer, ctx):
+        if budget:
+            from app.charts.budget_chart import Drawn, settings_for
+
+            renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, options.x, size))
+        elif options.settings or options.target:
+            renderer.settings = asked_settings(options, renderer, subject, size)
+        work = Measure(renderer, ctx, subject, options.x, size)
+        result = measure(work, options, quality_size)
+    print_table(result)
+    if options.json == STANDARD_OUTPUT:
+        print(json.dumps(result, indent=1, allow_nan=False))
+    elif options.json is not None:
+        write_json(options.json, result)
+        print(f"written to {options.json}", file=sys.stderr)
+    return 0
+
+
+def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
+    """RenderSettings of --settings and --target; UsageError where there is none such."""
+    from dataclasses import replace
+
+    from app.charts.chart_settings import named_settings, render_settings
+    from app.charts.chart_stage import distances_of
+    from app.errors import UsageError
+    from scene.framing import orbit_path
+
+    drawing = renderer.backends["drawing"].split()[0]
+    settings = renderer.settings
+    if options.settings:
+        named = named_settings(options.settings, drawing)
+        distances = distances_of(subject.points(), orbit_path(8, *subject.bounds(), size))
+        settings = render_settings(named, settings.background, drawing, distances)
+    if options.target and drawing != "quads":
+        raise UsageError(f"--target is what quads blend into, and {drawing} are drawn here.")
+    return replace(settings, target=options.target) if options.target else settings
+
+
+def measure(work, options, quality_size: tuple[int, int]) -> dict:
+    """All rows of a Measure, with what was asked; says on stderr what it is at."""
+    from rich.console import Console
+
+    with Console(stderr=True).status("starting") as status:
+        result = work.all(options.frames, options.sweep, quality_size, status.update)
+    return result | {"command": command_line(), "scene": options.scene.name}
+
+
+def command_line() -> str:
+    """What was typed, with file names alone: rows are read on other machines."""
+    words = [Path(w).name if os.sep in w else w for w in sys.argv[1:]]
+    return " ".join(["python3 launch.py", *words])
+
+
+def check_counts(options) -> None:
+    """--frames and --sweep: two or more, since one frame has no percentiles."""
+    from app.drawing import MOST_VALUES
+    from app.errors import UsageError
+
+    for name in ("frames", "sweep"):
+        if not 2 <= getattr(options, name) <= MOST_VALUES:
+            raise UsageError(f"--{name} is {getattr(options, name)}, expected 2 to {MOST_VALUES}.")
+
+
+def check_result_path(path: Path) -> None:
+    """Refuses, before minutes of work, a file that cannot be written or that is not a result."""
+    from app.errors import UsageError
+
+    if path.is_dir():
+        raise UsageError(f"{path} is a folder; name the JSON file that the result goes to.")
+    if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
+        raise UsageError(f"cannot write into the folder {path.parent}; choose another file.")
+    if path.exists() and not is_result(path):
+        raise UsageError(f"{path} exists and is no bench result; choose another file.")
+
+
+def is_result(path: Path) -> bool:
+    try:
+        found = json.loads(path.read_bytes()) if path.stat().st_size < LARGEST_RESULT else None
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(found, dict) and "frame_ms" in found
+
+
+def write_json(path: Path, result: dict) -> None:
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def print_table(result: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    backends = ", ".join(f"{what} {name}" for what, name in result["backends"].items())
+    rows = {
+        "frame": result["frame_ms"],
+        "stereo": result["stereo_ms"],
+        "x sweep": result["sweep_ms"],
+    }
+    if touch := result.get("touch"):
+        rows |= {"touch scene": touch["frame_ms"], "its physics": touch["physics_ms"]}
+    last = list(rows)[-1]
+    rows |= result["passes"]
+    table = Table("ms", "p50", "p95", "p99")
+    for name, row in rows.items():
+        table.add_row(name, *(f"{row[p]:.2f}" for p in ("p50", "p95", "p99")))
+        if name == last:
+            table.add_section()
+    db = result["psnr_db"]
+    quality = "NaN in a picture" if db is None else f"{db:.1f} dB"
+    told = (
+        f"PSNR to the float64 reference {quality} at {result['quality_size']} "
+        f"(worst of {result['quality_images']}), {result['drawn']:,} of {result['splats']:,} "
+        f"splats drawn, stereo/mono {result['stereo_over_mono']:.2f}, "
+        f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms{frame_over_draw(result)}; "
+        f"{result['frames']} frames after {result['warm_up']} that do not count"
+    )
+    console = Console(stderr=True, highlight=False)
+    title = f"{result['scene']}, {result['size']}, {backends}, {result['gl_renderer']}"
+    console.print(title, markup=False)  # a scene's name may hold brackets
+    console.print(table)
+    console.print(told, markup=False)
+
+
+def frame_over_draw(result: dict) -> str:
+    if result["draw_pass_ratio"] is None:
+        return ""
+    return (
+        f", frame/draw pass ({' + '.join(result['draw_passes'])}) {result['draw_pass_ratio']:.2f}"
+    )

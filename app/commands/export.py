@@ -1,0 +1,284 @@
+"""launch.py export: a scene at one control value as a file for other programs."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
+
+PACKAGE = ".shift"
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Write a scene as it is shown at one x: plain splats that every viewer opens, or a package."""
+
+    scenes: tyro.conf.Positional[tuple[Path, ...]]
+    """What to export; several become one file, where they stand when opened together, and the
+    objects of a scene file where that puts them."""
+    out: Path
+    """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, or
+    our package, .shift or a folder (a name without an ending)."""
+    x: str = ""
+    """Control value in 0..1 or the name of a stop, of all objects; default: the first stop, and in
+    a scene file what it says for each."""
+    sh_degree: int = 3
+    """Spherical harmonics of the colours, at most; 0: one colour from all sides."""
+    palette: bool = True
+    """Thermal stops in their false colours, as they are shown; --no-palette: as the networks give
+    them."""
+    select: tuple[str, ...] = ()
+    """Parts with a control value X of their own (a number or a stop's name), in each object's
+    frame: sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border]
+    half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border]."""
+    only: tuple[str, ...] = ()
+    """Nothing but what lies in one of these: sphere:x,y,z:radius box:x,y,z:hx,hy,hz
+    half:x,y,z:nx,ny,nz lens:degrees; anchors count with all their splats."""
+    object: str = ""
+    """Nothing but the scene of that number, counted from 1, or file name; of a scene file, nothing
+    but the object of that name or label."""
+    label: int | None = None
+    """Nothing but the object of that label (files with labels: Gaussian Grouping)."""
+    eye: str = ""
+    """x,y,z in metres: where a scene is seen from whose shape depends on that (Scaffold-GS);
+    default: the first view."""
+    overwrite: bool = False
+    """Replace an earlier file; never what is read."""
+
+
+def run(options: Options) -> int:
+    from app.commands.exported import Look, check_output, export, is_folder
+    from app.errors import UsageError
+    from runtime_models.evaluate import follows_eye
+    from runtime_models.write_plain import writer_of
+
+    scenes = choose_scenes(options)
+    if not 0 <= options.sh_degree <= 3:
+        raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
+    package = is_folder(options.out) or options.out.suffix.lower() == PACKAGE
+    if not package:
+        writer_of(options.out)  # before the scene is read
+    check_output(options.out, options.scenes, options.overwrite)
+    eye = parse_eye(options.eye)
+    opened = [open_scene(path, options) for path in scenes]
+    models = [thing.model for scene in opened for thing in scene.scene.objects]
+    if package:
+        return export_package(options, opened)
+    if eye and not any(map(follows_eye, models)):
+        print(
+            "--eye changes nothing: the shapes of this scene are the same from everywhere, and its "
+            "colours are written for all directions.",
+            file=sys.stderr,
+        )
+    origin = opened[0].origin
+    parts = [
+        part
+        for path, scene in zip(scenes, opened, strict=True)
+        for part in parts_of(path, scene, scene.origin - origin, options)
+    ]
+    look = Look(options.sh_degree, options.palette, eye, tuple(origin))
+    with progress_after(PATIENCE_S) as told:
+        splats = export(parts, look, options.out, told)
+    for finding in splats.findings:
+        print(sentence(finding), file=sys.stderr)
+    degree = round(splats.sh.shape[1] ** 0.5) - 1
+    print(
+        f"{options.out}: {len(splats.means):,} splats, SH degree {degree}, "
+        f"{options.out.stat().st_size:,} bytes, {told_x(parts)}.",
+        file=sys.stderr,
+    )
+    return 0
+
+
+def choose_scenes(options: Options) -> tuple[Path, ...]:
+    """The scenes that are exported, or of which objects are.  Raises UsageError."""
+    from app.errors import UsageError
+    from scene.scene_file import is_scene_file
+
+    scenes = options.scenes
+    if not scenes:
+        raise UsageError("no scene is given; name at least one.")
+    if not options.object or (len(scenes) == 1 and is_scene_file(scenes[0])):
+        return scenes
+    numbered = {str(i): path for i, path in enumerate(scenes, 1)}
+    named = {path.name: path for path in scenes}
+    if options.object not in numbered | named:
+        names = ", ".join(f"{i} {path.name}" for i, path in enumerate(scenes, 1))
+        raise UsageError(f"--object is {options.object}; there are {names}.")
+    return ((numbered | named)[options.object],)
+
+
+def open_scene(path: Path, options: Options):
+    """The Subject of a file, of a scene file the chosen objects alone.  Raises UsageError."""
+    from dataclasses import replace
+
+    from app.commands.exported import check_output
+    from app.errors import UsageError
+    from app.subject import Subject, open_subject
+    from scene.scene import Scene
+    from scene.scene_file import HULLS, is_scene_file
+
+    if not is_scene_file(path):
+        return Subject.of(open_model(path, options))
+    subject = open_subject(path, options)
+    read = {name for item in subject.file.all_items for name in (item.model, item.collider) if name}
+    inputs = [subject.file.path(name) for name in read if name != HULLS]
+    check_output(options.out, inputs, options.overwrite)
+    chosen = options.object if len(options.scenes) == 1 else ""
+    things = [
+        thing
+        for thing in subject.scene.objects
+        if (chosen in (thing.name, str(thing.label)) if chosen else thing.visible)
+    ]
+    if exact := [thing for thing in things if chosen and thing.name == chosen]:
+        things = exact  # a name that is a number, too
+    if not things and chosen:
+        names = ", ".join(f"{thing.label} {thing.name}" for thing in subject.scene.objects)
+        raise UsageError(f"--object is {chosen}; there are {names}.")
+    if not things:
+        raise UsageError(f"{path}: all objects are hidden; --object NAME exports one of them.")
+    return replace(subject, scene=Scene(tuple(things)))
+
+
+def parts_of(path: Path, subject, position, options: Options) -> list:
+    """What of a scene is written; position (3,) metres is where its zero is put."""
+    from dataclasses import replace
+
+    from app.subject import moved_object
+    from scene.pose import Pose
+    from scene.scene import IDENTITY
+
+    if not subject.file:
+        return [make_part(path, subject.scene.objects[0].model, position, options)]
+    if options.x:
+        from app.commands.compare_sides import subject_at
+
+        subject = subject_at(subject, options.x, f"--x {options.x}")
+    parts = []
+    for thing in subject.scene.objects:
+        part = make_part(path, thing.model, position, options, thing)
+        placed = moved_object(thing, Pose(position, IDENTITY.wxyz))
+        selectors = (*placed.selectors, *part.thing.selectors)
+        parts.append(replace(part, thing=replace(placed, selectors=selectors)))
+    return parts
+
+
+def parse_eye(text: str) -> tuple[float, float, float] | None:
+    """Three numbers of a text.  Raises UsageError."""
+    from math import isfinite
+
+    from app.errors import UsageError
+
+    if not text:
+        return None
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3 or not all(map(isfinite, numbers)):
+        raise UsageError(f"--eye is '{text}', expected x,y,z in metres.")
+    return numbers
+
+
+def make_part(path: Path, model, position, options: Options, known=None):
+    """What the options say about one model, which stands at position (3,) in metres: its x, its
+    regions, what of it is written.  known: the object of a scene file, which has an x already.
+    """
+    from app.commands.exported import Part
+    from app.errors import UsageError
+    from scene.framing import default_view
+    from scene.pose import Pose
+    from scene.read_selector import read_selector
+    from scene.scene import IDENTITY, SceneObject
+
+    x = known.x if known else choose_x(options.x, model, path.name)
+    eye = default_view(model, (640, 360)).world_from_eye
+    try:
+        selectors = tuple(read_selector(text, model.stops, eye) for text in options.select)
+    except ValueError as error:
+        raise UsageError(f"--select {error}") from None
+    try:
+        inside = tuple(read_selector(with_x(text), (), eye) for text in options.only)
+    except ValueError as error:
+        raise UsageError(f"--only {error}") from None
+    pose = Pose(position, IDENTITY.wxyz)
+    thing = SceneObject(path.stem or path.name, model, pose, x, selectors=selectors)
+    return Part(thing, inside or None, options.label)
+
+
+def choose_x(text: str, model, name: str) -> float:
+    """The control value of a number or a stop's name.  Raises UsageError."""
+    from app.errors import UsageError
+
+    if not text:
+        return min((stop.x for stop in model.stops), default=0.0)
+    for stop in model.stops:
+        if stop.name.lower() == text.lower():
+            return stop.x
+    try:
+        x = float(text)
+    except ValueError:
+        x = float("nan")
+    if not 0 <= x <= 1:
+        names = ", ".join(f"{stop.name} ({stop.x:g})" for stop in model.stops) or "none"
+        raise UsageError(
+            f"--x is '{text}', expected 0 to 1 or one of the stops of {name}: {names}."
+        )
+    return x
+
+
+def with_x(text: str) -> str:
+    """A selector of --only in the form that has a control value, which means nothing here."""
+    from scene.read_selector import FORMS
+
+    kind, *parts = text.split(":")
+    if kind not in FORMS:
+        raise ValueError(f"'{text}' begins with '{kind}'; {', '.join(FORMS)} are known.")
+    form = FORMS[kind].split("[")[0].removesuffix(":X")
+    if len(parts) != form.count(":"):
+        raise ValueError(f"'{text}' has {len(parts)} parts after '{kind}'; write {form}.")
+    return f"{text}:0"
+
+
+def told_x(parts: list) -> str:
+    """x of what was written, with the stop's name where it is one."""
+    thing = parts[0].thing
+    if len({part.thing.x for part in parts}) > 1:
+        return f"{len(parts)} objects, each at its own x"
+    name = next((stop.name for stop in thing.model.stops if stop.x == thing.x), "")
+    return f"x = {thing.x:g}" + (f" ({name})" if name else "")
+
+
+def export_package(options: Options, opened: list) -> int:
+    """Writes a model of anchors and networks whole; nothing else can become one."""
+    import numpy as np
+
+    from app.errors import UsageError
+    from runtime_models.model import AnchorModel
+    from runtime_models.write_package import write_package
+
+    asked = {
+        "--x": options.x, "--select": options.select, "--only": options.only,
+        "--label": options.label is not None, "--eye": options.eye,
+    }  # fmt: skip
+    given = [name for name, value in asked.items() if value]
+    if given:
+        raise UsageError(
+            f"a package holds every x and every part; leave {given[0]} out, or write plain splats "
+            "(.ply, .spz, .glb ...)."
+        )
+    models = [thing.model for subject in opened for thing in subject.scene.objects]
+    if len(models) != 1 or opened[0].file or not isinstance(models[0], AnchorModel):
+        what = "several scenes" if len(models) != 1 else "plain splats"
+        what = "objects of a scene file, which have places," if opened[0].file else what
+        raise UsageError(
+            f"{what} cannot become a package: it is anchors and five networks, which `launch.py "
+            "train` makes of photos; write .ply, .spz or .glb."
+        )
+    features = models[0].features
+    halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
+    size = write_package(models[0], options.out, "float16" if halves else "float32")
+    print(f"{options.out}: {size:,} bytes, every x.", file=sys.stderr)
+    return 0

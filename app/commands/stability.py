@@ -1,0 +1,142 @@
+"""launch.py stability: a scene, and the renderer with it, in the cases where methods fail."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.opening import ReadingOptions
+
+FAILED = 1  # exit code: a case went past its bound
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Draw a scene in the cases where splat renderers fail, and hold every figure to its bound.
+
+    Writes stability.csv (case, figure, measured, bound, verdict, and why the bound is where it is)
+    and a picture of each case's worst frame beside what it is compared with. Run it again to go on
+    where it was stopped: cases that held are kept, those that failed are measured anew.
+
+    Exit code 0: every case holds; 1: one fails (its rows say FAILS); 2: bad input.
+    docs/stability.md says what each case means.
+    """
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
+    out: Path
+    """Folder for stability.csv and the pictures."""
+    cases: tuple[str, ...] = ()
+    """Names of cases; default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
+    far-origin, depth-range, inside, lenses, random-eyes, needles, limits, counts, crowd,
+    extrapolated-x, broken-heads, life."""
+    size: str = "640x360"
+    """WIDTHxHEIGHT in pixels."""
+    steps: int = 24
+    """Frames between two stops of the x sweep, and of the 90-degree turn."""
+    rounds: int = 50
+    """Contexts made and closed by the case life."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Drawing back end: GL quads or OpenCL tiles."""
+    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
+    """Where GL comes from."""
+    overwrite: bool = False
+    """Start anew where the folder holds the table of another scene, size or drawing."""
+
+
+def run(options: Options) -> int:
+    from app.drawing import make_folder, open_renderer, parse_size
+    from app.stability_cases.stage import Stage
+    from app.stability_cases.table import open_table
+    from app.subject import open_subject
+
+    size = parse_size(options.size)
+    names = choose_cases(options)
+    scene = open_subject(options.scene, options)
+    make_folder(options.out)
+
+    def reopen():
+        return open_renderer(options.context, options.drawing)
+
+    with reopen() as (renderer, ctx):
+        table = open_table(
+            options.out, command_line(), subject(options, renderer, scene), options.overwrite
+        )
+        stage = Stage(
+            renderer, ctx, scene, size, reopen, scene.background, options.steps, options.rounds
+        )
+        perform(stage, names, table)
+    print_table(table, names)
+    failed = [name for name in names if table.failed(name)]
+    told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
+    count = f"{len(names)} case{'s' * (len(names) > 1)}"
+    print(f"{count}, {told}; {table.path} and pictures beside it", file=sys.stderr)
+    return FAILED if failed else 0
+
+
+def choose_cases(options: Options) -> list[str]:
+    """The cases asked for, in the table's order; refuses numbers and names that cannot be."""
+    from app.errors import UsageError
+    from app.stability_cases.table import CASES
+
+    for name, least, most in (("steps", 6, 1000), ("rounds", 2, 1000)):
+        if not least <= getattr(options, name) <= most:
+            given = getattr(options, name)
+            raise UsageError(f"--{name} is {given}, expected {least} to {most}.")
+    for name in options.cases:
+        if name not in CASES:
+            raise UsageError(f"there is no case '{name}'; choose of {', '.join(CASES)}.")
+    return [name for name in CASES if not options.cases or name in options.cases]
+
+
+def subject(options: Options, renderer, scene) -> str:
+    """What the rows are about: rows of another scene, size or drawing do not belong with them."""
+    from app.measure import processor
+
+    backends = ", ".join(renderer.backends.values())
+    return (
+        f"{options.scene.name}, {scene.scene.splat_count} splats, {options.mode or 'cumulative'}, "
+        f"{options.size}, {options.steps} steps, {options.rounds} rounds, {backends}, {processor()}"
+    )
+
+
+def command_line() -> str:
+    from app.commands.bench import command_line as typed
+
+    return typed()
+
+
+def perform(stage, names: list[str], table) -> None:
+    """Runs what is not in the table yet; each case is on disk before the next one starts."""
+    from rich.console import Console
+
+    from app.stability_cases.table import CASES, save_panels
+
+    console = Console(stderr=True, highlight=False)
+    with console.status("starting") as status:
+        for i, name in enumerate(names):
+            if name in table.rows:
+                continue
+            status.update(f"{name} ({i + 1} of {len(names)})")
+            result = CASES[name](stage)
+            save_panels(result.panels, table.folder / f"{name}.png")
+            table.add(name, result.findings)
+            failed = sum(f.verdict == "FAILS" for f in result.findings)
+            console.print(f"{name}: {f'{failed} past their bounds' if failed else 'holds'}")
+
+
+def print_table(table, names: list[str]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    shown = Table("case", "figure", "measured", "bound", "verdict")
+    for name in names:
+        for i, (case, figure, measured, bound, verdict, _) in enumerate(table.rows[name]):
+            style = "bold red" if verdict == "FAILS" else ""
+            cells = (case if i == 0 else "", figure, measured, bound, verdict)
+            shown.add_row(*(Text(cell, style) for cell in cells))  # figures may hold brackets
+        shown.add_section()
+    Console(stderr=True, highlight=False).print(shown)

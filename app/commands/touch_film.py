@@ -1,0 +1,60 @@
+"""The touch scene of the main job: its script's hands at work, as pictures and as frame times."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.commands.simulate import make_simulation
+from app.drawing import save_png
+from app.measure import WARM_UP, percentiles
+from renderer.renderer import Renderer
+from scene.read_scene_file import read_scene_file
+from scene.read_script import read_script
+from scene.scene_file import first_view
+
+ASSETS = Path(__file__).resolve().parents[2] / "assets"
+SCENE, SCRIPT = ASSETS / "touch.scene.json", ASSETS / "touch.jsonl"
+MOMENTS_S = (0.0, 1.6, 3.85, 6.0)  # all at rest; the ring carried; the cube in the air; afterwards
+STEPS = 2  # of 1/90 s, a frame
+BACKGROUND = (0.0, 0.0, 0.0)  # what touch.scene.json was made to stand before
+
+
+def film(renderer: Renderer, ctx, size: tuple[int, int], path: Path) -> dict:
+    """Plays the scene as its script says; MOMENTS_S side by side become the PNG `path`.
+
+    ms of whole frames (physics, new poses and x, drawing) and of the physics alone in them.
+    Raises BadFile.
+    """
+    file = read_scene_file(SCENE)
+    simulation = make_simulation(file, read_script(SCRIPT, file.all_items))
+    world = simulation.world
+    view = first_view(file, world.drawn(), size)
+    renderer.settings = replace(renderer.settings, background=BACKGROUND)
+    frames, physics, pictures, changes, wanted = [], [], [], 0, list(MOMENTS_S)
+    while wanted:
+        start = time.perf_counter()
+        records = [simulation.step() for _ in range(STEPS)] if pictures else []
+        stepped = time.perf_counter()
+        renderer.update(world.drawn())
+        stats = renderer.draw([view])
+        if ctx is not None:
+            ctx.finish()
+        frames.append((time.perf_counter() - start) * 1e3)
+        physics.append((stepped - start) * 1e3)
+        changes += sum(len(record.events) for record in records)
+        if world.time_s >= wanted[0]:
+            pictures.append(renderer.resolved(0))
+            wanted.pop(0)
+    save_png(np.concatenate(pictures, axis=1), path)
+    return {
+        "scene": SCENE.name,
+        "frame_ms": percentiles(frames[WARM_UP:]),
+        "physics_ms": percentiles(physics[WARM_UP:]),
+        "frames": len(frames) - WARM_UP,
+        "steps_a_frame": STEPS,
+        "objects": len(world.things),
+        "splats": stats.splats,
+        "reactions": changes,
+    }

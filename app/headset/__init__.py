@@ -1,0 +1,1 @@
+"""launch.py vr: the viewer's counterpart in a headset."""

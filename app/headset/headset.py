@@ -1,0 +1,192 @@
+"""launch.py vr: a scene in a headset; without one a sentence, and the viewer where it can open."""
+
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from math import inf
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.opening import ReadingOptions
+
+DEMO = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
+NO_HEADSET = 4  # exit code
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Walk into a scene and touch it, see docs/vr.md."""
+
+    scene: Annotated[Path | None, tyro.conf.Positional] = None
+    """A scene file, a package or splats; none: three things on a table."""
+    eye_part: float = 1.0
+    """Of the width and height that the runtime recommends for an eye."""
+    drawing: Literal["auto", "quads", "tiles"] = "auto"
+    """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
+    quality: Literal["auto", "best", "balanced", "fast"] = "auto"
+    """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
+    frames last, and fewer pixels while frames are late; best: exact, always."""
+    target_ms: float | None = None
+    """Milliseconds that a frame may take us with --quality auto; default: 85 % of the headset's."""
+    floor_db: float | None = None
+    """Never below this PSNR against the exact picture with --quality auto; default 35."""
+    turning: Literal["snap", "smooth", "none"] = "snap"
+    """By the stick that does not walk: 30 degrees at a time, evenly, or by the body alone."""
+    walking_hand: Literal["left", "right"] = "left"
+    """The hand whose stick walks; the other turns and flies."""
+    panel_hand: Literal["left", "right"] = "left"
+    """The hand that carries the panel; the other points at it."""
+    vignette: float = 0.8
+    """How dark the edge of the picture gets while a stick moves one; 0: not at all, 1: black."""
+    mirror: bool = True
+    """Show the left eye in a window too, where there is a display."""
+    frames: int = 0
+    """End after so many frames, for tests and benchmarks; 0: stay until it is ended."""
+    report: Path | None = None
+    """Write what the run was like here, as JSON, at its end."""
+    lines: Path | None = None
+    """Write one line of JSON a frame here, as it happens."""
+    pictures: Path | None = None
+    """Folder for the pictures of both eyes."""
+    every: int = 1
+    """Of --pictures: every so many frames."""
+    pixels: str = ""
+    """Format of the runtime's pictures, such as SRGB8_ALPHA8 or RGBA16F; default: the best."""
+
+
+def run(options: Options) -> int:
+    """0 after a session; NO_HEADSET, or the viewer's code, without one."""
+    from vr.instance import Lost, NoHeadset
+
+    check(options)
+    try:
+        return wear(options)
+    except (NoHeadset, Lost) as reason:
+        return without_headset(str(reason), options)
+
+
+def check(options: Options) -> None:
+    """UsageError, one sentence, for what makes no sense."""
+    from app.errors import UsageError
+
+    if not 0.1 <= options.eye_part <= 2:
+        raise UsageError(f"--eye-part is {options.eye_part:g}, expected 0.1 to 2.")
+    for name, value in (("--target-ms", options.target_ms), ("--floor-db", options.floor_db)):
+        if value is not None and not 0 < value < inf:
+            raise UsageError(f"{name} is {value}, expected a number above 0.")
+        if value is not None and options.quality != "auto":
+            raise UsageError(f"{name} is for --quality auto; leave one of the two out.")
+    if not 0 <= options.vignette <= 1:
+        raise UsageError(f"--vignette is {options.vignette:g}, expected 0 to 1.")
+    if options.frames < 0:
+        raise UsageError(f"--frames is {options.frames}, expected 0 (no end) or more.")
+    if options.every < 1:
+        raise UsageError(f"--every is {options.every}, expected 1 or more.")
+    if options.scene is not None and not options.scene.exists():
+        raise UsageError(f"there is no {options.scene}.")
+    for path in (options.report, options.lines):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise UsageError(f"there is no folder {path.parent} for {path.name}.")
+        if path is not None and path.resolve() == (options.scene or DEMO).resolve():
+            raise UsageError(f"{path} is the scene; choose another file.")
+
+
+def wear(options: Options) -> int:
+    """The session from its door to its end.  Raises NoHeadset, Lost."""
+    from app.cli import has_display
+    from app.drawing import make_folder
+    from app.headset.headset_report import Report
+    from app.headset.mirror import open_mirror
+    from app.headset.pacing import FLOOR_DB, Pacing
+    from app.headset.wearing import Eyes, Wearing
+    from app.headset.worn_scene import open_worn
+    from renderer.renderer import Renderer
+    from vr.instance import Instance, Lost
+    from vr.locomotion import Rules
+    from vr.session import Session
+
+    with Instance() as instance:
+        scene = open_worn(options.scene or DEMO, options)
+        pacing = Pacing(
+            scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms
+        )
+        if options.pictures:
+            make_folder(options.pictures)
+        with (
+            Report(options.report, options.lines, options.pictures, options.every) as report,
+            open_mirror(has_display(), options.mirror) as mirror,
+            Session(instance, mirror.ctx, options.eye_part, options.pixels) as session,
+            Renderer(mirror.ctx, options.drawing) as renderer,
+            Eyes(mirror.ctx, session.sizes) as eyes,
+        ):
+            rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
+            for profile in session.hands.refused:
+                print(f"{instance.runtime} does not know {profile}.", file=sys.stderr)
+            wearing = Wearing(
+                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand
+            )
+            try:
+                with interrupting(wearing):
+                    wearing.loop(options.frames)
+            except Lost:
+                report.ended = "runtime lost"
+                raise
+            finally:
+                report.write(describe(instance, session) | pacing.report())
+    return 0
+
+
+@contextmanager
+def interrupting(wearing) -> Iterator[None]:
+    """Ctrl-C ends a session as its window's cross does, a second one at once.
+
+    Torn down in the middle of a frame, runtimes and drivers crash.
+    """
+    before = signal.getsignal(signal.SIGINT)
+
+    def ask(number, stack) -> None:
+        wearing.interrupted = True
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, ask)
+    if sys.platform != "win32":
+        signal.siginterrupt(signal.SIGINT, False)  # runtimes with a service do not call again
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if wearing.interrupted:
+        raise KeyboardInterrupt
+
+
+def describe(instance, session) -> dict:
+    """The report without how it ended."""
+    return {
+        "runtime": instance.runtime,
+        "headset": instance.headset,
+        "states": session.life.states,
+        "space": session.play.kind,
+        "recentrings": session.recentrings,
+        "profiles": session.profiles,
+        "pixels": session.pixels.name,
+        "eyes": session.sizes,
+        **session.pace.report(),
+    }
+
+
+def without_headset(reason: str, options: Options) -> int:
+    """Says why, and opens the viewer, unless nobody looks: a measured run, or no display."""
+    from app.cli import has_display
+
+    print(f"shapeshift vr: {reason}", file=sys.stderr)
+    if options.frames or options.report or not has_display():
+        return NO_HEADSET
+    from app.viewer import desktop
+
+    print("Opening the scene in a window instead.", file=sys.stderr)
+    reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}
+    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), **reading))

@@ -1,0 +1,118 @@
+"""What a run in the headset leaves behind for tests and benchmarks: a report, lines, pictures."""
+
+import json
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+import numpy as np
+
+from app.drawing import save_png
+from runtime_models.whole_file import write_whole
+from scene.pose import Pose
+from vr.carried import panel_row
+from vr.frame import SIDES, Frame, Hand
+from vr.swapchain import read
+
+if TYPE_CHECKING:
+    from app.headset.wearing import Wearing
+
+DECIMALS = 6
+
+
+class Report:
+    """Writes a line a frame as it happens, pictures of every n-th, and the report at the end."""
+
+    def __init__(
+        self,
+        path: Path | None = None,
+        lines: Path | None = None,
+        pictures: Path | None = None,
+        every: int = 1,
+    ) -> None:
+        self.ended = "by the runtime"
+        self._path, self._pictures, self._every = path, pictures, every
+        self._lines: IO[str] | None = None
+        if lines is not None:
+            self._lines = lines.open("w", encoding="utf-8", newline="\n")
+
+    def note(self, wearing: "Wearing", frame: Frame, records: list) -> None:
+        """A frame that has been handed over."""
+        number = wearing.session.pace.frames
+        if self._lines is not None:
+            row = frame_row(number, wearing, frame, records)
+            self._lines.write(json.dumps(row, allow_nan=False, separators=(",", ":")) + "\n")
+            self._lines.flush()
+        if self._pictures is not None and frame.drawn and number % self._every == 0:
+            for side, framebuffer in zip(SIDES, wearing.eyes.framebuffers, strict=True):
+                save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
+
+    def write(self, told: dict) -> None:
+        """The report itself."""
+        if self._path is not None:
+            text = json.dumps({**told, "ended": self.ended}, indent=1) + "\n"
+            write_whole(self._path, text.encode())
+
+    def close(self) -> None:
+        if self._lines is not None:
+            self._lines.close()
+
+    def __enter__(self) -> "Report":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.close()
+
+
+def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> dict:
+    """What a line tells."""
+    session, world, standing = wearing.session, wearing.world, wearing.standing
+    times = session.pace.own_ms
+    return {
+        "frame": number,
+        "seen_s": rounded(frame.seen_s),
+        "time_s": rounded(world.time_s),  # of the physics
+        "state": session.life.state,
+        "drawn": frame.drawn,
+        "focused": frame.focused,
+        "recentred": frame.recentred,
+        "head": pose_row(frame.head),
+        "views": [
+            {**pose_row(view.world_from_eye), "tangents": numbers(view.tangents)}
+            for view in frame.views
+        ],
+        "hands": {side: hand_row(hand) for side, hand in frame.hands.items()},
+        "standing": {**pose_row(standing.world_from_play), "scale": rounded(standing.scale)},
+        "held": {side: world.held(side) for side in SIDES},
+        "objects": {
+            thing.name: {**pose_row(thing.world_from_object), "x": rounded(thing.x)}
+            for thing in world.drawn().objects
+        },
+        "panel": panel_row(wearing.panel.carried),
+        "events": [event for record in records for event in record.events],
+        "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in wearing.pulses],
+        "own_ms": rounded(times[-1]) if times else None,
+        "dropped": session.pace.dropped,
+    }
+
+
+def hand_row(hand: Hand) -> dict:
+    return {
+        "active": hand.active,
+        "grip": pose_row(hand.grip) if hand.grip is not None else None,
+        "aim": pose_row(hand.aim) if hand.aim is not None else None,
+        "squeeze": rounded(hand.squeeze),
+        "trigger": rounded(hand.trigger),
+        "stick": numbers(hand.stick),
+    }
+
+
+def pose_row(pose: Pose) -> dict:
+    return {"position": numbers(pose.position), "wxyz": numbers(pose.wxyz)}
+
+
+def numbers(many: np.ndarray | tuple) -> list[float]:
+    return [rounded(number) for number in many]
+
+
+def rounded(number: float) -> float:
+    return round(float(number), DECIMALS) + 0.0

@@ -1,0 +1,172 @@
+"""Keeps the drawing of a headset's frames within the runtime's period: settings, then pixels."""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from statistics import median
+
+import numpy as np
+
+from app.charts.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
+from app.charts.quick_chart import QUICK, QuickChart, QuickRow
+from renderer.renderer import Renderer
+from renderer.resolution import Resolution
+from renderer.settings import RenderSettings
+from scene.pose import Pose, View
+from scene.scene import Scene
+
+AUTO = "auto"
+FIXED = {  # quality of the panel -> row of the quick chart that it always is
+    "best": "",
+    "balanced": "sort 4, colours 5°, 1 px",
+    "fast": "the same at 50 %",
+}
+# Of the quick chart, what pays most first, since there may not be the time for all.
+PRICED = (
+    "75 % scale", "50 % scale", "sort 4, colours 5°, 1 px", "the same at 75 %",
+    "the same at 50 %", "1 px footprint", "sort every 4",
+)  # fmt: skip
+PATIENCE_S = 4.0
+QUALITIES = (AUTO, *FIXED)
+PART = 0.85  # of the period may be ours: the runtime wants the rest
+SAME = 0.1  # of a period: how much another one may differ and ask for nothing new
+LEAST = 0.25  # of that is the splats', however long all else takes
+EASY = 0.6  # of that: what takes the exact picture no longer needs no chart
+OVER, LATE = 1.05, 24  # times that, as the median of so many frames, is late
+TRIES = 4  # exact frames that say whether shortcuts are needed at all; one before them warms up
+
+
+class Pacing:
+    """Gives the settings of every frame of a headset and takes its time.
+
+    AUTO draws the exact picture where it is far from taking PART of the period.  Else the quick
+    chart is measured, once, and the best of it chosen that is fast enough; while frames are late
+    fewer pixels are drawn, as long as they are priced at `floor_db` or better.  The other
+    qualities stay as they are.
+    """
+
+    def __init__(
+        self, background: tuple[float, float, float], quality: str = AUTO,
+        floor_db: float = FLOOR_DB, target_ms: float | None = None,
+    ) -> None:  # fmt: skip
+        self.quality, self.floor_db, self._fixed_ms = quality, floor_db, target_ms
+        self.choice: Choice | None = None  # of AUTO, where the chart was measured
+        self.exact_ms = 0.0  # that the exact picture of both eyes took at first
+        self._period_s = 0.0  # that was chosen for
+        self._exact = RenderSettings(background=background)
+        self._rows: tuple[QuickRow, ...] = ()
+        self._resolution: Resolution | None = None
+        self._times: deque[float] = deque(maxlen=LATE)  # ms of drawing, since that was chosen
+        self._rest: deque[float] = deque(maxlen=LATE)  # ms of all else: world, hands, panel
+
+    def settings(self) -> RenderSettings:
+        """Of the next frame."""
+        if self.quality != AUTO:
+            return replace(self._exact, **QUICK.get(FIXED[self.quality], {}))
+        if self.choice is None:
+            return self._exact
+        scale = self._resolution.scale
+        background = self._exact.background
+        return replace(self.choice.settings, background=background, render_scale=scale)
+
+    @property
+    def chosen(self) -> str:
+        """Name of the row of the quick chart that is in use."""
+        if self.quality != AUTO:
+            return FIXED[self.quality] or EXACT
+        return self.choice.name if self.choice else EXACT
+
+    @property
+    def target_ms(self) -> float:
+        """What is left for drawing the splats: fewer of them make nothing else quicker."""
+        whole = self._fixed_ms or PART * self._period_s * 1e3
+        return max(whole - median(self._rest or (0.0,)), LEAST * whole)
+
+    def wants_measure(self, period_s: float) -> bool:
+        """Whether nothing was chosen yet for a period like this, or what was proves too slow."""
+        if self.quality != AUTO or not period_s > 0:
+            return False
+        late = len(self._times) == LATE and median(self._times) > OVER * self.target_ms
+        another = not abs(period_s - self._period_s) <= SAME * self._period_s
+        return another or (late and not self._rows)
+
+    def measure(self, chart: "StereoChart", period_s: float) -> None:
+        """Chooses for a period; says on stderr what it chose instead of the exact picture.
+
+        What was measured once is not measured again.
+        """
+        late = bool(self.exact_ms)
+        self._times.clear()
+        self._period_s = period_s
+        target_ms = self.target_ms
+        self.exact_ms = self.exact_ms or chart.exact_ms()
+        if not self._rows and not late and self.exact_ms <= EASY * target_ms:
+            return
+        self._rows = self._rows or chart.rows()
+        self.choice = choose(self._rows, target_ms, self.floor_db)
+        if self.choice.name != EXACT:
+            print(self.choice.sentence, file=sys.stderr)
+        # Fewer pixels are priced alone: on top of other shortcuts nobody knows what they cost.
+        chosen = self.choice.settings
+        priced = least_scale(self._rows, self.floor_db)
+        alone = replace(chosen, render_scale=1.0, target="rgba16f", background=(0.0, 0.0, 0.0))
+        scale = chosen.render_scale
+        least = min(priced, scale) if alone == RenderSettings() else scale
+        self._resolution = Resolution(target_ms, least, scale)
+
+    def seen(self, drawing_ms: float, own_ms: float) -> None:
+        """Takes the time of a frame, of its splats and of all of it; 0: it does not count."""
+        if not 0 < drawing_ms <= own_ms:
+            return
+        self._rest.append(own_ms - drawing_ms)
+        if self.quality != AUTO:
+            return
+        self._times.append(drawing_ms)
+        if self._resolution is not None:
+            self._resolution.target_ms = self.target_ms
+            self._resolution.seen(drawing_ms)
+
+    def report(self) -> dict:
+        return {
+            "quality": self.quality,
+            "exact_ms": round(self.exact_ms, 3),
+            "chosen": self.chosen,
+            "scale": self.settings().render_scale,
+        }
+
+
+class StereoChart:
+    """Prices the quick settings with both eyes, before anything is shown."""
+
+    def __init__(
+        self, renderer: Renderer, scene: Scene, views: Sequence[View], centre: np.ndarray,
+        finish: Callable[[], None],
+    ) -> None:  # fmt: skip
+        left, right = views
+        apart = np.linalg.inv(left.world_from_eye.matrix()) @ right.world_from_eye.matrix()
+        self._renderer = renderer
+
+        def eyes(view: View) -> list[View]:
+            pose = Pose.from_matrix(view.world_from_eye.matrix() @ apart)
+            return [view, replace(right, world_from_eye=pose)]
+
+        self._chart = QuickChart(renderer, scene, left, centre, finish, eyes)
+
+    def exact_ms(self) -> float:
+        """Median of a few exact frames of both eyes."""
+        return median([self._chart.time_exact(i) for i in range(TRIES + 1)][1:])
+
+    def rows(self) -> tuple[QuickRow, ...]:
+        """Those of PRICED that PATIENCE_S is enough for; nobody sees a picture meanwhile."""
+        kept, until = self._renderer.settings, time.perf_counter() + PATIENCE_S
+        self._chart.only(PRICED)
+        try:
+            while not self._chart.done and (
+                time.perf_counter() < until or not self._chart.rows  # the exact one at least
+            ):
+                self._chart.step()
+        finally:
+            self._renderer.settings = kept
+        return tuple(self._chart.rows)

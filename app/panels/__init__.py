@@ -1,0 +1,1 @@
+"""What ImGui draws over the picture: panel, sections, slider, status line, theme."""

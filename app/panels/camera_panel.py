@@ -1,0 +1,117 @@
+"""The panel's section "Cameras": steps through those of a file, keeps views in one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from imgui_bundle import imgui
+
+from app.panels import theme
+from app.panels.panel_rows import button_row, choice, tip
+from app.viewer.sections import Section
+from app.viewer.stepping import picture_box
+from runtime_models.model import BadFile
+from scene.camera_list import CameraList, moved
+from scene.pose import View
+from scene.write_cameras import COLMAP_FORMS, FORMS, write_cameras
+
+if TYPE_CHECKING:
+    from app.viewer.viewer import Viewer
+
+Vec = imgui.ImVec2
+FORM_NAMES = {
+    "ours": "our own list",
+    "inria": "3DGS cameras.json",
+    "transforms": "transforms.json",
+    "nerfstudio": "nerfstudio camera path",
+    "vr": "splatapult floor",
+    "colmap-bin": "COLMAP, binary",
+    "colmap-txt": "COLMAP, text",
+}
+
+
+class KeptViews:
+    """The views that a person keeps; every one is written at once, into a file of this start."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._number = 0
+        self.form = "ours"
+        self.views: list[View] = []
+
+    def keep(self, view: View) -> Path:
+        """Adds a view; returns where all of them lie now.  Raises BadFile, OSError."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        if not self._number:
+            taken = {path.name.split(".")[0] for path in self._folder.glob("views-*")}
+            self._number = next(n for n in range(1, 10**6) if f"views-{n:04d}" not in taken)
+        views = (*self.views, view)
+        if self.form == "vr":  # a floor is one view: the last
+            views = views[-1:]
+        names = tuple(f"view {i + 1}" for i in range(len(views)))
+        ending = "" if self.form in COLMAP_FORMS else f".{self.form}.json"
+        path = self._folder / f"views-{self._number:04d}{ending}"
+        write_cameras(CameraList(views, names, self.form), path, self.form)
+        self.views.append(view)
+        return path
+
+
+def attach_cameras(viewer: "Viewer") -> None:
+    """Adds the section, and what the status line says of cameras."""
+    viewer.hooks.sections.append(Section("Cameras", lambda scale: draw_cameras(viewer, scale)))
+    viewer.hooks.status.append(lambda: viewer.steps.text)
+    viewer.hooks.marks.append(lambda scale: draw_edges(viewer, scale))
+
+
+def draw_edges(viewer: "Viewer", ui_scale: float) -> None:
+    """Where the picture of the camera that is looked through ends."""
+    steps, window = viewer.steps, viewer.window
+    if not (viewer.overlay and steps.standing) or steps.moving:
+        return
+    box = picture_box(steps.cameras.views[steps.index], viewer.view())
+    left, top, right, low = np.array(box) * window.logical_size[0] / window.size[0]
+    imgui.get_background_draw_list().add_rect(
+        Vec(left, top), Vec(right, low), theme.color(theme.MUTED, 0.6), 0, 0, max(1.0, ui_scale)
+    )
+
+
+def draw_cameras(viewer: "Viewer", ui_scale: float) -> None:
+    steps, kept = viewer.steps, viewer.kept
+    if steps.count:
+        imgui.text_disabled(steps.text)
+        clicked = button_row(("Previous", "Next"), ui_scale, 2)
+        if clicked:
+            step_to_camera(viewer, 1 if clicked == "Next" else -1)
+        tip("Keys P and N; moving leaves the camera.", ui_scale)
+    else:
+        imgui.text_wrapped("Drop a file of cameras on the window to step through them.")
+    imgui.push_item_width(-1)
+    kept.form = choice("form", kept.form, FORMS, [f"as {FORM_NAMES[form]}" for form in FORMS])
+    imgui.pop_item_width()
+    if imgui.button("Keep this view", Vec(-1, 0)):
+        keep_view(viewer)
+    tip("Key K. All views of this start go into one file beside the pictures.", ui_scale)
+
+
+def step_to_camera(viewer: "Viewer", by: int) -> None:
+    """To the next (1) or the previous (-1) camera, with a word on what its file leaves out."""
+    steps = viewer.steps
+    if not steps.step(by, viewer.view()):
+        viewer.say("There are no cameras to step through; drop a file of them here.")
+    elif steps.untold:
+        viewer.say("\n".join(steps.untold))
+        steps.untold = ()
+
+
+def keep_view(viewer: "Viewer") -> None:
+    """Writes the view of now, as it would be without the panel, behind those kept before."""
+    view = viewer.plain_view()
+    (view,) = moved([view], viewer.stage.origin)
+    try:
+        path = viewer.kept.keep(view)
+    except BadFile as error:
+        viewer.say(str(error))
+    except OSError as error:
+        viewer.say(f"The view cannot be kept: {error.strerror}: {error.filename}")
+    else:
+        viewer.say(f"Kept in {path}")

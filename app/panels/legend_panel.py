@@ -1,0 +1,34 @@
+"""The legend of a debug view, beside the panel: what its colours mean, with their counts."""
+
+from collections.abc import Sequence
+
+from imgui_bundle import imgui
+
+from app.panels import theme
+
+Vec = imgui.ImVec2
+Row = tuple[str, tuple[float, float, float]]  # text, display sRGB
+
+
+def draw_legend(rows: Sequence[Row], left: float, ui_scale: float) -> None:
+    """Draws rows of swatch and text at the upper edge, right of `left`, logical pixels."""
+    if not rows:
+        return
+    line, pad, margin = imgui.get_text_line_height(), 10 * ui_scale, 16 * ui_scale
+    step = line + 4 * ui_scale
+    width = max(imgui.calc_text_size(text).x for text, _ in rows) + line + 3 * pad
+    left += margin if left <= 0 else margin / 2
+    draw = imgui.get_background_draw_list()
+    draw.add_rect_filled(
+        Vec(left, margin),
+        Vec(left + width, margin + 2 * pad + step * len(rows) - 4 * ui_scale),
+        theme.color(theme.SURFACE, 0.85),
+        8 * ui_scale,
+    )
+    for number, (text, rgb) in enumerate(rows):
+        y = margin + pad + number * step
+        x = left + pad
+        draw.add_rect_filled(
+            Vec(x, y + 0.1 * line), Vec(x + 0.8 * line, y + 0.9 * line), theme.color(rgb), 2.0
+        )
+        draw.add_text(Vec(x + line + pad, y), theme.color(theme.TEXT), text)

@@ -1,0 +1,169 @@
+"""The panel's section "Regions": parts of an object with a control value of their own."""
+
+import numpy as np
+from imgui_bundle import imgui
+
+from app.panels import theme
+from app.panels.panel_rows import button_row, choice, right_aligned, slider, tip
+from app.panels.slider import track
+from app.viewer.regions import KINDS, Region
+from app.viewer.stage import Stage
+
+Vec = imgui.ImVec2
+LARGEST = 2.0  # scene radii, of a size
+LONGEST_NAME = 40
+MOST_BRUSH = 120.0  # logical pixels
+DIRECTIONS = {  # name -> the way out of a half-space's plane, into what it selects
+    "up": (0, 1, 0), "down": (0, -1, 0), "right": (1, 0, 0), "left": (-1, 0, 0),
+    "front": (0, 0, 1), "back": (0, 0, -1),
+}  # fmt: skip
+KIND_TIPS = {
+    "box": "A box with its own x; click into the picture to place it.",
+    "sphere": "A sphere with its own x; click into the picture to place it.",
+    "half-space": "All on one side of a plane; click into the picture to place it.",
+    "lens": "What you look at, through a round lens around the line of sight. Key L.",
+    "painted": "What you paint: hold B and drag over the picture, Shift erases.",
+}
+
+
+def draw_regions(stage: Stage, ui_scale: float) -> None:
+    """Buttons that add, the list, and the controls of the chosen one."""
+    if not stage.scene.objects:
+        imgui.text_disabled("There is no object to select from.")
+        return
+    for number, kind in enumerate(KINDS):
+        _add_button(stage, number, kind, ui_scale)
+    regions = stage.regions
+    for number in range(len(regions.items)):
+        imgui.push_id(number)
+        _row(stage, number, ui_scale)
+        imgui.pop_id()
+    if regions.current is not None:
+        imgui.push_item_width(-1)
+        imgui.push_id("chosen")
+        _chosen(stage, regions.current, ui_scale)
+        imgui.pop_id()
+        imgui.pop_item_width()
+
+
+def _add_button(stage: Stage, number: int, kind: str, ui_scale: float) -> None:
+    """One of the buttons that add a region, three to a line."""
+    gap = imgui.get_style().item_spacing.x
+    if number % 3:
+        imgui.same_line()
+        width = imgui.get_content_region_avail().x / (3 - number % 3)
+        width -= gap * (2 - number % 3) / (3 - number % 3)
+    else:
+        width = (imgui.get_content_region_avail().x - 2 * gap) / 3
+    if imgui.button(f"+ {'plane' if kind == 'half-space' else kind}", Vec(width, 0)):
+        stage.add_region(kind)
+    tip(KIND_TIPS[kind], ui_scale)
+
+
+def _row(stage: Stage, number: int, ui_scale: float) -> None:
+    """On or off, the name that chooses it, its x."""
+    regions = stage.regions
+    region = regions.items[number]
+    changed, on = imgui.checkbox("##on", region.enabled)
+    if changed:
+        regions.edit(number, enabled=on)
+    tip("On or off; it keeps its settings.", ui_scale)
+    imgui.same_line()
+    chosen = number == regions.chosen
+    ink = theme.ACCENT if chosen else theme.TEXT
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
+    width = imgui.get_content_region_avail().x - 56 * ui_scale
+    if imgui.selectable(region.name or "(no name)", chosen, 0, Vec(width, 0))[0]:
+        regions.choose(-1 if chosen else number)
+    imgui.pop_style_color()
+    imgui.same_line()
+    right_aligned(f"x {region.x:.2f}")
+
+
+def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
+    """Every control of the region that is being edited."""
+    regions, number = stage.regions, stage.regions.chosen
+    things = stage.scene.objects
+    changed, name = imgui.input_text("##name", region.name)
+    if changed:
+        regions.edit(number, name=name[:LONGEST_NAME])
+    if len(things) > 1 and region.kind != "painted":
+        names = [f"of {thing.name}" for thing in things]
+        index = choice("object", region.index, range(len(things)), names)
+        regions.edit(number, index=index)
+    if region.is_placed:
+        _place(stage, ui_scale)
+    _sizes(stage, region, ui_scale)
+    far = 0.5 * stage.radius
+    border = slider("border", region.border, 0.0, far, "border: %.3f m", "border: sharp")
+    tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
+    regions.edit(number, border=border)
+    x, held = track(things[region.index].model.stops, region.x, 46 * ui_scale)
+    if held:
+        regions.edit(number, x=x)
+    if imgui.button("Remove", Vec(-1, 0)):
+        regions.remove(number)
+
+
+def _place(stage: Stage, ui_scale: float) -> None:
+    """The button after which a click into the picture sets the place."""
+    regions = stage.regions
+    label = "Click into the picture \u2026" if regions.placing else "Place"
+    if regions.placing:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
+    clicked = imgui.button(f"{label}###place", Vec(-1, 0))
+    if regions.placing:
+        imgui.pop_style_color()
+    if clicked:
+        regions.placing = not regions.placing
+    tip("The next click puts its centre on the surface there; drag to move it on.", ui_scale)
+
+
+def _sizes(stage: Stage, region: Region, ui_scale: float) -> None:
+    """What makes a region large or small; depends on its kind."""
+    regions, number = stage.regions, stage.regions.chosen
+    low, high = 0.01 * stage.radius, LARGEST * stage.radius
+    if region.kind == "box":
+        names = ("half width", "half height", "half depth")
+        half = [
+            slider(name, float(metres), low, high, f"{name}: %.2f m")
+            for name, metres in zip(names, region.half, strict=True)
+        ]
+        regions.edit(number, half=np.array(half))
+    elif region.kind == "sphere":
+        radius = slider("radius", float(region.half[0]), low, high, "radius: %.2f m")
+        regions.edit(number, half=np.full(3, radius))
+    elif region.kind == "half-space":
+        _direction(stage, region)
+    elif region.kind == "lens":
+        degrees = float(np.degrees(np.arctan(region.tangent)))
+        degrees = slider("lens", degrees, 1.0, 60.0, "half its angle: %.0f\u00b0")
+        tip("The lens stays around the line of sight, whatever you look at.", ui_scale)
+        if not np.isclose(degrees, np.degrees(np.arctan(region.tangent)), atol=1e-3):
+            regions.edit(number, tangent=float(np.tan(np.radians(degrees))))
+    else:
+        _brush(stage, region, ui_scale)
+
+
+def _direction(stage: Stage, region: Region) -> None:
+    """Which side of the plane is selected."""
+    regions = stage.regions
+    names = list(DIRECTIONS)
+    near = [float(np.dot(region.normal, DIRECTIONS[name])) for name in names]
+    at = names[int(np.argmax(near))]
+    chosen = choice("direction", at, names, [f"towards: {name}" for name in names])
+    if chosen != at:
+        regions.edit(regions.chosen, normal=np.array(DIRECTIONS[chosen], float))
+
+
+def _brush(stage: Stage, region: Region, ui_scale: float) -> None:
+    """The brush, how much is painted, and what needs no brush."""
+    regions = stage.regions
+    regions.brush = slider("brush", regions.brush, 3.0, MOST_BRUSH, "brush: %.0f px")
+    tip(KIND_TIPS["painted"], ui_scale)
+    count = int(region.painted.sum())
+    imgui.text_disabled(f"{count:,} of {len(region.painted):,} painted")
+    clicked = button_row(("None", "All", "Invert"), ui_scale, 3)
+    if clicked:
+        new = {"None": np.zeros_like, "All": np.ones_like, "Invert": np.logical_not}[clicked]
+        regions.edit(regions.chosen, painted=new(region.painted))

@@ -1,0 +1,1 @@
+"""Commands that train scenes from photos and judge what came out."""

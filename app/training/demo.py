@@ -1,0 +1,104 @@
+"""launch.py demo: the bundled demo again, from its ray-traced capture to its package."""
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+MOST_BYTES = 5_000_000  # the package lies in the repository
+ITERATIONS = 4000  # 3 to 5 minutes on two cores
+ANCHORS = 14000  # at the start
+MOST_ANCHORS = 22000
+
+
+@dataclass(frozen=True)
+class Options:
+    """Photograph the workshop (minutes), train it (minutes), write its package."""
+
+    out: Path = Path("out/workshop")
+    """Folder for the capture, workshop.shift and its checkpoint."""
+    package: Path | None = None
+    """Copy the package there too when it is done; the bundled one is assets/workshop.shift."""
+    seconds: float | None = None
+    """Train for so long instead of a fixed number of steps."""
+    iterations: int = ITERATIONS
+    """Steps of training; the same number gives the same bits."""
+    size: str = "384x288"
+    """WIDTHxHEIGHT of the photos."""
+    views: int = 72
+    """Photos to train on, a stop."""
+    test_views: int = 8
+    """Photos held out, a stop."""
+    processes: int = 0
+    """That trace rays at the same time; 0 = one a core, at most 8."""
+
+
+def run(options: Options) -> int:
+    from app.drawing import parse_size
+    from app.training import train
+
+    size = parse_size(options.size)
+    folder = options.out / "capture"
+    recipe = {"size": list(size), "views": options.views, "test_views": options.test_views}
+    if made_before(folder, recipe):
+        say(f"Using the photos that are in {folder}; delete it to trace them again.")
+    else:
+        photograph(folder, size, options)
+    package = options.out / "workshop.shift"
+    limited = options.seconds is not None
+    code = train.run(
+        train.Options(
+            capture=folder,
+            out=package,
+            seconds=options.seconds,
+            iterations=None if limited else options.iterations,
+            anchors=ANCHORS,
+            max_anchors=MOST_ANCHORS,
+        )
+    )
+    if code == 0 and options.package is not None:
+        publish(package, options.package)
+    return code
+
+
+def publish(package: Path, target: Path) -> None:
+    """The finished package to where it is wanted, whole or not at all."""
+    from app.errors import UsageError
+
+    data = package.read_bytes()
+    if len(data) > MOST_BYTES:
+        raise UsageError(
+            f"{package} has {len(data):,} bytes, more than the {MOST_BYTES:,} that a bundled "
+            "package may have; lower MOST_ANCHORS"
+        )
+    beside = target.with_name(target.name + ".part")
+    beside.write_bytes(data)
+    os.replace(beside, target)
+    say(f"{target}: {len(data) / 1e6:.2f} MB")
+
+
+def made_before(folder: Path, recipe: dict) -> bool:
+    """Whether a finished capture made by the same recipe lies in the folder."""
+    from scene.read_capture import read_capture
+
+    if not (folder / "transforms.json").is_file():
+        return False
+    return read_capture(folder).notes.get("recipe") == recipe
+
+
+def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
+    from app.progress import progress_bar
+    from training.synthetic.workshop import make_workshop
+
+    processes = options.processes or min(os.cpu_count() or 1, 8)
+    with progress_bar(transient=False) as progress:
+        task = progress.add_task("photographing the workshop")
+
+        def tell(done: int, all_of_them: int) -> None:
+            progress.update(task, completed=done, total=all_of_them)
+
+        make_workshop(folder, size, options.views, options.test_views, processes, tell)
+
+
+def say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

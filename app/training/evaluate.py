@@ -1,0 +1,108 @@
+"""launch.py eval: PSNR and SSIM of a scene on the held-out photos of a capture."""
+
+import json
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from app.opening import ReadingOptions, open_model
+
+if TYPE_CHECKING:
+    from scene.capture import Capture
+
+
+@dataclass(frozen=True)
+class Options(ReadingOptions):
+    """Compare a scene with the held-out photos of a capture (every 8th, unless it says which)."""
+
+    scene: Annotated[Path, tyro.conf.Positional]
+    """A package, or any other file of splats."""
+    capture: Annotated[Path, tyro.conf.Positional]
+    """A folder of posed photos."""
+    modality: str | None = None
+    """Only this one of the capture: for a scene that was trained on it alone."""
+    json: Path | None = None
+    """Write the result here; - writes it to standard output."""
+    downscale: int | None = None
+    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels, as training."""
+    masks: Literal["object", "valid", "ignore"] = "object"
+    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
+    background: Literal["auto", "black", "white", "gray"] = "auto"
+    """Colour behind everything.  auto: the capture's, else black."""
+    vgg: Path | None = None
+    """An ONNX file of VGG16's first layers: tells a distance of its features, too.  It is no LPIPS,
+    and compares only with figures of the same file."""
+
+
+def run(options: Options) -> int:
+    from app.commands.bench import write_json
+    from app.errors import UsageError
+    from rasterizer.device import open_device
+    from scene.read_capture import read_capture
+    from scene.scene_file import is_scene_file
+    from training.evaluate import evaluate_model, report
+    from training.rig import rig_of, with_found
+    from training.vgg_distance import VggDistance
+
+    started = time.perf_counter()
+    if is_scene_file(options.scene):
+        raise UsageError(
+            f"{options.scene} is a scene file of objects, and photos are of one scene as it was "
+            "trained; name the model of one object."
+        )
+    distance = None if options.vgg is None else VggDistance(options.vgg)
+    capture = read_capture(options.capture)
+    if options.modality is not None:
+        capture = only(capture, options.modality)
+    model = open_model(options.scene, options)
+    capture = with_found(capture, rig_of(model.provenance))
+    scores = evaluate_model(
+        open_device(), model, capture, options.downscale, options.masks, options.background,
+        distance,
+    )  # fmt: skip
+    result = report(options.scene, scores, started)
+    if distance is not None:
+        result["vgg_file"] = distance.name
+    print_table(result)
+    if options.json == Path("-"):
+        print(json.dumps(result, indent=1))
+    elif options.json is not None:
+        write_json(options.json, result)
+    return 0
+
+
+def only(capture: "Capture", name: str) -> "Capture":
+    """The capture with one of its modalities.  Raises UsageError."""
+    from app.errors import UsageError
+
+    stops = tuple(stop for stop in capture.stops if stop.name == name)
+    if not stops:
+        names = ", ".join(stop.name for stop in capture.stops)
+        raise UsageError(f"the capture has no modality '{name}'; it has {names}.")
+    photos = tuple(photo for photo in capture.photos if photo.modality == name)
+    return replace(capture, stops=stops, photos=photos)
+
+
+def print_table(result: dict) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    vgg = ["VGG distance"] if "vgg_file" in result else []
+    depth = any("depth_error" in score for score in result["modalities"].values())
+    more = [*vgg, *(["depth error %"] if depth else [])]
+    table = Table("modality", "PSNR dB", "median", "worst", "SSIM", *more, "photos", "splats alive")
+    for name, score in result["modalities"].items():
+        worst, db = min(score["psnr_db_each"].items(), key=lambda pair: pair[1])
+        row = [f"{score['psnr_db']:.2f}", f"{score['median_db']:.2f}", f"{db:.1f} {worst}"]
+        row.append(f"{score['ssim']:.4f}")
+        row += [f"{score['vgg_distance']:.4f}"] if vgg else []
+        if depth:
+            row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")
+        table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
+    console = Console(file=sys.stderr)
+    console.print(table)
+    console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")

@@ -1,0 +1,154 @@
+"""launch.py fit: the smallest scene that shows a capture as well as the largest, and why."""
+
+import json
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
+
+if TYPE_CHECKING:
+    from training.fit import Need
+    from training.need import Measured, Verdict
+
+
+@dataclass(frozen=True)
+class TrialOptions:
+    """The trials: of what, into what, how long, and what they may lose."""
+
+    capture: Annotated[Path, tyro.conf.Positional]
+    """A folder of posed photos, as of train."""
+    out: Path
+    """The package to write: NAME.shift or a folder."""
+    tolerance_db: float = 0.1
+    """What any modality may lose in all against the largest model, with the error of that."""
+    seeds: int = 2
+    """Trainings of every trial.  Two seeds of one model differ by about 0.2 dB."""
+    json: Path | None = None
+    """Write the need report here; - writes it to standard output."""
+    iterations: int | None = None
+    """Steps of every training.  Default: 600."""
+    seconds: float | None = None
+    """Train every trial for so long instead."""
+    final_iterations: int | None = None
+    """Train the chosen model again, for so many steps.  Default: the trial's model is written."""
+    final_seconds: float | None = None
+    """The same, for so long."""
+    preset: Literal["fast", "paper"] = "fast"
+    """As of train: where nothing is said, the preset decides."""
+    seed: int | None = None
+    """The first seed."""
+    grow: bool | None = None
+    """Add and remove anchors between 10 % and 60 % of each training."""
+    max_anchors: int | None = None
+    """Cap of growing."""
+
+
+@dataclass(frozen=True)
+class Options(PhotoOptions, SizeOptions, ModelOptions, TrialOptions):
+    """Take away what a scene does not need: train without one part after the other, and compare
+    the held-out photos.  The options say how large a model it starts from.
+    """
+
+    fixed: str | None = None
+    """Networks that do not see x from the start, as offset,scale,rotation."""
+    calibrate: str | None = None
+    """A modality whose cameras' offset is found first, as of train."""
+    masks: Literal["object", "valid", "ignore"] | None = None
+    """What a mask means, as of train."""
+    background: Literal["auto", "random", "black", "white", "gray"] | None = None
+    """Colour behind everything, as of train."""
+
+
+TRIAL = 600  # steps
+
+
+def run(options: Options) -> int:
+    from app.commands.bench import write_json
+    from app.errors import UsageError
+    from app.progress import progress_bar
+    from app.training.train import calibrated, say, settings_of
+    from rasterizer.device import open_device
+    from runtime_models.write_package import refuse_foreign, write_package
+    from scene.read_capture import read_capture
+    from training.fit import Fit
+    from training.rig import with_found
+
+    if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
+        raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")
+    if options.iterations is None and options.seconds is None:
+        options = replace(options, iterations=TRIAL)
+    refuse_foreign(options.out)  # now, not after the trials
+    settings, last = settings_of(options, None), None
+    if options.final_iterations is not None or options.final_seconds is not None:
+        longer = {"iterations": options.final_iterations, "seconds": options.final_seconds}
+        last = settings_of(replace(options, **longer), None)
+    capture, device = read_capture(options.capture), open_device(options.device)
+    if options.calibrate is not None:
+        settings = calibrated(device, capture, settings, options.calibrate)
+        capture = with_found(capture, settings.rig)
+    with progress_bar() as bar:
+        task = bar.add_task("compiling kernels", total=1.0)
+
+        def tell(what: str, done: float) -> None:
+            bar.update(task, description=what, completed=done)
+
+        fit = Fit(
+            device, capture, settings, options.tolerance_db, options.seeds, tell, last=last,
+        )  # fmt: skip
+        need = fit.run()
+    result, model = need.as_dict(), need.fitted.models[0]
+    noted = replace(model, provenance={**model.provenance, "need": result})
+    size = write_package(noted, options.out, need.fitted.storage)
+    print_report(need)
+    say(f"{options.out}: {size:,} bytes, the fitted model of the first seed with this report in it")
+    if options.json == Path("-"):
+        print(json.dumps(result, indent=1))
+    elif options.json is not None:
+        write_json(options.json, result)
+    return 0
+
+
+def print_report(need: "Need") -> None:
+    """The need report on standard error."""
+    from rich.console import Console
+    from rich.table import Table
+
+    wide = None if sys.stderr.isatty() else 160  # into a file, no row needs to be broken
+    console, names = Console(stderr=True, width=wide), list(need.photos)
+    table = Table(
+        "without", *(f"{n} dB" for n in names), "verdict", "bytes", "decode ms", "train s"
+    )
+    for verdict in need.verdicts:
+        table.add_row(verdict.part, *cells(verdict, names))
+    console.print(table)
+    console.print(
+        f"Differences to the model before, ± one standard error over {need.seeds} seeds and "
+        f"{', '.join(f'{count} {name}' for name, count in need.photos.items())} held-out photos.  "
+        f"A part is dropped where the loss, to the largest model too, and its error stay within "
+        f"{need.tolerance_db:g} dB in every modality."
+    )
+    for (a, b), iou in need.outlines.items():
+        console.print(f"Outlines of {a} and {b}: {100 * iou:.1f} % in common")
+    for word, found in (("largest", need.full), ("fitted", need.fitted)):
+        console.print(f"{word}: {describe(found)}")
+
+
+def cells(verdict: "Verdict", names: list[str]) -> list[str]:
+    """The columns of one row of the report, all but the first."""
+    needed = f" ({', '.join(verdict.needed_by)})" if verdict.needed_by and len(names) > 1 else ""
+    saved = (f"{verdict.bytes:+,}", f"{verdict.decode_ms:+.2f}", f"{verdict.train_s:+.1f}")
+    return [*(str(verdict.change[n]) for n in names), verdict.word + needed, *saved]
+
+
+def describe(found: "Measured") -> str:
+    facts = found.as_dict()
+    quality = ", ".join(f"{name} {value:.2f} dB" for name, value in facts["psnr_db"].items())
+    return (
+        f"{quality}; {facts['anchors']:,} anchors of {facts['splats_per_anchor']} splats, "
+        f"{facts['features']} features as {facts['storage']}, {facts['bytes']:,} bytes, "
+        f"decoded in {facts['decode_ms']:.2f} ms, trained in {facts['train_s']:.1f} s"
+    )

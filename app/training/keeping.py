@@ -1,0 +1,113 @@
+"""What a training run leaves on disk, also where memory or the disk end it: see train.py."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.errors import UsageError
+
+if TYPE_CHECKING:
+    from training.train import Trainer
+
+LESS = "fewer --anchors and --max-anchors, or a larger --downscale, need less"
+
+
+def refuse_place(out: Path) -> None:
+    """Raises UsageError where nothing can be written: before the training, not after it."""
+    there = next(folder for folder in out.absolute().parents if folder.exists())
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        raise UsageError(
+            f"--out {out}: nothing can be written into {there} ({error.strerror}); name another "
+            "place."
+        ) from None
+
+
+def memory_errors() -> tuple[type[Exception], ...]:
+    """What says that memory is full: the device's or this process's."""
+    import pyopencl
+
+    from rasterizer.device import NoMemory
+
+    return NoMemory, pyopencl.MemoryError, MemoryError
+
+
+@contextmanager
+def memory_for_training() -> Iterator[None]:
+    """Raises UsageError where what is needed at the beginning is too much."""
+    try:
+        yield
+    except memory_errors():
+        raise UsageError(f"there is not enough memory to begin; {LESS}.") from None
+
+
+@contextmanager
+def kept_when_memory_ends(trainer: "Trainer", out: Path, checkpoint: Path) -> Iterator[None]:
+    """Writes what there is when memory ends, and raises UsageError that says so."""
+    try:
+        yield
+    except memory_errors():
+        save(trainer, out, checkpoint)
+        raise UsageError(
+            f"memory was full after {trainer.iteration} steps, with {trainer.anchors_count:,} "
+            f"anchors; the scene as it was then is in {out}.  To train on, {LESS}."
+        ) from None
+
+
+def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
+    """The package first, then the checkpoint; neither is ever half-written.
+
+    Raises UsageError where that cannot be; then both lie in a folder of the system's for temporary
+    files, if there is room.
+    """
+    from app.training.train import say
+    from runtime_models.write_package import write_package
+    from training.checkpoint import write_checkpoint
+
+    if trainer.mend():
+        say("the picture was lost in the last steps; what is kept is the last good state")
+    model, state = trainer.model(), trainer.checkpoint()
+    try:
+        write_package(model, out)
+        write_checkpoint(checkpoint, *state)
+    except OSError as error:
+        why = f"{out}: could not be written ({error.strerror or error})"
+    else:
+        return
+    try:
+        elsewhere = Path(tempfile.mkdtemp(prefix="shapeshift-"))
+        write_package(model, elsewhere / out.name)
+        write_checkpoint(elsewhere / checkpoint.name, *state)
+    except OSError:
+        raise UsageError(f"{why}, nor anywhere else; {last_of(checkpoint)}.") from None
+    raise UsageError(f"{why}; the scene and its checkpoint are in {elsewhere} instead.")
+
+
+def last_of(checkpoint: Path) -> str:
+    """What a run that could not be saved can go on from, in words."""
+    from runtime_models.model import BadFile
+    from training.checkpoint import read_checkpoint
+
+    try:
+        notes = read_checkpoint(checkpoint)[1]
+    except BadFile:
+        return "make room and train again"
+    return f"make room, and --resume goes on from step {notes['iteration']}"
+
+
+def save_on_the_way(trainer: "Trainer", checkpoint: Path) -> str:
+    """Writes the checkpoint; in words why not, where the disk is full: training goes on."""
+    from training.checkpoint import write_checkpoint
+
+    try:
+        write_checkpoint(checkpoint, *trainer.checkpoint())
+    except OSError as error:
+        return (
+            f"{checkpoint}: could not be written ({error.strerror or error}); training goes on, "
+            "make room before it ends"
+        )
+    return ""

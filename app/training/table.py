@@ -1,0 +1,264 @@
+"""launch.py table: one shape-shifting model beside separate models and plain splats."""
+
+import os
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
+from app.training.train import INTERRUPTED, say
+from app.training.train import Options as TrainOptions
+from app.training.train_options import PhotoOptions, SizeOptions
+
+if TYPE_CHECKING:
+    from scene.capture import Capture
+    from training.vgg_distance import VggDistance
+
+NO_VGG = "no VGG distance: --vgg names no file"
+PLACES = {
+    "joint": "joint.shift", "separate": "separate", "splats": "splats", "spz": "spz",
+}  # in --out  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MethodOptions:
+    """The methods: of what, into what, how long, and how large each may become."""
+
+    capture: Annotated[Path, tyro.conf.Positional]
+    """A folder of posed photos; each modality needs held-out ones."""
+    out: Path
+    """A folder for the models, table.csv and table.md.  A method that is in it is not run again."""
+    seconds: float | None = None
+    """Budget of every method; where it trains several models, they share it."""
+    iterations: int | None = None
+    """The same in steps: the same bits on every run."""
+    methods: tuple[Literal["joint", "separate", "splats", "spz"], ...] = (
+        "joint", "separate", "splats", "spz",
+    )  # fmt: skip
+    """joint: one shape-shifting model.  separate: one anchor model a modality.  splats: plain 3DGS
+    splats a modality, as PLY.  spz: those splats packed, without training again."""
+    vgg: Path | None = None
+    """An ONNX file of VGG16's first layers: adds a distance of its features, which is no LPIPS."""
+    seed: int | None = None
+    """Of everything random."""
+    anchors: int | None = None
+    """How many anchors a model starts with at most."""
+    max_anchors: int | None = None
+    """Cap of growing, a model."""
+    splats: int | None = None
+    """How many plain splats a modality starts with at most."""
+    max_splats: int | None = None
+    """Cap of growing plain splats, a modality."""
+    sh_degree: int | None = None
+    """Of plain splats' colours: 0 to 3.  Default: 3."""
+    calibrate: str | None = None
+    """A modality whose cameras' offset is found first, for all methods alike; as of train."""
+
+
+@dataclass(frozen=True)
+class Options(PhotoOptions, SizeOptions, MethodOptions):
+    """Train a capture in three ways with the same budget and compare them on held-out photos.
+
+    The form is that of the paper's Tables 1 and 2: method by modality.
+    """
+
+
+def run(options: Options) -> int:
+    from app.charts.chart_rows import RowsFile
+    from app.errors import UsageError
+    from rasterizer.device import open_device
+    from scene.read_capture import read_capture
+    from training.rig import with_found
+    from training.vgg_distance import VggDistance
+
+    if options.seconds is None and options.iterations is None:
+        raise UsageError("a comparison needs a budget: give --seconds or --iterations.")
+    if not options.methods:
+        raise UsageError("--methods names none; leave it out for all.")
+    if "spz" in options.methods and "splats" not in options.methods:
+        raise UsageError("--methods spz packs the files of splats; add splats before it.")
+    if options.out.exists() and not options.out.is_dir():
+        raise UsageError(f"{options.out} is a file; --out is a folder.")
+    capture, device = read_capture(options.capture), open_device(options.device)
+    distance = None if options.vgg is None else VggDistance(options.vgg)
+    refuse_capture(capture, options, distance)
+    options.out.mkdir(parents=True, exist_ok=True)
+    head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
+    table = RowsFile(options.out / "table.csv", VggRow if distance else Row, head)
+    say(head[1])
+    rig = offset_of(device, capture, options)
+    capture = with_found(capture, rig)
+    for method in sorted(set(options.methods), key=list(PLACES).index):
+        if any(row.method == method and row.modality == MEAN for row in table.rows):
+            say(f"{NAMES[method]}: already in {table.path}")
+            continue
+        say(f"{NAMES[method]}:")
+        if method == "spz":
+            runs = pack_splats(capture, options.out, table.rows)
+        else:
+            runs = train_method(method, device, capture, options, rig)
+        if runs is None:
+            say(f"{options.out}: interrupted; the same command goes on with this method.")
+            return INTERRUPTED
+        for row in rows_of(method, device, capture, options, runs, distance):
+            table.add(row)
+    finish(table.rows, options.out, head)
+    return 0
+
+
+def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
+    """What would come to light after the training, now.  Raises BadFile."""
+    from runtime_models.model import BadFile
+    from training.photos import choose_downscale
+    from training.vgg_distance import refuse_small
+
+    factor = options.downscale or choose_downscale(capture.photos)
+    for stop in capture.stops:
+        held_out = capture.of(stop.name, "test")
+        if not held_out:
+            raise BadFile(
+                f"{capture.folder}: no photo of modality '{stop.name}' is held out for testing; "
+                "mark some with split 'test'."
+            )
+        if distance is not None:
+            for photo in held_out:
+                refuse_small(*(max(round(side / factor), 1) for side in photo.view.size))
+
+
+def offset_of(device, capture: "Capture", options: Options) -> str:
+    """TrainSettings.rig of what --calibrate finds, once for all methods: it is kept in --out."""
+    from app.charts.chart_rows import write_text
+    from app.training.train import calibrated, settings_of
+
+    if options.calibrate is None:
+        return ""
+    kept = options.out / "rig.json"
+    if not kept.exists():
+        settings = settings_of(train_options("joint", options), None)
+        write_text(kept, calibrated(device, capture, settings, options.calibrate).rig)
+    return kept.read_text(encoding="utf-8")
+
+
+def train_method(
+    method: str, device, capture: "Capture", options: Options, rig: str
+) -> dict | None:
+    """A Run of app.training.train_baselines for each modality; None where Ctrl-C ended it early.
+
+    rig: of TrainSettings, what the capture's cameras were moved by.
+    """
+    from app.training.train import describe, settings_of, train
+    from app.training.train_baselines import Run, plain_settings, train_separate, train_splats
+    from runtime_models.write_package import refuse_foreign, write_package
+    from training.train import Trainer
+
+    asked, out = train_options(method, options), options.out / PLACES[method]
+    if method == "splats":
+        outcome = train_splats(device, capture, plain_settings(asked), out)
+    elif method == "separate":
+        settings = replace(settings_of(asked, None), rig=rig)
+        outcome = train_separate(device, capture, settings, out)
+    else:
+        refuse_foreign(out)
+        trainer = Trainer(device, capture, replace(settings_of(asked, None), rig=rig))
+        say(describe(trainer))
+        if train(trainer, None):
+            return None
+        write_package(trainer.model(), out)
+        one = Run(out, trainer.elapsed, trainer.iteration)
+        return {stop.name: one for stop in capture.stops}
+    return None if outcome.interrupted else outcome.runs
+
+
+def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
+    """A Run for each modality: the files of `splats` as spz, trained when those were."""
+    from app.errors import UsageError
+    from app.training.train_baselines import Run
+    from runtime_models.formats import read_plain
+    from runtime_models.plain_splats import Reading
+    from runtime_models.write_layer_list import layer_name, write_layer_list
+    from runtime_models.write_spz import write_spz
+
+    layers, runs, reading = [], {}, Reading(allow_huge=True)
+    for number, stop in enumerate(capture.stops):
+        source = out / PLACES["splats"] / layer_name(number, stop)
+        layers.append((stop, read_plain(source, reading)))
+        made = next(r for r in rows if (r.method, r.modality) == ("splats", stop.name))
+        file = out / PLACES["spz"] / layer_name(number, stop, ".spz")
+        runs[stop.name] = Run(file, made.seconds, made.steps)
+    try:
+        write_layer_list(layers, out / PLACES["spz"], write_spz, ".spz")
+    except ValueError as error:  # places that spz cannot hold
+        raise UsageError(f"{error}  Leave spz out of --methods.") from None
+    return runs
+
+
+def train_options(method: str, options: Options) -> TrainOptions:
+    """What `launch.py train` would be asked for."""
+    shared = {f.name for f in fields(TrainOptions)} & {f.name for f in fields(options)}
+    strange = {"splats": ("anchors", "max_anchors")}.get(
+        method, ("splats", "max_splats", "sh_degree")
+    )
+    shared -= {"calibrate", *strange}  # what it finds is the same for all methods
+    asked = {n: getattr(options, n) for n in shared}
+    model = "splats" if method == "splats" else "anchors"
+    return TrainOptions(**asked, model=model, separate=method == "separate")
+
+
+def rows_of(
+    method: str, device, capture: "Capture", options: Options, runs: dict, distance
+) -> list[Row]:
+    """The rows of a method: its files, read back from disk, on the held-out photos."""
+    from runtime_models.plain_splats import Reading
+    from runtime_models.read_scene import read_model
+    from training.evaluate import bytes_on_disk, evaluate_model
+    from training.photos import choose_downscale
+    from training.plain import one_modality
+
+    factor = options.downscale or choose_downscale(capture.photos)
+    kind, reading, rows = VggRow if distance else Row, Reading(allow_huge=True), []
+    whole = read_model(options.out / PLACES[method], reading) if method != "separate" else None
+    for stop in capture.stops:
+        part, made = one_modality(capture, stop.name), runs[stop.name]
+        score = evaluate_model(
+            device, whole or read_model(made.file, reading), part, factor,
+            options.masks or "object", options.background or "auto", distance,
+        )[stop.name]  # fmt: skip
+        rows.append(kind(
+            method, stop.name, round(score.psnr_db, 3), round(score.median_db, 3),
+            round(score.ssim, 5),
+            bytes_on_disk(made.file) / 1e6, round(made.seconds, 1), made.steps, score.alive,
+            score.photos, *([round(score.vgg, 5)] if distance else []),
+        ))  # fmt: skip
+    return [*rows, mean_row(rows, list({run.file: run for run in runs.values()}.values()))]
+
+
+def command_line(options: Options) -> str:
+    """The command without folders: what else is asked for stands in it, methods aside."""
+    words = ["python3 launch.py table", options.capture.resolve().name]
+    for field in fields(options):
+        value = getattr(options, field.name)
+        if field.name not in ("capture", "out", "methods") and value is not None:
+            shown = value.name if isinstance(value, Path) else value
+            words.append(f"--{field.name.replace('_', '-')} {shown}")
+    return " ".join([*words, "--out DIR"])
+
+
+def machine_line(device) -> str:
+    from app.measure import processor
+
+    return f"{processor()}, {os.cpu_count()} cores; {device.platform}: {device.name}"
+
+
+def capture_line(capture: "Capture", options: Options, distance: "VggDistance | None") -> str:
+    from training.photos import choose_downscale
+
+    factor = options.downscale or choose_downscale(capture.photos)
+    each = []
+    for stop in capture.stops:
+        train, test = (capture.of(stop.name, split) for split in ("train", "test"))
+        width, height = test[0].view.size
+        each.append(f"{stop.name} {len(train)} + {len(test)} photos of {width}x{height}")
+    vgg = NO_VGG if distance is None else f"VGG distance by {distance.name}"
+    return f"{'; '.join(each)}; sides divided by {factor}; {vgg}"

@@ -1,0 +1,195 @@
+"""train --model splats and --separate: what a shape-shifting model is compared with."""
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.errors import UsageError
+from app.training.train import (
+    INTERRUPTED,
+    Options,
+    calibrated,
+    decibels,
+    describe,
+    say,
+    settings_of,
+    train,
+)
+
+if TYPE_CHECKING:
+    from scene.capture import Capture
+    from training.plain import PlainTrainer
+    from training.plain_settings import PlainSettings
+    from training.settings import TrainSettings
+
+# Options that say where and how long, or how photos are read: they go for every kind of model.
+COMMON = {"capture", "out", "model", "separate", "resume", "preset", "device", "downscale", "masks",
+          "background", "seconds", "iterations"}  # fmt: skip
+PAPER_ITERATIONS = 30000  # of 3DGS, and of the shape-shifting paper
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the training of one model left behind."""
+
+    file: Path
+    seconds: float  # of training alone
+    steps: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the training of a model a modality left behind."""
+
+    runs: dict[str, Run]  # of every modality that was trained
+    interrupted: bool
+
+    @property
+    def seconds(self) -> float:
+        return sum(run.seconds for run in self.runs.values())
+
+    @property
+    def steps(self) -> int:
+        return sum(run.steps for run in self.runs.values())
+
+
+def run_baseline(options: Options) -> int:
+    from rasterizer.device import open_device
+    from scene.read_capture import read_capture
+    from training.rig import with_found
+
+    if options.resume:
+        raise UsageError(
+            "--resume goes on with the one shape-shifting model; --model splats and --separate "
+            "train several models and begin anew."
+        )
+    if options.separate and options.model == "splats":
+        raise UsageError("plain splats are one model a modality already; leave out --separate.")
+    settings = plain_settings(options) if options.model == "splats" else settings_of(options, None)
+    capture, device = read_capture(options.capture), open_device(options.device)
+    say(f"{device.name}, {device.platform}")
+    if options.calibrate is not None:
+        settings = calibrated(device, capture, settings, options.calibrate)
+        capture = with_found(capture, settings.rig)
+    train_all = train_splats if options.model == "splats" else train_separate
+    outcome = train_all(device, capture, settings, options.out)
+    say(word_on(outcome, capture, options.out))
+    return INTERRUPTED if outcome.interrupted else 0
+
+
+def plain_settings(options: Options) -> "PlainSettings":
+    """The settings of plain splats, out of the options.  Raises UsageError."""
+    from training.plain_settings import PlainSettings
+
+    names = {f.name for f in fields(PlainSettings)}
+    asked = {f.name: getattr(options, f.name) for f in fields(options)}
+    for name, default in ((f.name, f.default) for f in fields(options)):
+        if name not in names | COMMON and asked[name] != default:
+            option = f"--{name.replace('_', '-')}"
+            raise UsageError(f"{option} is of anchor models; leave it out with --model splats.")
+    chosen = {n: asked[n] for n in names & asked.keys() if asked[n] is not None}
+    if "seconds" in chosen and "iterations" not in chosen:
+        chosen["iterations"] = None
+    elif options.preset == "paper":
+        chosen.setdefault("iterations", PAPER_ITERATIONS)
+    try:
+        return PlainSettings(**chosen)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def share_of(
+    settings: "TrainSettings | PlainSettings", capture: "Capture"
+) -> "TrainSettings | PlainSettings":
+    """The settings of one modality's model: its share of the budget, photos as small as all are."""
+    from training.photos import choose_downscale
+
+    count = len(capture.stops)
+    steps, seconds = settings.iterations, settings.seconds
+    return replace(
+        settings,
+        iterations=None if steps is None else max(round(steps / count), 1),
+        seconds=None if seconds is None else seconds / count,
+        downscale=settings.downscale or choose_downscale(capture.photos),
+    )
+
+
+def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Path) -> Outcome:
+    """Plain splats of every modality into the folder `out`: a PLY each and layers.json."""
+    from runtime_models.write_layer_list import layer_name, refuse_other_folder, write_layer_list
+    from training.plain import PlainTrainer, one_modality
+
+    refuse_other_folder(out)  # now, not after the training
+    settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
+    layers, runs, interrupted = [], {}, False
+    for number, part in enumerate(parts):
+        trainer = PlainTrainer(device, part, settings)
+        say(describe_plain(trainer))
+        interrupted = train(trainer, None)
+        layers.append((trainer.stop, trainer.splats()))
+        file = out / layer_name(number, trainer.stop)
+        runs[trainer.stop.name] = Run(file, trainer.elapsed, trainer.iteration)
+        say(told(trainer, trainer.count))
+        if interrupted:
+            break
+    write_layer_list(layers, out)
+    return Outcome(runs, interrupted)
+
+
+def train_separate(device, capture: "Capture", settings: "TrainSettings", out: Path) -> Outcome:
+    """An anchor model of every modality into the folder `out`: a package each."""
+    from runtime_models.write_layer_list import layer_name
+    from runtime_models.write_package import refuse_foreign, write_package
+    from training.plain import one_modality
+    from training.train import Trainer
+
+    if out.is_file() or out.suffix == ".shift":
+        raise UsageError(f"{out}: --separate writes several packages; name a folder for them.")
+    files = {
+        stop.name: (out / layer_name(number, stop)).with_suffix(".shift")
+        for number, stop in enumerate(capture.stops)
+    }
+    for file in files.values():
+        refuse_foreign(file)  # now, not after the training
+    settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
+    runs, interrupted = {}, False
+    for part in parts:
+        trainer, name = Trainer(device, part, settings), part.stops[0].name
+        say(describe(trainer))
+        interrupted = train(trainer, None)
+        write_package(trainer.model(), files[name])
+        runs[name] = Run(files[name], trainer.elapsed, trainer.iteration)
+        say(told(trainer, trainer.anchors_count))
+        if interrupted:
+            break
+    return Outcome(runs, interrupted)
+
+
+def each_modality(capture: "Capture", one_modality) -> list["Capture"]:
+    """A capture a modality; all are checked before the first is trained.  Raises BadFile."""
+    return [one_modality(capture, stop.name) for stop in capture.stops]
+
+
+def describe_plain(trainer: "PlainTrainer") -> str:
+    photos = trainer.schedule.photos[trainer.stop.name]
+    width, height = photos[0].view.size
+    return (
+        f"{len(photos)} x {trainer.stop.name} of {width}x{height} pixels; "
+        f"{len(trainer.held_out)} held out; {trainer.count:,} splats from {trainer.origin}, "
+        f"{trainer.voxel:.4g} m apart, SH degree {trainer.settings.sh_degree}"
+    )
+
+
+def told(trainer, count: int) -> str:
+    psnr = decibels(trainer.held_out_psnr(most=len(trainer.held_out)))
+    return f"{trainer.iteration} steps in {trainer.elapsed:.1f} s, {count:,} {trainer.unit}; " + (
+        f"held-out photos: {psnr}" if psnr else "no photo was held out"
+    )
+
+
+def word_on(outcome: Outcome, capture: "Capture", out: Path) -> str:
+    missing = [s.name for s in capture.stops if s.name not in outcome.runs]
+    if outcome.interrupted:
+        rest = f"; not trained: {', '.join(missing)}" if missing else ""
+        return f"{out}: interrupted after {outcome.seconds:.1f} s{rest}"
+    return f"{out}: done after {outcome.steps} steps in {outcome.seconds:.1f} s"

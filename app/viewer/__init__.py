@@ -1,0 +1,1 @@
+"""The window: what it shows, what hands and files do to it."""

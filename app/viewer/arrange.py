@@ -1,0 +1,168 @@
+"""Edits of what the stage shows: the file, its history, the world and the scene change together."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.viewer.document import key_of
+from runtime_models.model import BadFile
+from scene import edits
+from scene.control import Sweep
+from scene.edits import Change, History
+from scene.pose import Pose
+from scene.scene import SceneObject
+from scene.scene_file import SceneFile, SceneItem, labelled, object_of
+
+if TYPE_CHECKING:
+    from app.viewer.opened import Source
+    from app.viewer.stage import Stage
+
+LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
+MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told
+COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
+
+
+def edit(stage: "Stage", file: SceneFile, what: str, together: str = "") -> None:
+    """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
+    turn_to(stage, stage.document.history.take(file, what, together))
+
+
+def undo(stage: "Stage") -> str:
+    """Takes the last edit back; returns what it was, "" where there was none."""
+    what = stage.document.history.undoes
+    turn_to(stage, stage.document.history.undo())
+    return what
+
+
+def redo(stage: "Stage") -> str:
+    what = stage.document.history.redoes
+    turn_to(stage, stage.document.history.redo())
+    return what
+
+
+def turn_to(stage: "Stage", history: History) -> None:
+    """Goes to another step of the history: only what differs is touched."""
+    before = stage.document.history
+    stage.document.history = history
+    if history.file is before.file:
+        return
+    changed = edits.changes(before.file, history.file)
+    try:
+        world = stage.world
+        stage.bodies.follow(stage.document)
+        arrange(stage, changed)
+        if stage.world is not world:  # a new one stands at its start
+            stage.follow_world()
+    except BadFile:
+        stage.document.history = before
+        stage.bodies.follow(stage.document)
+        raise
+
+
+def arrange(stage: "Stage", changed: Sequence[Change]) -> None:
+    """The scene's objects as the file has them now; the rest goes on as it stands."""
+    of = {change.after.name: change for change in changed if change.after is not None}
+    was = {thing.name: index for index, thing in enumerate(stage.scene.objects)}
+    rows, moved = [], {}
+    for number, (label, item) in enumerate(labelled(stage.document.file)):
+        change = of.get(item.name)
+        if change is None:
+            index = was[item.name]
+        elif change.before is None or change.fields & LOOKS:
+            index = None
+        else:
+            index = was[change.before.name]
+        if index is None:
+            rows.append(fresh_row(stage, item, label))
+        else:
+            thing = changed_thing(stage.scene.objects[index], item, change)
+            rows.append((thing, stage.filed[index], stage.sweeps[index], stage.sources[index]))
+            moved[index] = number
+    stage.take_rows(rows, moved)
+    if any(
+        {"visible"} & change.fields or None in (change.before, change.after) for change in changed
+    ):
+        stage.reframe()
+    names = {change.before.name: change.after for change in changed if change.before}
+    if stage.chosen in names:
+        stage.chosen = names[stage.chosen].name if names[stage.chosen] else ""
+
+
+def fresh_row(
+    stage: "Stage", item: SceneItem, label: int
+) -> "tuple[SceneObject, object, Sweep, Source]":
+    """What the stage holds of an object that was not there."""
+    source = stage.document.sources[key_of(item)]
+    thing = object_of(item, stage.in_palette(source.model), label)
+    sweep = Sweep.over(source.model.stops)
+    sweep.resume_at(item.x)
+    return thing, source.model, sweep, source
+
+
+def changed_thing(thing: SceneObject, item: SceneItem, change: Change | None) -> SceneObject:
+    """An object that is there already, with what was edited."""
+    if change is None:
+        return thing
+    values: dict = {"name": item.name, "visible": item.visible, "selectors": item.selectors}
+    if change.fields & {"position", "wxyz"}:
+        values["world_from_object"] = item.pose
+    if "x" in change.fields:
+        values["x"] = item.x
+    return replace(thing, **values)
+
+
+def steer(stage: "Stage", index: int, x: float, together: str = "") -> None:
+    """A hand moves x: where the object starts as well, unless the world is running."""
+    thing = stage.scene.objects[index]
+    stage.set_x(index, x)
+    item = edits.find(stage.document.file, thing.name)
+    if not stage.running and item is not None:
+        file = edits.set_x(stage.document.file, thing.name, x)
+        history = stage.document.history
+        word = together or f"x of {thing.name}"
+        stage.document.history = history.take(file, word, together or f"x {thing.name}")
+        stage.bodies.follow(stage.document)
+
+
+def place(stage: "Stage", index: int, pose: Pose) -> None:
+    """A hand moves an object: where it starts as well, unless the world is running."""
+    name = stage.scene.objects[index].name
+    file = edits.place(stage.document.file, name, pose)
+    stage.move(index, edits.wanted(file, name).pose)
+    if not stage.running:
+        history = stage.document.history
+        stage.document.history = history.take(file, f"move {name}", f"place {name}")
+        stage.bodies.follow(stage.document)
+
+
+def as_it_stands(stage: "Stage") -> SceneFile:
+    """The file with everything where it is now, at its x.  ValueError for what has flown off."""
+    file = stage.document.file
+    for thing in stage.scene.objects:
+        file = edits.place(file, thing.name, thing.world_from_object)
+        file = edits.set_x(file, thing.name, thing.x)
+    return file
+
+
+def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, float]:
+    """Metres along the world's x that a copy of points (N, 3), object frame, stands beside it."""
+    if not len(points):
+        return (0.0, 0.0, 0.0)
+    along = points @ thing.world_from_object.matrix()[0, :3]
+    low, high = np.percentile(along, (2, 98))
+    return (float(COPY_BESIDE * (high - low)), 0.0, 0.0)
+
+
+def stands_elsewhere(stage: "Stage") -> bool:
+    """Whether anything is not where it starts, or at another x."""
+    items = {item.name: item for item in stage.document.file.all_items}
+    for thing in stage.scene.objects:
+        item, pose = items[thing.name], thing.world_from_object
+        if thing.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
+            return True
+        if abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True))) < 1 - TURNED:
+            return True
+    return False

@@ -1,0 +1,211 @@
+"""The viewer's files: those it opens while the window goes on, and those it opened before."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from imgui_bundle import imgui
+
+from app.camera_files import camera_reading, in_scene
+from app.opening import sentence
+from app.panels.recent_panel import RecentMenu
+from app.paths import config_folder
+from app.viewer.controls import Camera
+from app.viewer.document import Document, document_from, document_of
+from app.viewer.opened import Found, Opener, ReadModel, read_files
+from app.viewer.recent import RecentFiles
+from app.viewer.stage import scene_of
+from runtime_models.model import BadFile
+from scene import edits
+from scene.pose import View
+from scene.read_cameras import read_camera_list
+from scene.scene import Scene
+from scene.scene_file import scene_of as scene_of_file
+
+if TYPE_CHECKING:
+    from app.viewer.desktop import Options
+    from app.viewer.viewer import Viewer
+
+TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
+MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
+
+
+class Files:
+    """Opens what is dropped or chosen; the scene changes when all of it has been read."""
+
+    def __init__(self, viewer: "Viewer", recent: RecentFiles | None = None) -> None:
+        self._viewer = viewer
+        self._opener = Opener()
+        self.recent = recent  # None: nothing is kept
+        self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
+        # Reads one scene, in the thread that opens; replaced where progress can be told.
+        self.read: ReadModel = lambda path, told: viewer.stage.read_model(path)
+        self._menu = RecentMenu()
+        viewer.hooks.each_frame.append(self.poll)
+        viewer.hooks.top.append(self.draw_recent)
+
+    @property
+    def busy(self) -> bool:
+        return self._opener.busy
+
+    def open_soon(self, paths: tuple[Path, ...]) -> None:
+        """Begins to read files; the window stays alive meanwhile."""
+        viewer = self._viewer
+        reading, plain = camera_reading(viewer.options), viewer.options.reading()
+        self._opener.start(
+            paths, lambda paths, told: read_files(paths, self.read, reading, told, plain)
+        )
+        viewer.say(self._opener.note)
+
+    def started(self, found: Found, options: "Options") -> None:
+        """The scene and cameras with which the window opens."""
+        viewer = self._viewer
+        viewer.set_title()
+        self._at_demo = not (options.scenes or options.touch)
+        if options.screenshot is None:
+            self.recent = RecentFiles.read(config_folder())
+            if options.scenes:
+                self.remember_all(found)
+        self.take_cameras(found, stand=options.camera is not None)
+        viewer.say(told_of(found))
+
+    def poll(self) -> bool:
+        """Takes over what has been read; True while something is being read."""
+        return take_over(self._viewer, self._opener, self._ask_and_take)
+
+    def _ask_and_take(self, found: Found) -> None:
+        if found.sources:
+            self._viewer.objects.saving.before_losing(lambda: self.take(found))
+        else:
+            self.take(found)
+
+    def take(self, found: Found) -> None:
+        """Shows what has been read; a scene that the device cannot hold leaves the old one."""
+        viewer = self._viewer
+        stage = viewer.stage
+        if found.sources:
+            try:
+                scene, document = opened_scene(found)
+                viewer.renderer.update(scene)
+            except BadFile as error:
+                stage.problem = str(error)
+                viewer.shown.forget()
+                return
+            stage.take(found.sources, scene, home_of(found), document)
+            self._at_demo = False
+            viewer.show_scene()
+        self.take_cameras(found, stand=not found.sources)
+        self.remember_all(found)
+        viewer.say(told_of(found))
+
+    def take_cameras(self, found: Found, stand: bool) -> None:
+        """The cameras of a file for n and p; of a scene without any there are none."""
+        viewer = self._viewer
+        cameras = found.cameras
+        if cameras is None and found.floor is not None and not found.sources:
+            cameras = found.floor
+        if cameras is None and not found.sources:
+            return
+        if cameras is not None and viewer.stage.scene.objects:
+            cameras = in_scene(cameras, viewer.stage.scene.objects[0].model)
+        now = viewer.view()
+        viewer.steps.take(cameras)
+        if stand and cameras is not None:
+            viewer.steps.go_to(0, now if viewer.frames else None)
+            viewer.steps.untold = ()  # said with the file's other notes
+
+    def draw_recent(self, ui_scale: float) -> None:
+        """The buttons under the panel's title."""
+        if self._at_demo and imgui.button("Things to touch", imgui.ImVec2(-1, 0)):
+            self.open_soon((TOUCH,))
+        chosen = self._menu.draw(self.recent, ui_scale)
+        if chosen is not None:
+            self.open_soon((chosen,))
+
+    def remember_all(self, found: Found) -> None:
+        """What was opened by name: the scene file, not what is in it."""
+        inside = len(found.file.all_items) if found.file else 0
+        for path in [found.path] * (inside > 0) + [s.path for s in found.sources[inside:]]:
+            self.remember(path)
+
+    def remember(self, path: Path) -> None:
+        """Puts a file first in the list of recent ones."""
+        if self.recent is None:
+            return
+        try:
+            self.recent.add(path)
+        except OSError as error:
+            self._viewer.say(f"The list of recent files cannot be kept: {error.strerror}.")
+            self.recent = None
+
+
+def take_over(viewer: "Viewer", opener: Opener, take: Callable[[Found], None]) -> bool:
+    """Gives what a thread has read to `take`, its failure to the viewer; True while it reads."""
+    if not opener.busy:
+        return False
+    name = opener.paths[0].name
+    try:
+        found = opener.poll()
+    except (BadFile, OSError) as error:
+        viewer.stage.problem = str(error)
+        viewer.say("")
+    except MemoryError:
+        viewer.stage.problem = f"{name} needs more memory than there is."
+        viewer.say("")
+    else:
+        if found is not None:
+            viewer.say("")
+            take(found)
+    if opener.busy:
+        viewer.say(opener.note)
+    return opener.busy
+
+
+def opened_scene(found: Found, x: float | None = None) -> tuple[Scene, Document]:
+    """What is drawn of what was opened, each at x or its first stop, and its file.
+
+    Raises BadFile for a scene file whose objects cannot be as it says.
+    """
+    if found.file is None:
+        scene = scene_of(found.sources, x)
+        return scene, document_from(scene, found.sources)
+    file, inside = found.file, len(found.file.all_items)
+    document = document_of(found.path, file, found.sources[:inside])
+    for source in found.sources[inside:]:
+        file = edits.add(file, document.item(source))
+        document.history = document.history.take(file, f"add {file.items[-1].name}")
+    return scene_of_file(file, document.models_by_name()), document
+
+
+def told_of(found: Found) -> str:
+    """What was repaired in the files and assumed about the cameras, a line each; "" = nothing."""
+    findings = [finding for source in found.sources for finding in source.model.findings]
+    lines = [sentence(finding) for finding in findings if finding.repaired]
+    more = [f"and {len(lines) - MOST_TOLD} more."] if len(lines) > MOST_TOLD else []
+    return "\n".join([*lines[:MOST_TOLD], *more, *found.notes])
+
+
+def home_of(found: Found) -> View | None:
+    """The view that stands on the floor which lies with the first scene."""
+    if found.floor is None or not found.sources:
+        return None
+    return in_scene(found.floor, found.sources[0].model).views[0]
+
+
+def first_camera(viewer: "Viewer") -> Camera:
+    """The camera of a new scene: on its floor where one is given, else the whole in view."""
+    stage = viewer.stage
+    camera = Camera(stage.first_view(viewer.free_size()), stage.first_target, stage.radius)
+    if stage.home is not None:
+        camera.toggle_flying()
+        camera.stand(stage.home.world_from_eye, stage.home_fov_y)
+    return camera
+
+
+def named_cameras(options: "Options", found: Found) -> Found:
+    """With the cameras of --camera instead of those beside the scene.  Raises BadFile."""
+    if options.camera is None:
+        return found
+    cameras = read_camera_list(options.camera, camera_reading(options))
+    return replace(found, cameras=cameras, notes=cameras.notes)

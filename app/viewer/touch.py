@@ -1,0 +1,259 @@
+"""Touching in the viewer: play and step the physics, the mouse as a hand, rays, reactions seen."""
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+import glfw
+
+from app.panels.touch_panel import draw_touch
+from app.viewer.arrange import steer
+from app.viewer.hands import is_painting
+from app.viewer.sections import Section
+from app.viewer.touch_marks import Flash, Label, Marks
+from app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release, Wheel
+from scene.follow import put_back
+from scene.mouse_hand import MouseHand, moved, pose, pushed, ray, rolled, take, turned
+from scene.pose import View
+from scene.record import Record
+from scene.thing import middle_of
+from scene.world import World
+
+if TYPE_CHECKING:
+    from app.viewer.desktop import Viewer
+
+HAND = "mouse"
+REMEMBERED = 6  # reactions that the panel lists
+WORDS = {"collision": "struck", "grab": "taken", "ray": "hit by a ray", "enter": "arrived"}
+KEYS = (
+    ("T", "let things move, hold them still"),
+    ("Shift+T", "one step of 1/90 s"),
+    ("R", "put everything back"),
+    ("drag a thing", "carry it, while things move"),
+    ("wheel, carrying", "farther, nearer"),
+    ("Shift, carrying", "drag turns it, wheel rolls it"),
+    ("X", "a ray at the mouse"),
+    ("J", "show colliders"),
+)
+
+
+def attach_touch(viewer: "Viewer") -> "Touch":
+    """Adds the section, keys and mouse to a viewer."""
+    touch = Touch(viewer)
+    hooks = viewer.hooks
+    hooks.takes.append(touch.take)
+    hooks.each_frame.append(touch.each_frame)
+    hooks.over.append(touch.marks.draw_colliders)
+    hooks.marks.append(touch.marks.draw)
+    hooks.opened.append(touch.forget)
+    hooks.status.append(touch.status)
+    hooks.sections.insert(  # first: its buttons stay where they are, whatever is chosen
+        0,
+        Section(
+            "Touch",
+            lambda ui_scale: draw_touch(touch, ui_scale),
+            above=True,
+            opens=touch.opens,
+            shown=lambda: touch.world is not None,
+        ),
+    )
+    hooks.keys += KEYS
+    return touch
+
+
+class Touch:
+    """What the mouse holds, and what has just happened in the stage's world."""
+
+    def __init__(self, viewer: "Viewer") -> None:
+        self.viewer = viewer
+        self.hand: MouseHand | None = None  # while it holds something
+        self.pads: dict[str, tuple[float, float]] = {}  # name -> balance, power as last put there
+        self.told: deque[str] = deque(maxlen=REMEMBERED)  # the last reactions, newest first
+        self.marks = Marks(self)
+        self._known: World | None = None
+        self._unfold = False
+
+    @property
+    def world(self) -> World | None:
+        """None: nothing of what is open can be touched, or its colliders are being made."""
+        return self.viewer.stage.world
+
+    @property
+    def held(self) -> str | None:
+        return self.world.held(HAND) if self.world and self.hand else None
+
+    def forget(self) -> None:
+        """Another scene: nothing of the old one is held or told."""
+        self.hand = self._known = None
+        self.pads.clear()
+        self.told.clear()
+        self.marks.forget()
+
+    def opens(self) -> bool:
+        """Once for every world: its section unfolds."""
+        unfold, self._unfold = self._unfold, False
+        return unfold
+
+    def meet(self, world: World) -> None:
+        """The bodies of what was opened are there, or there anew on another floor."""
+        if self._known is None:
+            self._unfold, world.paused = True, not self.viewer.options.play
+        self._known = world
+
+    def status(self) -> str:
+        """Words for the status line."""
+        if self.held:
+            return f"carrying {self.held}"
+        return "things hold still: T lets them move" if self.world and self.world.paused else ""
+
+    # ---- input
+
+    def take(self, event: Event) -> bool:
+        """True for what concerns the hand, its ray and the physics."""
+        if self.world is None:
+            return False
+        if isinstance(event, KeyDown):
+            return self.press_key(event)
+        if self.hand is None:
+            return isinstance(event, Press) and event.button == "left" and self.grab(event)
+        match event:
+            case Drag(button="left"):
+                self.drag(event.dx, event.dy)
+            case Wheel():
+                self.turn_wheel(event.notches)
+            case Release(button="left"):
+                self.let_go()
+            case Press() | DoubleClick():  # another button, or the camera is meant
+                self.let_go()
+                return False
+            case _:
+                return False
+        return True
+
+    def press_key(self, event: KeyDown) -> bool:
+        match event.key:
+            case glfw.KEY_T if event.shift:
+                self.step()
+            case glfw.KEY_T:
+                self.toggle()
+            case glfw.KEY_R:
+                self.put_back()
+            case glfw.KEY_X:
+                self.shoot()
+            case glfw.KEY_J:
+                self.marks.colliders = not self.marks.colliders
+            case glfw.KEY_ESCAPE if self.hand is not None:
+                self.let_go()
+            case _:
+                return False
+        return True
+
+    def grab(self, press: Press) -> bool:
+        """Takes what lies under the mouse, if it can be carried."""
+        viewer = self.viewer
+        regions = viewer.stage.regions
+        if self.world.paused or is_painting(viewer) or regions.placing:
+            return False
+        view, size = viewer.view(), viewer.window.logical_size
+        name = self.under(view, (press.x, press.y))
+        if name is None:
+            return False
+        middle = middle_of(self.world.things[name])  # about which it is turned
+        self.hand = take(view, size, middle)
+        self.world.move_hand(HAND, pose(self.hand, view, size))
+        self.world.grab_body(HAND, name, middle)
+        viewer.stage.chosen = name
+        return True
+
+    def under(self, view: View, place: tuple[float, float]) -> str | None:
+        """What could be carried that lies under a place of the picture, logical pixels."""
+        hit = self.world.aim(*ray(view, place, self.viewer.window.logical_size))
+        thing = self.world.things.get(hit.object) if hit else None
+        return hit.object if thing is not None and thing.moves else None
+
+    def drag(self, dx: float, dy: float) -> None:
+        viewer = self.viewer
+        if self.shift:
+            self.hand = turned(self.hand, dx, dy, viewer.view())
+        else:
+            self.hand = moved(self.hand, dx, dy, viewer.window.logical_size)
+
+    def turn_wheel(self, notches: float) -> None:
+        view = self.viewer.view()
+        self.hand = (rolled if self.shift else pushed)(self.hand, notches, view)
+
+    @property
+    def shift(self) -> bool:
+        held = self.viewer.window.held
+        return bool(held(glfw.KEY_LEFT_SHIFT) or held(glfw.KEY_RIGHT_SHIFT))
+
+    def let_go(self) -> None:
+        """What the mouse holds flies on."""
+        if self.hand is not None and self.world is not None:
+            self.world.release(HAND)
+        self.hand = None
+
+    # ---- the world
+
+    def toggle(self) -> None:
+        """Lets things move, or holds them still."""
+        self.let_go()
+        self.world.paused = not self.world.paused
+        self.viewer.say("Things hold still" if self.world.paused else "Things move")
+
+    def step(self) -> None:
+        """One step by hand; things hold still after it."""
+        self.let_go()
+        self.world.paused = True
+        self.follow([self.world.step()])
+
+    def put_back(self) -> None:
+        """Everything where it was before it was touched."""
+        self.let_go()
+        stage = self.viewer.stage
+        stage.bodies.follow(stage.document)  # edits that the world has not heard of
+        put_back(self.world)
+        self.follow([])
+
+    def control(self, name: str, x: float) -> None:
+        """A pad puts an object's x there."""
+        stage = self.viewer.stage
+        names = [thing.name for thing in stage.scene.objects]
+        steer(stage, names.index(name), x)
+
+    def shoot(self) -> None:
+        """A ray from the eye through the mouse: what it meets answers."""
+        viewer = self.viewer
+        if not viewer.window.on_scene:
+            return
+        hit = self.world.ray(*ray(viewer.view(), viewer.window.cursor, viewer.window.logical_size))
+        if hit is not None:
+            self.marks.flashes.append(Flash(hit.point))
+        if self.world.paused:  # nobody else would let it answer
+            self.step()
+
+    def each_frame(self) -> bool:
+        """Moves the hand and lets time pass; True while a mark has yet to fade."""
+        world, viewer = self.world, self.viewer
+        if world is None:
+            self.hand = None
+            return False
+        if world is not self._known:
+            self.meet(world)
+        if self.hand is not None and world.held(HAND) is None:
+            self.hand = None  # what it held is gone
+        if self.hand is not None:
+            world.move_hand(HAND, pose(self.hand, viewer.view(), viewer.window.logical_size))
+        records = world.advance(viewer.seconds)
+        if not world.paused:
+            self.follow(records)
+        self.marks.fade(viewer.seconds)
+        return self.marks.fading and viewer.options.screenshot is None
+
+    def follow(self, records: list[Record]) -> None:
+        """Shows where things are now, and what has answered."""
+        self.viewer.stage.follow_world()
+        for record in records:
+            for event in record.events:
+                after = event["to"] or f"x {event['x']:.2f}"
+                self.told.appendleft(f"{event['object']}: {WORDS[event['on']]}, now {after}")
+                self.marks.labels.append(Label(event["object"], after))

@@ -1,0 +1,307 @@
+"""The viewer: a window loop that draws only when something has changed."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.panels.camera_panel import KeptViews, attach_cameras
+from app.panels.export_panel import attach_export
+from app.panels.legend_panel import draw_legend
+from app.panels.panel import draw_note, draw_panel, draw_problem, free_area
+from app.panels.scale_bar import draw_scale_bar
+from app.panels.slider import draw_slider_bar
+from app.panels.status_line import draw_status
+from app.viewer.bodies import attach_bodies
+from app.viewer.controls import SMOOTH_S
+from app.viewer.dial import FLOOR_DB, TARGET_MS, Dial
+from app.viewer.files import Files, first_camera
+from app.viewer.hands import is_erasing, is_painting, push, take
+from app.viewer.objects import attach_objects
+from app.viewer.outlines import draw_brush, draw_outlines
+from app.viewer.pictures import write_numbered_png, write_png
+from app.viewer.readings import Readings
+from app.viewer.sections import Hooks
+from app.viewer.shown import Shown, Wish
+from app.viewer.stage import Stage
+from app.viewer.stepping import Steps
+from app.viewer.touch import attach_touch
+from app.viewer.window import Event, Window
+from renderer.context import describe
+from renderer.debug import debug_legend
+from renderer.renderer import Renderer
+from scene.pose import View
+
+if TYPE_CHECKING:
+    from app.viewer.desktop import Options
+
+WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
+NOTE_S = 3.0  # how long a note stays
+SLEEP_S = 0.5  # longest wait for input while nothing moves
+POLL_S = 0.03  # the same while a thread works at something that the window waits for
+LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took long
+
+
+class Viewer:
+    """One window, one renderer, one stage, one camera, and the loop that ties them."""
+
+    def __init__(
+        self, window: Window, renderer: Renderer, stage: Stage, options: "Options"
+    ) -> None:
+        self.window, self.renderer, self.stage, self.options = window, renderer, stage, options
+        self.overlay = options.panel
+        self.hooks = Hooks()
+        self._polling = False  # a hook waits for something that is under way
+        names = describe(window.ctx) | renderer.backends
+        self.readings = Readings(
+            machine={key.replace("_", " "): str(v) for key, v in names.items()},
+            drawing=renderer.backends["drawing"],
+        )
+        self._free = self._free_wanted()  # where the picture's middle is; follows the overlay
+        self.camera = first_camera(self)
+        self.steps = Steps()
+        self.kept = KeptViews(options.pictures)
+        self.files = Files(self)
+        attach_bodies(self)
+        self.objects = attach_objects(self)
+        attach_cameras(self)
+        attach_export(self)
+        self.touch = attach_touch(self)
+        self.shown = Shown(renderer, self.readings)
+        self.dial = Dial(
+            options.target_ms or TARGET_MS,
+            options.floor_db or FLOOR_DB,
+            wanted=(options.target_ms or options.floor_db) is not None,
+        )
+        self._note_until = 0.0
+        self.seconds = 0.0  # that the frame which is under way lets pass
+        self.frames = 0  # drawn since the window opened
+        self._overlay_ms = 0.0
+        self.save_picture = False
+
+    def loop(self) -> None:
+        """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
+        last = time.perf_counter()
+        while not (self.window.closing and self._may_close()):
+            busy = self._busy()
+            redraw = self.window.wait(0.0 if busy else POLL_S if self._polling else SLEEP_S)
+            now = time.perf_counter()
+            if self.window.minimised:
+                last = now
+                time.sleep(0.05)
+                continue
+            seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
+            last = now
+            if busy or redraw or self._polling or self._note_ends(now) or self._idle_work_due(now):
+                self.frame(seconds)
+            if self.options.screenshot and self._last_frame:
+                return
+
+    def _may_close(self) -> bool:
+        """Whether nothing would be lost; else the window stays, and a box asks."""
+        may = all([asked() for asked in self.hooks.closing])
+        if not may:
+            self.window.keep_open()
+        return may
+
+    def frame(self, seconds: float) -> None:
+        """One frame of the window: `seconds` have passed since the last one."""
+        start, self.seconds = time.perf_counter(), seconds
+        for event in self.window.begin_frame():
+            self.take(event)
+        self.stage.advance(seconds)
+        pushed = push(self.window)
+        if pushed.any:
+            self.leave_camera()
+        self.camera.step(seconds, pushed)
+        self.steps.advance(seconds)
+        self._polling = any([work() for work in self.hooks.each_frame])
+        self._follow_overlay(seconds)
+        self._turn_dial()
+        fresh = self._draw_splats()
+        drawn = time.perf_counter()
+        self._draw_overlay()
+        self.window.end_frame()
+        self._overlay_ms = (time.perf_counter() - drawn) * 1e3
+        self.frames += 1
+        self._save_pictures()
+        self.window.swap()
+        now = self.readings.now = time.perf_counter()
+        if fresh:
+            self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
+            self.dial.seen((now - start) * 1e3, self._moving)
+        self.readings.idle = not fresh
+
+    def take(self, event: Event) -> None:
+        """Lets one input event act."""
+        take(self, event)
+
+    def open_soon(self, paths: tuple[Path, ...]) -> None:
+        """Opens files and folders, scenes or cameras, while the window goes on."""
+        self.files.open_soon(paths)
+
+    def say(self, text: str) -> None:
+        """Shows a note for a few seconds, longer for more lines; "" takes it away."""
+        self.readings.note = text
+        self._note_until = time.perf_counter() + NOTE_S * (1 + text.count("\n"))
+
+    def _busy(self) -> bool:
+        """Whether the next frame is due without waiting for input."""
+        waiting = self.options.screenshot is not None
+        sliding = not np.array_equal(self._free, self._free_wanted())
+        measuring = self.dial.wanted or self.dial.measuring
+        first = self.frames < WARM_UP
+        return self._moving or waiting or sliding or measuring or first
+
+    def _free_wanted(self) -> np.ndarray:
+        """(4,) pixels: the part of the window that the overlay leaves free."""
+        window = self.window
+        pixels = window.ui_scale * window.size[0] / max(window.logical_size[0], 1)
+        if not self.overlay:
+            return np.array([0.0, 0.0, *window.size])
+        return np.array(free_area(window.size, len(self.stage.sliders), pixels))
+
+    def _follow_overlay(self, seconds: float) -> None:
+        """The picture moves over when the overlay comes or goes, in the same soft way."""
+        wanted = self._free_wanted()
+        self._free = wanted + (self._free - wanted) * np.exp(-seconds / SMOOTH_S)
+        if np.abs(self._free - wanted).max() < 0.5 or self.frames == 0:
+            self._free = wanted
+
+    def view(self) -> View:
+        """What the window shows: a camera that was stepped to, or what the hand has turned to."""
+        view = self.camera.view(self.window.size, tuple(self._free))
+        if self.steps.standing:
+            return self.steps.view(view.size, tuple(self._free), view.near, view.far)
+        return view
+
+    def plain_view(self) -> View:
+        """The same without what the overlay covers: a camera as filed, or centred."""
+        if self.steps.standing and not self.steps.moving:
+            return self.steps.cameras.views[self.steps.index]
+        return self.camera.view(self.free_size())
+
+    def leave_camera(self) -> None:
+        """From the camera that was stepped to, where it stands, to moving freely."""
+        if self.steps.standing:
+            view, (_, top, _, bottom) = self.view(), self._free
+            height = (view.tangents[3] - view.tangents[2]) * (bottom - top) / view.size[1]
+            self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
+            self.steps.leave()
+
+    def free_size(self) -> tuple[int, int]:
+        left, top, right, bottom = self._free_wanted()
+        return int(right - left), int(bottom - top)
+
+    def _note_ends(self, now: float) -> bool:
+        """True once when the note's time is over; it is taken away then."""
+        over = bool(self.readings.note) and now >= self._note_until
+        if over:
+            self.readings.note = ""
+        return over
+
+    def _wish(self) -> Wish:
+        """What the screen should show now."""
+        stage, view, moving = self.stage, self.view(), self._moving
+        settings = self.dial.while_moving(stage.settings) if moving else stage.settings
+        return Wish(stage.shown(view), view, settings, moving or self.dial.measuring)
+
+    @property
+    def _moving(self) -> bool:
+        by_hand = self.camera.moving or push(self.window).any
+        stage = self.stage
+        living = stage.running and not stage.world.resting
+        return by_hand or self.steps.moving or stage.playing or living
+
+    def _idle_work_due(self, now: float) -> bool:
+        """Whether the picture has rested so long that its error is to be measured."""
+        return self.shown.due(self._wish(), now)
+
+    def _turn_dial(self) -> None:
+        """Measures a little for the budget where that is wanted, and takes over what it chose."""
+        dial, stage = self.dial, self.stage
+        if dial.wanted:
+            view = self.view()
+            finish = self.window.ctx.finish
+            dial.start(self.renderer, stage.shown(view), view, stage.centre, finish)
+        if dial.measuring:
+            self.shown.forget()
+            if dial.step():
+                stage.settings = dial.applied(stage.settings)
+
+    def _draw_splats(self) -> bool:
+        """Draws the scene into the window; True when the splats had to be drawn anew."""
+        wish, now = self._wish(), time.perf_counter()
+        if self.stage.measure_now or self.shown.due(wish, now):
+            self.stage.measure_now = False
+            self.shown.measure(wish)
+        force = self.options.screenshot is not None or self.frames < WARM_UP
+        fresh = self.shown.draw(wish, self.window.screen(), force)
+        for draw in self.hooks.over:
+            draw(wish)
+        if fresh:
+            self.readings.stats.ms["overlay"] = self._overlay_ms  # of the frame before
+        self.shown.read(wish, now)
+        return fresh
+
+    def _draw_overlay(self) -> None:
+        scale = self.window.ui_scale
+        self.readings.flying = self.camera.flying
+        covered = []
+        free = free_area(self.window.logical_size, len(self.stage.sliders), scale)
+        left = free[0] if self.overlay else 0.0
+        if not self.save_picture:
+            self._draw_marks(scale)
+        if self.overlay:
+            draw_scale_bar(self.stage.scene, scale)
+            debug, stats = self.stage.settings.debug, self.readings.stats
+            draw_legend(debug_legend(debug, stats), left, scale)
+            covered = [
+                draw_panel(self.stage, self.dial, self.readings, scale, self.hooks),
+                draw_slider_bar(self.stage, left, scale),
+                draw_status(self.stage, [words() for words in self.hooks.status], scale),
+            ]
+        if not self.save_picture:  # a note is no part of a picture
+            draw_note(self.readings.note, left, scale)
+        draw_problem(self.stage, scale)
+        self.window.covered = tuple(covered)
+
+    def _draw_marks(self, scale: float) -> None:
+        """Outlines of the regions, and the brush while there is one."""
+        stage, window = self.stage, self.window
+        for draw in self.hooks.marks:
+            draw(scale)
+        if self.overlay or stage.regions.placing:
+            draw_outlines(stage.regions, stage.scene, self.view(), scale)
+        if is_painting(self) and window.on_scene:
+            draw_brush(window.cursor, stage.regions.brush * scale, is_erasing(self), scale)
+
+    def show_scene(self) -> None:
+        """The stage has another scene: a new camera, and whoever depends on it is told."""
+        self.camera = first_camera(self)
+        self.steps.leave()
+        self.dial.forget()
+        for changed in self.hooks.opened:
+            changed()
+        self.set_title()
+
+    def set_title(self) -> None:
+        mark = "* " if self.objects.unsaved else ""
+        name = self.stage.title
+        self.window.set_title(f"{mark}{name} \u2013 Shapeshift" if name else "Shapeshift")
+
+    @property
+    def _last_frame(self) -> bool:
+        """Whether a --screenshot is due: enough frames, the budget has chosen, all is read."""
+        measuring = self.dial.wanted or self.dial.measuring
+        return self.frames >= self.options.frames and not measuring and not self._polling
+
+    def _save_pictures(self) -> None:
+        """Writes the picture that a key or --screenshot asked for, of what is on the screen."""
+        if self.options.screenshot is not None and self._last_frame:
+            write_png(self.window.picture(), self.options.screenshot)
+        if self.save_picture:
+            self.save_picture = False
+            path = write_numbered_png(self.window.picture(), self.options.pictures)
+            self.say(f"Saved {path}")
