@@ -17,12 +17,12 @@ from training.initial import common_box
 from training.photos import BLACK, read
 from training.plain import one_modality
 from training.rig import Found, rigid, told
-from training.rig_solve import FIRST_GRAY, Frozen, Shape
+from training.rig_solve import Frozen, Shape
 from training.schedule import choose_background
 from training.settings import TrainSettings
 from training.train import Trainer
 
-STEPS = 1000  # of training the shape
+STEPS = 2000  # of training the shape
 MOST_SIDE = 400  # pixels of a photo that the offset is found from
 SOLVE, SOLVE_FIRST = 5, 13  # steps at each offset that is tried, and at a stage's first
 PROBE = 0.004  # radians, and shares of the distance: 0.3 to 2 pixels
@@ -214,7 +214,7 @@ def gain_db(frozen: Frozen, offset: np.ndarray) -> float:
     """How much better the photos are shown from `offset` than from the stated poses."""
     costs = []
     for where in (np.eye(4), offset):
-        frozen.gray = np.full(frozen.count, FIRST_GRAY)
+        frozen.gray = np.zeros_like(frozen.gray)
         frozen.stand(where)
         frozen.solve(SOLVE_FIRST)
         costs.append(frozen.slope()[0])

@@ -2,7 +2,9 @@
 
 How bright each splat is in that modality is solved for at every offset (least squares, by conjugate
 gradients), so that the error is a function of the offset alone: brightness that was fitted at one
-offset would hold the cameras there.  Photos count as grey.
+offset would hold the cameras there.  It changes with the side from which one looks: what is hot
+glows less at a grazing angle, which else would look like an edge that lies elsewhere.
+Photos count as grey.
 """
 
 from collections.abc import Callable
@@ -19,6 +21,7 @@ from training.rig import moved_by, offset_view, pose_gradient
 
 GRAY = 6  # of a record's numbers: the first of its colour's three
 FIRST_GRAY = 0.3
+SIDES = 4  # numbers of a splat's brightness: one from all sides, and how it changes with the side
 LEAST_SEEN = 0.01  # pixels: splats that fill less in all photos change no faster than at this
 Shape = tuple  # means (N, 3), scales (N, 3), wxyz (N, 4), opacity (N,) on the device, metres
 Answer = Callable[[int, np.ndarray], np.ndarray]  # of a photo and a picture (H, W): a gradient
@@ -34,7 +37,9 @@ class Frozen:
         self.device, self.shape, self.photos = device, shape, photos
         self.behind, self.distance = behind, distance
         self.count = shape[0].shape[0]
-        self.gray = np.full(self.count, FIRST_GRAY)
+        self.gray = np.zeros((self.count, SIDES))  # see `sides`
+        self.gray[:, 0] = FIRST_GRAY
+        self.means = device.download(shape[0]).astype(np.float64)
         self.wanted = [p.over((behind,) * 3).mean(axis=2, dtype=np.float32) for p in photos]
         self.weights = [np.float32(1) if p.weight is None else p.weight for p in photos]
         self.values = sum(
@@ -60,13 +65,23 @@ class Frozen:
             bin_tiles(self.device, self.projected(view, blank), view.size) for view in self.views
         ]
         if self.pace is None:  # what A^T A does to ones bounds its eigenvalues
-            self.pace = np.maximum(self.seen(np.ones(self.count)), LEAST_SEEN)
+            ones = np.zeros_like(self.gray)
+            ones[:, 0] = 1
+            self.pace = np.maximum(self.seen(ones)[:, :1], LEAST_SEEN)
+
+    def sides(self, photo: LoadedPhoto) -> np.ndarray:
+        """(N, 4) 1 and the direction to each splat from where the photo is said to be taken; by
+        an offset that turns by next to nothing.  Times `gray` and summed: how bright it looks.
+        """
+        way = self.means - photo.view.world_from_eye.position
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        return np.concatenate([np.ones((self.count, 1)), way], axis=1)
 
     def projected(self, view: View, color) -> Projected:
         return project(self.device, *self.shape, color, camera_of(view))
 
     def seen(self, gray: np.ndarray) -> np.ndarray:
-        """(N,) A^T A gray, where A draws splats of that brightness, over nothing, in all photos."""
+        """(N, 4) A^T A gray, where A draws splats of that brightness in all photos."""
         return self.answered(gray, 0.0, lambda i, picture: picture * self.weights[i])
 
     def missing(self, i: int, picture: np.ndarray) -> np.ndarray:
@@ -76,13 +91,15 @@ class Frozen:
     def answered(
         self, gray: np.ndarray, behind: float, answer: Answer, by_step: np.ndarray | None = None
     ) -> np.ndarray:
-        """(N,) the gradient by `gray` of what `answer` says of every photo's picture, summed.
+        """(N, 4) the gradient by `gray` of what `answer` says of every photo's picture, summed.
 
         by_step: (6,) to which the gradient by `step` is added.
         """
-        device, by_gray = self.device, np.zeros(self.count)
-        color = device.upload(np.repeat(np.float32(gray)[:, None], 3, axis=1))
+        device, by_gray = self.device, np.zeros_like(gray)
         for i, (view, tiles) in enumerate(zip(self.views, self.tiles, strict=True)):
+            sides = self.sides(self.photos[i])
+            bright = (sides * gray).sum(axis=1, keepdims=True).astype(np.float32)
+            color = device.upload(bright.repeat(3, axis=1))
             projected = self.projected(view, color)
             frame = rasterize(device, projected, tiles, view.size, (behind,) * 3)
             grad = np.zeros(frame.image.shape, np.float32)
@@ -90,7 +107,7 @@ class Frozen:
             record = rasterize_backward(
                 device, projected, tiles, frame, device.upload(grad), absolute=False
             )
-            by_gray += device.view(record)[:, GRAY]
+            by_gray += device.view(record)[:, GRAY, None] * sides
             if by_step is not None:
                 by_step += self.step_gradient(view, color, projected, record)
         return by_gray
@@ -109,16 +126,16 @@ class Frozen:
         """Brings `gray` nearer to what shows the photos best from where the cameras stand."""
         gradient = self.answered(self.gray, self.behind, self.missing)
         nearer = gradient / self.pace
-        way, size = nearer.copy(), gradient @ nearer
+        way, size = nearer.copy(), np.vdot(gradient, nearer)
         for _ in range(steps):
             moved = self.seen(way)
-            curve = way @ moved
+            curve = np.vdot(way, moved)
             if not curve > 0:  # nothing is left to explain
                 return
             self.gray = self.gray + size / curve * way
             gradient -= size / curve * moved
             nearer, before = gradient / self.pace, size
-            size = gradient @ nearer
+            size = np.vdot(gradient, nearer)
             way = nearer + size / before * way
 
     def slope(self) -> tuple[float, np.ndarray]:
