@@ -40,7 +40,9 @@ class Stage:
     probe: bool  # whether the curvature is measured, or that of the stage before is used
 
 
-STAGES = (Stage(4, 36, 8, True), Stage(1, 18, 4, True), Stage(1, 72, 3, False))
+STAGES = (
+    Stage(4, 36, 12, True), Stage(2, 36, 10, True), Stage(1, 36, 8, True), Stage(1, 72, 3, False),
+)  # fmt: skip
 
 
 def calibrate(

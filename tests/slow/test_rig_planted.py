@@ -1,4 +1,4 @@
-"""What is left of a planted offset of two degrees and three centimetres, on the demo."""
+"""A planted offset of two degrees and three centimetres is found to a tenth, on the demo."""
 
 import numpy as np
 import pytest
@@ -27,15 +27,14 @@ def held(tmp_path_factory) -> tuple:
     return device, demo, shape_for(device, demo, SETTINGS, "Thermal", STEPS, lambda *_: None)
 
 
-def test_most_of_a_planted_offset_is_found(held):
-    """A quarter of the turn and a third of the shift may be left; a tenth is not reached."""
+def test_a_planted_offset_is_found_to_a_tenth(held):
     device, demo, shape = held
     true = planted()
     wrong = offset_capture(demo, "Thermal", np.linalg.inv(true))
     found = search(device, wrong, SETTINGS, "Thermal", shape, STAGES, lambda *_: None)
     left = told(np.linalg.inv(true) @ found.offset)
-    assert left.turn_deg < 0.5
-    assert left.shift_m < 0.01
+    assert left.turn_deg < 0.2
+    assert left.shift_m < 0.003
     assert found.gain_db > 2
     check_views(with_found(wrong, noted("Thermal", found)), demo)
 
@@ -47,5 +46,5 @@ def check_views(right: Capture, stated: Capture) -> None:
         assert (
             photo.view == before.view
             if photo.modality != "Thermal"
-            else np.linalg.norm(away) < 0.01
+            else np.linalg.norm(away) < 0.003
         )
