@@ -25,8 +25,8 @@ class Rates:
 
 
 # Ten seconds to minutes on a CPU: 5 times the rates that Scaffold-GS uses for 30,000 iterations.
-# Twice as much ends 1.2 dB lower on two scenes after 2,000 steps, half as much the same; long runs
-# end a little finer.
+# Twice as much ends 0.9 and 1.2 dB lower on two scenes after 2,000 steps, half as much the same on
+# one; long runs end a little finer.
 SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, decay=0.1)
 LONG = replace(SHORT, decay=0.03)
 LEAST_GAP = 1 / 63  # of x between two stops: nearer ones share units of the encoding

@@ -28,7 +28,8 @@ class Options(ReadingOptions):
     json: Path | None = None
     """Write the result here; - writes it to standard output."""
     downscale: int | None = None
-    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels, as training."""
+    """Divide the photos' sides by this.  Default: as in the training, if the scene knows it, else
+    until neither exceeds 640 pixels."""
     masks: Literal["object", "valid", "ignore"] = "object"
     """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
     background: Literal["auto", "black", "white", "gray"] = "auto"
@@ -60,19 +61,35 @@ def run(options: Options) -> int:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)
     capture = with_found(capture, rig_of(model.provenance))
+    downscale = options.downscale or trained_downscale(model.provenance)
     scores = evaluate_model(
-        open_device(), model, capture, options.downscale, options.masks, options.background,
+        open_device(), model, capture, downscale, options.masks, options.background,
         distance,
     )  # fmt: skip
     result = report(options.scene, scores, started)
     if distance is not None:
         result["vgg_file"] = distance.name
     print_table(result)
+    if options.downscale is None and (downscale or 1) > 1:
+        print(
+            f"Photos made {downscale} times smaller, as in the training; --downscale 1 takes them "
+            "whole.",
+            file=sys.stderr,
+        )
     if options.json == Path("-"):
         print(json.dumps(result, indent=1))
     elif options.json is not None:
         write_json(options.json, result)
     return 0
+
+
+def trained_downscale(provenance: dict) -> int | None:
+    """What the sides of the photos were divided by that a scene was trained on; None: not known.
+
+    At other sizes its splats are too thin or too thick, and the figures say that instead.
+    """
+    factor = provenance.get("downscale")
+    return factor if type(factor) is int and 1 <= factor <= 64 else None
 
 
 def only(capture: "Capture", name: str) -> "Capture":
@@ -94,15 +111,17 @@ def print_table(result: dict) -> None:
     vgg = ["VGG distance"] if "vgg_file" in result else []
     depth = any("depth_error" in score for score in result["modalities"].values())
     more = [*vgg, *(["depth error %"] if depth else [])]
-    table = Table("modality", "PSNR dB", "median", "worst", "SSIM", *more, "photos", "splats alive")
+    table = Table("modality", "PSNR dB", "median", "SSIM", *more, "photos", "splats alive")
+    worst = {}
     for name, score in result["modalities"].items():
-        worst, db = min(score["psnr_db_each"].items(), key=lambda pair: pair[1])
-        row = [f"{score['psnr_db']:.2f}", f"{score['median_db']:.2f}", f"{db:.1f} {worst}"]
-        row.append(f"{score['ssim']:.4f}")
+        photo, db = min(score["psnr_db_each"].items(), key=lambda pair: pair[1])
+        worst[photo] = f"{photo} {db:.1f} dB"
+        row = [f"{score['psnr_db']:.2f}", f"{score['median_db']:.2f}", f"{score['ssim']:.4f}"]
         row += [f"{score['vgg_distance']:.4f}"] if vgg else []
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")
         table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
     console = Console(file=sys.stderr)
     console.print(table)
+    console.print(f"worst: {', '.join(worst.values())}", highlight=False, markup=False)
     console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")
