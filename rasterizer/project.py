@@ -15,7 +15,7 @@ KERNELS = Path(__file__).parent / "kernels"
 RECORD = 12  # floats a splat: mean x y | conic a b c | opacity | r g b | half extents x y | cut
 LEAST_ALPHA = 1 / 255  # below it a pixel is not drawn (3DGS)
 LOW_PASS = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
-CLAMP = 1.3  # the Jacobian's x/z and y/z stay within this many times the view's tangents (3DGS)
+CLAMP = 1.3  # the Jacobian's x/z and y/z stay within this many times the widest tangents (3DGS)
 LEAST_CHUNK = 2048  # splats: less is not worth a work-item
 WIDTH = {"cpu": 8, "gpu": 1}  # splats a work-item of `project`
 GROUP = 64  # work-items
@@ -24,7 +24,9 @@ CULL_REASONS = ("opacity", "distance", "frustum", "size", "footprint", "faded") 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole with OpenCV axes: made by Camera(*view.pinhole(), view.size, view.near)."""
+    """A pinhole with OpenCV axes; of a View:
+    Camera(*view.pinhole(), view.size, view.near, view.widest_tangents()).
+    """
 
     camera_from_world: np.ndarray  # (4, 4); x right, y down, z forward, metres
     fx: float  # pixels
@@ -33,16 +35,20 @@ class Camera:
     cy: float
     size: tuple[int, int]  # width, height, pixels
     near: float  # metres: drawn where z > near
+    # Largest |x/z| and |y/z| of the centred picture that this one is a part of; None: the smallest.
+    widest: tuple[float, float] | None = None
 
     def limits(self) -> tuple[float, float, float, float]:
-        """Least and most x/z, least and most y/z that the Jacobian sees."""
+        """Least and most x/z, least and most y/z that the Jacobian sees.
+
+        About the axis, so that a part of a picture is what it is in the whole; of a centred picture
+        3DGS's limits.
+        """
         width, height = self.size
-        return (
-            -CLAMP * self.cx / self.fx,
-            CLAMP * (width - self.cx) / self.fx,
-            -CLAMP * self.cy / self.fy,
-            CLAMP * (height - self.cy) / self.fy,
-        )
+        x = max(self.cx, width - self.cx) / self.fx
+        y = max(self.cy, height - self.cy) / self.fy
+        x, y = (CLAMP * t for t in self.widest or (x, y))
+        return -x, x, -y, y
 
     def packed(self) -> np.ndarray:
         """(20,) float32 as kernels/common/camera.cl reads it."""

@@ -59,9 +59,8 @@ def classify(
         depth = -place[2]
         per_depth = 1 / depth
         tangent_x, tangent_y = place[0] * per_depth, place[1] * per_depth
-        margin = layout.JACOBIAN_MARGIN
-        held_x = np.clip(tangent_x, np.float32(margin * left), np.float32(margin * right))
-        held_y = np.clip(tangent_y, np.float32(margin * down), np.float32(margin * up))
+        most_x, most_y = (np.float32(layout.JACOBIAN_MARGIN * t) for t in view.widest_tangents())
+        held_x, held_y = np.clip(tangent_x, -most_x, most_x), np.clip(tangent_y, -most_y, most_y)
         matrices = rows_of(view.eye_from_world() @ poses)
         for i, start, end in runs(owner, len(poses)):
             part, matrix = slice(start, end), matrices[i]

@@ -11,7 +11,7 @@ COVARIANCE_VECS = 2  # vec4 a splat: xx xy xz yy | yz zz 0 0
 MOST_VIEWS = 2  # that one dispatch of project handles
 
 MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
-JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the view the projection counts as flat
+JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the widest tangents the projection counts as flat
 HALF_MAX = 60000.0  # below 65504, where packHalf2x16 turns to infinity
 HUGE = 1e18  # stands for "no limit"; its square is still a float
 
@@ -74,8 +74,7 @@ def defines() -> dict[str, int | float]:
     numbers = {
         "WORKGROUP": WORKGROUP, "DECODE_WORKGROUP": DECODE_WORKGROUP, "SORT_BLOCKS": SORT_BLOCKS,
         "RADIX": RADIX, "CULLED_KEY": f"{CULLED_KEY:#x}u", "MAX_ALPHA": MAX_ALPHA,
-        "JACOBIAN_MARGIN": JACOBIAN_MARGIN, "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK,
-        "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",
+        "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK, "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",
     }  # fmt: skip
     slots = {f"SLOT_{name}": slot for name, slot in SLOTS.items()}
     counts = {f"COUNT_{name}": f"{row}u" for name, row in COUNTS.items()}

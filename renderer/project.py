@@ -71,6 +71,7 @@ class Projector:
         for program in programs.values():
             set_uniforms(
                 program, keep_outside=keep_outside, tangents=_each(v.tangents for v in views),
+                clamps=_each(jacobian_clamp(v) for v in views),
                 size=_each(v.size for v in views), near=_each(v.near for v in views),
                 **limits(settings),
             )  # fmt: skip
@@ -101,6 +102,12 @@ class Projector:
 
     def __exit__(self, *failure) -> None:
         self.release()
+
+
+def jacobian_clamp(view: View) -> tuple[float, float]:
+    """Largest |x/z| and |y/z| at which the projection's slope is that of the place itself."""
+    x, y = view.widest_tangents()
+    return layout.JACOBIAN_MARGIN * x, layout.JACOBIAN_MARGIN * y
 
 
 def limits(settings: RenderSettings) -> dict[str, object]:

@@ -110,7 +110,8 @@ def seen_anchors(
     """(A,) bool: anchors of which a splat may show in a view; never False where one does.
 
     All, where more than half are seen: to pick rows takes as long as to colour twice as many.
-    A splat's ellipse reaches JACOBIAN_MARGIN times further aside than its true outline at most.
+    The ellipse of a splat of radius 1 reaches hypot(1, tangent) aside, where the Jacobian holds the
+    tangent within JACOBIAN_MARGIN times the widest.
     """
     seen = np.zeros(len(anchors), bool)
     k = math.sqrt(2 * math.log(1 / settings.min_alpha))
@@ -124,10 +125,12 @@ def seen_anchors(
         blur_y = blur * (up - down) / view.size[1]
         deepest = np.maximum(depth + reach, 0)
         inside = depth + reach > view.near
-        for across, tangent, blurred in (
-            (x, right, blur_x), (-x, -left, blur_x), (y, up, blur_y), (-y, -down, blur_y),
+        aside_x, aside_y = (math.hypot(1, JACOBIAN_MARGIN * t) for t in view.widest_tangents())
+        for across, tangent, aside, blurred in (
+            (x, right, aside_x, blur_x), (-x, -left, aside_x, blur_x),
+            (y, up, aside_y, blur_y), (-y, -down, aside_y, blur_y),
         ):  # fmt: skip
-            room = JACOBIAN_MARGIN * math.hypot(1, tangent) * reach + blurred * deepest
+            room = aside * reach + blurred * deepest
             inside &= across - tangent * depth <= room
         seen |= inside
     return seen | (np.count_nonzero(seen) > len(seen) // 2)

@@ -15,7 +15,8 @@ from scene.pose import View
 from scene.scene import Scene, SceneObject
 
 MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
-JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection counts as flat
+JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection counts as flat;
+#                        an off-centre view has that of the centred picture that it is a part of
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,9 @@ def gate_object(
         mean = means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
         depth = mean[:, 2]
         axes = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3) metres
-        left, right, down, up = (t * JACOBIAN_MARGIN for t in view.tangents)
-        x, y = np.clip(mean[:, 0] / depth, left, right), np.clip(mean[:, 1] / depth, -up, -down)
+        most_x, most_y = (t * JACOBIAN_MARGIN for t in view.widest_tangents())
+        x = np.clip(mean[:, 0] / depth, -most_x, most_x)
+        y = np.clip(mean[:, 1] / depth, -most_y, most_y)
         zero = np.zeros_like(depth)
         jacobian = np.stack(
             [

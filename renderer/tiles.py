@@ -200,7 +200,7 @@ class TilesDrawing:
             self._color,
             self._object_index,
             self._world_from_objects,
-            [Camera(*view.pinhole(), view.size, view.near) for view in views],
+            [camera_of(view) for view in views],
             limits_of(settings),
             sort,
             into,
@@ -282,7 +282,7 @@ class TilesDrawing:
         """Depth, normals and coverage from a view; the last frame stays as it is."""
         if not self.splats:
             return Surface.empty(view.size)
-        camera = Camera(*view.pinhole(), view.size, view.near)
+        camera = camera_of(view)
         sort = SortFrames((camera.camera_from_world,), settings.order == "distance")
         (projected,) = self._launch([view], settings, sort)
         order = sort_order(self.device, projected.found)
@@ -306,6 +306,11 @@ class TilesDrawing:
         self.allocate([])
         self._images.clear()
         self.device.pool.free_held()
+
+
+def camera_of(view: View) -> Camera:
+    """The view as rasterizer/ takes it."""
+    return Camera(*view.pinhole(), view.size, view.near, view.widest_tangents())
 
 
 def limits_of(settings: RenderSettings) -> Limits:

@@ -174,7 +174,8 @@ def first_of_each(views: list[View]) -> list[int]:
     seen = {}
     for i, view in enumerate(views):
         pose = view.world_from_eye
-        seen.setdefault((tuple(pose.position), tuple(pose.wxyz), view.tangents, view.size), i)
+        lens = (view.tangents, view.whole, view.size)
+        seen.setdefault((tuple(pose.position), tuple(pose.wxyz), *lens), i)
     return list(seen.values())
 
 

@@ -4,7 +4,7 @@ Name transforms by what they give and take:  p_world = world_from_object @ p_obj
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,19 +62,22 @@ class View:
     near: float  # metres
     far: float  # metres
     size: tuple[int, int]  # width, height, pixels
+    # Tangents of the picture that this is a part of, where it is one: see widest_tangents.
+    whole: tuple[float, float, float, float] | None = None
 
     def __post_init__(self) -> None:
         """Refuses what has no picture: ValueError with a sentence."""
-        left, right, down, up = self.tangents
         pose = (*self.world_from_eye.position, *self.world_from_eye.wxyz)
         told = " ".join(f"{number:.6g}" for number in pose)
         if not all(map(math.isfinite, pose)):
             raise ValueError(f"a view has the pose {told}; every number of it must be finite.")
-        if not (-math.inf < left < right < math.inf and -math.inf < down < up < math.inf):
-            raise ValueError(
-                f"a view has the tangents {self.tangents}; left must be less than right, and down "
-                "less than up, all finite."
-            )
+        for tangents in (self.tangents, self.whole or self.tangents):
+            left, right, down, up = tangents
+            if not (-math.inf < left < right < math.inf and -math.inf < down < up < math.inf):
+                raise ValueError(
+                    f"a view has the tangents {tangents}; left must be less than right, and down "
+                    "less than up, all finite."
+                )
         if not 0 < self.near < self.far:
             raise ValueError(
                 f"a view has near {self.near} and far {self.far}; 0 < near < far is wanted, metres."
@@ -110,6 +113,28 @@ class View:
         fx, fy = width / (right - left), height / (up - down)
         return OPENCV_FROM_EYE @ self.eye_from_world(), fx, fy, -left * fx, up * fy
 
+    def widest_tangents(self) -> tuple[float, float]:
+        """Half width and half height, as tangents, of the smallest centred picture that holds this
+        one and its whole: how far aside the projection of splats follows the perspective.
+
+        So an off-centre view is drawn as that part of the centred picture is.
+        """
+        every = (self.tangents, self.whole or self.tangents)
+        return (
+            max(max(-left, right) for left, right, _, _ in every),
+            max(max(-down, up) for _, _, down, up in every),
+        )
+
+    def part(self, left: int, top: int, size: tuple[int, int]) -> "View":
+        """The view of `size` pixels of this one from column `left` and row `top` (0 on top)."""
+        (x, right, y, up), (width, height) = self.tangents, self.size
+        across, along = (right - x) / width, (up - y) / height  # tangents a pixel
+        tangents = (
+            x + left * across, x + (left + size[0]) * across,
+            up - (top + size[1]) * along, up - top * along,
+        )  # fmt: skip
+        return replace(self, tangents=tangents, size=size, whole=self.whole or self.tangents)
+
     @staticmethod
     def from_pinhole(
         world_from_camera: np.ndarray,
@@ -127,7 +152,7 @@ class View:
 
     def resized(self, size: tuple[int, int]) -> "View":
         """The same field of view in another number of pixels."""
-        return View(self.world_from_eye, self.tangents, self.near, self.far, size)
+        return replace(self, size=size)
 
 
 def look_at(eye: np.ndarray, target: np.ndarray, up: tuple = (0.0, 1.0, 0.0)) -> Pose:

@@ -16,5 +16,6 @@ def own_rows(cameras: CameraList) -> list[dict]:
                 "near": float(view.near),
                 "far": float(view.far),
             }
+            | ({"whole": [float(t) for t in view.whole]} if view.whole else {})
         )
     return rows

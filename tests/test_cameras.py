@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from runtime_models.model import BadFile
-from scene.camera_list import first_of_each
+from scene.camera_list import CameraList, first_of_each
 from scene.pose import OPENCV_FROM_EYE, look_at, perspective
 from scene.read_cameras import read_cameras
+from scene.write_cameras import write_cameras
 
 UPRIGHT = np.eye(4).tolist()
 
@@ -33,6 +34,21 @@ def test_our_own_form(tmp_path):
     assert second.tangents == (-0.5, 0.25, -0.125, 1.0)
     assert (third.near, third.far) == (0.5, 9)
     assert read_cameras(written(tmp_path, rows))[0].size == (640, 360)
+
+
+def test_our_own_form_tells_of_which_picture_a_view_is_a_part(tmp_path):
+    row = {"matrix": UPRIGHT, "tangents": [0, 0.25, 0, 0.1]}
+    rows = [row | {"whole": [-0.5, 0.5, -0.3, 0.3]}, row]
+    part, other = read_cameras(written(tmp_path, rows), (64, 48))
+    assert part.whole == (-0.5, 0.5, -0.3, 0.3) and other.whole is None
+    assert first_of_each([part, other, part]) == [0, 1]
+    listed = CameraList((part, other), ("", ""), "test")
+    write_cameras(listed, tmp_path / "again.json", "ours")
+    again = read_cameras(tmp_path / "again.json")
+    assert [view.whole for view in again] == [part.whole, None]
+    for broken in ([1, -1, -1, 1], [0, 1, 2], "all", [0, 1, 0, float("inf")]):
+        with pytest.raises(BadFile, match="'whole' must be left < right, down < up"):
+            read_cameras(written(tmp_path, json.dumps([row | {"whole": broken}])))
 
 
 def test_3dgs_own_list_is_turned_as_its_splats_are(tmp_path):

@@ -17,7 +17,7 @@ from rasterizer_scenes import (
 )
 
 from rasterizer.bin import bin_tiles
-from rasterizer.project import project, project_backward
+from rasterizer.project import Camera, project, project_backward
 from rasterizer.raster import rasterize, rasterize_backward
 from rasterizer.reference import finite_differences, render_reference
 
@@ -71,6 +71,42 @@ def test_every_gradient_matches_finite_differences(group, form):
     splats, camera = random_splats(14, seed=21, scale=0.15), off_centre_camera(size)
     upstream = random_gradients(size)
     got, _ = gradients(splats, camera, *upstream, form)
+    loss = loss_of(splats, group, camera, *upstream)
+    want = finite_differences(loss, as_double(splats)[group], 1e-7)
+    error = np.linalg.norm(got[group] - want) / np.linalg.norm(want)
+    assert error <= 1e-5, f"{GROUPS[group]}: {error:.1e}"
+
+
+def beside_its_axis(size: tuple[int, int], widest: tuple[float, float] | None) -> Camera:
+    """One whose picture does not hold its axis: tangents 0.4 to 1.02 across, -1.1 to -0.67 up."""
+    return Camera(np.eye(4), 60.0, 60.0, -24.0, 66.0, size, 0.05, widest)
+
+
+def splats_around_a_clamp(camera: Camera) -> tuple[list, np.ndarray]:
+    """Long splats before and beside that picture; (N, 2) bool: held by the clamp across, along."""
+    rng = np.random.default_rng(5)
+    splats = random_splats(24, seed=5, scale=0.25)
+    z = rng.uniform(0.7, 2.0, 24)
+    tangents = rng.uniform((0.0, -1.9), (1.9, 0.0), (24, 2))
+    splats[0][:] = np.column_stack([tangents * z[:, None], z])
+    least_x, most_x, least_y, most_y = camera.limits()
+    x, y = tangents.T
+    return splats, np.column_stack([(x < least_x) | (x > most_x), (y < least_y) | (y > most_y)])
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("group", range(5), ids=GROUPS)
+@pytest.mark.parametrize("widest", [None, (0.6, 0.7)], ids=["own", "whole"])
+def test_gradients_within_and_beyond_the_clamp_of_an_off_centre_picture(group, form, widest):
+    """The place of a splat that the clamp holds no longer moves the slope of its projection."""
+    size = (37, 26)
+    camera = beside_its_axis(size, widest)
+    splats, held = splats_around_a_clamp(camera)
+    upstream = random_gradients(size)
+    got, record = gradients(splats, camera, *upstream, form)
+    drawn = np.abs(record[:, 2:5]).max(axis=1) > 0
+    for mine in (held[:, 0], held[:, 1], ~held.any(axis=1)):
+        assert np.count_nonzero(drawn & mine) >= 2, "a splat on either side of each clamp"
     loss = loss_of(splats, group, camera, *upstream)
     want = finite_differences(loss, as_double(splats)[group], 1e-7)
     error = np.linalg.norm(got[group] - want) / np.linalg.norm(want)

@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from renderer.classify import classify
 from renderer.reference import reference_counts, reference_image
 from renderer.renderer import Renderer
 from renderer.settings import CULL_REASONS, RenderSettings
@@ -39,6 +41,8 @@ def test_a_threshold_met_exactly(renderer, name):
     layers, settings, want = THRESHOLDS[name]
     told = counts(renderer, alone(layers), [FRONT], settings)
     assert told == {reason: want.split().count(reason) for reason in told}
+    reasons, _, _ = classify(renderer._drawing.splat_points(), np.eye(4)[None], FRONT, settings)
+    assert [("drawn", *CULL_REASONS)[reason] for reason in reasons] == want.split()
 
 
 @pytest.mark.parametrize("order", ["depth", "distance"])

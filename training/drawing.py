@@ -35,7 +35,7 @@ class Drawing:
 
 
 def camera_of(view: View) -> Camera:
-    return Camera(*view.pinhole(), view.size, view.near)
+    return Camera(*view.pinhole(), view.size, view.near, view.widest_tangents())
 
 
 def untimed(name: str) -> AbstractContextManager:

@@ -32,7 +32,7 @@ def moved_by(six: np.ndarray) -> np.ndarray:
 def offset_view(view: View, eye_from_found: np.ndarray) -> View:
     """The view from where a camera sits that is off by `eye_from_found` (4, 4) in its own axes."""
     pose = Pose.from_matrix(view.world_from_eye.matrix() @ eye_from_found)
-    return View(pose, view.tangents, view.near, view.far, view.size)
+    return replace(view, world_from_eye=pose)
 
 
 def offset_capture(capture: Capture, modality: str, eye_from_found: np.ndarray) -> Capture:

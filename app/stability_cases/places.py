@@ -13,7 +13,7 @@ from app.stability_cases.finding import (
     clean,
     decibels,
 )
-from app.stability_cases.scenes import alone, front, shell, splats, turns
+from app.stability_cases.scenes import alone, around, front, shell, splats, turns
 from app.stability_cases.stage import Stage, difference, moved, turned, turned_about
 from scene.pose import Pose, View, look_at, perspective
 from scene.scene import IDENTITY
@@ -22,6 +22,8 @@ FAR_OFF = np.array([5e6, -5e6, 5e6])  # metres: geocentric coordinates are that 
 NEAREST, FARTHEST = 1e-2, 1e6  # metres
 WALLS = 33  # from NEAREST to FARTHEST, four a decade
 ORACLE_DB = 55  # rgba16f alone costs 59.5 dB (its rounding, blended back to front)
+PART_DB = 80  # two draws of the same splats
+PART_REASON = "else float32's rounding of places alone: 90 dB and more"
 SMALL = (160, 96)  # pixels: what the float64 oracle draws in a second
 FILL = 12.0  # times the frame from outside
 CLOSE_UPS = 6
@@ -150,8 +152,8 @@ def within_a_splat(stage: Stage) -> tuple[list, list[Panel]]:
 
 
 def lenses(stage: Stage) -> Result:
-    """Fields of view of 1 and 170 degrees."""
-    findings, images, panels = [], [], []
+    """Fields of view of 1 and 170 degrees; parts of a picture against what the whole has there."""
+    findings, images, panels = parts(stage)
     ball = shell()
     for degrees, distance in ((1.0, 100.0), (170.0, 0.2)):
         fov_y = np.radians(degrees)
@@ -174,6 +176,46 @@ def lenses(stage: Stage) -> Result:
             stage.panel(f"{degrees:g} degrees, the scene", seen),
         ]
     return Result([clean(*images), *findings], panels)
+
+
+def parts(stage: Stage) -> tuple[list, list, list]:
+    """Findings, images and panels: what an off-centre lens sees, against the whole picture."""
+    width, height = stage.size
+    quarter, eighth = max(width // 4, 1), max(width // 8, 1)
+    edges = {  # left, top, width, height; the whole need not be known
+        "left half": (0, 0, width // 2, height),
+        "right quarter": (width - quarter, 0, quarter, height),
+        "right eighth": (width - eighth, 0, eighth, height),
+        "upper right corner": (width - quarter, 0, quarter, max(height // 4, 1)),
+    }
+    middle = {
+        "second quarter": (quarter, 0, quarter, height),
+        "fifth eighth": (width // 2, 0, eighth, height),
+        "ninth in the middle": (width // 3, height // 3, width // 3 + 1, height // 3 + 1),
+    }
+    findings, images, worst = [], [], None
+    scenes = {"splats around the eye": (alone(around()), front(stage.size, 0.0)),
+              "the scene": (stage.scene(), stage.view())}  # fmt: skip
+    for what, (scene, view) in scenes.items():
+        whole = stage.draw(scene, view)
+        images.append(whole)
+        for kind, boxes, reason in (
+            ("at the edge", edges, "a lens off centre is that part of the centred one"),
+            ("inside, of a known whole", middle, "View.whole says how wide the lens is"),
+        ):  # fmt: skip
+            decided = []
+            for name, (left, top, *size) in boxes.items():
+                part = view.part(left, top, tuple(size))
+                image = stage.draw(scene, part if boxes is middle else replace(part, whole=None))
+                there = whole[top : top + size[1], left : left + size[0]]
+                images.append(image)
+                decided.append((decibels(image, there), name))
+                if worst is None or decided[-1][0] < worst[0]:
+                    worst = (decided[-1][0], f"{name}, {what}", image, there)
+            db, name = min(decided)
+            figure = f"{what}, parts {kind} (worst: {name}), dB to the whole"
+            findings.append(at_least(figure, db, PART_DB, f"{reason}; {PART_REASON}"))
+    return findings, images, compared(stage, worst[1], worst[2], "in the whole", worst[3])
 
 
 def random_eyes(stage: Stage) -> Result:

@@ -37,6 +37,17 @@ def shell(count: int = 1500, seed: int = 0) -> SplatLayers:
     )
 
 
+def around(count: int = 1200, seed: int = 0) -> SplatLayers:
+    """Splats before the eye of `front(size, 0)` and far beside it, so long that they reach into the
+    picture from there.
+    """
+    rng = np.random.default_rng(seed)
+    means = rng.uniform((-6, -4, -2.5), (6, 4, -0.4), (count, 3))
+    scales = np.exp(rng.normal(-2, 0.6, (count, 3)))
+    color, opacity = rng.uniform(size=(count, 3)), rng.uniform(0.05, 1, count)
+    return splats(means, scales, opacity, color, turns(count, rng))
+
+
 def turns(count: int, rng: np.random.Generator) -> np.ndarray:
     """(N, 4) unit quaternions of any direction."""
     wxyz = rng.normal(size=(count, 4))

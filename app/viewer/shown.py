@@ -90,7 +90,8 @@ def picture_key(scene: Scene, view: View, settings: RenderSettings) -> tuple:
     pose = view.world_from_eye
     quality = replace(settings, background=(0.0, 0.0, 0.0))
     return (
-        scene, pose.position.tobytes(), pose.wxyz.tobytes(), view.tangents, view.size, quality,
+        scene, pose.position.tobytes(), pose.wxyz.tobytes(), view.tangents, view.whole, view.size,
+        quality,
     )  # fmt: skip
 
 

@@ -27,12 +27,13 @@ from peers import make_views  # noqa: E402
 from rasterizer.bin import bin_tiles, sort_order  # noqa: E402
 from rasterizer.device import Device, open_device  # noqa: E402
 from rasterizer.pack import pack  # noqa: E402
-from rasterizer.project import Camera, Projected, grid_of  # noqa: E402
+from rasterizer.project import Projected, grid_of  # noqa: E402
 from rasterizer.project_arena import SortFrames, project_arena  # noqa: E402
 from rasterizer.raster import rasterize_rgba_views  # noqa: E402
 from rasterizer.shade_sh import shade_sh, upload_sh  # noqa: E402
 from renderer.reference import reference_image  # noqa: E402
 from renderer.settings import RenderSettings  # noqa: E402
+from renderer.tiles import camera_of  # noqa: E402
 from runtime_models.evaluate import Evaluator  # noqa: E402
 from runtime_models.model import SplatLayers, Stop  # noqa: E402
 from runtime_models.read_scene import read_model  # noqa: E402
@@ -76,7 +77,7 @@ class Arena:
         shade_sh(self.device, self.sh, eye, rows, self.mean_opacity, self.color)
 
     def project(self, views: list[View], into: list[Projected] | None) -> list[Projected]:
-        cameras = [Camera(*view.pinhole(), view.size, view.near) for view in views]
+        cameras = [camera_of(view) for view in views]
         sort = SortFrames((cameras[0].camera_from_world,))  # parallel eyes: the depths of either
         arrays = (self.mean_opacity, self.covariance, self.color, self.object_index)
         return project_arena(

@@ -26,6 +26,7 @@ uniform uint first;            // splats of this object: rows first to last - 1
 uniform uint last;
 uniform vec4 frames[3 * (VIEWS + SORT_FRAME)];  // rows eye_from_object of each view, then the order's
 uniform vec4 tangents[VIEWS];  // left, right, down, up of the view; left and down negative
+uniform vec2 clamps[VIEWS];    // largest tangents that the Jacobian sees, either side of the axis
 uniform vec2 size[VIEWS];      // pixels
 uniform float near[VIEWS];     // metres
 uniform bool keep_outside;     // what this frame culls stays in the order, for other frames
@@ -75,10 +76,10 @@ Projected project(Splat splat, const uint view) {
     vec3 p = place_in(view, splat.mean);  // metres
     float distance2 = dot(p, p), z = -p.z, per_z = 1.0 / z;
 
-    // Rows of J W: how the pixel moves with the object's metres.  Beyond JACOBIAN_MARGIN times the
-    // view the slope of the projection is held, or a splat beside the eye would cover everything.
+    // Rows of J W: how the pixel moves with the object's metres.  Far beside the view the slope of
+    // the projection is held, or a splat beside the eye would cover everything.
     vec2 tangent = p.xy * per_z;
-    vec2 held = clamp(tangent, JACOBIAN_MARGIN * t.xz, JACOBIAN_MARGIN * t.yw);
+    vec2 held = clamp(tangent, -clamps[view], clamps[view]);
     vec3 u = focal.x * per_z * (row_x + held.x * row_z);
     vec3 v = focal.y * per_z * (row_y + held.y * row_z);
     vec3 sigma_u = splat.sigma * u, sigma_v = splat.sigma * v;
