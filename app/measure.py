@@ -14,14 +14,13 @@ import numpy as np
 from app.subject import Subject
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
-from scene.framing import orbit_path
+from scene.framing import distances_from, orbit_path
 from scene.metrics import psnr
 from scene.pose import View
 from scene.scene import Scene
-from scene.stereo import stereo_pair
+from scene.stereo import eyes_apart, stereo_pair
 
 WARM_UP = 3  # frames that do not count: first use compiles and allocates
-EYE_DISTANCE = 0.064  # of a person, metres; scaled with the scene below
 QUALITY_VIEWS = 3
 # The draw pass: what finds the pixels of a splat and fills them.  A GL driver does both in one.
 DRAW_PASSES = ("bin", "splat")
@@ -97,7 +96,7 @@ class Measure:
         views = orbit_path(*path)
         # Half a step further on, so that neither finds the colours of the other's eye ready.
         between = orbit_path(*path, start=np.pi / count)
-        distance = EYE_DISTANCE * self.radius / 2  # a model of 2 m radius is seen by a person
+        distance = eyes_apart(distances_from(self.subject.points(), views[0]))
         frames_of = [
             frame
             for i, (view, other) in enumerate(zip(views, between, strict=True))

@@ -61,12 +61,13 @@ class SortFrames:
 def project_arena(
     device: Device, mean_opacity, covariance, color, object_index, world_from_object,
     cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
-    into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (),
+    into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (), second_color=None,
 ) -> list[Projected]:  # fmt: skip
     """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
 
     mean_opacity (N, 4) object frame metres and 0..1; covariance (N, 8) m^2, object frame, xx xy xz
-    yy yz zz and two unused; color (N, 4), last unused; object_index (N,) int32; device arrays.
+    yy yz zz and two unused; color (N, 4), last unused, and second_color, that of the second view
+    where it has its own; object_index (N,) int32; device arrays.
     world_from_object: numpy (O, 3 or 4, 4) or (O, 12) rows, rigid.
     sort: no camera_from_world at all: no keys, an order from before is to be used; None: by depth,
     each view for itself.  With one frame for two views both share the pairs to be sorted.
@@ -87,6 +88,8 @@ def project_arena(
     projected = [replace(p, low_pass=limits.low_pass) for p in into]
     poses = _poses(cameras, sort, world_from_object)
     variant = {"VIEWS": views, "ORDERS": orders}
+    if second_color is not None and views == 2:
+        variant["OWN_COLORS"] = 1
     if any(antialiased):
         flags = np.array(antialiased, np.float32)
         poses = np.concatenate([poses.reshape(len(flags), -1), flags[:, None]], axis=1)
@@ -97,8 +100,8 @@ def project_arena(
     device.launch(
         device.program(KERNEL, **variant)["project_arena"], len(found.status), 1,
         count, found.chunk, sort.by_distance, sort.keep_outside,
-        device.constants(np.concatenate(frame)), mean_opacity, covariance, color, object_index,
-        *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
+        device.constants(np.concatenate(frame)), mean_opacity, covariance, color, second_color,
+        object_index, *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
     )  # fmt: skip
     return projected
 

@@ -11,6 +11,7 @@ The life of the passes, in the order of the calls:
     decoder.color(i, x, eye_object)                  # then, and when the eye moved
     arena.place(world_from_objects)                  # (4, 4) each, NaN hides; any time
     projector.project(arena, views, settings, sort_from_world)    # one or two views at once
+    # with colours an eye: arena.color_set(v, len(views)) and decoder.color for each eye before
     sorter.sort(arena, settings.key_bits)
     for i, view in enumerate(views):
         splatter.draw(arena, i, view.size, settings.min_alpha)
@@ -70,7 +71,8 @@ class Arena:
         n = self.count
         self.mean_opacity = gpu.reserve(16 * n)
         self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * n)
-        self.color = gpu.reserve(16 * n)
+        self.colors = [gpu.reserve(16 * n)]  # for all views, or one a view
+        self.color, self.set = self.colors[0], 0  # that decoding writes into
         self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
         self.keys, self.keys_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
         self.order, self.order_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
@@ -83,6 +85,17 @@ class Arena:
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
+
+    def color_set(self, which: int, count: int) -> None:
+        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
+        or one a view.
+        """
+        for buffer in self.colors[count:]:
+            buffer.release()
+        self.colors = self.colors[:count]
+        while len(self.colors) < count:
+            self.colors.append(self.gpu.reserve(16 * self.count, "colours of another eye"))
+        self.color, self.set = self.colors[which], which
 
     def holds_views(self, views: int) -> bool:
         """Whether the records of so many views at once fit this driver's storage blocks."""
@@ -149,7 +162,7 @@ class Arena:
 
     def release(self) -> None:
         for buffer in (
-            self.mean_opacity, self.covariance, self.color, self.records,
+            self.mean_opacity, self.covariance, *self.colors, self.records,
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
             self.command, self.staging,
         ):  # fmt: skip

@@ -24,7 +24,8 @@ class Decoder:
         if mlps not in MLPS:
             raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
         self._arena = arena
-        self._colors: dict[int, np.ndarray] = {}  # of what onnxruntime decodes, (N, 3)
+        # Of what onnxruntime decodes, (N, 3): by object and set of colours.
+        self._colors: dict[tuple[int, int], np.ndarray] = {}
         made: dict[int, Layers | Networks | Evaluator] = {}
         for model in models:
             if id(model) in made:
@@ -65,8 +66,9 @@ class Decoder:
         """
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
-            self._colors[i] = model.color(x, eye, seen, self._colors.get(i))
-            arena.write_color(i, self._colors[i])
+            key = (i, arena.set)
+            self._colors[key] = model.color(x, eye, seen, self._colors.get(key))
+            arena.write_color(i, self._colors[key])
         elif isinstance(model, Layers):
             model.color(arena, arena.starts[i], eye)
         else:

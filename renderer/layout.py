@@ -21,6 +21,7 @@ SLOTS = {
     "MEAN_OPACITY": 0,  # vec4 (N,)      xyz metres in the object, w opacity
     "COVARIANCE": 1,  # vec4 (N, 2)    m^2, in the object
     "COLOR": 2,  # vec4 (N,)      display sRGB
+    "SECOND_COLOR": 3,  # vec4 (N,)      of the second of two views, where it has its own
     "RECORDS": 5,  # uvec4 (V, N, 2)   screen ellipses
     "KEYS": 6,  # uint (N,)      depth or distance as float bits, or CULLED_KEY
     "COUNTS": 7,  # uint (20,)     as COUNTS below

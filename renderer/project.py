@@ -23,12 +23,13 @@ class Projector:
         self._variant(1, False, RenderSettings())  # a broken shader is told at the start
 
     def _variant(
-        self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False
-    ) -> ComputeShader:
+        self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False,
+        own_colors: bool = False,
+    ) -> ComputeShader:  # fmt: skip
         return self._gpu.compute(
             "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
             KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
-            ANTIALIASED=int(antialiased),
+            ANTIALIASED=int(antialiased), OWN_COLORS=int(own_colors),
         )  # fmt: skip
 
     def project(
@@ -38,6 +39,7 @@ class Projector:
         settings: RenderSettings,
         sort_from_world: np.ndarray | None = None,
         keep_outside: bool = False,
+        first_view: int = 0,
     ) -> None:
         """Projects all objects with their poses, under the limits of the settings.
 
@@ -45,6 +47,7 @@ class Projector:
         settings.order) in the frame sort_from_world (4, 4), by default the first view's eye.
         keep_outside: the order is to outlive this frame, or did outlive another: every splat that
         is not absent has a key, and every record is written; those of culled ones have no area.
+        first_view: number of the first of the views in its frame, where each has its own colours.
         """
         if not 1 <= len(views) <= layout.MOST_VIEWS:
             raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
@@ -61,11 +64,15 @@ class Projector:
         rows = np.stack([frame @ arena.world_from_object for frame in frames], axis=1)
         rows = np.ascontiguousarray(rows[:, :, :3], np.float32)  # (O, frames, 3, 4)
         bind(
-            mean_opacity=arena.mean_opacity, covariance=arena.covariance, color=arena.color,
+            mean_opacity=arena.mean_opacity, covariance=arena.covariance,
             records=arena.records, keys=arena.keys, counts=arena.counts,
         )  # fmt: skip
+        mine = arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
+        bind(color=mine[0])
+        if own_colors := len(views) > 1 < len(mine):
+            bind(second_color=mine[1])
         programs = {
-            kind: self._variant(len(views), len(frames) > len(views), settings, kind)
+            kind: self._variant(len(views), len(frames) > len(views), settings, kind, own_colors)
             for kind in set(arena.antialiased)
         }
         for program in programs.values():

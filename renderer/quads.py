@@ -85,6 +85,12 @@ class QuadsDrawing:
         self._changed = True
         self._decoder.geometry(i, x, eye_object, seen)
 
+    def color_set(self, which: int, count: int) -> None:
+        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
+        or one a view.
+        """
+        self._arena.color_set(which, count)
+
     def decode_color(
         self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None
     ) -> None:
@@ -112,8 +118,10 @@ class QuadsDrawing:
             self._changed = True
             self._arena.place(poses)
 
-    def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
-        """Draws every view; view i is then image(i)."""
+    def draw(
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
+    ) -> None:
+        """Draws every view; view i is then image(first + i)."""
         arena = self._arena
         self._splatter.target = settings.target
         self.backends["drawing"] = f"quads ({settings.target})"
@@ -133,12 +141,13 @@ class QuadsDrawing:
             with timer.time("project"):
                 own = frame is None or canted or len(views) == 1  # its own eye: one frame less
                 sort_from_world = None if own else frame
-                self._projector.project(arena, group, settings, sort_from_world, keep_outside)
+                how = (settings, sort_from_world, keep_outside, i)
+                self._projector.project(arena, group, *how)
             if frame is not None:
                 with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
                     self._sorter.sort(arena, settings.key_bits)
             with timer.time("splat"):
-                self._splat(group, i, settings)
+                self._splat(group, first + i, settings)
             i += len(group)
         self._last = len(groups[-1]) - 1
 
@@ -202,8 +211,11 @@ class QuadsDrawing:
 
     def write_colors(self, color: np.ndarray) -> None:
         """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
-        for i, (start, end) in enumerate(pairwise(self._arena.starts)):
-            self._arena.write_color(i, color[start:end])
+        sets = len(self._arena.colors)
+        for which in reversed(range(sets)):
+            self._arena.color_set(which, sets)
+            for i, (start, end) in enumerate(pairwise(self._arena.starts)):
+                self._arena.write_color(i, color[start:end])
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of a view just drawn blends, for a debug view."""

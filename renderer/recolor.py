@@ -60,6 +60,12 @@ class Colored:
         return True
 
 
+def forget_colors(sets: list[Colored]) -> None:
+    """They are to be computed again, whatever the eye does."""
+    for colored in sets:
+        colored.key = None
+
+
 def centre_of(model: Model) -> np.ndarray:
     """(3,) metres: the middle of a model's anchors or splats, (0, 0, 0) where it has none."""
     places = model.means if isinstance(model, SplatLayers) else model.anchors

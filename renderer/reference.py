@@ -35,15 +35,21 @@ class Projected:
 
 
 def reference_image(
-    scene: Scene, view: View, settings: RenderSettings | None = None, eye: np.ndarray | None = None
+    scene: Scene,
+    view: View,
+    settings: RenderSettings | None = None,
+    eye: np.ndarray | None = None,
+    middle: np.ndarray | None = None,
 ) -> np.ndarray:
     """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top.
 
-    eye: (3,) world metres, where colours are looked at from and distances in the order
-    "distance" are measured from, if not the view's own eye (stereo: the centre of both).
+    eye: (3,) world metres, where colours are looked at from, if not the view's own eye (shared
+    colours of two eyes: the middle of both).  middle: where distances in the order "distance" are
+    measured from, if not `eye` (one order for two eyes: the middle of both).
     """
     settings = settings or RenderSettings()
     eye = view.world_from_eye.position if eye is None else eye
+    middle = eye if middle is None else middle
     objects = tint_objects(scene, [gate_object(o, view, settings, eye) for o in scene.objects])
     if not objects:
         return np.zeros((view.size[1], view.size[0], 4))
@@ -51,7 +57,7 @@ def reference_image(
         np.concatenate([getattr(o, name)[o.reason == 0] for o in objects])
         for name in ("depth", "place", "mean_px", "covariance", "opacity", "color")
     )
-    key = np.linalg.norm(place - eye, axis=1) if settings.order == "distance" else depth
+    key = np.linalg.norm(place - middle, axis=1) if settings.order == "distance" else depth
     order = np.argsort(key, kind="stable")
     return blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
 

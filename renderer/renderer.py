@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import moderngl
 import numpy as np
 
-from renderer.context import is_software
+from renderer.backends import choose_backends
 from renderer.debug import debug_image, opaque, prepare_debug
+from renderer.eye_colors import Look, drawn_together, shared_is_enough
 from renderer.false_colors import FalseColors, Tint, false_colors, same_tint
 from renderer.gpu import Gpu
 from renderer.palette import apply_palette, palette_colors
@@ -17,6 +18,7 @@ from renderer.recolor import (
     Colored,
     centre_of,
     color_key,
+    forget_colors,
     reach_of,
     reach_of_scaffold,
     seen_anchors,
@@ -34,7 +36,6 @@ from scene.pose import View
 from scene.scene import Scene, SceneObject
 
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
-CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
 
 
 @dataclass
@@ -42,11 +43,12 @@ class _Decoded:
     """What of an object lies in the arena now."""
 
     model: Model
-    colored: Colored
+    colored: list[Colored]  # one for all views of a frame, or one a view
     key: tuple | None = None  # control_key of x; None: not decoded yet
     x: float | np.ndarray = 0.0  # control value of its geometry, or (A,) one an anchor
     version: int = 0  # goes up with every other x
     tint: Tint | None = None  # false colours of its own; None: as decoded
+    look: Look | None = None  # made for the first pair of eyes
 
 
 class Renderer:
@@ -66,7 +68,7 @@ class Renderer:
         sort: str = "auto",
         target: str | None = None,
     ) -> None:
-        drawing, mlps, sort = _choose(ctx, drawing, mlps, sort)
+        drawing, mlps, sort = choose_backends(ctx, drawing, mlps, sort)
         if target not in (None, *TARGETS):
             raise ValueError(f"there is no target {target!r}; choose {', '.join(TARGETS)}.")
         self.settings = RenderSettings()
@@ -139,7 +141,8 @@ class Renderer:
         tints = self._false_colors.tints or [None] * len(self._decoded)
         for decoded, tint in zip(self._decoded, tints, strict=True):
             if not same_tint(tint, decoded.tint):
-                decoded.tint, decoded.colored.key = tint, None
+                decoded.tint = tint
+                forget_colors(decoded.colored)
 
     def _rebuild(self, scene: Scene) -> None:
         """A new arena for another set of objects; an empty one if the set does not fit."""
@@ -150,7 +153,7 @@ class Renderer:
         except ValueError:
             self._drawing.allocate([])
             raise
-        self._decoded = [_Decoded(model, Colored(centre_of(model))) for model in models]
+        self._decoded = [_Decoded(model, [Colored(centre_of(model))]) for model in models]
 
     def draw(
         self,
@@ -159,21 +162,25 @@ class Renderer:
     ) -> FrameStats:
         """Draws every view; with `target` (one framebuffer a view) presents them there as well.
 
-        Colours are computed once a frame, for the centre of the views' eyes, and only when it
-        moved.  Counts of splats in the result are those of the last view.
+        Colours are computed for each eye, or once for the middle of the eyes where that cannot be
+        told apart (settings.stereo_colors), and only when it moved.  Counts of splats in the result
+        are those of the last view.
         """
         targets = [target] if isinstance(target, moderngl.Framebuffer) else target
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
-        self._decode_colors(views)
         settings = self._settings_of_frame()
-        self._sizes = [view.size for view in views]  # of what is shown; drawn is views from here
-        views = [scaled(view, settings.render_scale) for view in views]
-        if prepare_debug(self._drawing, views, self._scene, settings.debug):
-            for decoded in self._decoded:
-                decoded.colored.key = None  # their own colours are to come back
+        self._sizes = [view.size for view in views]  # of what is shown
+        full, views = views, [scaled(view, settings.render_scale) for view in views]
+        own, sorts = self._own_colors(full), 0
         with self._framebuffer_kept():
-            self._drawing.draw(views, settings, self._timer)
+            for group in drawn_together(self._scene, len(full), own):
+                self._decode_colors(full[group], own)
+                if prepare_debug(self._drawing, views, self._scene, settings.debug):
+                    for decoded in self._decoded:
+                        forget_colors(decoded.colored)  # their own are to come back
+                self._drawing.draw(views[group], settings, self._timer, group.start)
+                sorts += self._drawing.sorts
             self._debug = [
                 debug_image(self._drawing, i, view, self._scene, settings)
                 for i, view in enumerate(views if settings.debug else [])
@@ -187,7 +194,8 @@ class Renderer:
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
         stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
-        stats.sorts, stats.order_age = self._drawing.sorts, self._drawing.order_age
+        stats.sorts, stats.order_age = sorts, self._drawing.order_age
+        stats.color_sets = len(full) if own else 1
         if self._debug:
             stats.debug = self._debug[0][1]
         return stats
@@ -197,50 +205,68 @@ class Renderer:
         target = "rgba32f" if self.settings.debug else self._target or self.settings.target
         return replace(self.settings, target=target)
 
-    def _decode_colors(self, views: list[View]) -> None:
-        """Runs the colours of the visible objects for the centre of the eyes, where it moved.
+    def _own_colors(self, views: list[View]) -> bool:
+        """Whether each of the views gets colours of its own: settings.stereo_colors."""
+        wish = "shared" if self.settings.debug or len(views) == 1 else self.settings.stereo_colors
+        if wish != "auto":
+            return wish == "each"
+        for decoded in self._decoded:
+            decoded.look = decoded.look or Look.of(decoded.model)
+        looks = [decoded.look for decoded in self._decoded]
+        return not shared_is_enough(self._scene, looks, views)
 
-        And the geometry of those that follow the eye: as often, and one for both eyes as well.
+    def _decode_colors(self, views: list[View], own: bool = False) -> None:
+        """Runs the colours of the visible objects for the middle of the eyes; own: for each eye."""
+        groups = [[view] for view in views] if own else [views]
+        for decoded in self._decoded:
+            fresh = (Colored(decoded.colored[0].centre) for _ in groups[len(decoded.colored) :])
+            decoded.colored = [*decoded.colored[: len(groups)], *fresh]
+        with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
+            for which, group in enumerate(groups):
+                self._drawing.color_set(which, len(groups))
+                self._decode_color_set(which, group)
+            self._drawing.wait_decoded()
+
+    def _decode_color_set(self, which: int, views: list[View]) -> None:
+        """Runs one set of colours for the middle of some eyes, where it moved.
+
+        And the geometry of those that follow the eye: as often.
         """
         eye_world = np.mean([v.world_from_eye.position for v in views], axis=0)
         degrees = self.settings.recolor_degrees
-        with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
-            for i, (thing, decoded) in enumerate(
-                zip(self._scene.objects, self._decoded, strict=True)
-            ):
-                if not thing.visible:
+        for i, (thing, decoded) in enumerate(zip(self._scene.objects, self._decoded, strict=True)):
+            if not thing.visible:
+                continue
+            colored = decoded.colored[which]
+            object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+            eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
+            key = color_key(thing.model, decoded.version, eye)
+            stale = colored.is_stale(key, degrees, nearer=follows_eye(thing.model))
+            if follows_eye(thing.model):
+                due, wanted = self._wanted_of_follower(thing, colored, stale, views)
+                if not due:
                     continue
-                colored = decoded.colored
-                object_from_world = np.linalg.inv(thing.world_from_object.matrix())
-                eye = object_from_world[:3, :3] @ eye_world + object_from_world[:3, 3]
-                key = color_key(thing.model, decoded.version, eye)
-                stale = colored.is_stale(key, degrees, nearer=follows_eye(thing.model))
-                if follows_eye(thing.model):
-                    due, wanted = self._wanted_of_follower(thing, colored, stale, views)
-                    if not due:
-                        continue
-                    colored.key, colored.anchors = key, wanted
-                    self._drawing.decode_geometry(i, decoded.x, eye, wanted)
-                    self._geometry_runs += 1
-                else:
-                    wanted = self._wanted_anchors(i, thing, decoded, stale, views)
-                    if not colored.take(key, wanted, stale):
-                        continue  # all that is seen has its colours
-                self._drawing.decode_color(i, decoded.x, eye, wanted)
-                if decoded.tint is not None:
-                    palette = palette_colors(decoded.tint.name)
-                    self._drawing.tint(i, palette, decoded.tint.weights)
-                self._color_runs += 1
-            self._drawing.wait_decoded()
+                colored.key, colored.anchors = key, wanted
+                self._drawing.decode_geometry(i, decoded.x, eye, wanted)
+                self._geometry_runs += 1
+            else:
+                wanted = self._wanted_anchors(i, thing, decoded, colored, stale, views)
+                if not colored.take(key, wanted, stale):
+                    continue  # all that is seen has its colours
+            self._drawing.decode_color(i, decoded.x, eye, wanted)
+            if decoded.tint is not None:
+                palette = palette_colors(decoded.tint.name)
+                self._drawing.tint(i, palette, decoded.tint.weights)
+            self._color_runs += 1
 
     def _wanted_anchors(
-        self, i: int, thing: SceneObject, decoded: _Decoded, stale: bool, views: list[View]
-    ) -> np.ndarray | None:
+        self, i: int, thing: SceneObject, decoded: _Decoded, colored: Colored, stale: bool,
+        views: list[View],
+    ) -> np.ndarray | None:  # fmt: skip
         """(A,) bool: the anchors that views see and whose colours are stale; None: all.
 
         Layers are coloured as a whole: harmonics take no longer than to find out who is seen.
         """
-        colored = decoded.colored
         if not self.settings.skip_unseen or isinstance(thing.model, SplatLayers):
             if stale or colored.anchors is None:
                 return None
@@ -362,27 +388,3 @@ class Renderer:
 def scaled(view: View, part: float) -> View:
     """The view in `part` times its pixels a side, at least one."""
     return view if part == 1 else view.resized(tuple(max(1, round(part * n)) for n in view.size))
-
-
-def _choose(ctx: moderngl.Context | None, drawing: str, mlps: str, sort: str) -> tuple:
-    """(drawing, mlps, sort) with "auto" replaced; ValueError for what cannot work."""
-    for what, name in (("drawing", drawing), ("mlps", mlps), ("sort", sort)):
-        if name != "auto" and name not in CHOICES[what]:
-            raise ValueError(
-                f"there is no {what} {name!r}; choose auto, {', '.join(CHOICES[what])}."
-            )
-    gpu = ctx is not None and not is_software(ctx)
-    if drawing == "auto":
-        drawing = "quads" if gpu else "tiles"
-    if drawing == "tiles" and (mlps == "gl" or sort == "gl"):
-        raise ValueError(
-            "tiles decode and sort without GL; leave mlps and sort at auto, or draw quads."
-        )
-    if drawing == "quads" and ctx is None:
-        raise ValueError("quads are drawn with GL; open a context, or draw tiles.")
-    by_default = ("gl", "gl") if gpu and drawing == "quads" else ("onnxruntime", "numpy")
-    return (
-        drawing,
-        by_default[0] if mlps == "auto" else mlps,
-        by_default[1] if sort == "auto" else sort,
-    )

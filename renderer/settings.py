@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 ORDERS = ("depth", "distance")
 KEY_BITS = (16, 32)
 STEREO_SORTS = ("shared", "each")
+STEREO_COLORS = ("auto", "each", "shared")
 TARGETS = ("rgba8", "rgba16f", "rgba32f")
 DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object")
 # Why a splat is not drawn, in the order of the gates: the first that it fails counts it.
@@ -41,6 +42,9 @@ class RenderSettings:
     resort_degrees: float = 0.0  # and as soon as the view has turned by so much; 0: whenever
 
     # Colour
+    # Of two eyes: each its own; shared, for the middle between them; auto: shared where nobody can
+    # tell (renderer/eye_colors.py), else each.
+    stereo_colors: str = "auto"
     recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
     skip_unseen: bool = False  # no colours (Scaffold-GS: nothing) for anchors that no view can see
 
@@ -49,7 +53,7 @@ class RenderSettings:
     def __post_init__(self) -> None:
         for name, choices in (
             ("order", ORDERS), ("key_bits", KEY_BITS), ("stereo_sort", STEREO_SORTS),
-            ("target", TARGETS), ("debug", DEBUG_VIEWS),
+            ("stereo_colors", STEREO_COLORS), ("target", TARGETS), ("debug", DEBUG_VIEWS),
         ):  # fmt: skip
             if getattr(self, name) not in choices:
                 told = ", ".join(repr(c) for c in choices)
@@ -77,7 +81,8 @@ class FrameStats:
     drawn: int = 0
     culled: dict[str, int] = field(default_factory=dict)  # CULL_REASONS
     geometry_runs: int = 0  # objects whose four geometry networks ran for this frame
-    color_runs: int = 0  # objects whose colour network ran for this frame
+    color_runs: int = 0  # objects whose colours were computed for this frame, once for each eye
+    color_sets: int = 1  # 2 where each of two eyes had its own
     sorts: int = 0  # how often this frame sorted: 0 with an order kept, 1, or 1 a view
     order_age: int = 0  # frames since the order in use was made
     debug: dict[str, float] = field(default_factory=dict)  # numbers of the debug picture's legend

@@ -6,7 +6,7 @@ Same life as renderer/quads.py: allocate, decode what changed, place, draw.  No 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class _Slot:
     count: int
     evaluator: Evaluator
     sh: object | None  # device array of coefficients; None: the colour comes from a network
-    colors: np.ndarray | None = None  # (count, 3) of a network, as last decoded
+    colors: dict[int, np.ndarray] = field(default_factory=dict)  # set -> (count, 3) of a network
     placed: bool = False  # layers: the control value changes nothing but their opacity
 
 
@@ -81,7 +81,8 @@ class TilesDrawing:
         self._changed = True
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
-        self._color = device.zeros((self.splats, 4))
+        self._colors = [device.zeros((self.splats, 4))]  # for all views, or one a view
+        self._color, self._set = self._colors[0], 0  # that decoding writes into
         self._antialiased = tuple(map(is_antialiased, models))
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
@@ -114,6 +115,15 @@ class TilesDrawing:
         pack(self.device, splats, slot.start, self._mean_opacity, self._covariance)
         slot.placed = slot.sh is not None
 
+    def color_set(self, which: int, count: int) -> None:
+        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
+        or one a view.
+        """
+        self._colors = self._colors[:count]
+        while len(self._colors) < count:
+            self._colors.append(self.device.zeros((self.splats, 4)))
+        self._color, self._set = self._colors[which], which
+
     def decode_color(
         self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None
     ) -> None:
@@ -127,8 +137,9 @@ class TilesDrawing:
             args = (slot.sh, eye_object, rows, self._mean_opacity, self._color, seen)
             shade_sh(self.device, *args)
         else:
-            slot.colors = slot.evaluator.color(x, eye_object, seen, slot.colors)
-            pack_color(self.device, slot.colors, slot.start, self._color)
+            kept = slot.colors.get(self._set)
+            slot.colors[self._set] = slot.evaluator.color(x, eye_object, seen, kept)
+            pack_color(self.device, slot.colors[self._set], slot.start, self._color)
 
     def wait_decoded(self) -> None:
         """Returns when what was decoded is there: once for all objects, not after each."""
@@ -147,11 +158,13 @@ class TilesDrawing:
         if not np.array_equal(poses, self._world_from_objects, equal_nan=True):
             self._world_from_objects, self._changed = poses, True
 
-    def draw(self, views: list[View], settings: RenderSettings, timer: PassTimer) -> None:
-        """Draws every view; view i is then image(i)."""
+    def draw(
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
+    ) -> None:
+        """Draws every view; view i is then image(first + i)."""
         if not self.splats:
             for i, view in enumerate(views):
-                self._images[i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
+                self._images[first + i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
             return
         with timer.time("project", on_gpu=False):
             self._project(views, settings)
@@ -166,7 +179,8 @@ class TilesDrawing:
                 images = rasterize_rgba_views(
                     self.device, drawn, size, least_through=settings.min_through
                 )
-                self._images.update(zip(same, images, strict=True))
+                numbers = [first + i for i in same]
+                self._images.update(zip(numbers, images, strict=True))
 
     def _project(self, views: list[View], settings: RenderSettings) -> None:
         """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
@@ -181,7 +195,8 @@ class TilesDrawing:
             pair = views[first : first + 2]
             mine = frames[first : first + (1 if shared else 2)]
             sort = SortFrames(tuple(mine), settings.order == "distance", keep_outside)
-            projected = self._launch(pair, settings, sort, self._rooms.get(first))
+            colors = self._colors[first : first + 2] if len(self._colors) > 1 else self._colors
+            projected = self._launch(pair, settings, sort, self._rooms.get(first), colors)
             self._rooms[first] = projected
             self._projected += projected
         self.sorts, self.order_age = plan.sorts, plan.age
@@ -192,12 +207,14 @@ class TilesDrawing:
         settings: RenderSettings,
         sort: SortFrames,
         into: list[Projected] | None = None,
+        colors: list | None = None,
     ) -> list[Projected]:
+        first, *second = colors or self._colors
         return project_arena(
             self.device,
             self._mean_opacity,
             self._covariance,
-            self._color,
+            first,
             self._object_index,
             self._world_from_objects,
             [camera_of(view) for view in views],
@@ -205,6 +222,7 @@ class TilesDrawing:
             sort,
             into,
             self._antialiased,
+            second[0] if second else None,
         )
 
     def _bin(self, views: list[View], key_bits: int) -> list[Tiles]:
@@ -270,7 +288,8 @@ class TilesDrawing:
 
     def write_colors(self, color: np.ndarray) -> None:
         """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
-        pack_color(self.device, np.reshape(color, (self.splats, 3)), 0, self._color)
+        for each in self._colors:
+            pack_color(self.device, np.reshape(color, (self.splats, 3)), 0, each)
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
         """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""

@@ -148,6 +148,13 @@ def scene_points(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(means), np.concatenate(opacities)
 
 
+def distances_from(points: tuple[np.ndarray, np.ndarray], view: View) -> np.ndarray:
+    """(n,) metres from an eye to the splats that are there; points: means (N, 3) and opacities."""
+    means, opacity = points
+    there = means[np.isfinite(means).all(axis=1) & (opacity > 0)]
+    return np.linalg.norm(there - view.world_from_eye.position, axis=1)
+
+
 def framing_view(means: np.ndarray, opacity: np.ndarray, size: tuple[int, int]) -> View:
     """The view that shows splats whole, from their long side and slightly from above."""
     centre, radius = frame_points(means, opacity)

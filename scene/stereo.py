@@ -6,6 +6,17 @@ import numpy as np
 
 from scene.pose import Pose, View
 
+PUPILS_M = 0.064  # metres between the eyes of a person
+LOOKED_FROM_M = 1.8  # metres: from where a person looks at a thing
+
+
+def eyes_apart(distances: np.ndarray) -> float:
+    """How far apart the eyes of a person are in a scene whose scale nobody knows: the middle one of
+    the distances (n,) to its splats is taken for LOOKED_FROM_M; in the scene's own unit.
+    """
+    middle = float(np.median(distances)) if len(distances) else LOOKED_FROM_M
+    return PUPILS_M / LOOKED_FROM_M * middle
+
 
 def stereo_pair(view: View, distance: float) -> list[View]:
     """Left and right eye, `distance` metres apart, parallel, about the place of `view`."""

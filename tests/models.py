@@ -64,6 +64,16 @@ def without_control(model: AnchorModel, *names: str) -> AnchorModel:
     return replace(model, networks=networks)
 
 
+def without_direction(model: AnchorModel) -> AnchorModel:
+    """The same with colours that are alike from everywhere."""
+    mlp, widths = model.networks["color"], {"feature": model.features.shape[1], "direction": 3}
+    of_column = np.repeat(mlp.inputs, [widths.get(name, model.encoding.d) for name in mlp.inputs])
+    weights = (mlp.weights[0][:, of_column != "direction"], *mlp.weights[1:])
+    inputs = tuple(name for name in mlp.inputs if name != "direction")
+    blind = replace(mlp, weights=weights, inputs=inputs)
+    return replace(model, networks=model.networks | {"color": blind})
+
+
 def run_in_numpy(mlp: Mlp, rows: np.ndarray) -> np.ndarray:
     """The slow twin of every way to run a network: (N, inputs) to (N, outputs) in float64."""
     value = rows.astype(np.float64)

@@ -139,6 +139,7 @@ def settings_of(rng: np.random.Generator) -> RenderSettings:
         "order": ["depth", "distance"], "low_pass": [0.3, 0.0],
         "min_alpha": [1 / 255, *beside(1 / 255)], "resort_frames": [1, 0, 3],
         "resort_degrees": [0.0, 180.0], "stereo_sort": ["shared", "each"],
+        "stereo_colors": ["auto", "each", "shared"],
         "recolor_degrees": [0.0, 30.0], "skip_unseen": [False, True],
         "target": ["rgba16f", "rgba32f", "rgba8"], "render_scale": [1.0, 1.0, 0.5, 2.0],
         "min_through": [1e-4, 1e-6, 0.1],

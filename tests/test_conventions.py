@@ -1,10 +1,13 @@
 """CONVENTIONS.md, executed: an assert a row.  If one must change, look at every shader and file."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from runtime_models.model import AnchorModel, ControlEncoding, SplatLayers, Stop
 from scene.pose import Pose, View, look_at, perspective
+from scene.stereo import eyes_apart, stereo_pair
 
 HALF = np.sqrt(0.5)
 HERE = Pose(np.zeros(3), np.array([1.0, 0, 0, 0]))
@@ -78,6 +81,28 @@ def test_view_from_pinhole_is_the_inverse_of_pinhole(seed):
     back = View.from_pinhole(np.linalg.inv(camera_from_world), (fx, fy), (cx, cy), (640, 360))
     np.testing.assert_allclose(back.tangents, view.tangents, atol=1e-12)
     np.testing.assert_allclose(back.eye_from_world(), view.eye_from_world(), atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("distance", [0.0, 0.064, 0.3])
+def test_two_eyes_stand_so_far_apart_about_the_place_of_one(seed, distance):
+    """Left first; half the distance to either side along the head's own x, looking the same way."""
+    view = View(random_pose(seed), (-1.3, 0.9, -0.8, 1.1), 0.1, 50, (640, 360))
+    pair = stereo_pair(view, distance)
+    head = view.world_from_eye
+    local = [np.linalg.inv(head.matrix()) @ [*eye.world_from_eye.position, 1] for eye in pair]
+    np.testing.assert_allclose(local[0], [-distance / 2, 0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(local[1], [distance / 2, 0, 0, 1], atol=1e-12)
+    for eye in pair:
+        np.testing.assert_array_equal(eye.world_from_eye.wxyz, head.wxyz)
+        assert replace(eye, world_from_eye=head) == replace(view, world_from_eye=head)
+
+
+def test_eyes_of_a_scene_without_a_scale():
+    """64 mm where the middle splat is 1.8 m away, and in proportion."""
+    assert eyes_apart(np.array([1.0, 1.8, 40.0])) == pytest.approx(0.064)
+    assert eyes_apart(np.full(7, 18.0)) == pytest.approx(0.64)
+    assert eyes_apart(np.zeros(0)) == pytest.approx(0.064)
 
 
 def test_perspective_has_the_asked_field_of_view():

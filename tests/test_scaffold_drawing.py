@@ -71,11 +71,28 @@ def test_beside_other_objects_in_one_order(renderer, tmp_path):
     assert stats.geometry_runs == 3
 
 
-def test_both_eyes_are_decoded_once_for_their_middle(renderer, tmp_path):
+@pytest.mark.parametrize("order", ["depth", "distance"])
+def test_each_eye_sees_the_splats_that_it_sees_alone(renderer, tmp_path, order):
+    """Opacities, scales and rotations follow it as well: eyes are drawn one after the other."""
+    one = made(tmp_path, anchors=60)
+    both = Scene((SceneObject("scaffold", one, TURNED), SceneObject("layers", random_layers(200))))
+    pair = stereo_pair(seen_from(0.3, 0.3, 2), 0.064)
+    images, stats = draw_told(renderer, both, pair, order=order)
+    assert (stats.geometry_runs, stats.color_runs) == (3, 4)  # layers stay where they are
+    assert (stats.sorts, stats.color_sets) == (2, 2)
+    again, stats = draw_told(renderer, both, pair, order=order)
+    assert stats.geometry_runs == 2
+    for eye, image, same in zip(pair, images, again, strict=True):
+        (by_itself,), _ = draw_told(renderer, both, [eye], order=order)
+        np.testing.assert_array_equal(image, by_itself)
+        np.testing.assert_array_equal(same, by_itself)
+
+
+def test_shared_both_eyes_are_decoded_once_for_their_middle(renderer, tmp_path):
     scene, view = in_scene(made(tmp_path, anchors=60)), seen_from(0.3, 0.3, 2)
     pair = stereo_pair(view, 0.064)
-    images, stats = draw_told(renderer, scene, pair)
-    assert (stats.geometry_runs, stats.color_runs) == (1, 1)
+    images, stats = draw_told(renderer, scene, pair, stereo_colors="shared")
+    assert (stats.geometry_runs, stats.color_runs, stats.color_sets) == (1, 1, 1)
     for image, eye in zip(images, pair, strict=True):
         middle = reference_image(scene, eye, eye=view.world_from_eye.position)
         assert psnr_db(image, middle) > 80
@@ -121,7 +138,7 @@ def test_only_what_is_in_view_is_decoded_and_the_picture_is_the_same(renderer, t
         runs.append(stats.geometry_runs)
     assert runs[0] == runs[2] == runs[4] == 1
     assert runs[3] == 0
-    seen = renderer._decoded[0].colored.anchors
+    seen = renderer._decoded[0].colored[0].anchors
     assert 0 < seen.sum() < len(seen) / 2
     _, stats = draw_told(renderer, scene, [views[0]])
     assert stats.geometry_runs == 1  # all are wanted now

@@ -110,6 +110,8 @@ def shivering(renderer, image, i):
         ("far-origin", shivering),
         ("depth-range", shivering),
         ("canted", shivering),
+        ("stereo", eyes_swapped),
+        ("stereo", shivering),
     ],
     ids=lambda value: getattr(value, "__name__", value),
 )
@@ -122,6 +124,27 @@ def test_the_case_fails_where_the_renderer_does(stage, name, spoil):
         spoiled = Spoiled(stage.renderer, spoil)
         result = CASES[name](make_stage(spoiled, None, reopen))
     assert failures(result)
+
+
+def test_colours_of_the_middle_between_the_eyes_fail(stage, monkeypatch):
+    """What every stereo frame had before each eye got colours of its own."""
+    monkeypatch.setattr("renderer.eye_colors.SHARED_DB", -1e9)
+    assert any("glossy ball" in text for text in failures(CASES["stereo"](stage)))
+
+
+def test_a_clamp_about_the_tangents_fails(stage, monkeypatch):
+    """1.3 times each tangent, as the Jacobian was held before: within a picture off its axis."""
+
+    def limits(camera):
+        (width, height), k = camera.size, 1.3
+        return (
+            -k * camera.cx / camera.fx, k * (width - camera.cx) / camera.fx,
+            -k * camera.cy / camera.fy, k * (height - camera.cy) / camera.fy,
+        )  # fmt: skip
+
+    monkeypatch.setattr("rasterizer.project.Camera.limits", limits)
+    found = failures(CASES["lenses"](stage))
+    assert sum("parts" in text for text in found) >= 3, found
 
 
 def spoiled_reopen():

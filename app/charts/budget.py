@@ -99,9 +99,7 @@ def least_scale(rows: Sequence[Row], floor_db: float) -> float:
 
     How far dynamic resolution may go down; 1 where no scale is good enough.
     """
-    alone = [
-        row for row in rows
-        if replace(row.settings, render_scale=1.0, target="rgba16f", background=(0.0, 0.0, 0.0))
-        == RenderSettings()
-    ]  # fmt: skip
+    plain = RenderSettings()
+    same = {"render_scale": 1.0, "target": plain.target, "background": plain.background}
+    alone = [row for row in rows if replace(row.settings, **same) == plain]
     return min((row.settings.render_scale for row in alone if row.db >= floor_db), default=1.0)

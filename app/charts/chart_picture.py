@@ -18,7 +18,7 @@ FAMILIES = {  # name -> (colour, fields that belong to it)
     "order": ("#0072b2", ("key_bits", "order", "resort_frames", "resort_degrees", "stereo_sort")),
     "culls": ("#d55e00", ("min_alpha", "low_pass", "max_pixels", "max_distance", "min_pixels",
                           "fade")),
-    "colour": ("#009e73", ("recolor_degrees", "skip_unseen")),
+    "colour": ("#009e73", ("recolor_degrees", "skip_unseen", "stereo_colors")),
     "pixels": ("#cc79a7", ("target", "render_scale", "min_through")),
     "several of them": ("#56564f", ()),
 }  # fmt: skip

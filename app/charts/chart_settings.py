@@ -98,6 +98,8 @@ SETTINGS = (
     # Beside one eye, so that its ratio is what the second eye costs.
     Named("stereo", eyes=2, beside_eyes=1),
     Named("stereo, a sort each", {"stereo_sort": "each"}, eyes=2),
+    Named("stereo, colours each", {"stereo_colors": "each"}, eyes=2),
+    Named("stereo, shared colours", {"stereo_colors": "shared"}, eyes=2),
     *(row for row in _table_3() if row.eyes == 2),
 )  # fmt: skip
 

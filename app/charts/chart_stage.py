@@ -9,15 +9,15 @@ import numpy as np
 from app.charts.chart_settings import Distances
 from app.charts.quick_chart import turned
 from app.subject import Subject
-from scene.framing import frame_points, framing_view, scene_points
+from scene.framing import distances_from, frame_points, framing_view, scene_points
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene
+from scene.stereo import eyes_apart
 
 WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
 GAP = 1.05  # of the sum of two radii, between neighbours
 NEAR_PART, FAR_PART = 0.6, 0.9  # of the splats, see distances_of
 DISTANCE_VIEWS = 5
-EYE_DISTANCE = 0.032  # of the framed radius: a thing of 2 m radius is seen by a person's eyes
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Stage:
     path: tuple[View, ...]  # warm-up first: WARM_UP views that do not count
     xs: tuple[float, ...]  # of the sweep, seen from the middle of the path
     distances: Distances
-    eye_distance: float  # metres, of rows with two eyes
+    eye_distance: float  # metres between the eyes, of rows with two
 
     @property
     def middle(self) -> View:
@@ -64,7 +64,7 @@ def make_stage(
     """
     scene = side_by_side(subjects, x)
     points = scene_points(scene)
-    centre, radius = frame_points(*points)
+    centre, _ = frame_points(*points)
     if cameras:
         counted = tuple(cameras)
         path = (counted[0],) * WARM_UP + counted
@@ -72,7 +72,8 @@ def make_stage(
         first = subjects[0].view(size) if len(subjects) == 1 else framing_view(*points, size)
         path = arc(first, centre, walk)
     xs = tuple(np.linspace(0, 1, walk.sweep).tolist())
-    return Stage(scene, path, xs, distances_of(points, path), EYE_DISTANCE * radius)
+    apart = eyes_apart(distances_from(points, path[len(path) // 2]))
+    return Stage(scene, path, xs, distances_of(points, path), apart)
 
 
 def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
@@ -102,14 +103,11 @@ def distances_of(points: tuple[np.ndarray, np.ndarray], path: Sequence[View]) ->
     near and far: within them lie 60 % and 90 % of the splats, in the median over views of the path.
     The paper's 20 and 40 m are such parts of its scenes, and mean nothing in one of 2 m.
     """
-    means, opacity = points
-    seen = means[np.isfinite(means).all(axis=1) & (opacity > 0)]
-    if not len(seen):
+    looks = [path[i] for i in np.linspace(0, len(path) - 1, DISTANCE_VIEWS).astype(int)]
+    distances = [distances_from(points, view) for view in looks]
+    if not len(distances[0]):
         return Distances(1.0, 2.0)
-    eyes = [path[i].world_from_eye.position for i in
-            np.linspace(0, len(path) - 1, DISTANCE_VIEWS).astype(int)]  # fmt: skip
-    parts = [np.quantile(np.linalg.norm(seen - eye, axis=1), (NEAR_PART, FAR_PART)) for eye in eyes]
-    near, far = np.median(parts, axis=0)
+    near, far = np.median([np.quantile(d, (NEAR_PART, FAR_PART)) for d in distances], axis=0)
     return Distances(float(f"{near:.4g}"), float(f"{far:.4g}"))
 
 

@@ -18,11 +18,14 @@ from scene.scene import Scene
 FRAMES = 5  # of each setting that count, along the turn; one before them does not
 BETWEEN = 3  # exact frames that count between two settings, again after one that does not
 STEP = np.radians(2.0)  # of the turn about the scene's centre between two frames
+# Two eyes are off by less than that when one set of colours is right for both of them.
+RECOLORED = {"recolor_degrees": 5.0, "stereo_colors": "shared"}
+LATER = {"resort_frames": 4, **RECOLORED}
 QUICK = {  # name -> what differs from exact; pairs come from what pays most on its own
     "16-bit keys": {"key_bits": 16},
     "sort every 4": {"resort_frames": 4},
     "sort every 8": {"resort_frames": 8},
-    "colours after 5\u00b0": {"recolor_degrees": 5.0},
+    "colours after 5\u00b0": RECOLORED,
     "0.5 px footprint": {"min_pixels": 0.5},
     "1 px footprint": {"min_pixels": 1.0},
     "2 px footprint": {"min_pixels": 2.0, "fade": 0.2},
@@ -30,16 +33,10 @@ QUICK = {  # name -> what differs from exact; pairs come from what pays most on 
     "stop at 1/256": {"min_through": 1 / 256},
     "75 % scale": {"render_scale": 0.75},
     "50 % scale": {"render_scale": 0.5},
-    "sort 4, colours 5\u00b0, 1 px": {
-        "resort_frames": 4, "recolor_degrees": 5.0, "min_pixels": 1.0,
-    },
-    "the same at 75 %": {
-        "resort_frames": 4, "recolor_degrees": 5.0, "min_pixels": 1.0, "render_scale": 0.75,
-    },
-    "the same at 50 %": {
-        "resort_frames": 4, "recolor_degrees": 5.0, "min_pixels": 1.0, "render_scale": 0.5,
-    },
-}  # fmt: skip
+    "sort 4, colours 5\u00b0, 1 px": {**LATER, "min_pixels": 1.0},
+    "the same at 75 %": {**LATER, "min_pixels": 1.0, "render_scale": 0.75},
+    "the same at 50 %": {**LATER, "min_pixels": 1.0, "render_scale": 0.5},
+}
 
 
 @dataclass(frozen=True)

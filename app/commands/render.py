@@ -38,6 +38,9 @@ class Options(ReadingOptions):
     """WIDTHxHEIGHT in pixels; default 640x360, or what the camera file says."""
     stereo: float = 0.0
     """Distance of two eyes in metres; above 0 each picture holds both, side by side."""
+    stereo_colors: Literal["auto", "each", "shared"] = "auto"
+    """Of two eyes: each its own, shared for the middle between them, or shared where nobody can
+    tell."""
     background: tuple[float, float, float] | None = None
     """Display sRGB, 0 to 1; default: what the scene was trained on, else black."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
@@ -113,6 +116,8 @@ def run(options: Options) -> int:
             x, eyes = controls[0], 1 + (options.stereo > 0)
             drawn = Drawn(opened.subject, x, views[0].size, eyes)
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
+            if options.stereo_colors != "auto":
+                renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)
         scenes = [opened.scene_at(x, i) for x, i in pairs]
         work = (renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
         if options.output == "picture":
@@ -197,7 +202,8 @@ def choose_settings(options: Options):
     from renderer.settings import RenderSettings
 
     try:
-        return RenderSettings(**{name: getattr(options, name) for name in ("debug", *LIMITS)})
+        names = ("debug", "stereo_colors", *LIMITS)
+        return RenderSettings(**{name: getattr(options, name) for name in names})
     except ValueError as error:
         raise UsageError(f"--{str(error).replace('_', '-', 1)}") from None
 

@@ -34,6 +34,9 @@ class Options(ReadingOptions):
     """Milliseconds that a frame may take us with --quality auto; default: 85 % of the headset's."""
     floor_db: float | None = None
     """Never below this PSNR against the exact picture with --quality auto; default 35."""
+    stereo_colors: Literal["auto", "each", "shared"] = "auto"
+    """each: colours for each eye, always; shared: for the middle between the eyes; auto: as
+    --quality has it, which shares them where nobody can tell."""
     turning: Literal["snap", "smooth", "none"] = "snap"
     """By the stick that does not walk: 30 degrees at a time, evenly, or by the body alone."""
     walking_hand: Literal["left", "right"] = "left"
@@ -112,8 +115,9 @@ def wear(options: Options) -> int:
     with Instance() as instance:
         scene = open_worn(options.scene or DEMO, options)
         pacing = Pacing(
-            scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms
-        )
+            scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms,
+            options.stereo_colors,
+        )  # fmt: skip
         if options.pictures:
             make_folder(options.pictures)
         with (

@@ -49,9 +49,10 @@ class Pacing:
 
     def __init__(
         self, background: tuple[float, float, float], quality: str = AUTO,
-        floor_db: float = FLOOR_DB, target_ms: float | None = None,
+        floor_db: float = FLOOR_DB, target_ms: float | None = None, stereo_colors: str = AUTO,
     ) -> None:  # fmt: skip
         self.quality, self.floor_db, self._fixed_ms = quality, floor_db, target_ms
+        self._stereo_colors = stereo_colors  # AUTO: as the quality has it
         self.choice: Choice | None = None  # of AUTO, where the chart was measured
         self.exact_ms = 0.0  # that the exact picture of both eyes took at first
         self._period_s = 0.0  # that was chosen for
@@ -64,12 +65,15 @@ class Pacing:
     def settings(self) -> RenderSettings:
         """Of the next frame."""
         if self.quality != AUTO:
-            return replace(self._exact, **QUICK.get(FIXED[self.quality], {}))
-        if self.choice is None:
-            return self._exact
-        scale = self._resolution.scale
-        background = self._exact.background
-        return replace(self.choice.settings, background=background, render_scale=scale)
+            settings = replace(self._exact, **QUICK.get(FIXED[self.quality], {}))
+        elif self.choice is None:
+            settings = self._exact
+        else:
+            scale, background = self._resolution.scale, self._exact.background
+            settings = replace(self.choice.settings, background=background, render_scale=scale)
+        if self._stereo_colors == AUTO:
+            return settings
+        return replace(settings, stereo_colors=self._stereo_colors)
 
     @property
     def chosen(self) -> str:
@@ -111,9 +115,10 @@ class Pacing:
         # Fewer pixels are priced alone: on top of other shortcuts nobody knows what they cost.
         chosen = self.choice.settings
         priced = least_scale(self._rows, self.floor_db)
-        alone = replace(chosen, render_scale=1.0, target="rgba16f", background=(0.0, 0.0, 0.0))
+        plain = RenderSettings()
+        alone = replace(chosen, render_scale=1.0, target=plain.target, background=plain.background)
         scale = chosen.render_scale
-        least = min(priced, scale) if alone == RenderSettings() else scale
+        least = min(priced, scale) if alone == plain else scale
         self._resolution = Resolution(target_ms, least, scale)
 
     def seen(self, drawing_ms: float, own_ms: float) -> None:
@@ -134,6 +139,7 @@ class Pacing:
             "exact_ms": round(self.exact_ms, 3),
             "chosen": self.chosen,
             "scale": self.settings().render_scale,
+            "stereo_colors": self.settings().stereo_colors,
         }
 
 

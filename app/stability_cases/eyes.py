@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.stability_cases.finding import (
+    Finding,
     Panel,
     Result,
     at_least,
@@ -12,17 +13,25 @@ from app.stability_cases.finding import (
     clean,
     decibels,
 )
-from app.stability_cases.scenes import alone, front, splats
-from app.stability_cases.stage import Stage, difference, turned
+from app.stability_cases.scenes import alone, front, glossy, splats
+from app.stability_cases.stage import Stage, difference, turned, turned_about
+from renderer import eye_colors
+from scene.framing import distances_from
 from scene.pose import View
-from scene.stereo import stereo_pair
+from scene.stereo import PUPILS_M, eyes_apart, stereo_pair
 
-APART = 0.064  # metres between the eyes of a person
 DEPTHS = (0.5, 1.0, 3.0, 10.0, 100.0)  # metres
 CANTED = (2.0, 5.0, 10.0)  # degrees between the eyes: each then wants an order of its own
 NEARLY_PARALLEL = 0.5  # degrees: one order for both by rule (up to 1 degree)
 SAME_DB = 90  # of pictures from the same orders: only what is drawn in another sequence differs
 SHARED_DB = 60  # and where equal depths round differently: half floats alone cost 59.5 to 80
+AUTO_DB = eye_colors.SHARED_DB  # below that colours are never shared
+SAME_EYE_DB = 75  # of an eye in a pair and alone: other rounding, 16 bits on the way
+SAME_EYE = "an eye in a pair sees what it sees alone"
+AUTO_REASON = (
+    "colours are shared where the eyes are so near each other for the scene that they differ by "
+    "less (8 bits alone cost 58.9), else each eye has its own"
+)
 YAW_DB = 46  # a quarter degree off costs splats of random colours 54 (case stale-yaw), 0.5 each 48
 
 
@@ -30,7 +39,7 @@ def disparity(stage: Stage) -> Result:
     """Two eyes see a splat where a pinhole puts it, off-centre lenses too, and in this order."""
     size = stage.size
     straight = front(size, 0.0)
-    left_view, right_view = stereo_pair(straight, APART)
+    left_view, right_view = stereo_pair(straight, PUPILS_M)
     left, right, down, up = straight.tangents
     views = [
         replace(left_view, tangents=(1.3 * left, 0.8 * right, 1.1 * down, 0.9 * up)),
@@ -54,12 +63,12 @@ def disparity(stage: Stage) -> Result:
         )  # fmt: skip
         drawn += images
     shifted = [centroid(image)[0] for image in drawn[:2]]
-    straight_pair = stage.draw_all(scene_of_disparity(), stereo_pair(straight, APART))
+    straight_pair = stage.draw_all(scene_of_disparity(), stereo_pair(straight, PUPILS_M))
     across = centroid(straight_pair[0])[0] - centroid(straight_pair[1])[0]
     fx = size[0] / (right - left)
     findings.append(
         at_most(
-            "parallel eyes at 1 m, pixels off b f / z", abs(across - APART * fx), 0.1,
+            "parallel eyes at 1 m, pixels off b f / z", abs(across - PUPILS_M * fx), 0.1,
             "the disparity of equal lenses, twice the error of a place; swapped eyes fail",
         )
     )  # fmt: skip
@@ -125,10 +134,56 @@ def canted(stage: Stage) -> Result:
     return Result([clean(*images), *findings], panels)
 
 
+def stereo(stage: Stage) -> Result:
+    """Each eye of a stereo frame against that eye drawn alone; lenses that lean, heads askew."""
+    findings, images, worst = [], [], None
+    near, reach = stereo_pair(front(stage.size, 1.5), PUPILS_M), f"half a metre away, {SAME_EYE}"
+    for what, scene, pair, wish, least, reason in (
+        ("the scene", stage.scene(), eyes_of(stage), "auto", AUTO_DB, AUTO_REASON),
+        ("the scene, colours each", stage.scene(), eyes_of(stage), "each", SAME_EYE_DB, SAME_EYE),
+        ("a glossy ball", alone(glossy()), near, "auto", SAME_EYE_DB, reach),
+    ):  # fmt: skip
+        frame = stage.draw_all(scene, pair, stereo_colors=wish)
+        single = [stage.draw(scene, eye) for eye in pair]
+        images += [*frame, *single]
+        db, eye = min(
+            (decibels(a, b), i) for i, (a, b) in enumerate(zip(frame, single, strict=True))
+        )
+        findings.append(at_least(f"{what}, an eye against it alone, dB", db, least, reason))
+        if worst is None or db < worst[0]:
+            worst = (db, what, frame[eye], single[eye])
+    leaning, drawn = lean(stage)
+    _, what, together, itself = worst
+    panels = [
+        stage.panel(f"{what}, one of two eyes", together),
+        stage.panel("the same eye alone", itself),
+        Panel("8 times the difference", difference(together, itself)),
+    ]
+    return Result([clean(*images, *drawn), *findings, leaning], panels)
+
+
+def lean(stage: Stage) -> tuple[Finding, list[np.ndarray]]:
+    """Eyes of a headset on a head askew, against one centred picture that holds what each sees."""
+    width, height = stage.size
+    scene, narrow = alone(glossy()), max(width // 4, 1)
+    straight = turned_about(front(stage.size, 1.5), np.zeros(3), 20.0, (0, 0, 1))
+    wholes = stereo_pair(straight, PUPILS_M)
+    lenses = [eye.part(x, height // 5, (width - narrow, height - height // 5))
+              for eye, x in zip(wholes, (0, narrow), strict=True)]  # fmt: skip
+    pair = [replace(lens, whole=None) for lens in lenses]
+    frame = stage.draw_all(scene, pair)
+    dbs = []
+    for image, whole, x in zip(frame, wholes, (0, narrow), strict=True):
+        there = stage.draw(scene, whole)[height // 5 :, x : x + width - narrow]
+        dbs.append(decibels(image, there))
+    told = "lenses off centre on a head askew, an eye against the centred picture around it, dB"
+    return at_least(told, min(dbs), SAME_EYE_DB, f"an off-centre lens is a part; {SAME_EYE}"), frame
+
+
 def eyes_of(stage: Stage) -> list[View]:
-    """Two parallel eyes on the scene, as far apart as a person's are for its size."""
-    _, radius = stage.bounds()
-    return stereo_pair(stage.view(), APART * radius / 2)
+    """Two parallel eyes on the scene, as far apart as a person's are who stands 1.8 m before it."""
+    view = stage.view()
+    return stereo_pair(view, eyes_apart(distances_from(stage.subject.points(), view)))
 
 
 def centroid(image: np.ndarray) -> np.ndarray:

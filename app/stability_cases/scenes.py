@@ -1,5 +1,7 @@
 """Small scenes that cases make themselves: their right picture is known, whatever the user's is."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from runtime_models.model import AnchorModel, ControlEncoding, Mlp, Model, SplatLayers, Stop
@@ -35,6 +37,13 @@ def shell(count: int = 1500, seed: int = 0) -> SplatLayers:
     return splats(
         normal, size, rng.uniform(0.3, 1, count), rng.uniform(size=(count, 3)), turns(count, rng)
     )
+
+
+def glossy(count: int = 1500, seed: int = 5) -> SplatLayers:
+    """The ball with strong harmonics of degree 3: from a little aside it looks otherwise."""
+    ball, rng = shell(count, seed), np.random.default_rng(seed)
+    more = rng.normal(size=(count, 15, 3)) * 0.15
+    return replace(ball, sh=np.concatenate([ball.sh, more.astype(np.float32)], axis=1))
 
 
 def around(count: int = 1200, seed: int = 0) -> SplatLayers:

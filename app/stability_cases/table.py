@@ -20,6 +20,7 @@ CASES = {
     "popping": popping.popping,
     "disparity": eyes.disparity,
     "canted": eyes.canted,
+    "stereo": eyes.stereo,
     "far-origin": places.far_origin,
     "depth-range": places.depth_range,
     "inside": places.inside,

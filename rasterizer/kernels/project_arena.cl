@@ -4,8 +4,12 @@
 // find_places reads them again), and what no view can see is dropped before its covariance is read.
 // Needs: VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
+// OWN_COLORS = 1: the second view has colours of its own.
 #ifndef ANTIALIASED
 #define ANTIALIASED 0
+#endif
+#ifndef OWN_COLORS
+#define OWN_COLORS 0
 #endif
 #include "common/camera.cl"
 #include "common/limits.cl"
@@ -197,7 +201,8 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
 __kernel void project_arena(
     int count, int chunk, int by_distance, int keep_outside, __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
-    __global const float* color, __global const int* object_index,
+    __global const float* color, __global const float* second_color,
+    __global const int* object_index,
     __global float* record_0, __global float* depth_0, __global int* culled_0,
     __global uint2* places_0, __global uint4* status_0, __global uint2* pairs_0,
     __global int* table_0,
@@ -268,6 +273,11 @@ __kernel void project_arena(
         leave_out(i, n, record[v], depth[v], places[v]);
         continue;
       }
+#if OWN_COLORS
+      if (v == 1) {
+        LOAD_ROWS(LOAD_COLORS, s, second_color, 4)
+      }
+#endif
       __global const float* view = views + VIEW_SIZE * v;
       const float8 antialiased = ANTIALIASED ? m[POSE - 1] : (float8)(0);
       const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], antialiased,

@@ -11,7 +11,8 @@ uniform vec2 shifts;  // x in the grid minus x in the left and right picture, pi
 uniform uint count;   // splats; records of the right view start there
 
 out vec4 sigmas;  // place in the axes of the left and of the right ellipse
-flat out vec3 color;
+flat out vec3 left_color;
+flat out vec3 right_color;
 flat out vec2 opacities;
 
 const vec2 NOWHERE = vec2(100.0);  // sigmas, where nothing is left of any splat
@@ -55,7 +56,8 @@ void main() {
     if (in_left && in_right) {
         sigmas.zw = inverse(mat2(right.major, right.minor)) * (pixel - right.center);
     }
-    color = e.color;
+    left_color = left.color;
+    right_color = right.color;
     opacities = vec2(left.opacity, right.opacity);
     gl_Position = vec4(2.0 * pixel / size - 1.0, 0.0, 1.0);
 }

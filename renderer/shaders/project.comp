@@ -10,6 +10,7 @@
 #define FADE 0            // 1: some limit has a ramp
 #define ANTIALIASED 0     // 1: what the low pass makes wider becomes fainter
 #define KEY_RANGE 0       // 1: the least and largest key are wanted
+#define OWN_COLORS 0      // 1: the second view has colours of its own
 #endif
 #include "common/finite.glsl"
 #include "common/record.glsl"
@@ -18,6 +19,9 @@ layout(local_size_x = WORKGROUP) in;
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
 layout(std430, binding = SLOT_COVARIANCE) readonly buffer Covariance { vec4 covariance[]; };
 layout(std430, binding = SLOT_COLOR) readonly buffer Color { vec4 color[]; };
+#if OWN_COLORS
+layout(std430, binding = SLOT_SECOND_COLOR) readonly buffer SecondColor { vec4 second_color[]; };
+#endif
 layout(std430, binding = SLOT_RECORDS) writeonly buffer Records { uvec4 records[]; };
 layout(std430, binding = SLOT_KEYS) writeonly buffer Keys { uint keys[]; };
 layout(std430, binding = SLOT_COUNTS) buffer Counts { uint counts[]; };
@@ -171,6 +175,9 @@ void main() {
         bool drawn = here.row == COUNT_DRAWN;
         if (!drawn) atomicAdd(group_counts[here.row], 1u);
 #if VIEWS == 2
+#if OWN_COLORS
+        splat.rgb = second_color[i].rgb;
+#endif
         Projected there = project(splat, 1u);
         if (there.row != COUNT_DRAWN) atomicAdd(group_counts[COUNTS_STRIDE + there.row], 1u);
         drawn = drawn || there.row == COUNT_DRAWN;

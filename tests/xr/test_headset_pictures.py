@@ -50,9 +50,9 @@ def scene_at(line: dict) -> Scene:
     return replace(scene, objects=tuple(objects))
 
 
-def drawn(scene: Scene, view: View, eye: np.ndarray) -> np.ndarray:
+def drawn(scene: Scene, view: View) -> np.ndarray:
     """(H, W, 3) over the background."""
-    image = reference_image(scene, view, eye=eye)
+    image = reference_image(scene, view)
     return np.clip(image[..., :3] + (1 - image[..., 3:]) * BACKGROUND, 0, 1)
 
 
@@ -87,16 +87,16 @@ def seen(stand, start) -> tuple[dict, list[np.ndarray]]:
 def test_both_eyes_see_the_scene_as_the_reference_draws_it(seen):
     line, pictures = seen
     eyes = eyes_of(line)
-    scene, middle = scene_at(line), sum(eye.world_from_eye.position for eye in eyes) / 2
+    scene = scene_at(line)
     empty = replace(scene, objects=tuple(o for o in scene.objects if o.name != "cube"))
     cube = np.array(line["objects"]["cube"]["position"])
     columns = []
     for eye, picture in zip(eyes, pictures, strict=True):
-        wanted = drawn(scene, eye, middle)
+        wanted = drawn(scene, eye)
         assert np.abs(picture - wanted).max() < 1.5 * ROUNDING
         column, row = pixel_of(eye, cube)
         columns.append(column)
-        without = drawn(empty, eye, middle)[row, column]
+        without = drawn(empty, eye)[row, column]
         assert np.abs(picture[row, column] - without).max() > 20 * ROUNDING, "no cube there"
     # What is before both eyes lies farther left in the right one, whose frustum leans to the right.
     assert columns[1] < columns[0] - 20

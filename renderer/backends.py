@@ -1,0 +1,33 @@
+"""What a renderer draws, decodes and sorts with, where that is left to it."""
+
+import moderngl
+
+from renderer.context import is_software
+
+CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
+
+
+def choose_backends(
+    ctx: moderngl.Context | None, drawing: str, mlps: str, sort: str
+) -> tuple[str, str, str]:
+    """(drawing, mlps, sort) with "auto" replaced; ValueError for what cannot work."""
+    for what, name in (("drawing", drawing), ("mlps", mlps), ("sort", sort)):
+        if name != "auto" and name not in CHOICES[what]:
+            raise ValueError(
+                f"there is no {what} {name!r}; choose auto, {', '.join(CHOICES[what])}."
+            )
+    gpu = ctx is not None and not is_software(ctx)
+    if drawing == "auto":
+        drawing = "quads" if gpu else "tiles"
+    if drawing == "tiles" and (mlps == "gl" or sort == "gl"):
+        raise ValueError(
+            "tiles decode and sort without GL; leave mlps and sort at auto, or draw quads."
+        )
+    if drawing == "quads" and ctx is None:
+        raise ValueError("quads are drawn with GL; open a context, or draw tiles.")
+    by_default = ("gl", "gl") if gpu and drawing == "quads" else ("onnxruntime", "numpy")
+    return (
+        drawing,
+        by_default[0] if mlps == "auto" else mlps,
+        by_default[1] if sort == "auto" else sort,
+    )
