@@ -23,6 +23,7 @@ class Gpu:
         self.max_groups = ctx.info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]
         self.max_uniforms = ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]  # bytes
         self.max_side = min(ctx.info["GL_MAX_TEXTURE_SIZE"], *ctx.info["GL_MAX_VIEWPORT_DIMS"])
+        self.targets: dict[str, bool] = {}  # formats that were tried: see target.py
         self._programs: dict[tuple, moderngl.ComputeShader | moderngl.Program] = {}
 
     def reserve(self, size: int, what: str = "buffer") -> moderngl.Buffer:
@@ -47,7 +48,7 @@ class Gpu:
         return buffer
 
     def target(self, size: tuple[int, int], dtype: str) -> moderngl.Framebuffer:
-        """A framebuffer with one RGBA texture; dtype "f1", "f2" or "f4"."""
+        """A framebuffer with one RGBA texture; dtype one of target.DTYPES."""
         if not max(size) <= self.max_side:
             raise TooLarge(
                 f"a view of {size[0]} x {size[1]} pixels was asked for and this driver draws "

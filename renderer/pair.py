@@ -45,9 +45,13 @@ class PairSplatter:
         return shift if near and grid_width(width, shift) <= self._gpu.max_side else None
 
     def draw(
-        self, arena: Arena, pictures: list[moderngl.Framebuffer], shift: int, min_alpha: float
-    ) -> None:
-        """Draws the arena as it was last projected and sorted into the targets of both views."""
+        self, arena: Arena, pictures: list[moderngl.Framebuffer], shift: int, min_alpha: float,
+        unit: float = 1.0,
+    ) -> None:  # fmt: skip
+        """Draws the arena as it was last projected and sorted into the targets of both views.
+
+        unit: the display value that 1 in these stands for.
+        """
         ctx = self._gpu.ctx
         width, height = pictures[0].size
         first = (max(-shift, 0), max(shift, 0))  # column of the grid where each picture starts
@@ -61,6 +65,7 @@ class PairSplatter:
             program = self._program
             program["size"].value, program["shifts"].value = both.size, first
             program["min_alpha"].value, program["count"].value = min_alpha, arena.count
+            program["per_unit"].value = 1 / unit
             self._triangles.render_indirect(arena.command, moderngl.TRIANGLES, count=1)
         for picture, source, column in zip(pictures, both.color_attachments, first, strict=True):
             with self._gpu.drawing_into(picture):

@@ -26,6 +26,7 @@ from renderer.sort_check import checked_sorter
 from renderer.splat import Splatter
 from renderer.surface import Surface
 from renderer.surface_quads import draw_surface
+from renderer.target import brightest, choose_target
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
 from runtime_models.evaluate import Control, follows_eye
@@ -50,6 +51,8 @@ class QuadsDrawing:
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._cadence = Cadence()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
+        self._models: list[Model] = []
+        self._most: float | None = None  # brightest colour of these; None: not known yet
         self._last = 0  # row of the counts of the view drawn last
         self._tinter: Tinter | None = None  # made when a part alone shows a thermal stop
         self._arena: Arena | None = None
@@ -64,6 +67,7 @@ class QuadsDrawing:
         """Room for these objects; what was decoded before is gone."""
         self._release_arena()
         self._changed = True
+        self._models, self._most = models, None
         counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
         self._arena = Arena(self._gpu, counts, antialiased)
         self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
@@ -123,8 +127,9 @@ class QuadsDrawing:
     ) -> None:
         """Draws every view; view i is then image(first + i)."""
         arena = self._arena
-        self._splatter.target = settings.target
-        self.backends["drawing"] = f"quads ({settings.target})"
+        target, unit = choose_target(self._gpu, settings.target, self._brightest())
+        self._splatter.target, self._splatter.unit = target, unit
+        self.backends["drawing"] = f"quads ({target})"
         canted = len(sort_frames(views, settings)) > 1
         if canted:  # an order a view, and room for one: none is kept
             settings = replace(settings, resort_frames=1, resort_degrees=0.0)
@@ -159,7 +164,7 @@ class QuadsDrawing:
             shift = self._pair.shift(arena, group[0].size[0])
         if shift is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
-            self._pair.draw(arena, pictures, shift, settings.min_alpha)
+            self._pair.draw(arena, pictures, shift, settings.min_alpha, self._splatter.unit)
             return
         for row, view in enumerate(group):
             self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row)
@@ -193,9 +198,19 @@ class QuadsDrawing:
         """{drawn, *CULL_REASONS} of the view drawn last."""
         return self._projector.counts(self._arena, self._last)
 
+    def _brightest(self) -> float:
+        """The largest colour of the scene, found out once."""
+        if self._most is None:
+            self._most = brightest(self._models)
+        return self._most
+
     def presentable(self, i: int) -> moderngl.Texture:
-        """The float image of view i on the GPU, row 0 at the bottom."""
+        """The image of view i on the GPU, row 0 at the bottom; its colours count in unit_of(i)."""
         return self._splatter.texture(i)
+
+    def unit_of(self, i: int) -> float:
+        """The display value that 1 in presentable(i) stands for."""
+        return self._splatter.unit_of(i)
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""

@@ -336,7 +336,8 @@ class Renderer:
                 pixels = self._drawing.presentable_rgba8(i, background, palette, weight)
                 self._resolve.copy(pixels, framebuffer)
             else:
-                self._resolve.draw(image, framebuffer, background, palette, weight)
+                unit = 1.0 if self._debug else self._drawing.unit_of(i)
+                self._resolve.draw(image, framebuffer, background, palette, weight, unit)
 
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""

@@ -28,11 +28,13 @@ class Resolve:
         background: tuple[float, float, float],
         palette: np.ndarray | None = None,
         weight: float = 0.0,
+        unit: float = 1.0,
     ) -> None:
         """Fills the framebuffer's viewport: palette applied, over the background.
 
         source: premultiplied; a texture has row 0 at the bottom, an array (H, W, 4) on top.
         palette: (256, 3) display sRGB; weight 0..1, 0 leaves the colours alone.
+        unit: the display value that 1 in the source stands for.
         """
         from_array = isinstance(source, np.ndarray)
         texture = self._upload(source) if from_array else source
@@ -49,7 +51,7 @@ class Resolve:
         program["image"].value, program["palette"].value = 0, 1
         program["weight"].value = weight if use_palette else 0.0
         program["background"].value = tuple(background)
-        program["top_first"].value = from_array
+        program["top_first"].value, program["unit"].value = from_array, unit
         with self._gpu.drawing_into(framebuffer):
             self._gpu.ctx.enable_only(moderngl.NOTHING)
             self._triangle.render(moderngl.TRIANGLES, vertices=3)

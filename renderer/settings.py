@@ -7,7 +7,7 @@ ORDERS = ("depth", "distance")
 KEY_BITS = (16, 32)
 STEREO_SORTS = ("shared", "each")
 STEREO_COLORS = ("auto", "each", "shared")
-TARGETS = ("rgba8", "rgba16f", "rgba32f")
+TARGETS = ("auto", "rgba8", "rgba16", "rgba16f", "rgba32f")
 DEBUG_VIEWS = ("", "culls", "birdseye", "overdraw", "depth", "object")
 # Why a splat is not drawn, in the order of the gates: the first that it fails counts it.
 CULL_REASONS = ("opacity", "distance", "frustum", "size", "footprint", "faded")
@@ -24,7 +24,9 @@ class RenderSettings:
     min_alpha: float = 1 / 255  # a pixel's alpha below this is not drawn (3DGS)
     low_pass: float = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)  # display sRGB
-    target: str = "rgba16f"  # what quads blend into; tiles blend float32 in registers
+    # What quads blend into (renderer/target.py); tiles blend float32 in registers.  auto: 16 bits
+    # from 0 to the scene's brightest colour, half floats where that is above 64 or not bounded.
+    target: str = "auto"
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
     min_through: float = 1e-4  # tiles: a pixel is done when less than this comes through (3DGS)
 

@@ -1,24 +1,27 @@
-"""splat: draws the sorted ellipses back to front into a float target, one a view."""
+"""splat: draws the sorted ellipses back to front into a picture, one a view."""
 
 import moderngl
 import numpy as np
 
 from renderer.buffers import Arena, bind
 from renderer.gpu import Gpu
+from renderer.target import DTYPES
 
-DTYPES = {"rgba8": "f1", "rgba16f": "f2", "rgba32f": "f4"}
+FULL = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}  # what stands for 1
 
 
 class Splatter:
     """Owns the images of the views; colour in them is premultiplied over nothing."""
 
-    def __init__(self, gpu: Gpu, target: str = "rgba16f") -> None:
+    def __init__(self, gpu: Gpu, target: str = "rgba16", unit: float = 1.0) -> None:
         if target not in DTYPES:
             raise ValueError(f"there is no target {target!r}; choose {', '.join(DTYPES)}.")
-        self.target = target  # may change from frame to frame
+        # Both may change from frame to frame.  unit: the display value that 1 in the picture means.
+        self.target, self.unit = target, unit
         self._gpu = gpu
         self._program = gpu.program("splat.vert", "splat.frag")
         self._targets: dict[int, moderngl.Framebuffer] = {}
+        self._units: dict[int, float] = {}  # of the images
         # No attributes and no indices: the shader pulls what it draws from the arena.
         self._triangles = gpu.ctx.vertex_array(self._program, [])
 
@@ -45,25 +48,35 @@ class Splatter:
         self._program["size"].value = size
         self._program["min_alpha"].value = min_alpha
         self._program["first"].value = first
+        self._program["per_unit"].value = 1 / self.unit
         self._triangles.render_indirect(arena.command, moderngl.TRIANGLES, count=1)
         ctx.memory_barrier()  # the next view's project overwrites what this draw still reads
 
     def texture(self, i: int) -> moderngl.Texture:
-        """The image of view i on the GPU, row 0 at the bottom."""
+        """The image of view i on the GPU, row 0 at the bottom; its colours count in unit_of(i)."""
         return self._targets[i].color_attachments[0]
+
+    def unit_of(self, i: int) -> float:
+        """The display value that 1 in the image of view i stands for."""
+        return self._units[i]
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 of view i, row 0 on top: the one place where GL's rows are turned."""
         texture = self.texture(i)
         width, height = texture.size
-        read = np.uint8 if texture.dtype == "f1" else texture.dtype
-        pixels = np.frombuffer(texture.read(), read).reshape(height, width, 4)
+        kind = np.dtype({"f1": np.uint8, "nu2": np.uint16}.get(texture.dtype, texture.dtype))
+        pixels = np.frombuffer(texture.read(), kind).reshape(height, width, 4)
         rows = np.ascontiguousarray(pixels[::-1], np.float32)
-        return rows / np.float32(255) if read is np.uint8 else rows
+        if kind in FULL:
+            rows /= np.float32(FULL[kind])
+        if self._units[i] != 1:
+            rows[..., :3] *= np.float32(self._units[i])
+        return rows
 
     def target_of(self, i: int, size: tuple[int, int]) -> moderngl.Framebuffer:
         """The image of view i to draw into, of this size and of the kind in use."""
         old, dtype = self._targets.get(i), DTYPES[self.target]
+        self._units[i] = self.unit
         if old is not None and old.size == tuple(size) and old.color_attachments[0].dtype == dtype:
             return old
         made = self._gpu.target(size, dtype)  # before the old one goes: it may be refused

@@ -271,6 +271,10 @@ class TilesDrawing:
         """What resolve takes: the image, row 0 on top."""
         return self._images[i]
 
+    def unit_of(self, i: int) -> float:
+        """The display value that 1 in presentable(i) stands for: floats hold any."""
+        return 1.0
+
     def presentable_rgba8(
         self,
         i: int,

@@ -89,7 +89,7 @@ def make(seed: int) -> Poisoned:
 def plain(settings: RenderSettings) -> bool:
     """Whether the first frame is what the oracle draws, to float rounding."""
     whole = settings.render_scale == 1 and not settings.debug and settings.min_through < 1e-3
-    return whole and settings.target != "rgba8" and settings.key_bits == 32
+    return whole and settings.target not in ("rgba8", "rgba16") and settings.key_bits == 32
 
 
 def walk(made: Poisoned) -> list[list[View]]:
@@ -141,7 +141,8 @@ def settings_of(rng: np.random.Generator) -> RenderSettings:
         "resort_degrees": [0.0, 180.0], "stereo_sort": ["shared", "each"],
         "stereo_colors": ["auto", "each", "shared"],
         "recolor_degrees": [0.0, 30.0], "skip_unseen": [False, True],
-        "target": ["rgba16f", "rgba32f", "rgba8"], "render_scale": [1.0, 1.0, 0.5, 2.0],
+        "target": ["auto", "rgba16f", "rgba32f", "rgba8", "rgba16"],
+        "render_scale": [1.0, 1.0, 0.5, 2.0],
         "min_through": [1e-4, 1e-6, 0.1],
         "debug": [""] * 8 + ["culls", "birdseye", "overdraw", "depth", "object"],
     }  # fmt: skip

@@ -51,7 +51,7 @@ def test_what_a_drawing_does_not_read_is_left_out():
         assert not any(field in n.changes for n in settings_of(drawing) for field in idle)
     assert any("min_through" in n.changes for n in settings_of("tiles"))
     targets = {n.changes.get("target") for n in settings_of("quads")}
-    assert {"rgba8", "rgba16f"} <= targets
+    assert {"rgba8", "rgba16f", "auto"} <= targets
     known = {field.name for field in fields(RenderSettings)}
     assert all(set(n.changes) <= known for n in SETTINGS)
 
@@ -70,7 +70,7 @@ def test_exact_is_float_and_shortcuts_blend_as_the_viewer_does():
         RenderSettings(), "quads"
     )
     assert render_settings(by_name[EXACT], BLACK, "quads", PLACES).target == "rgba32f"
-    assert render_settings(by_name["from 2 px"], BLACK, "quads", PLACES).target == "rgba16f"
+    assert render_settings(by_name["from 2 px"], BLACK, "quads", PLACES).target == "auto"
     assert render_settings(by_name["near"], BLACK, "tiles", PLACES).max_distance == 2.0
     assert render_settings(by_name["far"], (1, 0, 0), "tiles", PLACES).background == (1, 0, 0)
 

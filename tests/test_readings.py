@@ -87,9 +87,9 @@ def test_a_few_frames_are_kept_however_slow_they_are():
 def test_exact_leaves_nothing_out_and_keeps_the_background():
     rough = RenderSettings(background=(1, 0, 0), max_pixels=3, order="distance", debug="depth")
     assert exact(rough, "tiles") == RenderSettings(background=(1, 0, 0))
-    assert exact(rough, "quads (rgba16f)").target == "rgba32f"
+    assert exact(rough, "quads (rgba16)").target == "rgba32f"
     assert is_exact(RenderSettings(debug="culls", background=(0, 1, 0)), "tiles (PoCL)")
-    assert not is_exact(RenderSettings(), "quads (rgba16f)")  # 16-bit floats round
+    assert not is_exact(RenderSettings(), "quads (rgba16)")  # 16 bits round
     assert is_exact(RenderSettings(target="rgba32f"), "quads (rgba32f)")
     assert shortcuts(rough) == ["max_pixels", "order"]
 

@@ -287,7 +287,7 @@ def test_photos_that_another_splatter_made_are_drawn_again(renderer, data, modal
         ({"drawing": "quads"}, "quads are drawn with GL; open a context, or draw tiles"),
         ({"mlps": "gl"}, "tiles decode and sort without GL"),
         ({"sort": "gl"}, "tiles decode and sort without GL"),
-        ({"target": "rgb565"}, "there is no target 'rgb565'; choose rgba8, rgba16f, rgba32f"),
+        ({"target": "rgb565"}, "there is no target 'rgb565'; choose auto, rgba8, rgba16, rgba16f"),
         ({"drawing": "rays"}, "there is no drawing 'rays'; choose auto, quads, tiles"),
     ],
 )

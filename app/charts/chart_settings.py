@@ -57,7 +57,8 @@ COMBINED = {**AFTER_1, "recolor_degrees": 2.0, "min_pixels": 1.0}
 FAINT_AND_SMALL = {"min_alpha": 4 / 255, "min_pixels": 2.0}
 SETTINGS = (
     Named(EXACT, quick=True),
-    Named("rgba16f", {"target": "rgba16f"}, quick=True),
+    Named("16-bit target", {"target": "auto"}, quick=True),
+    Named("rgba16f", {"target": "rgba16f"}),
     Named("rgba8", {"target": "rgba8"}, quick=True),
     Named("16-bit keys", {"key_bits": 16}),
     Named("distance order", {"order": "distance"}),
@@ -132,7 +133,7 @@ def named_settings(name: str, drawing: str) -> Named:
 def render_settings(
     named: Named, background: tuple[float, float, float], drawing: str, distances: Distances
 ) -> RenderSettings:
-    """What to draw a row with.  Shortcuts blend into half floats, as the viewer does; exact not."""
+    """What to draw a row with.  Shortcuts blend into 16 bits, as the viewer does."""
     plain = exact(RenderSettings(background=background), drawing)
     if not named.changes and not named.place:
         return plain

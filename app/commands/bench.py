@@ -40,8 +40,9 @@ class Options(ReadingOptions):
     """Where GL comes from."""
     settings: str = ""
     """A setting by its name in the chart, such as "sort every 4"; wrong names list them all."""
-    target: Literal["", "rgba8", "rgba16f", "rgba32f"] = ""
-    """What quads blend into; default rgba16f, or what --settings says."""
+    target: Literal["", "auto", "rgba8", "rgba16", "rgba16f", "rgba32f"] = ""
+    """What quads blend into; default auto (rgba16 where the scene's colours fit, else rgba16f), or
+    what --settings says."""
     target_ms: float | None = None
     """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
     machine; measured once, in seconds, and kept."""

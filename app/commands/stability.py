@@ -30,8 +30,8 @@ class Options(ReadingOptions):
     """Folder for stability.csv and the pictures."""
     cases: tuple[str, ...] = ()
     """Names of cases; default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
-    stereo, far-origin, depth-range, inside, lenses, random-eyes, needles, limits, counts, crowd,
-    extrapolated-x, broken-heads, life."""
+    stereo, far-origin, depth-range, inside, lenses, random-eyes, needles, faint-layers, limits,
+    counts, crowd, extrapolated-x, broken-heads, life."""
     size: str = "640x360"
     """WIDTHxHEIGHT in pixels."""
     steps: int = 24

@@ -206,8 +206,9 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
     imgui.end_disabled()
     tip(
         "Tiles blend in float32 registers: there is no target to choose." if tiles
-        else "What quads blend into: 8 bits are fastest and band, 16-bit floats are good to "
-        "about 58 dB, 32-bit floats are exact.", ui_scale,
+        else "What quads blend into. auto: 16 bits from 0 to the scene's brightest colour, 80 dB "
+        "and more; 16-bit floats where no such colour is known, 35 to 60 dB. 8 bits band, 32-bit "
+        "floats are exact.", ui_scale,
     )  # fmt: skip
     imgui.begin_disabled(not tiles)
     values = sorted({*STOPS, settings.min_through})

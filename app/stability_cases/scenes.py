@@ -1,6 +1,6 @@
 """Small scenes that cases make themselves: their right picture is known, whatever the user's is."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,44 @@ def around(count: int = 1200, seed: int = 0) -> SplatLayers:
     scales = np.exp(rng.normal(-2, 0.6, (count, 3)))
     color, opacity = rng.uniform(size=(count, 3)), rng.uniform(0.05, 1, count)
     return splats(means, scales, opacity, color, turns(count, rng))
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Faint round splats side by side in one plane, the first before the second, each in the middle
+    of a pixel: what they look like is known without any projection.
+    """
+
+    view: View
+    scene: Scene
+    picture: np.ndarray  # (H, W, 4) float64
+
+
+def faint_layers(count: int, size: tuple[int, int], opacity: float, sigma_px: float) -> Layers:
+    """`count` splats of random colours with footprints of sigma_px, blended by their formula."""
+    rng, (width, height), distance = np.random.default_rng(3), size, 3.0
+    view = front(size, distance)
+    column, row = rng.integers(0, width, count), rng.integers(0, height, count)
+    pixel = distance * (view.tangents[3] - view.tangents[2]) / height  # metres
+    x, y = (column + 0.5 - width / 2) * pixel, (height / 2 - row - 0.5) * pixel
+    color = rng.uniform(size=(count, 3))
+    sigma = sigma_px * pixel
+    thin = (sigma, sigma, 1e-3 * sigma)
+    scene = alone(splats(np.column_stack([x, y, np.zeros(count)]), thin, opacity, color))
+
+    away = np.arange(-int(4 * sigma_px), int(4 * sigma_px) + 1)
+    square = away[:, None] ** 2 + away**2
+    alpha = np.float32(opacity) * np.exp(-square / (2 * (sigma_px**2 + 0.3)))
+    alpha[alpha < 1 / 255] = 0
+    edge = len(away) // 2  # pixels around the picture, so that every footprint fits
+    through = np.ones((height + 2 * edge, width + 2 * edge))
+    image = np.zeros((*through.shape, 3))
+    for i, j, rgb in zip(row.tolist(), column.tolist(), color, strict=True):
+        under = through[i : i + len(away), j : j + len(away)]
+        image[i : i + len(away), j : j + len(away)] += (alpha * under)[..., None] * rgb
+        under *= 1 - alpha
+    whole = np.concatenate([image, 1 - through[..., None]], axis=2)
+    return Layers(view, scene, whole[edge:-edge, edge:-edge])
 
 
 def turns(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -27,6 +27,7 @@ CASES = {
     "lenses": places.lenses,
     "random-eyes": places.random_eyes,
     "needles": shapes.needles,
+    "faint-layers": shapes.faint,
     "limits": shapes.limits,
     "counts": shapes.counts,
     "crowd": shapes.crowd,

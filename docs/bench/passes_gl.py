@@ -145,7 +145,7 @@ class Passes:
         fragments = self.fragments()
         floor = self.full_screen_ms(round(fragments / (SIZE[0] * SIZE[1])))
         limit = {100_000: 5.0, 400_000: 9.0, 800_000: 12.0}.get(self.count, 12.0)
-        return f"draw rgba16f ({fragments / 1e6:.1f} M fragments)", ms, floor, limit
+        return f"draw {self.splatter.target} ({fragments / 1e6:.1f} M fragments)", ms, floor, limit
 
     def fragments(self) -> float:
         """Pixels of tight quads around all ellipses, which the triangles exceed by 30 %."""

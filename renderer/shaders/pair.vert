@@ -9,6 +9,7 @@ layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
 uniform vec2 size;    // pixels of the grid
 uniform vec2 shifts;  // x in the grid minus x in the left and right picture, pixels
 uniform uint count;   // splats; records of the right view start there
+uniform float per_unit;  // 1 over the display value that 1 in the pictures stands for
 
 out vec4 sigmas;  // place in the axes of the left and of the right ellipse
 flat out vec3 left_color;
@@ -56,8 +57,8 @@ void main() {
     if (in_left && in_right) {
         sigmas.zw = inverse(mat2(right.major, right.minor)) * (pixel - right.center);
     }
-    left_color = left.color;
-    right_color = right.color;
+    left_color = left.color * per_unit;
+    right_color = right.color * per_unit;
     opacities = vec2(left.opacity, right.opacity);
     gl_Position = vec4(2.0 * pixel / size - 1.0, 0.0, 1.0);
 }

@@ -5,6 +5,7 @@ uniform sampler2D image;
 uniform sampler2D palette;   // 256 x 1, display sRGB
 uniform float weight;        // 0: colours as they are, 1: palette alone
 uniform vec3 background;     // display sRGB
+uniform float unit;          // the display value that 1 in the image stands for
 uniform bool top_first;      // the image's first row is the upper one
 out vec4 shown;
 
@@ -21,6 +22,7 @@ vec3 palette_color(float luminance) {
 
 void main() {
     vec4 rgba = texture(image, top_first ? vec2(place.x, 1.0 - place.y) : place);
+    rgba.rgb *= unit;
     if (weight > 0.0) {
         float luminance = clamp(dot(rgba.rgb, LUMINANCE) / max(rgba.a, 1e-6), 0.0, 1.0);
         rgba.rgb = mix(rgba.rgb, palette_color(luminance) * rgba.a, weight);

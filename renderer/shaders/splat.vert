@@ -8,6 +8,7 @@ layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]
 layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
 uniform vec2 size;   // pixels
 uniform uint first;  // record of splat 0 in this view
+uniform float per_unit;  // 1 over the display value that 1 in the picture stands for
 
 out vec2 sigmas;              // place in the ellipse's own axes
 flat out vec4 color_opacity;
@@ -19,6 +20,6 @@ void main() {
     Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
     sigmas = e.cut * TRIANGLE[corner];
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
-    color_opacity = vec4(e.color, e.opacity);
+    color_opacity = vec4(e.color * per_unit, e.opacity);
     gl_Position = vec4(2.0 * pixel / size - 1.0, 0.0, 1.0);
 }

@@ -35,12 +35,17 @@ def test_targets_differ_in_what_rounding_costs(ctx):
     truth = reference_image(scene, view)
     with Renderer(ctx, "quads") as renderer:
         renderer.update(scene)
-        names = ("rgba8", "rgba16f", "rgba32f", "rgba8")
-        images = [draw(renderer, view, target=name) for name in names]
-        assert renderer.backends["drawing"] == "quads (rgba8)"
-    coarse, middle, fine = (psnr_db(image, truth) for image in images[:3])
-    assert 38 < coarse < middle - 6 and middle < fine - 6 and fine > 65
-    np.testing.assert_array_equal(images[0], images[3])  # made anew, the same again
+        names = ("rgba8", "rgba16f", "rgba16", "rgba32f", "auto", "rgba8")
+        images, told = [], []
+        for name in names:
+            images.append(draw(renderer, view, target=name))
+            told.append(renderer.backends["drawing"])
+        used = [*names[:4], "rgba16", "rgba8"]
+        assert told == [f"quads ({name})" for name in used]
+    coarse, halves, middle, fine = (psnr_db(image, truth) for image in images[:4])
+    assert 38 < coarse < halves - 6 and halves < middle - 12 and middle > fine - 6 and fine > 65
+    np.testing.assert_array_equal(images[4], images[2])
+    np.testing.assert_array_equal(images[0], images[5])  # made anew, the same again
     np.testing.assert_array_equal(np.rint(images[0] * 255) / np.float32(255), images[0])
     assert images[0].dtype == np.float32 and images[0].max() <= 1
 

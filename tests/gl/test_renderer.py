@@ -84,6 +84,7 @@ def stereo():
         ({"drawing": "tiles"}, 80),
         ({"drawing": "quads", "target": "rgba32f"}, 75),
         ({"drawing": "quads", "target": "rgba32f", "mlps": "gl", "sort": "gl"}, 75),
+        ({"drawing": "quads"}, 74),
         ({"drawing": "quads", "target": "rgba16f"}, 53),
     ],
     ids=lambda c: "-".join(c.values()) if isinstance(c, dict) else "",
@@ -310,7 +311,7 @@ def test_the_bound_framebuffer_stays_bound(opened, ctx, drawing):
 def test_software_gl_takes_the_cpu_back_ends(opened, ctx):
     renderer = opened("auto")
     if not is_software(ctx):
-        assert renderer.backends == {"drawing": "quads (rgba16f)", "mlps": "gl", "sort": "gl"}
+        assert renderer.backends == {"drawing": "quads (rgba16)", "mlps": "gl", "sort": "gl"}
     else:
         assert renderer.backends["drawing"].startswith("tiles (")
         assert renderer.backends["mlps"] == "onnxruntime"

@@ -22,6 +22,13 @@ def test_the_case_holds(ctx, name):
     assert result.panels
 
 
+def test_half_floats_lose_faint_layers(ctx):
+    """What the default was: the case would have said so."""
+    with Renderer(ctx, "quads", target="rgba16f") as renderer:
+        found = failures(CASES["faint-layers"](make_stage(renderer, ctx, reopen)))
+    assert len(found) == 2, found
+
+
 @pytest.mark.parametrize("name", ["disparity", "limits", "needles", "broken-heads", "crowd"])
 def test_the_case_holds_where_all_runs_in_gl(ctx, name):
     with Renderer(ctx, "quads", mlps="gl", sort="gl", target="rgba32f") as renderer:
