@@ -1,5 +1,6 @@
 """Several plain splat files to one scene with a stop per file."""
 
+import math
 import re
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from runtime_models.plain_splats import PlainSplats, Reading
 from runtime_models.stop_names import stems_named
 
 MODES = ("cumulative", "exclusive")
+BLOCK = 1 << 14  # splats at a time: nearly always the first of them tell
 
 
 def layer_files(folder: Path) -> list[Path]:
@@ -70,7 +72,10 @@ def join_layers(
     if antialiased and not all(part.antialiased for part in parts):
         what = "only some of the layers were trained antialiased"
         findings += (Finding(what, 0, "all are drawn so"),)
-    width = max(part.sh.shape[1] for part in parts)  # files of a lower degree get zeros
+    filed = max(part.sh.shape[1] for part in parts)
+    width = max(used_coefficients(part.sh) for part in parts)  # files of a lower degree get zeros
+    if width < filed:
+        provenance["sh_degree"] = math.isqrt(filed) - 1  # of the files
     pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
     parts.clear()
     shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
@@ -101,9 +106,25 @@ def moved(means: np.ndarray, shift: np.ndarray) -> np.ndarray:
     return (means + shift).astype(np.float32) if shift.any() else means
 
 
+def used_coefficients(sh: np.ndarray) -> int:
+    """1, 4, 9 or 16: how many of (N, M, 3) there are without the highest bands that are zero in
+    every splat.  They would be shaded at full price, and take 12 bytes a coefficient.
+    """
+    count = sh.shape[1]
+    while count > 1:
+        lower = (math.isqrt(count) - 1) ** 2
+        blocks = range(0, len(sh), BLOCK)
+        if any(sh[first : first + BLOCK, lower:count].any() for first in blocks):
+            return count
+        count = lower
+    return count
+
+
 def widened(sh: np.ndarray, width: int) -> np.ndarray:
-    """(N, width, 3): coefficients of a higher degree are zero."""
+    """(N, width, 3): coefficients of a higher degree are zero; bands above are left out."""
     more = width - sh.shape[1]
+    if more < 0:
+        return np.ascontiguousarray(sh[:, :width])
     return np.pad(sh, ((0, 0), (0, more), (0, 0))) if more else sh
 
 

@@ -117,6 +117,8 @@ def describe(model: Model, path: str | Path) -> dict:
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
     if plain:
+        if "sh_degree" in model.provenance:  # bands that are zero in every splat were left out
+            facts["sh_degree_in_file"] = model.provenance["sh_degree"]
         drawn = {"antialiased": True} if model.antialiased else {}
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]

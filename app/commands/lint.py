@@ -61,6 +61,7 @@ def examine(options: Options) -> dict:
         "format": facts["format"],
         "splats": facts["splats"],
         "sh_degree": facts["sh_degree"],
+        **{key: facts[key] for key in ("sh_degree_in_file",) if key in facts},
         "bytes": facts["bytes"],
         "extent_m": extent_of(sample),
         "origin_m": [float(c) for c in getattr(model, "origin", (0, 0, 0))],
@@ -151,6 +152,8 @@ def print_report(facts: dict) -> None:
     extent = " x ".join(f"{side:,.3g}" for side in facts["extent_m"])
     objects = f"{facts['objects']} objects, " if "objects" in facts else ""
     degree = "" if facts["sh_degree"] is None else f", SH degree {facts['sh_degree']}"
+    if "sh_degree_in_file" in facts:
+        degree += f" ({facts['sh_degree_in_file']} in the file, zero in every splat)"
     console.print(
         f"{facts['file']}: {facts['format']}, {objects}{facts['splats']:,} splats{degree}, "
         f"{facts['bytes']:,} bytes; {extent} m (1st to 99th percentile), "
