@@ -100,7 +100,7 @@ def _panel(axis, rows: list[ChartRow], title: str, clock: str) -> list[ChartRow]
 
 
 def family_of(row: ChartRow) -> str:
-    """Its kind, "" for exact; defaults under another name are the half-float target of quads."""
+    """Its kind, "" for exact; defaults under another name are the 16-bit target of quads."""
     return "" if row.name == "exact" else family(row.changes) or "pixels"
 
 
