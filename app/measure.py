@@ -15,6 +15,7 @@ from app.subject import Subject
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from scene.framing import distances_from, orbit_path
+from scene.json_fields import control_row
 from scene.metrics import psnr
 from scene.pose import View
 from scene.scene import Scene
@@ -72,7 +73,7 @@ class Measure:
             "sorts": float(np.mean(sorts)),
             "draw_passes": [name for name in passes if name in DRAW_PASSES],
             "draw_pass_ratio": float(np.median(mono) / drawing) if drawing else None,
-            "x": self.x,
+            "x": None if self.x is None else control_row(self.x),
             "objects": len(self.subject.scene.objects),
             "size": f"{self.size[0]}x{self.size[1]}",
             "quality_size": f"{quality_size[0]}x{quality_size[1]}",

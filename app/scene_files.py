@@ -48,6 +48,7 @@ def tell_findings(models: dict[str, "Model"]) -> None:
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:
     """What `launch.py info` prints of a scene file."""
+    from scene.json_fields import control_row
     from scene.scene_file import FORMAT
 
     return {
@@ -61,7 +62,7 @@ def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) ->
                 "name": item.name,
                 "model": item.model,
                 "splats": models[item.name].splat_count,
-                "x": item.x,
+                "x": control_row(item.x),
                 "position": list(item.position),
                 "collider": item.collider,
                 "static": item.static,

@@ -6,8 +6,9 @@ from renderer.buffers import Arena
 from renderer.gpu import Gpu
 from renderer.layers import Layers
 from renderer.networks import Networks
-from runtime_models.evaluate import Control, Evaluator, follows_eye
+from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import Model, SplatLayers
+from runtime_models.stop_weights import Controls
 
 MLPS = ("gl", "onnxruntime")
 
@@ -44,7 +45,7 @@ class Decoder:
     def geometry(
         self,
         i: int,
-        x: Control,
+        x: Controls,
         eye: np.ndarray | None = None,
         seen: np.ndarray | None = None,
     ) -> None:
@@ -59,7 +60,7 @@ class Decoder:
         else:
             model.geometry(arena, arena.starts[i], x)
 
-    def color(self, i: int, x: Control, eye: np.ndarray, seen: np.ndarray | None = None) -> None:
+    def color(self, i: int, x: Controls, eye: np.ndarray, seen: np.ndarray | None = None) -> None:
         """Colours of object i at x towards an eye (3,) in the object's frame; after geometry.
 
         seen: (A,) bool; the rest may keep what it has (compute passes colour all at once).

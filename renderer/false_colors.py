@@ -10,6 +10,7 @@ import numpy as np
 
 from renderer.palette import LUMINANCE, STEPS, palette_colors, thermal_weights
 from runtime_models.model import Model, SplatLayers
+from runtime_models.stop_weights import Controls
 from scene.scene import Scene
 
 
@@ -30,11 +31,11 @@ class FalseColors:
     tints: tuple[Tint | None, ...] | None = None
 
 
-def false_colors(scene: Scene, controls: list[float | np.ndarray]) -> FalseColors:
+def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
     """What the objects' control values ask for; controls: as control_of gives them."""
     asked = []  # (name, weights (n,)) an object, n = 1 for one value
     for thing, x in zip(scene.objects, controls, strict=True):
-        weights, stop = thermal_weights(thing.model.stops, np.atleast_1d(x))
+        weights, stop = thermal_weights(thing.model.blend, x)
         named = stop is not None and stop.palette and weights.any()
         asked.append((stop.palette, weights) if named else ("", np.zeros(1)))
     shown = [

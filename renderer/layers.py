@@ -6,8 +6,8 @@ import numpy as np
 from renderer import layout
 from renderer.buffers import Arena, bind
 from renderer.gpu import Gpu, groups_for
-from runtime_models.evaluate import Control
 from runtime_models.model import SplatLayers
+from runtime_models.stop_weights import Controls
 
 SH_ALIGN = 64  # splats; keeps parts of the coefficients to whole work groups
 
@@ -39,7 +39,7 @@ class Layers:
         model = self._model
         arena.write_geometry(i, model.means, model.scales, model.wxyz, model.opacity)
 
-    def geometry(self, arena: Arena, start: int, x: Control) -> None:
+    def geometry(self, arena: Arena, start: int, x: Controls) -> None:
         """Opacities of the layers that there are at x, or at (N,) one a splat -> rows start..."""
         model = self._model
         program, weights = self._weigh, self._weights

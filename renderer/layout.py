@@ -45,7 +45,7 @@ SLOTS = {
     "LAYER": 4,  # uint (n,)      which layer a plain splat is of
     "LAYER_WEIGHTS": 5,  # float          how much of each layer there is
     "OWN_OPACITY": 6,  # float (n,)     before the weight
-    "CONTROL": 6,  # float (A,)     a control value an anchor
+    "CONTROL": 6,  # vec4 (A, d / 4)  Psi of a control an anchor
     "PALETTE": 3,  # vec4 (256,)    display sRGB
     "TINT": 4,  # float (A,)     how much of the palette
 }

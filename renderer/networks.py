@@ -10,8 +10,8 @@ import numpy as np
 from renderer import layout
 from renderer.buffers import PARTS, Arena, bind
 from renderer.gpu import Gpu, groups_for
-from runtime_models.evaluate import Control
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
+from runtime_models.stop_weights import Control, Controls
 
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")  # their numbers in activation.glsl
 DIRECTION = 3  # inputs
@@ -107,8 +107,8 @@ class Networks:
         self._anchors = gpu.upload(anchors, "the model's anchors")
         self._features = gpu.upload(rows, "the model's features")
         self._heads = {name: self._prepare(name) for name in HEADS}
-        self._own: dict[str, _Head] = {}  # for a control value an anchor, made when there is one
-        self._control: moderngl.Buffer | None = None  # of these values
+        self._own: dict[str, _Head] = {}  # for a control an anchor, made when there is one
+        self._control: moderngl.Buffer | None = None  # Psi of these
 
     def _prepare(self, name: str, own_control: bool = False) -> "_Head":
         model, gpu, mlp = self._model, self._gpu, self._model.networks[name]
@@ -139,25 +139,26 @@ class Networks:
         )  # fmt: skip
         return _Head(name, mlp, packed, weights, stored, program)
 
-    def _heads_for(self, x: Control) -> dict[str, "_Head"]:
-        """The networks, ready for a control value or for (A,) of them, one an anchor."""
+    def _heads_for(self, x: Controls) -> dict[str, "_Head"]:
+        """The networks, ready for one control or for one an anchor."""
         if np.ndim(x) == 0:
             for head in self._heads.values():
-                head.set_control(self._model, float(x))
+                head.set_control(self._model, x)
             return self._heads
         if self._control is None:
             self._own = {name: self._prepare(name, own_control=True) for name in HEADS}
-            self._control = self._gpu.reserve(4 * len(self._model.anchors), "control values")
-        encoding = self._model.encoding
+            size = 16 * vecs(self._model.encoding.d) * len(self._model.anchors)
+            self._control = self._gpu.reserve(size, "control encodings")
+        width = self._model.encoding.d
         for head in self._own.values():  # models share programs
-            head.program["control_vecs"].value = vecs(encoding.d)
-            head.program["spacing"].value = encoding.spacing
-            head.program["sigma"].value = encoding.sigma
-        self._control.write(np.ascontiguousarray(x, np.float32))
+            head.program["control_vecs"].value = vecs(width)
+        rows = np.zeros((len(self._model.anchors), 4 * vecs(width)), np.float32)
+        rows[:, :width] = self._model.psi(x)
+        self._control.write(rows)
         return self._own
 
-    def geometry(self, arena: Arena, start: int, x: Control) -> None:
-        """Four networks at control x -> rows start... of the arena."""
+    def geometry(self, arena: Arena, start: int, x: Controls) -> None:
+        """Four networks at a control, or one an anchor -> rows start... of the arena."""
         heads = self._heads_for(x)
         k, count = self._model.splats_per_anchor, len(self._model.anchors)
         at_once = arena.staged // k  # anchors
@@ -167,7 +168,7 @@ class Networks:
                 self._run(heads[name], arena.staging, arena.staging_at(name), size, first, n)
             arena.pack_staged(start + first * k, n * k, self._anchors, first)
 
-    def color(self, arena: Arena, start: int, x: Control, eye: np.ndarray) -> None:
+    def color(self, arena: Arena, start: int, x: Controls, eye: np.ndarray) -> None:
         """The colour network at x towards an eye (3,) in the object's frame -> rows start..."""
         head = self._heads_for(x)["color"]
         head.program["eye"].value = tuple(float(v) for v in eye)
@@ -212,11 +213,11 @@ class _Head:
     weights: moderngl.Buffer
     stored: bool  # weights in a storage buffer, not a uniform block
     program: moderngl.ComputeShader
-    x: float | None = None  # control value that the first bias now holds
+    x: Control | None = None  # control that the first bias now holds
 
-    def set_control(self, model: AnchorModel, x: float) -> None:
+    def set_control(self, model: AnchorModel, x: Control) -> None:
         """Folds Psi(x) into the first layer's bias, where it is not there already."""
         if x != self.x:
-            bias = self.packed.folded_bias(model.encoding.encode(x))
+            bias = self.packed.folded_bias(model.psi(x)[0])
             self.weights.write(bias, offset=self.packed.bias_at)
             self.x = x

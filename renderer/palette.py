@@ -1,11 +1,11 @@
 """Palettes of thermal stops, and how much of a palette the control value asks for."""
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from runtime_models.model import BadFile, Stop
+from runtime_models.stop_weights import Controls, StopBlend
 from scene.scene import Scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
@@ -57,23 +57,22 @@ def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
     best: tuple[str, float, Stop | None] = ("", 0.0, None)
     for thing in scene.objects:
         for x in (thing.x, *(selector.x for selector in thing.selectors)) if thing.visible else ():
-            weights, stop = thermal_weights(thing.model.stops, np.array([x]))
+            weights, stop = thermal_weights(thing.model.blend, x)
             if stop is not None and weights[0] > best[1]:
                 best = (stop.palette, float(weights[0]), stop)
     return best
 
 
-def thermal_weights(stops: Sequence[Stop], x: np.ndarray) -> tuple[np.ndarray, Stop | None]:
-    """(n,) 0..1: how much of a palette each of the control values x (n,) asks for; and the thermal
-    stop that is nearest to most of them, None where no stop is thermal.
+def thermal_weights(blend: StopBlend, controls: Controls) -> tuple[np.ndarray, Stop | None]:
+    """(n,) 0..1: how much of a palette each of n controls asks for; and the thermal stop that is
+    nearest to most of them, None where no stop is thermal.
     """
-    stops = sorted(stops, key=lambda s: s.x)
-    thermal = [stop for stop in stops if stop.kind == "thermal"]
-    if not thermal or not len(x):
-        return np.zeros(len(x)), None
-    hats = [np.interp(x, [s.x for s in stops], [s is t for s in stops]) for t in thermal]
-    nearest = thermal[int(np.argmax(np.sum(hats, axis=1)))]
-    return np.minimum(np.sum(hats, axis=0), 1.0), nearest
+    rows = np.atleast_2d(blend.weights(controls))  # (n, S)
+    thermal = [s for s, stop in enumerate(blend.stops) if stop.kind == "thermal"]
+    if not thermal or not len(rows):
+        return np.zeros(len(rows)), None
+    nearest = thermal[int(np.argmax(rows[:, thermal].sum(axis=0)))]
+    return np.minimum(rows[:, thermal].sum(axis=1), 1.0), blend.stops[nearest]
 
 
 def apply_palette(rgba: np.ndarray, name: str, weight: float) -> np.ndarray:

@@ -29,8 +29,9 @@ from renderer.surface_quads import draw_surface
 from renderer.target import brightest, choose_target
 from renderer.timing import PassTimer
 from renderer.tint import Tinter
-from runtime_models.evaluate import Control, follows_eye
+from runtime_models.evaluate import follows_eye
 from runtime_models.model import Model, is_antialiased
+from runtime_models.stop_weights import Controls
 from scene.pose import View
 
 SAMPLE = 4096  # splats, for a median
@@ -77,7 +78,7 @@ class QuadsDrawing:
     def decode_geometry(
         self,
         i: int,
-        x: Control,
+        x: Controls,
         eye_object: np.ndarray | None = None,
         seen: np.ndarray | None = None,
     ) -> None:
@@ -96,7 +97,7 @@ class QuadsDrawing:
         self._arena.color_set(which, count)
 
     def decode_color(
-        self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None
+        self, i: int, x: Controls, eye_object: np.ndarray, seen: np.ndarray | None = None
     ) -> None:
         """Colours of object i at x, towards an eye (3,) in the object's frame.
 

@@ -30,6 +30,7 @@ from renderer.surface import Surface
 from renderer.timing import PassTimer
 from runtime_models.evaluate import follows_eye, shape_follows_control
 from runtime_models.model import Model, SplatLayers
+from runtime_models.stop_weights import Controls, same_controls
 from scene.control import control_key, control_of
 from scene.metrics import psnr
 from scene.pose import View
@@ -45,7 +46,7 @@ class _Decoded:
     model: Model
     colored: list[Colored]  # one for all views of a frame, or one a view
     key: tuple | None = None  # control_key of x; None: not decoded yet
-    x: float | np.ndarray = 0.0  # control value of its geometry, or (A,) one an anchor
+    x: Controls = 0.0  # of its geometry
     version: int = 0  # goes up with every other x
     tint: Tint | None = None  # false colours of its own; None: as decoded
     look: Look | None = None  # made for the first pair of eyes
@@ -118,9 +119,9 @@ class Renderer:
         self._drawing.place(poses)
         self._scene = scene
 
-    def _decode_geometry(self, i: int, decoded: _Decoded, x: float | np.ndarray) -> None:
+    def _decode_geometry(self, i: int, decoded: _Decoded, x: Controls) -> None:
         """Geometry of object i at x, unless it lies in the arena already."""
-        if decoded.key is not None and np.array_equal(x, decoded.x):
+        if decoded.key is not None and same_controls(x, decoded.x):
             return  # a selector changed where nothing is
         shaped = decoded.key is not None and not shape_follows_control(decoded.model)
         if not (

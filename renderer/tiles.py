@@ -27,8 +27,9 @@ from renderer.limits import check_tiles
 from renderer.settings import RenderSettings
 from renderer.surface import Surface
 from renderer.timing import PassTimer
-from runtime_models.evaluate import Control, Evaluator
+from runtime_models.evaluate import Evaluator
 from runtime_models.model import Model, SplatLayers, is_antialiased
+from runtime_models.stop_weights import Controls
 from scene.pose import OPENCV_FROM_EYE, View
 
 SAMPLE = 4096  # splats, for a median
@@ -97,7 +98,7 @@ class TilesDrawing:
     def decode_geometry(
         self,
         i: int,
-        x: Control,
+        x: Controls,
         eye_object: np.ndarray | None = None,
         seen: np.ndarray | None = None,
     ) -> None:
@@ -125,7 +126,7 @@ class TilesDrawing:
         self._color, self._set = self._colors[which], which
 
     def decode_color(
-        self, i: int, x: Control, eye_object: np.ndarray, seen: np.ndarray | None = None
+        self, i: int, x: Controls, eye_object: np.ndarray, seen: np.ndarray | None = None
     ) -> None:
         """Colours of object i at x, towards an eye (3,) in the object's frame.
 

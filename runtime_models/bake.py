@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.evaluate import Control, Evaluator, follows_eye
+from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import AnchorModel, BadFile, Finding, Model, ScaffoldModel, SplatLayers
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.spherical_harmonics import COEFFICIENTS, basis
+from runtime_models.stop_weights import Controls
 
 LEAST_ALPHA = 1 / 255  # no renderer draws a fainter splat
 DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3
@@ -20,7 +21,7 @@ Recolor = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 def bake(
     model: Model,
-    x: Control,
+    x: Controls,
     eye: np.ndarray | None = None,
     sh_degree: int = 3,
     recolor: Recolor | None = None,

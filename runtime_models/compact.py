@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime_models.evaluate import Evaluator
-from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp
+from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 
 LEAST_ALPHA = 1 / 255  # of the drawing rule: what is fainter everywhere is not drawn
 CONTROLS = 1025  # control values at which a hidden unit is looked at: 64 a width of Psi's Gaussians
@@ -74,8 +74,8 @@ def without_slots(mlp: Mlp, keep: np.ndarray, size: int) -> Mlp:
 def without_silent_units(mlp: Mlp, model: AnchorModel) -> Mlp:
     """The network without units of its first hidden layer that no anchor ever wakes.
 
-    Their largest sum is bounded part by part: features over all anchors, Psi over all x, and the
-    direction by its length; so whatever the eye and x are, the network gives what it gave.
+    Their largest sum is bounded part by part: features over all anchors, Psi over all controls, and
+    the direction by its length; so whatever the eye and x are, the network gives what it gave.
     """
     if len(mlp.weights) < 2:
         return mlp
@@ -85,7 +85,7 @@ def without_silent_units(mlp: Mlp, model: AnchorModel) -> Mlp:
     most, size = mlp.biases[0].astype(np.float64), np.abs(mlp.biases[0]).astype(np.float64)
     inputs = {
         "feature": model.features.astype(np.float64),
-        "control": psi_everywhere(model.encoding),
+        "control": psi_everywhere(model),
     }
     for part, values in inputs.items():
         if part in mlp.inputs:
@@ -106,6 +106,9 @@ def without_silent_units(mlp: Mlp, model: AnchorModel) -> Mlp:
     )
 
 
-def psi_everywhere(encoding: ControlEncoding) -> np.ndarray:
-    """(CONTROLS, d) float64 Psi of control values from 0 to 1."""
-    return encoding.encode(np.linspace(0, 1, CONTROLS)[:, None]).astype(np.float64)
+def psi_everywhere(model: AnchorModel) -> np.ndarray:
+    """(n, d) float64 Psi of numbers from 0 to 1 and of the stops: no blend of stops exceeds both
+    of its own in any weighted sum.
+    """
+    xs = np.append(np.linspace(0, 1, CONTROLS), [stop.x for stop in model.stops])
+    return model.encoding.encode(xs[:, None]).astype(np.float64)

@@ -9,7 +9,6 @@ from runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
     AnchorModel,
-    ControlEncoding,
     Mlp,
     Model,
     ScaffoldModel,
@@ -19,9 +18,8 @@ from runtime_models.model import (
 from runtime_models.rotation import normalize
 from runtime_models.session import BATCH, open_session
 from runtime_models.spherical_harmonics import shade
+from runtime_models.stop_weights import Controls
 from runtime_models.write_onnx import write_onnx
-
-Control = float | np.ndarray  # of everything, or (A,) one an anchor (layers: one a splat)
 
 
 def follows_eye(model: Model) -> bool:
@@ -36,7 +34,7 @@ def shape_follows_control(model: Model) -> bool:
     return isinstance(model, SplatLayers)
 
 
-def evaluate(model: Model, x: Control, eye: np.ndarray) -> Splats:
+def evaluate(model: Model, x: Controls, eye: np.ndarray) -> Splats:
     """The splats at control x seen from `eye` (3,), metres in the object's frame.
 
     Runs the networks as a package holds them, on every input, Psi(x) too: the plain twin of
@@ -82,7 +80,7 @@ class Evaluator:
         self._lasting: set[str] = set()  # of these, which hold for every x
         self._whole: dict[str, WholeNetwork] = {}  # for a control value an anchor
         self._threads = threads
-        self._own: tuple[np.ndarray, np.ndarray] | None = None  # x (A,) and its Psi (A, d)
+        self._own: tuple[np.ndarray, np.ndarray] | None = None  # x of anchors, Psi (A, d)
         self._centres: np.ndarray | None = None  # (A, k * 3) the anchor of every splat
         self._scaffold: ScaffoldEvaluator | None = None
         if isinstance(model, ScaffoldModel):
@@ -94,7 +92,7 @@ class Evaluator:
 
     def geometry(
         self,
-        x: Control,
+        x: Controls,
         unit: bool = True,
         eye: np.ndarray | None = None,
         seen: np.ndarray | None = None,
@@ -110,7 +108,7 @@ class Evaluator:
             return self._scaffold.geometry(eye, unit, seen)
         if isinstance(model, SplatLayers):
             weights = model.weights(x)  # (stops,) or (stops, N)
-            there = weights[model.layer] if np.ndim(x) == 0 else _own(weights, model.layer)
+            there = weights[model.layer] if weights.ndim == 1 else _own(weights, model.layer)
             return model.means, model.scales, model.wxyz, model.opacity * there
         if self._centres is None:
             self._centres = np.tile(model.anchors, model.splats_per_anchor)
@@ -122,7 +120,7 @@ class Evaluator:
 
     def color(
         self,
-        x: Control,
+        x: Controls,
         eye: np.ndarray,
         seen: np.ndarray | None = None,
         out: np.ndarray | None = None,
@@ -148,7 +146,7 @@ class Evaluator:
         return out
 
     def color_along(
-        self, x: Control, direction: np.ndarray, eye: np.ndarray | None = None
+        self, x: Controls, direction: np.ndarray, eye: np.ndarray | None = None
     ) -> np.ndarray:
         """(N, 3) display sRGB where each anchor is looked at along its direction (A, 3), unit.
 
@@ -160,7 +158,7 @@ class Evaluator:
 
     def _color(
         self,
-        x: Control,
+        x: Controls,
         rows: np.ndarray | slice,
         direction: np.ndarray,
         out: np.ndarray | None = None,
@@ -172,7 +170,7 @@ class Evaluator:
         out = np.empty(shape, np.float32) if out is None else out.reshape(shape)
         return self._run("color", x, direction, rows, out).reshape(-1, 3)
 
-    def _shape(self, name: str, x: Control) -> np.ndarray:
+    def _shape(self, name: str, x: Controls) -> np.ndarray:
         """(A, k * size) of a network of the geometry, of offset from the world's origin.
 
         With `keep`, one that does not see x is what it was.
@@ -189,7 +187,7 @@ class Evaluator:
     def _run(
         self,
         name: str,
-        x: Control,
+        x: Controls,
         direction: np.ndarray | None = None,
         rows: np.ndarray | slice = slice(None),
         out: np.ndarray | None = None,
@@ -230,22 +228,13 @@ class Evaluator:
             self._kept[name] = np.empty(shape, np.float32)
         return self._kept[name]
 
-    def _encoded(self, x: Control) -> np.ndarray:
+    def _encoded(self, x: Controls) -> np.ndarray:
         """Psi(x): (1, d) of one value, (A, d) of one an anchor."""
         if np.ndim(x) == 0:
-            return self.model.encoding.encode(float(x))[None]
+            return self.model.psi(x)
         if self._own is None or not np.array_equal(self._own[0], x):  # five networks ask for it
-            self._own = np.array(x, np.float32), encode_rows(self.model.encoding, x)
+            self._own = np.array(x), self.model.psi(x)
         return self._own[1]
-
-
-def encode_rows(encoding: ControlEncoding, x: np.ndarray) -> np.ndarray:
-    """(n, d) Psi of control values x (n,), float32 throughout: faster than encoding.encode."""
-    t = np.float32(np.arange(encoding.d) * encoding.spacing)
-    away = t - np.asarray(x, np.float32)[:, None]
-    away *= away
-    away *= np.float32(-1 / (2 * encoding.sigma**2))
-    return np.exp(away, out=away)
 
 
 def _own(weights: np.ndarray, layer: np.ndarray) -> np.ndarray:

@@ -1,16 +1,19 @@
 """The central types of what a scene holds: anchor model, plain splat layers, decoded splats."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from runtime_models.shapes import check
+from runtime_models.stop_weights import Controls, Pace, StopBlend, encode_control
 
 HEADS = ("offset", "scale", "rotation", "opacity", "color")
 SIZE_PER_SPLAT = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1, "color": 3}
 SCAFFOLD_HEADS = {"opacity": 1, "covariance": 7, "color": 3}  # numbers a splat
 OCTREE_RULES = ("round", "floor", "ceil", "progressive")
 STOP_KINDS = ("rgb", "thermal", "layer", "style")
+BETWEEN_STOPS = ("blend", "encoding")
 
 
 def one_line(text: str) -> str:
@@ -104,6 +107,8 @@ class AnchorModel:
     stops: tuple[Stop, ...]
     provenance: dict = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    pace: tuple[Pace, ...] = ()  # of some pairs of stops
+    between_stops: str = "blend"  # one of BETWEEN_STOPS: x there is a blend, or encoded as it is
 
     def __post_init__(self) -> None:
         check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
@@ -111,6 +116,15 @@ class AnchorModel:
     @property
     def splat_count(self) -> int:
         return len(self.anchors) * self.splats_per_anchor
+
+    @cached_property
+    def blend(self) -> StopBlend:
+        """What a control means."""
+        return StopBlend(self.stops, self.pace, self.between_stops == "encoding")
+
+    def psi(self, control: Controls) -> np.ndarray:
+        """(1, d) float32 control encoding, or (A, d) of one control an anchor."""
+        return encode_control(self.encoding, self.blend, control)
 
 
 @dataclass(frozen=True)
@@ -146,17 +160,21 @@ class SplatLayers:
     def splat_count(self) -> int:
         return len(self.means)
 
-    def weights(self, x: float | np.ndarray) -> np.ndarray:
-        """(stops,) float32 in 0..1: how much of each layer is there at x; (stops, n) for x (n,).
+    @cached_property
+    def blend(self) -> StopBlend:
+        """What a control means."""
+        return StopBlend(self.stops)
+
+    def weights(self, control: Controls) -> np.ndarray:
+        """(stops,) float32 in 0..1: how much of each layer is there; (stops, n) of n controls.
 
         Cumulative layers fade in on the way from the stop before and stay; exclusive layers fade
         out again on the way to the next stop.
         """
-        xs = np.array([s.x for s in self.stops])
-        rows = np.eye(len(xs))
+        rows = np.eye(len(self.stops))
         if self.mode == "cumulative":
             rows = np.tril(np.ones_like(rows))  # row i: what stop i shows
-        return np.array([np.interp(x, xs, column) for column in rows.T], np.float32)
+        return (self.blend.weights(control) @ rows).T.astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -196,6 +214,11 @@ class ScaffoldModel:
             offsets=(self.offsets, "A K 3"),
             scales=(self.scales, "A 3"),
         )
+
+    @cached_property
+    def blend(self) -> StopBlend:
+        """What a control means, though nothing depends on it."""
+        return StopBlend(self.stops)
 
     @property
     def splats_per_anchor(self) -> int:

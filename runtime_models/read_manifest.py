@@ -5,10 +5,19 @@ from dataclasses import dataclass
 from itertools import pairwise
 from reprlib import repr as short
 
-from runtime_models.model import HEADS, STOP_KINDS, BadFile, ControlEncoding, Stop
+from runtime_models.model import (
+    BETWEEN_STOPS,
+    HEADS,
+    STOP_KINDS,
+    BadFile,
+    ControlEncoding,
+    Stop,
+)
 from runtime_models.package_files import FORMAT
+from runtime_models.stop_weights import Pace
 
 LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
+LONGEST_PACE = 257  # weights of one pair of stops
 LARGEST_NUMBER = 1e30  # beyond it float32 products overflow
 PARTS = ("feature", "direction", "control")
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")
@@ -31,6 +40,8 @@ class Manifest:
     stops: tuple[Stop, ...]
     heads: dict[str, Head]
     provenance: dict
+    pace: tuple[Pace, ...] = ()
+    between_stops: str = "blend"
 
 
 def read_manifest(data: bytes, where: str) -> Manifest:
@@ -50,14 +61,21 @@ def read_manifest(data: bytes, where: str) -> Manifest:
         raise BadFile(f"{where} has up axis {short(top.get('up'))}, expected '+Y'; turn the scene.")
     provenance = Wanted(entries.get("provenance", {}), f"{where} 'provenance'")
     check_view(provenance)
-    heads = top.object("heads")
+    heads, stops = top.object("heads"), read_stops(top.get("stops"), where)
+    between = entries.get("between_stops", "blend")
+    if between not in BETWEEN_STOPS:
+        raise BadFile(
+            f"{where}: 'between_stops' is {short(between)}, expected one of {list(BETWEEN_STOPS)}."
+        )
     return Manifest(
         top.count("splats_per_anchor"),
         top.count("feature_width"),
         read_encoding(top.object("encoding")),
-        read_stops(top.get("stops"), where),
+        stops,
         {name: read_head(name, heads.object(name)) for name in HEADS},
         provenance.entries,
+        read_pace(entries.get("pace", []), {stop.name for stop in stops}, where),
+        between,
     )
 
 
@@ -161,6 +179,30 @@ def read_stop(want: Wanted) -> Stop:
     if not low < high:
         raise BadFile(f"{want.where}: value_range is {low} to {high}, expected the lower first.")
     return Stop(name, x, kind, palette, (low, high), unit)
+
+
+def read_pace(rows: object, stops: set[str], where: str) -> tuple[Pace, ...]:
+    """The paces of some pairs of stops."""
+    if not isinstance(rows, list):
+        raise BadFile(f"{where}: 'pace' is {short(rows)}, expected a list of pairs of stops.")
+    paces: dict[frozenset[str], Pace] = {}
+    for i, row in enumerate(rows):
+        want = Wanted(row, f"{where} pace {i}")
+        ends, blend = (want.text("from"), want.text("to")), want.get("blend")
+        if not (set(ends) <= stops and ends[0] != ends[1] and frozenset(ends) not in paces):
+            raise BadFile(
+                f"{want.where} is from {short(ends[0])} to {short(ends[1])}, expected two stops of "
+                "the scene, each pair once."
+            )
+        listed = isinstance(blend, list) and 2 <= len(blend) <= LONGEST_PACE
+        if not (listed and all(map(is_number, blend))):
+            raise BadFile(f"{want.where}: blend is {short(blend)}, expected 2 to {LONGEST_PACE} "
+                          "numbers.")  # fmt: skip
+        try:
+            paces[frozenset(ends)] = Pace(*ends, tuple(map(float, blend)))
+        except ValueError as error:
+            raise BadFile(f"{want.where}: {error}") from None
+    return tuple(paces.values())
 
 
 def check_view(provenance: Wanted) -> None:

@@ -42,7 +42,7 @@ def read_files(read: Callable[[str], bytes], package: str) -> AnchorModel:
     }
     return AnchorModel(
         anchors, features, networks, manifest.splats_per_anchor, manifest.encoding,
-        manifest.stops, manifest.provenance,
+        manifest.stops, manifest.provenance, (), manifest.pace, manifest.between_stops,
     )  # fmt: skip
 
 

@@ -77,6 +77,11 @@ class StopBlend:
     def names(self) -> tuple[str, ...]:
         return tuple(stop.name for stop in self.stops)
 
+    @property
+    def through_numbers(self) -> bool:
+        """Whether a way between two numbers leads through all numbers between them."""
+        return self.direct or len(self.stops) < 2
+
     @cached_property
     def _table(self) -> tuple[np.ndarray, np.ndarray]:
         """x (K,) rising, and the weights of all stops there (K, S): straight lines in between."""
@@ -153,7 +158,7 @@ class StopBlend:
         """Whether all numbers between two controls mean a blend of the same two stops."""
         if isinstance(start, StopWeights) or isinstance(end, StopWeights) or np.ndim(start) == 2:
             return False
-        if self.direct or len(self.stops) < 2:
+        if self.through_numbers:
             return True
         xs = sorted(stop.x for stop in self.stops)
         low, high = min(np.min(start), end), max(np.max(start), end)
@@ -192,6 +197,9 @@ def _along(curve: np.ndarray, part: np.ndarray) -> np.ndarray:
     return np.interp(part, np.linspace(0, 1, len(curve)), curve)
 
 
+NO_STOPS = StopBlend(())
+
+
 def _part_of(curve: np.ndarray, share: float | np.ndarray) -> np.ndarray:
     """How far along its way a curve has mixed in so much."""
     return np.interp(share, curve, np.linspace(0, 1, len(curve)))
@@ -218,7 +226,7 @@ def encode_control(encoding: "ControlEncoding", blend: StopBlend, control: Contr
 
 def _is_outside(blend: StopBlend, x: np.ndarray) -> np.ndarray:
     """Whether numbers lie between no two stops that are to be blended; as many."""
-    if blend.direct or len(blend.stops) < 2:
+    if blend.through_numbers:
         return np.ones(x.shape, bool)
     xs = [stop.x for stop in blend.stops]
     return ~((x >= min(xs)) & (x <= max(xs)))
@@ -234,7 +242,23 @@ def _encoded(encoding: "ControlEncoding", x: float | np.ndarray) -> np.ndarray:
     """(n, d) float32 Psi of numbers."""
     if np.ndim(x) == 0:
         return encoding.encode(float(x))[None]
-    return encoding.encode(np.asarray(x, np.float32)[:, None])
+    return encode_rows(encoding, x)
+
+
+def encode_rows(encoding: "ControlEncoding", x: np.ndarray) -> np.ndarray:
+    """(n, d) Psi of numbers x (n,), float32 throughout: faster than encoding.encode."""
+    t = np.float32(np.arange(encoding.d) * encoding.spacing)
+    away = t - np.asarray(x, np.float32)[:, None]
+    away *= away
+    away *= np.float32(-1 / (2 * encoding.sigma**2))
+    return np.exp(away, out=away)
+
+
+def same_controls(one: Controls, other: Controls) -> bool:
+    """Whether two say the same in the same way."""
+    if np.ndim(one) and np.ndim(other):
+        return np.array_equal(one, other)
+    return np.ndim(one) == np.ndim(other) and one == other
 
 
 def check_control(control: Control, whose: str) -> None:

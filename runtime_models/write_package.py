@@ -65,6 +65,7 @@ def describe_model(model: AnchorModel) -> dict:
             "spacing": model.encoding.spacing,
         },
         "stops": [describe_stop(stop) for stop in model.stops],
+        **describe_between(model),
         "heads": {
             name: {
                 "file": f"{name}.onnx",
@@ -76,6 +77,16 @@ def describe_model(model: AnchorModel) -> dict:
         "up": "+Y",
         "provenance": plain(model.provenance),
     }
+
+
+def describe_between(model: AnchorModel) -> dict:
+    """What older readers pass over; left out where it is as usual."""
+    rows = {} if model.between_stops == "blend" else {"between_stops": model.between_stops}
+    if model.pace:
+        rows["pace"] = [
+            {"from": pace.start, "to": pace.end, "blend": list(pace.blend)} for pace in model.pace
+        ]
+    return rows
 
 
 def describe_stop(stop: Stop) -> dict:

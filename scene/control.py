@@ -1,5 +1,6 @@
-"""The control value x over stops and time, and from place to place where an object has selectors.
+"""The control over stops and time, and from place to place where an object has selectors.
 
+It is a number x, a place on the slider, or a blend of any stops (runtime_models/stop_weights.py).
 The rule for x outside 0 to 1, where no network was trained: whoever asks for it by number is
 refused (commands, SceneObject and selectors name the value, NaN too); what a hand or a clock moves
 is clamped (sliders, snap, Sweep).  So nothing below ever meets such a value.
@@ -11,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime_models.model import SplatLayers, Stop
+from runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend
 from scene.scene import SceneObject
+from scene.selector import Selector
 
 SNAP = 0.02  # of the slider's range: nearer than this to a stop is on the stop
 
@@ -23,23 +26,36 @@ def snap(x: float, stops: Sequence[Stop], reach: float = SNAP) -> float:
     return nearest if abs(nearest - x) <= reach else x
 
 
-def control_of(thing: SceneObject) -> float | np.ndarray:
-    """x of an object: one value for all of it, or (A,) float32, one an anchor (layers: a splat).
+def control_of(thing: SceneObject) -> Controls:
+    """Of an object: one for all of it, or one an anchor (layers: a splat), float32: numbers (A,),
+    or where these do not do weights of its stops (A, S).
 
-    Each selector mixes its x in by its weight at the anchor, so that a border shows what the slider
-    shows on the way between both.
+    A border shows what a shift from outside to inside shows on its way: no third stop.
     """
-    if not thing.selectors:
-        return thing.x
+    x: Controls = thing.x
+    for selector in thing.selectors:
+        weights = selector_weights(thing, selector)
+        if not weights.any():  # a lens that looks elsewhere costs nothing
+            continue
+        whole = (weights == weights[0]).all()
+        x = thing.model.blend.between(x, selector.x, float(weights[0]) if whole else weights)
+    return x if np.ndim(x) == 0 else np.clip(x, 0, 1).astype(np.float32)
+
+
+def selector_weights(thing: SceneObject, selector: Selector) -> np.ndarray:
+    """(A,) float32 0..1: how much of each anchor (layers: splat) is inside."""
     model = thing.model
     places = model.means if isinstance(model, SplatLayers) else model.anchors  # (A, 3) metres
-    x = np.full(len(places), thing.x)
-    for selector in thing.selectors:
-        weights = selector.weights(_in_space(places, thing, selector.space))
-        x += (selector.x - x) * weights
-    if not len(x) or (x == x[0]).all():  # a lens that looks elsewhere costs nothing
-        return float(x[0]) if len(x) else thing.x
-    return np.clip(x, 0, 1).astype(np.float32)
+    return selector.weights(_in_space(places, thing, selector.space))
+
+
+def covered(thing: SceneObject, selectors: Sequence[Selector]) -> np.ndarray:
+    """(A,) 0..1: how much of each anchor lies in any of them."""
+    model = thing.model
+    outside = np.ones(model.splat_count if isinstance(model, SplatLayers) else len(model.anchors))
+    for selector in selectors:
+        outside = outside * (1 - selector_weights(thing, selector))
+    return 1 - outside
 
 
 def control_key(thing: SceneObject) -> tuple:
@@ -75,17 +91,37 @@ EASES = {  # name -> (part of the way at part t of the time, its inverse)
     "slow end": (lambda t: t * (2 - t), lambda y: 1 - (1 - y) ** 0.5),
 }
 MODES = ("ping-pong", "loop", "once")
+SHIFT_S = 0.6  # from any stop to any other, when somebody asks for it
+
+
+@dataclass
+class Shift:
+    """The control of an object on its way from where it is to where somebody wants it."""
+
+    start: Control
+    end: Control
+    blend: StopBlend  # of the object's model
+    seconds: float = 0.0  # since it began
+
+    @property
+    def control(self) -> Control:
+        return self.blend.between(self.start, self.end, ease(min(self.seconds / SHIFT_S, 1.0)))
+
+    @property
+    def over(self) -> bool:
+        return self.seconds >= SHIFT_S
 
 
 @dataclass
 class Sweep:
-    """x as a function of time: from stop to stop, resting a moment at each.
+    """The control as a function of time: from stop to stop, resting a moment at each.
 
     `seconds` counts playing time, so stopping and resuming keeps its place; `resume_at` moves it
     to where the hand has left the slider.  All fields may be changed while it plays.
     """
 
     xs: tuple[float, ...]  # x of the stops to visit, ascending
+    blend: StopBlend = NO_STOPS  # of the model: ways between them; without: through all x
     leg_s: float = 2.5  # from one stop to the next
     rest_s: float = 0.8  # at each stop
     seconds: float = 0.0
@@ -94,8 +130,8 @@ class Sweep:
     mode: str = "ping-pong"  # one of MODES: back the same way, back in one leg, or ends there
 
     @staticmethod
-    def over(stops: Sequence[Stop]) -> "Sweep":
-        return Sweep(tuple(sorted({s.x for s in stops})))
+    def over(blend: StopBlend) -> "Sweep":
+        return Sweep(tuple(sorted({stop.x for stop in blend.stops})), blend)
 
     @property
     def way(self) -> tuple[float, ...]:
@@ -110,45 +146,69 @@ class Sweep:
         """Seconds of one round; 0 when there is nowhere to go."""
         return max(len(self.way) - 1, 0) * (self.leg_s + self.rest_s)
 
-    def play(self, x: float) -> float:
-        """Starts at x; returns where: the beginning when a single round was at its end."""
+    def play(self, control: Control) -> Control:
+        """Starts there; returns where: the beginning when a single round was at its end."""
         self.playing = self.period > 0
-        if self.playing and self.mode == "once" and x >= self.xs[-1]:
+        at_end = self.playing and self.blend.place(control) >= self.xs[-1]
+        if at_end and self.mode == "once":
             self.seconds = 0.0
             return self.xs[0]
-        return x
+        return control
 
-    def advance(self, seconds: float) -> float:
-        """Plays on and returns x; a single round ends by itself."""
+    def advance(self, seconds: float) -> Control:
+        """Plays on and returns the control; a single round ends by itself."""
         if self.period > 0:
             self.seconds += seconds
             if self.mode != "once":
                 self.seconds %= self.period
             elif self.seconds >= self.period:
                 self.seconds, self.playing = self.period, False
-        return self.x
+        return self.control
 
     @property
-    def x(self) -> float:
+    def control(self) -> Control:
         if not self.period > 0:
             return self.xs[0] if self.xs else 0.0
         leg, into = self._place()
         part = EASES[self.ease][0](min(max((into - self.rest_s) / self.leg_s, 0.0), 1.0))
-        start, end = self.way[leg], self.way[leg + 1]
-        return start + (end - start) * part
+        return self.blend.between(self.way[leg], self.way[leg + 1], part)
 
-    def resume_at(self, x: float) -> None:
-        """Continues from x, on the next leg that passes it, if possible in the same direction."""
-        if not self.period > 0 or abs(self.x - x) < 1e-6:
+    @property
+    def x(self) -> float:
+        """Where the slider's knob is."""
+        return self.blend.place(self.control)
+
+    def resume_at(self, control: Control) -> None:
+        """Continues from there, on the next leg that passes it, if possible in the same direction.
+
+        Where none does, since a stop is not visited, on one that passes the knob's place.
+        """
+        if not self.period > 0 or self._shows(self.control, control):
             return
-        way = self.way
+        x, way = self.blend.place(control), self.way
         x = min(max(x, self.xs[0]), self.xs[-1])
         now, count = self._place()[0], len(way) - 1
         upwards = way[now + 1] > way[now]
+
+        def part_at(leg: int) -> float:
+            return min(max((x - way[leg]) / (way[leg + 1] - way[leg]), 0.0), 1.0)
+
+        def preferred(leg: int) -> tuple:
+            there = self.blend.between(way[leg], way[leg + 1], part_at(leg))
+            turns = (way[leg + 1] > way[leg]) != upwards
+            return not self._shows(there, control), turns, (leg - now) % count
+
         passing = [i for i in range(count) if min(way[i : i + 2]) <= x <= max(way[i : i + 2])]
-        leg = min(passing, key=lambda i: ((way[i + 1] > way[i]) != upwards, (i - now) % count))
-        part = EASES[self.ease][1](min(max((x - way[leg]) / (way[leg + 1] - way[leg]), 0.0), 1.0))
+        leg = min(passing, key=preferred)
+        part = EASES[self.ease][1](part_at(leg))
         self.seconds = leg * (self.leg_s + self.rest_s) + self.rest_s + part * self.leg_s
+
+    def _shows(self, one: Control, other: Control) -> bool:
+        """Whether two controls look the same."""
+        apart = self.blend.weights(one) - self.blend.weights(other)
+        return abs(self.blend.place(one) - self.blend.place(other)) < 1e-6 and (
+            bool((np.abs(apart) < 1e-5).all())
+        )
 
     def _place(self) -> tuple[int, float]:
         """The leg of the way it is on, and seconds since it began, with the rest before it."""

@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from runtime_models.stop_weights import Control, StopWeights, check_control
 from scene.pose import Pose
 from scene.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
-from scene.selector import check_x
 
 LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
@@ -74,10 +74,10 @@ def place(file: SceneFile, name: str, pose: Pose) -> SceneFile:
     return change(file, name, position=position, wxyz=wxyz)
 
 
-def set_x(file: SceneFile, name: str, x: float) -> SceneFile:
+def set_x(file: SceneFile, name: str, x: Control) -> SceneFile:
     """With the object's x at the start.  ValueError beyond 0 to 1."""
-    check_x(x, f"object '{name}'")
-    return change(file, name, x=float(x))
+    check_control(x, f"object '{name}'")
+    return change(file, name, x=x if isinstance(x, StopWeights) else float(x))
 
 
 def rename(file: SceneFile, before: str, after: str) -> SceneFile:

@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from runtime_models.model import BadFile
+from runtime_models.stop_weights import Control, StopWeights
 from scene.camera_list import is_number
 
 MOST_BYTES = 32 << 20  # of JSON: a million painted weights
@@ -50,6 +51,17 @@ def read_object_file(path: Path) -> "Fields":
     return read_object(path.read_bytes(), path.name)
 
 
+def control_row(control: Control, decimals: int | None = None) -> float | dict[str, float]:
+    """A control as JSON has it: the inverse of Fields.control; rounded where it is only told."""
+
+    def number(value: float) -> float:
+        return value if decimals is None else round(float(value), decimals) + 0.0  # never -0
+
+    if isinstance(control, StopWeights):
+        return {name: number(weight) for name, weight in control.parts}
+    return number(control)
+
+
 def shown(value: object) -> str:
     """A value as the file has it, cut short."""
     try:
@@ -84,6 +96,20 @@ class Fields:
         if key in self.data and not (is_number(value) and low <= value <= high):
             raise self.refuse(key, wanted)
         return float(value) if is_number(value) else value
+
+    def control(
+        self, key: str, default: object = _ABSENT, wanted: str = "0 to 1, or weights in braces,"
+    ) -> Control:
+        """A number from 0 to 1, or weights by the names of stops: {"RGB": 0.5, "Opened": 0.5}."""
+        value = self.take(key, default)
+        if key not in self.data or not isinstance(value, dict):
+            return self.number(key, default, wanted, 0, 1)
+        if not all(map(is_number, value.values())):
+            raise self.refuse(key, "weights that are numbers from 0 to 1, 1 in the sum,")
+        try:
+            return StopWeights(tuple(value.items()))
+        except ValueError:
+            raise self.refuse(key, "weights from 0 to 1, 1 in the sum,") from None
 
     def numbers(
         self, key: str, count: int, default: object = _ABSENT, most: float = 1e12

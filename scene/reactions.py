@@ -1,4 +1,5 @@
-"""How an object's x answers to what happens to it: declared as data, stepped as a pure function.
+"""How an object's control answers to what happens to it: declared as data, stepped as a pure
+function.
 
 A Machine is what a scene file declares, a Standing is where one object is in it.  `advance` takes a
 Standing, the time and what happened, and gives the next Standing: no clock, no engine, no state
@@ -11,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime_models.stop_weights import NO_STOPS, Control, StopBlend, StopWeights, check_control
 from scene.control import EASES
-from scene.selector import Box, Sphere, check_x
+from scene.selector import Box, Sphere
 
 KINDS = ("collision", "grab", "ray", "enter")
 NEXT = "next"  # as a goal: the state after this one, the first one after the last
@@ -21,15 +23,15 @@ SLACK_S = 1e-9  # of a time: steps of 1/90 s add up to a cooldown but for roundi
 
 @dataclass(frozen=True)
 class State:
-    """A named x that an object rests at."""
+    """A named control that an object rests at."""
 
     name: str
-    x: float
+    x: Control
 
     def __post_init__(self) -> None:
         if not self.name or self.name == NEXT:
             raise ValueError(f"a state is called '{self.name}'; any name but '{NEXT}' is wanted.")
-        check_x(self.x, f"state '{self.name}'")
+        check_control(self.x, f"state '{self.name}'")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +39,7 @@ class Reaction:
     """When what happens, x goes where and how."""
 
     on: str  # one of KINDS
-    to: str | float  # a state, NEXT, or an x
+    to: str | Control  # a state, NEXT, or a control
     after: tuple[str, ...] = ()  # states from which it goes there; none named: from all
     least_impulse_n_s: float = 0.0  # of a collision: from this one on
     region: Box | Sphere | None = None  # of an enter: world metres, the object's origin counts
@@ -48,10 +50,8 @@ class Reaction:
     def __post_init__(self) -> None:
         """Refuses what could never happen or never end: ValueError with a sentence."""
         _wanted(self, "on", self.on in KINDS, " or ".join(KINDS))
-        if isinstance(self.to, str):
-            _wanted(self, "to", bool(self.to), "a state, 'next' or a number from 0 to 1")
-        else:
-            _wanted(self, "to", 0 <= self.to <= 1, "a state, 'next' or a number from 0 to 1")
+        fits = bool(self.to) if isinstance(self.to, str | StopWeights) else 0 <= self.to <= 1
+        _wanted(self, "to", fits, "a state, 'next' or a number from 0 to 1")
         _wanted(self, "ease", self.ease in EASES, " or ".join(EASES))
         for name in ("seconds", "cooldown_s", "least_impulse_n_s"):
             unit = "N s" if name == "least_impulse_n_s" else "seconds"
@@ -68,7 +68,8 @@ class Machine:
 
     states: tuple[State, ...] = ()
     reactions: tuple[Reaction, ...] = ()
-    ring: bool = False  # x = 1 shows what x = 0 does: x only rises, and goes on from 0
+    ring: bool = False  # x = 1 shows what x = 0 does: from above, the way to 0 is that to 1
+    blend: StopBlend = NO_STOPS  # of the model: the ways between its stops
 
     def __post_init__(self) -> None:
         """Refuses goals that are no states: ValueError with a sentence."""
@@ -85,12 +86,39 @@ class Machine:
             for name in wanted:
                 if name not in names:
                     raise ValueError(f"'{name}' is no state; there are {known}.")
+        for state in self.states:
+            self.check(state.x, f"state '{state.name}'")
+        for reaction in self.reactions:
+            if not isinstance(reaction.to, str):
+                self.check(reaction.to, "'to'")
 
-    def nearest(self, x: float) -> str:
-        """The state whose x is nearest, the first of equals; "" where there is none."""
-        return min(self.states, key=lambda s: abs(s.x - x)).name if self.states else ""
+    def check(self, control: Control, whose: str) -> None:
+        """ValueError, one sentence, for a control that the object cannot have."""
+        check_control(control, whose)
+        if isinstance(control, StopWeights):
+            self.blend.weights(control)  # knows every stop
 
-    def goal(self, reaction: Reaction, state: str) -> State | float:
+    def nearest(self, control: Control) -> str:
+        """The state that is nearest, the first of equals; "" where there is none."""
+        if not self.states:
+            return ""
+        return min(self.states, key=lambda state: self._apart(state.x, control)).name
+
+    def _apart(self, a: Control, b: Control) -> float:
+        """By places on the slider; where one is a blend, by how much is to be mixed anew."""
+        if isinstance(a, StopWeights) or isinstance(b, StopWeights):
+            return float(np.abs(self.blend.weights(a) - self.blend.weights(b)).sum())
+        return abs(a - b)
+
+    def goes_over(self, start: Control, end: Control) -> bool:
+        """Whether the way of a ring leads up past 1, or to 1 instead of 0."""
+        if not self.ring or isinstance(end, StopWeights):
+            return False
+        if self.blend.through_numbers and not isinstance(start, StopWeights):
+            return end < start
+        return end == 0 < self.blend.place(start)
+
+    def goal(self, reaction: Reaction, state: str) -> State | Control:
         """Where the reaction leads from a state."""
         if not isinstance(reaction.to, str):
             same = [s for s in self.states if s.x == reaction.to]
@@ -121,33 +149,36 @@ class Event:
 
 @dataclass(frozen=True)
 class Motion:
-    """x on its way."""
+    """A control on its way."""
 
-    start: float
-    end: float
+    start: Control
+    end: Control
     began_s: float
     seconds: float
     ease: str
-    over: bool = False  # it goes up past 1 and on from 0
+    over: bool = False  # of a ring: it goes up, past 1 and on from 0
+    blend: StopBlend = NO_STOPS  # as of Machine
 
     def ends_by(self, time_s: float) -> bool:
         return time_s >= self.began_s + self.seconds - SLACK_S
 
-    def x(self, time_s: float) -> float:
-        """x at a time, 0 to 1."""
+    def x(self, time_s: float) -> Control:
+        """The control at a time."""
         if self.ends_by(time_s):
             return self.end
         part = EASES[self.ease][0](max(time_s - self.began_s, 0.0) / self.seconds)
-        value = self.start + (self.end + self.over - self.start) * part
-        return min(max(value - (value > 1), 0.0), 1.0)
+        if self.over and self.blend.through_numbers:
+            value = self.start + (self.end + 1 - self.start) * part
+            return min(max(value - (value > 1), 0.0), 1.0)
+        return self.blend.between(self.start, 1.0 if self.over else self.end, part)
 
 
 @dataclass(frozen=True)
 class Standing:
-    """Where one object is: its x, the state it is in or on its way to, what it waits for."""
+    """Where one object is: its control, the state it is in or on its way to, what it waits for."""
 
-    x: float
-    state: str = ""  # "" = an x without a name
+    x: Control
+    state: str = ""  # "" = a control without a name
     motion: Motion | None = None
     quiet_until_s: tuple[float, ...] = (-math.inf,) * len(KINDS)  # one of each of KINDS
     inside: tuple[bool, ...] | None = None  # of each reaction's region; None before the first step
@@ -162,18 +193,18 @@ class Fired:
     reaction: int  # its row in the machine
     before: str  # the state it was taken in
     after: str  # the state it leads to
-    to_x: float
+    to_x: Control
 
 
-def start(machine: Machine, x: float) -> Standing:
+def start(machine: Machine, x: Control) -> Standing:
     """An object at x, in the state that is nearest."""
-    check_x(x, "an object")
+    machine.check(x, "an object")
     return Standing(x, machine.nearest(x))
 
 
-def steer(machine: Machine, standing: Standing, x: float) -> Standing:
+def steer(machine: Machine, standing: Standing, x: Control) -> Standing:
     """The same after a hand has put x somewhere: no way goes on, no reaction waits longer."""
-    check_x(x, "an object")
+    machine.check(x, "an object")
     return replace(standing, x=x, state=machine.nearest(x), motion=None)
 
 
@@ -249,8 +280,10 @@ def _answer(
         quiet = list(standing.quiet_until_s)
         quiet[column] = standing.time_s + reaction.cooldown_s
         fired = Fired(kind, row, standing.state, name, x)
-        over = machine.ring and x < standing.x
-        motion = Motion(standing.x, x, standing.time_s, reaction.seconds, reaction.ease, over)
+        motion = Motion(
+            standing.x, x, standing.time_s, reaction.seconds, reaction.ease,
+            machine.goes_over(standing.x, x), machine.blend,
+        )  # fmt: skip
         standing = replace(standing, state=name, motion=motion, quiet_until_s=tuple(quiet))
         return _moved(standing, standing.time_s), [fired]
     return standing, []
@@ -271,14 +304,14 @@ class TwoAxes:
 
     def __post_init__(self) -> None:
         for name in ("below", "rest", "above"):
-            check_x(getattr(self, name), f"'{name}' of two axes")
+            check_control(getattr(self, name), f"'{name}' of two axes")
 
-    def x(self, balance: float, power: float) -> float:
-        """x of balance -1..1 and power 0..1; ValueError beyond."""
+    def x(self, balance: float, power: float, blend: StopBlend = NO_STOPS) -> Control:
+        """Of balance -1..1 and power 0..1; ValueError beyond.  blend: the model's."""
         if not (-1 <= balance <= 1 and 0 <= power <= 1):
             raise ValueError(f"balance {balance} and power {power}; -1 to 1 and 0 to 1 are wanted.")
         side = self.above if balance > 0 else self.below
-        return min(max(self.rest + (side - self.rest) * abs(balance) * power, 0.0), 1.0)
+        return blend.between(self.rest, side, abs(balance) * power)
 
 
 def _wanted(reaction: Reaction, field: str, fits: bool, wanted: str) -> None:

@@ -100,7 +100,7 @@ def read_looks(row: Fields) -> dict:
         "up": row.text("up", "", AXES),
         "flip": row.flag("flip"),
         **read_pose(row.inner("pose")),
-        "x": row.number("x", 0.0, "0 to 1", 0, 1),
+        "x": row.control("x", 0.0),
         "visible": row.flag("visible", True),
         "selectors": read_selectors(row),
         "collider": collider,
@@ -136,9 +136,7 @@ def read_view(row: Fields | None) -> FirstView | None:
 
 
 def read_state(row: Fields) -> State:
-    values = {"name": row.text("name"), "x": row.number("x", None, "0 to 1", 0, 1)}
-    if values["x"] is None:
-        raise BadFile(f"{row.where}: 'x' is missing.")
+    values = {"name": row.text("name"), "x": row.control("x")}
     row.done()
     return made(State, values, row.where)
 
@@ -157,7 +155,7 @@ def read_two_axes(row: Fields | None) -> TwoAxes | None:
 
 def read_reaction(row: Fields) -> Reaction:
     to, wanted = row.take("to"), "the name of a state, 'next' or a number from 0 to 1"
-    to = row.text("to", wanted=wanted) if isinstance(to, str) else row.number("to", 0, wanted, 0, 1)
+    to = row.text("to", wanted=wanted) if isinstance(to, str) else row.control("to", wanted=wanted)
     region = row.inner("region")
     values = {
         "on": row.text("on", known=KINDS),

@@ -114,7 +114,7 @@ def read_control(row: Fields, items: Sequence[SceneItem]) -> dict:
         "item": row.text("object", known=tuple(item.name for item in items)),
         "balance": row.number("balance", None, "-1 to 1", -1, 1),
         "power": row.number("power", None, "0 to 1", 0, 1),
-        "x": row.number("x", None, "0 to 1", 0, 1),
+        "x": row.control("x", None),
     }
     given = tuple(values[name] is not None for name in ("x", "balance", "power"))
     if given not in ((True, False, False), (False, True, True)):

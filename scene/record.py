@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from scene.json_fields import control_row
 from scene.reactions import Fired
 
 DECIMALS = 6  # of what is told: micrometres
@@ -31,7 +32,8 @@ class Record:
 
 def event_row(name: str, fired: Fired) -> dict:
     row = {"object": name, "on": fired.kind, "reaction": fired.reaction + 1}
-    return row | {"from": fired.before, "to": fired.after, "x": rounded(fired.to_x)}
+    to_x = control_row(fired.to_x, DECIMALS)
+    return row | {"from": fired.before, "to": fired.after, "x": to_x}
 
 
 def rounded(number: float) -> float:

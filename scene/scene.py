@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from runtime_models.model import Model
+from runtime_models.stop_weights import Control, StopWeights, check_control
 from scene.pose import UNIT_SLACK, Pose
-from scene.selector import Selector, check_x
+from scene.selector import Selector
 
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
@@ -17,10 +18,15 @@ class SceneObject:
     name: str
     model: Model
     world_from_object: Pose = IDENTITY
-    x: float = 0.0  # control value in [0, 1]
+    x: Control = 0.0  # a place on the slider, 0 to 1, or a blend of the model's stops
     label: int = 0  # 0 = background
     visible: bool = True
     selectors: tuple[Selector, ...] = ()  # parts with an x of their own; a later one lies above
+
+    @property
+    def slider_x(self) -> float:
+        """Where the knob of its slider is."""
+        return self.model.blend.place(self.x)
 
     def __post_init__(self) -> None:
         """Refuses a place or an x that is none: ValueError with a sentence."""
@@ -31,7 +37,10 @@ class SceneObject:
                 f"object '{self.name}' stands at {_told(pose.position)} with a quaternion "
                 f"{_told(pose.wxyz)}; finite metres and a quaternion of length 1 are wanted."
             )
-        check_x(self.x, f"object '{self.name}'")
+        for control in (self.x, *(selector.x for selector in self.selectors)):
+            check_control(control, f"object '{self.name}'")
+            if isinstance(control, StopWeights):
+                self.model.blend.weights(control)  # knows every stop
 
 
 def _told(numbers: np.ndarray) -> str:

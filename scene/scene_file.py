@@ -13,6 +13,7 @@ import numpy as np
 from runtime_models.model import BadFile, Model, SplatLayers
 from runtime_models.plain_splats import Reading
 from runtime_models.read_scene import read_model
+from runtime_models.stop_weights import Control
 from scene.framing import frame_points, framing_view, scene_points, view_from
 from scene.pose import Pose, View
 from scene.reactions import Machine, Reaction, State, TwoAxes
@@ -38,7 +39,7 @@ class SceneItem:
     flip: bool = False
     position: tuple[float, float, float] = (0.0, 0.0, 0.0)  # metres in the world
     wxyz: tuple[float, float, float, float] = UPRIGHT
-    x: float = 0.0
+    x: Control = 0.0
     visible: bool = True
     selectors: tuple[Selector, ...] = ()
     collider: str | None = None  # a mesh's path, HULLS, or None: nothing can touch it
@@ -129,9 +130,12 @@ def object_of(item: SceneItem, model: Model, label: int) -> SceneObject:
                 f"object '{item.name}': 'selectors': painted are {len(selector.weight):,} weights, "
                 f"its model has {count:,} anchors; paint it anew."
             )
-    return SceneObject(
-        item.name, model, item.pose, item.x, label, item.visible, selectors=item.selectors
-    )
+    try:
+        return SceneObject(
+            item.name, model, item.pose, item.x, label, item.visible, selectors=item.selectors
+        )
+    except ValueError as error:  # a blend of stops that its model has not
+        raise BadFile(f"object '{item.name}': 'x': {error}") from None
 
 
 def machine_of(item: SceneItem, model: Model) -> Machine:
@@ -140,10 +144,10 @@ def machine_of(item: SceneItem, model: Model) -> Machine:
     Raises BadFile for a state that is neither.
     """
     if not item.reactions:
-        return Machine(item.states)
+        return Machine(item.states, blend=model.blend)
     try:
         states = item.states or tuple(State(stop.name, stop.x) for stop in model.stops)
-        return Machine(states, item.reactions, item.ring)
+        return Machine(states, item.reactions, item.ring, model.blend)
     except ValueError as error:
         raise BadFile(f"object '{item.name}': 'reactions': {error}") from None
 

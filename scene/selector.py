@@ -1,7 +1,8 @@
-"""Parts of an object that have a control value of their own: the paper's selective visualisation.
+"""Parts of an object that have a control of their own: the paper's selective visualisation.
 
 Each selector gives every place a weight: 1 inside, and over `border` metres outside smoothly 0.
-Its x is mixed in by that weight; of several, a later one lies over an earlier one.  A selector is
+Its x, a number or a blend of stops, is mixed in by that weight; of several, a later one lies over
+an earlier one.  A selector is
 fixed to its object (space "object", metres in its frame), or stands in the world (space "world"),
 so that a moved object passes through it.
 """
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from runtime_models.stop_weights import Control, check_control
 from scene.pose import UNIT_SLACK, Pose
 
 SPACES = ("object", "world")
@@ -22,12 +24,12 @@ UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 class _Placed:
     """What every selector with a shape has."""
 
-    x: float  # control value inside, 0 to 1
+    x: Control  # inside
     border: float = 0.0  # metres outside the shape over which the weight falls to 0
     space: str = "object"  # one of SPACES
 
     def __post_init__(self) -> None:
-        check_x(self.x, _name(self))
+        check_control(self.x, _name(self))
         _wanted(self, "border", 0 <= self.border < math.inf, "metres, 0 or more")
         _wanted(self, "space", self.space in SPACES, " or ".join(SPACES))
 
@@ -153,10 +155,10 @@ class Painted:
     """Anchors chosen one by one; plain splats of SplatLayers likewise."""
 
     weight: np.ndarray  # (A,) float32 0..1, or bool
-    x: float
+    x: Control
 
     def __post_init__(self) -> None:
-        check_x(self.x, "Painted")
+        check_control(self.x, "Painted")
         weight = np.asarray(self.weight, np.float32)
         if weight.ndim != 1 or not ((weight >= 0) & (weight <= 1)).all():
             raise ValueError(
@@ -165,7 +167,7 @@ class Painted:
         object.__setattr__(self, "weight", weight)
 
     @staticmethod
-    def of(indices: Sequence[int], count: int, x: float) -> "Painted":
+    def of(indices: Sequence[int], count: int, x: Control) -> "Painted":
         """These of `count` anchors, entirely."""
         weight = np.zeros(count, np.float32)
         weight[np.asarray(indices, int)] = 1
@@ -193,12 +195,6 @@ class Painted:
 
 
 Selector = Box | Sphere | HalfSpace | Lens | Painted
-
-
-def check_x(x: float, whose: str) -> None:
-    """ValueError, naming the value, for what is not from 0 to 1: nothing was trained beyond."""
-    if not 0 <= x <= 1:
-        raise ValueError(f"{whose} has x = {x}; from 0 to 1 is wanted.")
 
 
 def carried(selector: Selector, world_from_before: Pose) -> Selector:

@@ -3,7 +3,7 @@
 from dataclasses import MISSING, fields
 
 from runtime_models.model import BadFile
-from scene.json_fields import Fields
+from scene.json_fields import Fields, control_row
 from scene.selector import SPACES, Box, HalfSpace, Lens, Painted, Selector, Sphere
 
 KINDS = {"box": Box, "sphere": Sphere, "half": HalfSpace, "lens": Lens, "painted": Painted}
@@ -22,6 +22,8 @@ def read_selector_row(row: Fields) -> Selector:
             values[field.name] = row.numbers(field.name, COUNTS[field.name], default)
         elif field.name == "space":
             values[field.name] = row.text("space", default, SPACES)
+        elif field.name == "x":
+            values["x"] = row.control("x")
         elif field.name == "weight":
             values[field.name] = row.numbers("weight", len(as_list(row.data["weight"])))
         else:
@@ -50,6 +52,8 @@ def selector_row(selector: Selector) -> dict:
         value = getattr(selector, field.name)
         if field.name == "weight":
             row["weight"] = value.tolist()
+        elif field.name == "x":
+            row["x"] = control_row(value)
         elif value is not None and (field.default is MISSING or value != field.default):
             row[field.name] = list(value) if isinstance(value, tuple) else value
     return row

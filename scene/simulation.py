@@ -36,8 +36,10 @@ class Simulation:
         self.world.grab(act.hand, act.reach_m)
 
     def control(self, act: Act) -> None:
-        axes = self.world.thing(act.item).item.two_axes
-        self.world.control(act.item, axes.x(act.balance, act.power) if act.x is None else act.x)
+        thing, x = self.world.thing(act.item), act.x
+        if x is None:
+            x = thing.item.two_axes.x(act.balance, act.power, thing.machine.blend)
+        self.world.control(act.item, x)
 
 
 DO = {

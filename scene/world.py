@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from runtime_models.model import Finding, Model
+from runtime_models.stop_weights import Control
 from scene.grab import jumped
+from scene.json_fields import control_row
 from scene.pose import Pose
 from scene.reactions import Event, advance, steer
 from scene.read_script import between
-from scene.record import Record, event_row, rounded
+from scene.record import DECIMALS, Record, event_row, rounded
 from scene.scene import Scene
 from scene.scene_file import SceneFile, SceneItem, labelled
 from scene.thing import Thing, after_step, drawn_thing, new_thing, same_pose
@@ -131,7 +133,7 @@ class World:
         self.things[name] = replace(thing, pose=pose, before=pose)
         self._stirred.add(name)
 
-    def control(self, name: str, x: float) -> None:
+    def control(self, name: str, x: Control) -> None:
         """Puts an object's x there at once; no reaction under way goes on."""
         thing = self.thing(name)
         self.things[name] = replace(thing, standing=steer(thing.machine, thing.standing, x))
@@ -337,7 +339,7 @@ class World:
         self.things[name] = after_step(thing, thing.pose if still else pose, standing, held)
         record.events += [event_row(name, answer) for answer in fired]
         told = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
-        x = rounded(standing.x)
+        x = control_row(standing.x, DECIMALS)
         if self._told.get(("pose", name)) != told:
             self._told["pose", name] = told
             record.poses[name] = list(told)

@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from runtime_models.whole_file import write_whole
+from scene.json_fields import control_row
 from scene.reactions import Reaction
 from scene.scene_file import FORMAT, HULLS, SceneFile, SceneItem
 from scene.selector_rows import selector_row
@@ -40,10 +41,12 @@ def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
                  "restitution", "ring"):  # fmt: skip
         if getattr(item, name) != getattr(PLAIN, name):
             row[name] = getattr(item, name)
+    if "x" in row:
+        row["x"] = control_row(item.x)
     if item.selectors:
         row["selectors"] = [selector_row(selector) for selector in item.selectors]
     if item.states:
-        row["states"] = [{"name": state.name, "x": state.x} for state in item.states]
+        row["states"] = [{"name": state.name, "x": control_row(state.x)} for state in item.states]
     if item.reactions:
         row["reactions"] = [reaction_row(reaction) for reaction in item.reactions]
     if item.two_axes:
@@ -52,7 +55,8 @@ def item_row(item: SceneItem, file: SceneFile, folder: Path) -> dict:
 
 
 def reaction_row(reaction: Reaction) -> dict:
-    row: dict = {"on": reaction.on, "to": reaction.to}
+    to = reaction.to if isinstance(reaction.to, str) else control_row(reaction.to)
+    row: dict = {"on": reaction.on, "to": to}
     for field in fields(Reaction):
         value = getattr(reaction, field.name)
         if field.name in ("on", "to") or value == field.default:

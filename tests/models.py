@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp, Stop
+from runtime_models.stop_weights import StopWeights
 from runtime_models.write_package import write_package
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0, "thermal", "ironbow", (15.0, 95.0), "°C"))
@@ -50,6 +51,24 @@ def make_random_model(
         STOPS,
         {"seed": seed},
     )
+
+
+def psi_of(model: AnchorModel, control: float | StopWeights) -> np.ndarray:
+    """(d,) float64 Psi of a control at even pace, by equations 6 and 7 and a sum over stops."""
+
+    def psi(x: float) -> np.ndarray:
+        t = np.arange(model.encoding.d) * model.encoding.spacing
+        return np.exp(-((t - x) ** 2) / (2 * model.encoding.sigma**2))
+
+    if isinstance(control, StopWeights):
+        place = {stop.name: stop.x for stop in model.stops}
+        return sum(weight * psi(place[name]) for name, weight in control.parts)
+    below = [stop.x for stop in model.stops if stop.x <= control]
+    above = [stop.x for stop in model.stops if stop.x >= control]
+    if model.between_stops == "encoding" or not (below and above) or below[-1] == above[0]:
+        return psi(control)
+    a, b = below[-1], above[0]
+    return ((b - control) * psi(a) + (control - a) * psi(b)) / (b - a)
 
 
 def without_control(model: AnchorModel, *names: str) -> AnchorModel:

@@ -9,6 +9,7 @@ from runtime_models.evaluate import evaluate
 from runtime_models.model import AnchorModel, Mlp
 from runtime_models.turn import HALF_TURN, turn_quaternions
 from runtime_models.write_onnx import write_onnx
+from tests.models import psi_of
 from tests.torch_files import write_tensors
 
 Layers = list[tuple[np.ndarray, np.ndarray]]  # (weight (out, in), bias (out,)) of each
@@ -210,7 +211,7 @@ def from_anchors(model: AnchorModel, x: float) -> Raw:
     where both are the same.  Its axes are COLMAP's, as a run's are.
     """
     heads, k = model.networks, model.splats_per_anchor
-    psi = model.encoding.encode(x).astype(np.float64)
+    psi = psi_of(model, x)
     opacity, color, scale, rotation = (
         folded(heads[name], psi) for name in ("opacity", "color", "scale", "rotation")
     )

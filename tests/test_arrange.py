@@ -171,6 +171,7 @@ def test_a_hand_on_the_slider_is_one_step(plain):
     arrange.undo(plain)
     assert plain.scene.objects[0].x == 0.0
     plain.go_to_stop(1)
+    plain.advance(1.0)
     assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
     assert arrange.undo(plain) == "stop 2"
     assert [thing.x for thing in plain.scene.objects] == [0.0, 0.0]

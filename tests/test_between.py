@@ -13,7 +13,7 @@ from test_training_gradients import LAYOUT, VOXEL, situation
 
 from app import cli
 from rasterizer.reference import finite_differences
-from runtime_models.model import BadFile, Stop
+from runtime_models.model import BadFile, ControlEncoding, Stop
 from runtime_models.read_scene import read_model
 from scene.capture import Capture
 from scene.pose import Pose, View, perspective
@@ -123,13 +123,29 @@ def test_a_package_shows_what_training_showed(device, rig):
 def test_ways_follow_from_seed_and_step_and_lie_between_neighbours():
     cure = Between("pictures", 0.25, 3, STOPS, {})
     again = Between("pictures", 0.25, 3, STOPS, {})
-    ways = [cure.way(i) for i in range(2000)]
-    assert ways == [again.way(i) for i in range(2000)]
+    ways = [cure.way(i, "A") for i in range(2000)]
+    assert ways == [again.way(i, "C") for i in range(2000)]
     taken = [way for way in ways if way is not None]
     assert 0.22 < len(taken) / len(ways) < 0.28
     assert {(w.low.name, w.high.name) for w in taken} == {("A", "B"), ("B", "C")}
-    assert all(w.low.x < w.x < w.high.x for w in taken)
-    assert ways != [Between("pictures", 0.25, 4, STOPS, {}).way(i) for i in range(2000)]
+    assert all(w.low.x < w.high.x and 0 < w.share < 1 for w in taken)
+    assert ways != [Between("pictures", 0.25, 4, STOPS, {}).way(i, "A") for i in range(2000)]
+
+
+def test_shapes_leave_the_photos_own_stop_towards_its_neighbours():
+    """As often as its colours have a part in the blend: 1 - share, a third of a way on average."""
+    cure = Between("shapes", 0.5, 3, STOPS, {})
+    for name, neighbours in (("A", {"B"}), ("B", {"A", "C"}), ("C", {"B"})):
+        taken = [way for i in range(4000) if (way := cure.way(i, name)) is not None]
+        assert 0.47 < len(taken) / 4000 < 0.53
+        assert {way.low.name for way in taken} == {name}
+        assert {way.high.name for way in taken} == neighbours
+        assert np.mean([way.share for way in taken]) == pytest.approx(1 / 3, abs=0.02)
+    psi = ControlEncoding(3, 0.5, 0.25)
+    rows = Way(STOPS[2], STOPS[1], 0.25, 0.0).psi_of_heads(psi)
+    wanted = 0.75 * psi.encode(0.4) + 0.25 * psi.encode(1.0)
+    np.testing.assert_allclose(rows[:4], np.tile(wanted, (4, 1)), atol=1e-7)
+    assert rows[4].tolist() == psi.encode(0.4).tolist()
 
 
 @pytest.mark.parametrize(
@@ -137,7 +153,7 @@ def test_ways_follow_from_seed_and_step_and_lie_between_neighbours():
              Between("photos", 1.0, 0, STOPS[:1], {"A": []})]
 )  # fmt: skip
 def test_who_asks_for_nothing_looks_at_stops_alone(cure):
-    assert cure.middle is None and all(cure.way(i) is None for i in range(50))
+    assert cure.middle is None and all(cure.way(i, "A") is None for i in range(50))
 
 
 def test_photos_are_paired_by_place_turn_lens_and_size():
@@ -159,7 +175,7 @@ def test_photos_are_paired_by_place_turn_lens_and_size():
 
 def test_a_capture_without_shared_places_is_refused(device, tmp_path):
     apart = fit_scenes.make_shapes(tmp_path, "shared", views=3, tests=1)
-    with pytest.raises(BadFile, match=r"same place.*--between pictures"):
+    with pytest.raises(BadFile, match=r"same place.*--between shapes"):
         Trainer(device, apart, replace(SETTINGS, between="photos"))
 
 
@@ -193,14 +209,16 @@ def test_the_pull_is_the_gradient_of_its_term(device, name):
     step = a_step(device, layout, parameters)
     way, encoding, eye = Way(STOPS[0], STOPS[2], 0.3, 0.0), Frequencies(4), np.array([0.3, 1, 3])
 
-    def splats(changed: dict, x: float) -> tuple:
-        return decode_reference(layout, parameters | changed, encoding.encode(x), eye, VOXEL)
+    def splats(changed: dict, psi: np.ndarray) -> tuple:
+        return decode_reference(layout, parameters | changed, psi, eye, VOXEL)
 
-    low, high = splats({}, way.low.x), splats({}, way.high.x)
+    ends = [encoding.encode(stop.x).astype(np.float64) for stop in (way.low, way.high)]
+    low, high = (splats({}, psi) for psi in ends)
+    there = 0.7 * ends[0] + 0.3 * ends[1]
 
     def term(changed: dict) -> float:
         total = 0.0
-        for i, (a, b, value) in enumerate(zip(low, high, splats(changed, way.x), strict=True)):
+        for i, (a, b, value) in enumerate(zip(low, high, splats(changed, there), strict=True)):
             unit = VOXEL if i < 2 else 1  # means and scales
             total += (((value - 0.7 * a - 0.3 * b) / unit) ** 2).sum()
         return 2.5 * total / len(low[3])
@@ -239,7 +257,9 @@ def test_gradients_are_added_in_place(device, count):
 
 @pytest.fixture(scope="module")
 def judged(device, rig):
-    """A run's figures between the stops and dB at them, by its changed settings."""
+    """A run's figures between the stops, as blends of them and with x encoded as it is, and dB at
+    the stops, by its changed settings.
+    """
     kept = {}
 
     def judge(**changed: object):
@@ -250,8 +270,12 @@ def judged(device, rig):
             trainer.encoding = psi or trainer.encoding
             run(trainer)
             views = [p.view for p in trainer.held_out if p.modality == "RGB"]
-            draw = draw_in_training(trainer, trainer.schedule.background)
-            kept[key] = between(draw, views, 0, 1, 20), trainer.held_out_psnr(4)
+            draws = [
+                draw_in_training(trainer, trainer.schedule.background, direct)
+                for direct in (False, True)
+            ]
+            figures = [between(draw, views, 0, 1, 20) for draw in draws]
+            kept[key] = *figures, trainer.held_out_psnr(4)
         return kept[key]
 
     return judge
@@ -260,22 +284,31 @@ def judged(device, rig):
 @pytest.mark.parametrize(
     ("changed", "gain_db"),
     [
-        ({"between": "photos"}, 4), ({"between": "pictures"}, 0.5),
-        ({"between": "splats", "between_pull": 0.1}, 3), ({"encoding": "stops"}, 2),
+        ({"between": "photos"}, 3), ({"between": "pictures"}, 5), ({"between": "shapes"}, 1),
+        ({"between": "splats", "between_pull": 1.0}, 2),
     ],
 )  # fmt: skip
 def test_every_cure_brings_midpoints_nearer_to_the_blend(judged, changed, gain_db):
-    plain, at_stops = judged()
-    cured, cured_at_stops = judged(**changed)
+    """Gains of one run each are 4.3, 7.7, 1.5 and 3.3 dB."""
+    plain, _, at_stops = judged()
+    cured, _, cured_at_stops = judged(**changed)
     assert cured.blend_db > plain.blend_db + gain_db
-    assert cured.flash < plain.flash and cured.jump < plain.jump
+    assert cured.flash < plain.flash and cured.jump < 1.1 * plain.jump
     for name, psnr in cured_at_stops.items():
         assert psnr > at_stops[name] - 1.5, name
 
 
+def test_a_blend_of_stops_needs_no_cure_of_a_narrow_encoding(judged):
+    """What no photo has taught is not asked: 29.4 dB and 1.3 even steps instead of 23.1 and 6.0."""
+    blended, direct, _ = judged()
+    assert blended.blend_db > direct.blend_db + 4 and blended.flash < 0.3 * direct.flash
+    assert blended.jump < 1.6 and direct.jump > 3
+
+
 def test_frequencies_fail_where_gaussians_hold(judged):
-    plain, _ = judged()
-    wild, _ = judged(psi=Frequencies(16))
+    """The paper's comparison: x goes into the encoding as it is."""
+    _, plain, _ = judged()
+    _, wild, _ = judged(psi=Frequencies(16))
     assert wild.flash > 2 * plain.flash and wild.jump > 1.5 * plain.jump
     assert wild.blend_db < plain.blend_db - 2
 
@@ -337,7 +370,7 @@ def test_the_command_takes_them_and_refuses_what_the_capture_has_not(device, rig
     assert (model.encoding.d, model.encoding.sigma) == (16, 0.1)
     apart = fit_scenes.make_shapes(tmp_path / "apart", "shared", views=3, tests=1)
     for words, told in (
-        (("--between", "photos"), "use --between pictures or splats"),
+        (("--between", "photos"), "use --between shapes or pictures"),
         (("--balance", "Heat=2"), "balance names 'Heat'; the modalities are RGB, Thermal."),
         (("--balance", "Heat"), "it is NAME=TURNS"),
         (("--encoding", "stops", "--sigma", "0.1"), "sets --control and --sigma itself"),

@@ -10,6 +10,7 @@ from hypothesis import strategies as some
 from app.viewer.controls import MAX_RADII, MIN_RADII, POLE, Camera, Push
 from app.viewer.stage import Stage
 from runtime_models.model import Stop
+from runtime_models.stop_weights import StopBlend, StopWeights
 from scene.control import EASES, MODES, Sweep, ease, snap, unease
 from scene.framing import fit_distance, orbit_path
 from scene.scene import Scene, SceneObject
@@ -216,7 +217,7 @@ def test_unease_is_the_inverse_of_ease(t):
 
 
 def test_sweep_visits_every_stop_rests_there_and_returns():
-    sweep = Sweep.over(STOPS)
+    sweep = Sweep.over(StopBlend(STOPS))
     leg = sweep.leg_s + sweep.rest_s
     for i, want in enumerate([0, 0.5, 1, 0.5, 0]):
         assert Sweep(sweep.xs, seconds=i * leg).x == pytest.approx(want)
@@ -229,7 +230,7 @@ def test_sweep_visits_every_stop_rests_there_and_returns():
 
 @given(some.floats(0, 1), some.floats(0, 14))
 def test_sweep_resumes_where_the_hand_left_the_slider(x, seconds):
-    sweep = Sweep.over(STOPS)
+    sweep = Sweep.over(StopBlend(STOPS))
     sweep.seconds = seconds
     backwards = seconds % sweep.period >= sweep.period / 2
     sweep.resume_at(x)
@@ -241,7 +242,7 @@ def test_sweep_resumes_where_the_hand_left_the_slider(x, seconds):
 
 
 def test_sweep_is_of_time_not_of_frames_and_stops_keep_their_place():
-    one, many = Sweep.over(STOPS), Sweep.over(STOPS)
+    one, many = Sweep.over(StopBlend(STOPS)), Sweep.over(StopBlend(STOPS))
     for _ in range(100):
         many.advance(0.013)
     assert one.advance(1.3) == pytest.approx(many.x)
@@ -251,8 +252,8 @@ def test_sweep_is_of_time_not_of_frames_and_stops_keep_their_place():
 
 
 def test_a_single_stop_has_nothing_to_play():
-    assert Sweep.over((Stop("only", 0.3),)).advance(5.0) == 0.3
-    assert Sweep.over(()).advance(5.0) == 0.0
+    assert Sweep.over(StopBlend((Stop("only", 0.3),))).advance(5.0) == 0.3
+    assert Sweep.over(StopBlend(())).advance(5.0) == 0.0
 
 
 @pytest.mark.parametrize("name", EASES)
@@ -271,7 +272,7 @@ def test_every_pace_goes_from_0_to_1_forwards_and_has_its_inverse(name):
 )  # fmt: skip
 @pytest.mark.parametrize("ease_name", EASES)
 def test_after_the_last_stop_each_mode_goes_its_own_way(mode, way, ease_name):
-    sweep = Sweep.over(STOPS)
+    sweep = Sweep.over(StopBlend(STOPS))
     sweep.mode, sweep.ease, sweep.rest_s = mode, ease_name, 0.0
     assert sweep.play(0.0) == 0.0
     got = [sweep.x] + [sweep.advance(sweep.leg_s) for _ in way[1:]]
@@ -279,8 +280,28 @@ def test_after_the_last_stop_each_mode_goes_its_own_way(mode, way, ease_name):
     assert sweep.playing == (mode != "once")
 
 
+def test_the_way_back_of_a_loop_passes_no_stop_between():
+    sweep = Sweep.over(StopBlend(STOPS))
+    sweep.mode, sweep.rest_s, sweep.ease = "loop", 0.0, "even"
+    sweep.seconds = 2.5 * sweep.leg_s
+    halfway = StopWeights((("bone", 0.5), ("skin", 0.5)))
+    assert sweep.control == halfway and sweep.x == pytest.approx(0.5)
+    sweep.resume_at(halfway)
+    assert sweep.seconds == 2.5 * sweep.leg_s
+    sweep.resume_at(0.5)  # a hand puts it on the stop that lies there
+    assert sweep.blend.weights(sweep.control).tolist() == [0, 1, 0]
+    sweep.resume_at(halfway)
+    assert sweep.control == halfway
+
+
+def test_between_two_stops_that_are_visited_the_others_do_not_show():
+    sweep = Sweep((0.0, 1.0), StopBlend(STOPS), rest_s=0.0)
+    for _ in range(40):
+        assert sweep.blend.weights(sweep.advance(0.1))[1] == 0
+
+
 def test_played_once_it_rests_at_the_end_and_the_next_play_begins_anew():
-    sweep = Sweep.over(STOPS)
+    sweep = Sweep.over(StopBlend(STOPS))
     sweep.mode = "once"
     sweep.play(0.0)
     sweep.advance(100.0)
@@ -294,19 +315,19 @@ def test_played_once_it_rests_at_the_end_and_the_next_play_begins_anew():
     some.floats(0, 10), some.floats(0, 1), some.floats(0, 30),
 )  # fmt: skip
 def test_changing_how_it_plays_does_not_move_it(mode, pace, leg, rest, x, seconds):
-    sweep = Sweep.over(STOPS)
+    sweep = Sweep.over(StopBlend(STOPS))
     sweep.seconds = seconds
     sweep.resume_at(x)
     sweep.mode, sweep.ease, sweep.leg_s, sweep.rest_s = mode, pace, leg, rest
     sweep.resume_at(x)  # what the stage does before each step
     assert sweep.x == pytest.approx(x, abs=1e-6)
-    later = sweep.advance(1e-4)
-    assert abs(later - x) < 0.02
+    sweep.advance(1e-4)
+    assert abs(sweep.x - x) < 0.02
 
 
 def test_the_stage_visits_two_stops_at_least():
     stage = Stage(lambda path: Dummy(STOPS))
-    stage.sweeps = [Sweep.over(STOPS)]
+    stage.sweeps = [Sweep.over(StopBlend(STOPS))]
     stage.scene = Scene((SceneObject("a", Dummy(STOPS), x=0.5),))
     stage.visit(0, 0.0, on=False)
     assert stage.sweeps[0].xs == (0.5, 1.0)
@@ -321,3 +342,7 @@ class Dummy:
     """What a stage needs of a model to play it."""
 
     stops: tuple
+
+    @property
+    def blend(self) -> StopBlend:
+        return StopBlend(self.stops)

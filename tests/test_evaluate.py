@@ -11,8 +11,9 @@ from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, SplatLa
 from runtime_models.read_package import read_package
 from runtime_models.rotation import covariance, normalize, rotation_matrices
 from runtime_models.spherical_harmonics import C0, HALF_TURN_SIGNS, basis, shade
+from runtime_models.stop_weights import StopWeights
 from runtime_models.write_package import write_package
-from tests.models import make_random_model, run_in_numpy
+from tests.models import make_random_model, psi_of, run_in_numpy
 
 
 def twin(model, x, eye):
@@ -20,12 +21,10 @@ def twin(model, x, eye):
     count, k = len(model.anchors), model.splats_per_anchor
     delta = model.anchors.astype(np.float64) - eye
     length = np.linalg.norm(delta, axis=1, keepdims=True)
-    t = np.arange(model.encoding.d) * model.encoding.spacing
-    psi = np.exp(-((t - x) ** 2) / (2 * model.encoding.sigma**2))
     parts = {
         "feature": model.features,
         "direction": np.divide(delta, length, out=np.zeros_like(delta), where=length > 0),
-        "control": np.tile(psi, (count, 1)),
+        "control": np.tile(psi_of(model, x), (count, 1)),
     }
     out = {}
     for name, mlp in model.networks.items():
@@ -41,7 +40,7 @@ def test_evaluation_equals_its_float64_twin(anchors, hidden):
     model = make_random_model(anchors, k=3, features=5, hidden=hidden, seed=anchors)
     eye = np.array([0.3, -2.0, 1.0])
     folded = Evaluator(model)
-    for x in (0.0, 0.37, 1.0):
+    for x in (0.0, 0.37, 1.0, StopWeights((("Thermal", 0.3), ("RGB", 0.7)))):
         got, want = evaluate(model, x, eye), twin(model, x, eye)
         fast = (*folded.geometry(x), folded.color(x, eye))
         for name, values in zip(("means", "scales", "wxyz", "opacity", "color"), fast, strict=True):
@@ -51,6 +50,15 @@ def test_evaluation_equals_its_float64_twin(anchors, hidden):
         np.testing.assert_allclose(got.opacity, want["opacity"][:, 0], atol=1e-5)
         np.testing.assert_allclose(got.color, want["color"], atol=1e-5)
         np.testing.assert_allclose(got.wxyz, normalize(want["rotation"]), atol=2e-4)
+
+
+def test_a_package_may_say_that_x_is_encoded_as_it_is():
+    model = replace(make_random_model(20, k=3, hidden=(8,)), between_stops="encoding")
+    got, want = evaluate(model, 0.37, np.ones(3)), twin(model, 0.37, np.ones(3))
+    np.testing.assert_allclose(got.means, want["offset"], atol=1e-5)
+    np.testing.assert_allclose(got.color, want["color"], atol=1e-5)
+    blended = evaluate(replace(model, between_stops="blend"), 0.37, np.ones(3))
+    assert np.abs(got.means - blended.means).max() > 1e-3  # the two are not the same
 
 
 def test_batches_join_without_a_seam():
@@ -88,7 +96,7 @@ def test_the_file_itself_run_by_onnxruntime_gives_the_same(tmp_path):
     x, eye = 0.61, np.array([2.0, 0.5, -1.0])
     direction = model.anchors - np.float32(eye)
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    control = np.tile(model.encoding.encode(x), (30, 1))
+    control = np.tile(psi_of(model, x), (30, 1))
     out = {}
     for name in HEADS:
         parts = (

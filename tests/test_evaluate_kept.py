@@ -6,11 +6,11 @@ import pytest
 from runtime_models.evaluate import (
     Evaluator,
     directions,
-    encode_rows,
     evaluate,
     shape_follows_control,
 )
 from runtime_models.model import HEADS, ControlEncoding
+from runtime_models.stop_weights import encode_rows
 from tests.models import make_random_model, without_control
 
 EYE = np.array([0.3, -0.2, 2.0])

@@ -17,7 +17,8 @@ from runtime_models.evaluate import evaluate
 from runtime_models.model import HEADS, BadFile
 from runtime_models.read_package import read_package
 from runtime_models.read_scene import describe, read_model
-from runtime_models.write_package import package_files, write_package
+from runtime_models.stop_weights import Pace
+from runtime_models.write_package import describe_model, package_files, write_package
 from tests.models import make_random_model
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -47,6 +48,18 @@ def test_round_trip_is_exact(tmp_path, name):
     assert facts["bytes"] == written
     assert (facts["anchors"], facts["splats"], facts["sh_degree"]) == (100, 500, None)
     assert facts["stops"][1] == {"name": "Thermal", "x": 1.0, "kind": "thermal"}
+
+
+def test_what_lies_between_the_stops_is_kept_and_older_readers_pass_over_it(tmp_path):
+    plain = make_random_model()
+    assert not {"pace", "between_stops"} & describe_model(plain).keys()
+    pace = (Pace("Thermal", "RGB", (0.0, 0.125, 1.0)),)
+    write_package(replace(plain, pace=pace, between_stops="encoding"), tmp_path / "a.shift")
+    again = read_package(tmp_path / "a.shift")
+    assert again.pace == pace and again.between_stops == "encoding"
+    assert again.psi(0.5).tolist() == [plain.encoding.encode(0.5).tolist()]
+    paced = replace(again, between_stops="blend")
+    assert paced.blend.weights(0.75).tolist() == [0.0625, 0.9375]  # a quarter of the way back
 
 
 def test_the_same_model_gives_the_same_bytes(tmp_path):

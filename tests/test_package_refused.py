@@ -100,11 +100,16 @@ def no_npy(folder):
 
 
 ROW = {"name": "a", "x": 0.0, "kind": "rgb"}
+PACE = {"from": "RGB", "to": "Thermal", "blend": [0, 0.25, 1]}
 LOOK = {"eye": [0, 0, 1], "target": [0, 0, 0]}
 
 
 def stops(*rows):
     return edit(stops=[ROW | row for row in rows])
+
+
+def pace(**entries):
+    return edit(pace=[PACE | entries])
 
 
 BROKEN = {
@@ -126,6 +131,20 @@ BROKEN = {
     "JSON of another kind": (write(MANIFEST, b"[1]"), "has format None"),
     "another up axis": (edit(up="-Z"), "up axis '-Z', expected '+Y'; turn the scene"),
     "no up axis": (edit(up=None), "lacks 'up'; docs/package.md lists"),
+    "unknown between": (edit(between_stops="steps"), "'between_stops' is 'steps', expected one of"),
+    "pace of another kind": (edit(pace={}), "'pace' is {}, expected a list of pairs"),
+    "pace row of another kind": (edit(pace=[1]), "pace 0 is 1, expected an object"),
+    "pace without a curve": (pace(blend=None), "pace 0: blend is None, expected 2 to 257 numbers"),
+    "pace of a word": (pace(blend=[0, "a"]), "blend is [0, 'a'], expected 2 to 257"),
+    "pace of one number": (pace(blend=[0]), "blend is [0], expected 2 to 257"),
+    "pace too long": (pace(blend=[i / 257 for i in range(258)]), "expected 2 to 257 numbers"),
+    "pace that stands": (pace(blend=[0, 0.5, 0.5, 1]), "does not rise from 0 to 1"),
+    "pace that falls": (pace(blend=[0, 0.6, 0.5, 1]), "does not rise from 0 to 1"),
+    "pace of half a way": (pace(blend=[0, 0.5]), "does not rise from 0 to 1"),
+    "pace from nowhere": (pace(to="Bone"), "is from 'RGB' to 'Bone', expected two stops of the"),
+    "pace to itself": (pace(to="RGB"), "is from 'RGB' to 'RGB', expected two stops"),
+    "pace twice": (edit(pace=[PACE, PACE | {"from": "Thermal", "to": "RGB"}]),
+                   "pace 1 is from 'Thermal' to 'RGB', expected two stops of the scene, each pair"),
     "no k": (edit(splats_per_anchor=None), "lacks 'splats_per_anchor'"),
     "k of zero": (edit(splats_per_anchor=0), "'splats_per_anchor' is 0, expected a whole number"),
     "k of true": (edit(splats_per_anchor=True), "'splats_per_anchor' is True"),

@@ -7,6 +7,8 @@ from fractions import Fraction
 
 import pytest
 
+from runtime_models.model import Stop
+from runtime_models.stop_weights import StopBlend, StopWeights
 from scene.control import EASES
 from scene.reactions import (
     KINDS,
@@ -201,6 +203,56 @@ def test_a_ring_goes_on_past_one():
     assert [advance(past, standing, t)[0].x for t in (0.5, 0.75, 1.0)] == pytest.approx(
         [1.0, 0.125, 0.25]
     )
+
+
+STOPS = StopBlend(tuple(Stop(state.name, state.x) for state in (*STATES, State("again", 1.0))))
+
+
+@pytest.mark.parametrize("ring", (False, True))
+def test_a_state_that_is_no_neighbour_is_reached_without_the_ones_between(ring):
+    table = machine(reaction(to="charcoal", seconds=1.0), ring=ring, blend=STOPS)
+    standing, _ = advance(table, start(table, 0.0), 0.0, [GRAB])
+    for time in (0.1, 0.5, 0.9):
+        row = STOPS.weights(advance(table, standing, time)[0].x)
+        assert row[0] > 0 and row[3] > 0 and not row[[1, 2, 4]].any()
+    half = advance(table, standing, 0.5)[0]
+    assert half.x == StopWeights((("normal", 0.5), ("charcoal", 0.5)))
+    assert advance(table, standing, 1.0)[0].x == 0.75
+    turned = replace(table, reactions=(reaction(to="ice", seconds=1.0),))  # from half way there
+    on = advance(turned, replace(half, state="normal"), 0.5, [GRAB])[0]
+    rows = [STOPS.weights(advance(turned, on, time)[0].x) for time in (0.5, 0.9, 1.2)]
+    assert rows[0].tolist() == [0.5, 0, 0, 0.5, 0]
+    assert not any(row[[2, 4]].any() for row in rows)
+    assert advance(turned, on, 1.5)[0].x == 0.25
+
+
+def test_the_end_of_a_ring_is_its_beginning():
+    table = machine(reaction(to="normal", seconds=1.0, ease="even"), ring=True, blend=STOPS)
+    standing, _ = advance(table, start(table, 0.75), 0.0, [GRAB])
+    assert [advance(table, standing, t)[0].x for t in (0.25, 0.5, 1.0)] == [0.8125, 0.875, 0.0]
+    standing, _ = advance(table, start(table, 0.25), 0.0, [GRAB])  # up, past fire and charcoal
+    row = STOPS.weights(advance(table, standing, 0.5)[0].x)
+    assert row.tolist() == [0, 0.5, 0, 0, 0.5]
+
+
+def test_states_may_be_blends():
+    blend = StopWeights((("ice", 0.5), ("charcoal", 0.5)))
+    states = (*STATES, State("ash", blend))
+    table = Machine(states, (reaction(to="ash", seconds=1.0),), blend=STOPS)
+    assert start(table, blend).state == "ash" and start(table, 0.7).state == "charcoal"
+    standing, _ = advance(table, start(table, 0.0), 0.0, [GRAB])
+    assert STOPS.weights(advance(table, standing, 0.5)[0].x).tolist() == [0.5, 0.25, 0, 0.25, 0]
+    assert advance(table, standing, 1.0)[0].x == blend
+    with pytest.raises(ValueError, match="no stop 'bone'"):
+        start(table, StopWeights((("bone", 1.0),)))
+    with pytest.raises(ValueError, match="no stop 'ice'"):
+        Machine((State("ash", blend),))
+
+
+def test_two_axes_lean_straight_to_their_sides():
+    axes = TwoAxes(0.0, 0.5, 1.0)
+    assert axes.x(-1, 0.5, STOPS) == StopWeights((("normal", 0.5), ("fire", 0.5)))
+    assert axes.x(-1, 1, STOPS) == 0.0 and axes.x(0, 1, STOPS) == 0.5
 
 
 def test_a_region_is_entered_from_outside_only():

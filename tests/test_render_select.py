@@ -6,6 +6,7 @@ from PIL import Image
 
 from app import cli
 from runtime_models.read_scene import read_model
+from runtime_models.stop_weights import StopBlend
 from scene.control import Sweep, control_of, snap
 from scene.framing import default_view
 from scene.read_selector import read_selector
@@ -71,7 +72,7 @@ def test_what_is_refused_is_one_sentence(scene, tmp_path, capsys, text, told):
 
 def test_hands_and_clocks_are_clamped_and_numbers_refused(scene, tmp_path, capsys):
     assert snap(-3.0, STOPS) == 0 and snap(7.0, STOPS) == 1
-    sweep = Sweep.over(STOPS)
+    sweep = Sweep.over(StopBlend(STOPS))
     sweep.resume_at(-3.0)
     assert all(0 <= sweep.advance(0.37) <= 1 for _ in range(50))
     for x in ("-0.1", "1.1", "nan"):

@@ -11,6 +11,7 @@ import pytest
 
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
+from runtime_models.stop_weights import StopWeights
 from runtime_models.write_ply import write_ply
 from scene.reactions import Reaction, State, TwoAxes
 from scene.read_scene_file import read_scene_file
@@ -29,16 +30,21 @@ from scene.write_scene_file import write_scene_file
 
 HALF = math.sqrt(0.5)
 THIRD = 1 / 3
+BLEND = StopWeights((("bone", 0.25), ("skin", 0.75)))
 REGION = Box(
     centre=(1, 2, THIRD), half=(0.1, 0.2, 0.3), wxyz=(HALF, 0, HALF, 0), x=0, space="world"
 )
-STATES = (State("normal", 0.0), State("ice", THIRD), State("charcoal", 0.9))
+STATES = (
+    State("normal", 0.0), State("ice", THIRD), State("charcoal", 0.9),
+    State("ash", StopWeights((("ice", 0.5), ("charcoal", 0.5)))),
+)  # fmt: skip
 SELECTORS = (
     Sphere(centre=(0.1, 0, THIRD), radius=0.2, x=1.0, border=0.01),
     Box(centre=(0, 0, 0), half=(1, 1, 1), x=THIRD, space="world"),
     HalfSpace(point=(0, 1, 0), normal=(0.3, -0.7, 0.11), x=0.5),
     Lens(position=(0, 0, 3), wxyz=(1, 0, 0, 0), half_angle=0.3, x=0.25),
     Lens(position=(0, 0, 3), wxyz=(HALF, HALF, 0, 0), tangents=(-1, 1, -0.5, 0.6), x=0.25),
+    Sphere(centre=(0, 0, 0), radius=0.2, x=BLEND),
     Painted(np.float32([0, 0.1, 1]), 0.75),
 )
 REACTIONS = (
@@ -47,6 +53,7 @@ REACTIONS = (
     Reaction(on="ray", to=0.123456789012345, seconds=0.0),
     Reaction(on="enter", to="ice", region=REGION),
     Reaction(on="enter", to=0, region=Sphere(centre=(0, 0, 0), radius=1, x=0, space="world")),
+    Reaction(on="ray", to=BLEND),
 )
 FULL = SceneItem(
     name="cube of ïce",
@@ -56,7 +63,7 @@ FULL = SceneItem(
     flip=True,
     position=(0.1, -2.5, 1e-9),
     wxyz=(HALF, 0.0, -HALF, 0.0),
-    x=0.7,
+    x=StopWeights((("bone", THIRD), ("skin", 2 * THIRD))),
     visible=False,
     selectors=SELECTORS,
     collider="hulls",
@@ -163,7 +170,9 @@ WRONG = [
         ("mode", "both", "'cumulative'"), ("up", "up", "'+X'"), ("flip", 1, "true or false"),
         ("static", "no", "true or false"), ("visible", None, "true or false"),
         ("ring", 0, "true or false"),
-        ("x", 1.5, "0 to 1"), ("x", -0.1, "0 to 1"),
+        ("x", 1.5, "0 to 1"), ("x", -0.1, "0 to 1"), ("x", {"bone": 0.5}, "1 in the sum"),
+        ("x", {"bone": -0.5, "skin": 1.5}, "1 in the sum"), ("x", {"bone": "1"}, "numbers from"),
+        ("x", {"bone": True}, "numbers from"), ("x", {}, "1 in the sum"),
         ("mass_kg", 0, "above 0"), ("mass_kg", -3, "above 0"),
         ("friction", -1, "0 to 10"), ("restitution", 1.01, "0 to 1"),
         *[(key, value, "") for value in NOT_A_NUMBER
@@ -183,9 +192,12 @@ WRONG = [
     (("objects", 0, "selectors", 0, "x"), 2, "0 to 1"),
     (("objects", 0, "selectors", 0, "space"), "mine", "'world'"),
     (("objects", 0, "selectors", 2, "normal"), [0, 0, 0], "not zero"),
-    (("objects", 0, "selectors", 5, "weight"), [0, 2], "0 to 1"),
-    (("objects", 0, "selectors", 5, "weight"), 7, "finite numbers"),
+    (("objects", 0, "selectors", 6, "weight"), [0, 2], "0 to 1"),
+    (("objects", 0, "selectors", 6, "weight"), 7, "finite numbers"),
     (("objects", 0, "reactions", 0, "on"), "touch", "'collision'"),
+    (("objects", 0, "selectors", 0, "x"), {"bone": 2}, "1 in the sum"),
+    (("objects", 0, "states", 1, "x"), {"bone": 0.5}, "1 in the sum"),
+    (("objects", 0, "reactions", 0, "to"), {"bone": 0.5}, "1 in the sum"),
     (("objects", 0, "reactions", 0, "to"), "", "a state"),
     (("objects", 0, "reactions", 0, "to"), 3, "a state"),
     (("objects", 0, "reactions", 0, "to"), True, "a state"),
@@ -350,6 +362,17 @@ def test_states_without_a_list_are_the_stops(tmp_path):
     wrong = replace(file.items[0], reactions=(Reaction(on="grab", to="hot"),))
     with pytest.raises(BadFile, match="object 'a': 'reactions': 'hot' is no state; there are lay"):
         machine_of(wrong, read_models(file)["a"])
+
+
+def test_a_blend_of_stops_that_the_model_has_not_is_refused(tmp_path):
+    states = {"states": (State("a", BLEND), State("b", 0.0)), "reactions": REACTIONS[:1]}
+    for number, changes in enumerate(({"x": BLEND}, states)):
+        (tmp_path / str(number)).mkdir()
+        file = small(tmp_path / str(number), **changes)
+        with pytest.raises(BadFile, match=r"object '.*'.*no stop 'bone'; there "):
+            models = read_models(file)
+            scene_of(file, models)
+            machine_of(file.items[0], models[file.items[0].name])
 
 
 def test_a_model_that_is_no_model_names_its_object(tmp_path):

@@ -12,6 +12,7 @@ from renderer.palette import apply_palette, palette_colors, thermal_blend, therm
 from renderer.reference import reference_image
 from runtime_models.evaluate import evaluate
 from runtime_models.model import Stop
+from runtime_models.stop_weights import StopBlend
 from scene.control import control_of
 from scene.pose import Pose
 from scene.scene import Scene, SceneObject
@@ -114,7 +115,7 @@ def test_a_legend_tells_of_a_selector_too():
     ball = replace(BALL, x=0.4)
     name, weight, stop = thermal_blend(scene_of(model, selectors=(ball,)))
     assert (name, stop.name) == ("ironbow", "Hot") and weight == pytest.approx(0.8)
-    assert thermal_weights((), np.zeros(3))[1] is None
+    assert thermal_weights(StopBlend(()), np.zeros(3))[1] is None
 
 
 @pytest.mark.parametrize(("anchors", "k"), [(1, 1), (64, 1), (65, 3), (300, 10)])

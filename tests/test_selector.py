@@ -8,7 +8,9 @@ import pytest
 from models import make_random_model
 from splat_scenes import random_layers
 
-from scene.control import control_key, control_of
+from runtime_models.model import Stop
+from runtime_models.stop_weights import Pace, StopWeights
+from scene.control import control_key, control_of, covered
 from scene.pose import Pose, look_at
 from scene.read_selector import read_selector
 from scene.scene import SceneObject
@@ -109,6 +111,49 @@ def test_control_is_mixed_in_turn_a_later_selector_above(model):
     np.testing.assert_allclose(x, slow_control(thing, places), atol=1e-6)
     alone = control_of(replace(thing, selectors=(*selectors, Painted(np.ones(len(places)), 0.5))))
     assert alone == 0.5
+
+
+def test_a_border_leads_from_outside_to_inside_without_a_third_stop():
+    stops = tuple(Stop(name, x) for name, x in (("a", 0.0), ("b", 0.4), ("c", 0.5), ("d", 1.0)))
+    model = replace(make_random_model(400), stops=stops)
+    ball = Sphere(centre=(0, 0, 0), radius=0.3, border=0.6, x=1.0)
+    thing = SceneObject("thing", model, x=0.0, selectors=(ball,))
+    inside, rows = ball.weights(model.anchors), control_of(thing)
+    assert rows.shape == (400, 4) and rows.dtype == np.float32
+    np.testing.assert_allclose(rows, np.stack([1 - inside, 0 * inside, 0 * inside, inside], 1))
+    assert ((inside > 0.1) & (inside < 0.9)).sum() > 50  # there is a border to speak of
+    # A later one over it, from whatever is there, and one that is a blend itself.
+    blend = StopWeights((("b", 0.25), ("d", 0.75)))
+    half = HalfSpace(point=(0, 0, 0), normal=(1, 0, 0), border=0.2, x=blend)
+    over = control_of(replace(thing, selectors=(ball, half)))
+    share = half.weights(model.anchors)[:, None]
+    np.testing.assert_allclose(over, rows * (1 - share) + share * [0, 0.25, 0, 0.75], atol=1e-6)
+    whole = Painted(np.ones(400), blend)
+    assert control_of(replace(thing, selectors=(ball, whole))) == blend
+
+
+def test_a_border_follows_the_pace_of_its_pair():
+    pace = (Pace("RGB", "Thermal", (0, 0.1, 1)),)
+    model = replace(make_random_model(300), pace=pace)
+    ball = Sphere(centre=(0, 0, 0), radius=0.3, border=0.6, x=1.0)
+    x = control_of(SceneObject("thing", model, x=0.0, selectors=(ball,)))
+    weights, inside = model.blend.weights(x)[:, 1], ball.weights(model.anchors)
+    np.testing.assert_allclose(weights, np.interp(inside, [0, 0.5, 1], [0, 0.1, 1]), atol=1e-6)
+
+
+def test_how_much_lies_in_any_of_several():
+    thing = SceneObject("thing", make_random_model(50))
+    some = [Painted(np.random.default_rng(i).uniform(size=50), 0.5) for i in range(2)]
+    wanted = 1 - (1 - some[0].weight) * (1 - some[1].weight)
+    np.testing.assert_allclose(covered(thing, some), wanted, atol=1e-7)
+    assert not covered(thing, ()).any()
+
+
+def test_an_object_has_no_blend_of_stops_that_its_model_has_not():
+    bone = StopWeights((("Bone", 1.0),))
+    for changes in ({"x": bone}, {"selectors": (Painted(np.ones(5), bone),)}):
+        with pytest.raises(ValueError, match="no stop 'Bone'; there are RGB, Thermal"):
+            SceneObject("thing", make_random_model(5), **changes)
 
 
 def test_what_selects_nothing_costs_nothing():

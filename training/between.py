@@ -2,8 +2,11 @@
 
 photos: now and then a step shows an x between two stops that were photographed from the same place,
 and is to look like the blend of both photos.  pictures: the same with the model's own pictures of
-both stops, so that no place need be shared.  splats: now and then a step adds a pull of the splats
-at an x in between towards the straight way between what they are at both stops.
+both stops, so that no place need be shared.  shapes: now and then a photo is shown with its stop's
+own colours on splats that are on their way to a neighbouring stop, and is to look like itself: what
+a viewer draws near a thermal stop, whose colours it takes from both ends.  splats: now and then a
+step adds a pull of the splats at an x in between towards the straight way between what they are at
+both stops.
 """
 
 from dataclasses import dataclass, replace
@@ -11,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from runtime_models.model import BadFile, ControlEncoding, Stop
+from runtime_models.model import HEADS, BadFile, ControlEncoding, Stop
 from scene.pose import View
 from training.drawing import Color
 from training.gaussians import Gaussians
@@ -19,7 +22,7 @@ from training.networks import KERNELS
 from training.photos import LoadedPhoto
 from training.step import Step
 
-CURES = ("none", "photos", "pictures", "splats")
+CURES = ("none", "photos", "pictures", "shapes", "splats")
 SAME_PLACE = 1e-4  # of the cameras' mean distance from their middle
 SAME_LENS = 1e-4  # of the tangents: 0.05 pixels of 1000
 SAME_TURN = 1 - 1e-7  # of the product of two quaternions: 0.05 degrees
@@ -28,16 +31,23 @@ Pair = tuple[LoadedPhoto, LoadedPhoto]
 
 @dataclass(frozen=True)
 class Way:
-    """Where between two stops a step is."""
+    """Where between two stops a step is; low is the first on the slider, or the photo's own."""
 
     low: Stop
     high: Stop
     share: float  # of the way from low to high, above 0 and below 1
     pick: float  # 0..1, which pair of photos
 
-    @property
-    def x(self) -> float:
-        return self.low.x + self.share * (self.high.x - self.low.x)
+    def psi(self, encoding: ControlEncoding) -> np.ndarray:
+        """(d,) float32 control encoding there: the blend that x between two stops stands for."""
+        low, high = encoding.encode(self.low.x), encoding.encode(self.high.x)
+        return np.float32(1 - self.share) * low + np.float32(self.share) * high
+
+    def psi_of_heads(self, encoding: ControlEncoding) -> np.ndarray:
+        """(5, d) float32: the shape's heads there, the colour's still at low."""
+        rows = np.tile(self.psi(encoding), (len(HEADS), 1))
+        rows[HEADS.index("color")] = encoding.encode(self.low.x)
+        return rows
 
 
 class Between:
@@ -59,7 +69,7 @@ class Between:
             if not self.spans:
                 raise BadFile(
                     "no two photos of neighbouring modalities were taken from the same place with "
-                    "the same lens, so there is nothing to blend; use --between pictures or splats."
+                    "the same lens, so there is nothing to blend; use --between shapes or pictures."
                 )
 
     @property
@@ -72,15 +82,20 @@ class Between:
         """A way that such a run may take; None: it takes none."""
         return Way(*self.spans[0], 0.5, 0.0) if self.often and self.spans else None
 
-    def way(self, iteration: int) -> Way | None:
+    def way(self, iteration: int, modality: str) -> Way | None:
         """Where this step looks; None: at its photo's stop.  Follows from seed and step."""
         if self.middle is None:
             return None
         chance, span, share, pick = np.random.default_rng([self.seed, 4, iteration]).random(4)
         if not chance < self.often:
             return None
-        low, high = self.spans[int(span * len(self.spans))]
-        return Way(low, high, float(share), float(pick))
+        if self.cure != "shapes":
+            low, high = self.spans[int(span * len(self.spans))]
+            return Way(low, high, float(share), float(pick))
+        ends = [(a, b) for pair in self.spans for a, b in (pair, pair[::-1]) if a.name == modality]
+        own, other = ends[int(span * len(ends))]
+        # As often as the photo's colours have a part in what is shown there.
+        return Way(own, other, 1 - float(share) ** 0.5, float(pick))
 
     def pair(self, way: Way) -> Pair:
         """Photos of both stops from one place."""
@@ -150,7 +165,7 @@ def own_blend(
 def straight_pull(
     step: Step, way: Way, encoding: ControlEncoding, eye: np.ndarray, voxel: float, pull: float
 ) -> dict[str, object]:
-    """Gradients of the pull on the splats at way.x, by weights and features; copies.
+    """Gradients of the pull on the splats at way.psi, by weights and features; copies.
 
     The mean over the splats of |v - ((1 - share) v_low + share v_high)|^2 summed over means and
     scales in voxels, wxyz, opacity and colour, times `pull`.  Both ends are taken as they are, so
@@ -162,7 +177,7 @@ def straight_pull(
         [field.copy() for field in step.decode(encoding.encode(stop.x), eye).fields()]
         for stop in (way.low, way.high)
     )
-    here = step.decode(encoding.encode(way.x), eye)
+    here = step.decode(way.psi(encoding), eye)
     kernels, count = device.program(KERNELS / "between.cl"), len(here.opacity)
     shares = np.array([voxel**-2.0, voxel**-2.0, 1, 1, 1]) * (pull / count)
     grads = []

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from runtime_models.stop_weights import StopBlend, encode_control
 from scene.pose import View
 from training.drawing import Color
 from training.evaluate import Painter
@@ -93,11 +94,16 @@ def draw_of(painter: Painter, background: Color) -> Draw:
     return draw
 
 
-def draw_in_training(trainer, background: Color) -> Draw:
-    """Pictures of what a Trainer holds, whatever its encoding is."""
+def draw_in_training(trainer, background: Color, direct: bool = False) -> Draw:
+    """Pictures of what a Trainer holds, whatever its encoding is.
+
+    direct: x goes into the encoding as it is, as a reader does that knows of no blends of stops.
+    """
+    blend = StopBlend(trainer.stops, direct=direct)
 
     def draw(view: View, x: float) -> tuple[np.ndarray, np.ndarray]:
-        drawing = trainer.step.draw(view, trainer.encoding.encode(x), background)
+        psi = encode_control(trainer.encoding, blend, x)[0]
+        drawing = trainer.step.draw(view, psi, background)
         return pictures(trainer.device, drawing.frame)
 
     return draw

@@ -225,7 +225,7 @@ class Heads:
         if self.form == "gpu":
             blocks = blocks_of_weights(layout)
             self.groups, self.blocks = len(blocks) * self.chunks, device.upload(blocks)
-        self.control = device.zeros(layout.control)
+        self.control = device.zeros((len(HEADS), layout.control))
         self.bias = device.empty(5 * hidden)
         self.first_t = device.empty(5 * hidden * features)
         self.middle_t = device.empty(max(5 * (layout.layers - 1) * hidden * hidden, 1))
@@ -244,9 +244,13 @@ class Heads:
         self.grad_features = device.empty((count, padded(layout.features)))
 
     def forward(self, weights, anchors, features, control: np.ndarray, eye: np.ndarray):
-        """Raw outputs (A, RAW) on the device for Psi `control` (d,) and an eye (3,) in metres."""
+        """Raw outputs (A, RAW) on the device for Psi `control` and an eye (3,) in metres.
+
+        control: (d,) of all heads, or (5, d) one a head.
+        """
         self.resize(len(anchors))
-        self.control.set(np.asarray(control, np.float32))
+        rows = np.broadcast_to(np.asarray(control, np.float32), self.control.shape)
+        self.control.set(np.ascontiguousarray(rows))
         self.eye = [np.float32(v) for v in eye]
         layout = self.layout
         self.device.launch(

@@ -91,7 +91,7 @@ class TrainSettings:
     rate_scale: float = 1.0  # times every learning rate
     rise: int = 0  # steps over which the networks' rates rise; after a fall it is 200
     revive: float = 0.05  # lambda of a pull on absent splats: mean max(0.02 - opacity, 0)
-    between: str = "none"  # how x between stops is learned: none | photos | pictures | splats
+    between: str = "none"  # how x between stops is learned: one of CURES
     between_share: float = 0.25  # of the steps, in which it is
     between_pull: float = 1.0  # lambda of the pull of splats
     thermal_smooth: float = 0.0  # lambda of thermal pictures' roughness; ThermalGaussian: 0.6

@@ -36,7 +36,9 @@ class Step:
             self.ms[name] = self.ms.get(name, 0.0) + 1e3 * (time.perf_counter() - start)
 
     def decode(self, control: np.ndarray, eye: np.ndarray) -> Gaussians:
-        """The model's splats for Psi `control` (d,) seen from `eye` (3,) metres."""
+        """The model's splats for Psi `control` (d,), or (5, d) one a head, seen from `eye` (3,)
+        metres.
+        """
         adam = self.adam
         with self.timed("heads"):
             raw = self.heads.forward(

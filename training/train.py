@@ -197,14 +197,16 @@ class Trainer(Run):
             self.coarse.drop(factor)
         return self.coarse.photo(self.schedule.photo(self.iteration), factor)
 
-    def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
+    def learn(
+        self, photo: LoadedPhoto, background: Color, control: np.ndarray | None = None
+    ) -> dict[str, object]:
+        """Gradients of how a photo differs.  control: Psi of each head, if not that of its stop."""
         settings = self.settings
+        control = self.control(photo.modality) if control is None else control
         target = self.targets.target(photo, background)
         self.evidence.stop = [s.name for s in self.stops].index(photo.modality)
         depth = self.targets.wish(photo, settings.depth_share)
-        self.drawing = self.step.draw(
-            photo.view, self.control(photo.modality), background, depth is not None
-        )
+        self.drawing = self.step.draw(photo.view, control, background, depth is not None)
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
             settings.opacity_share, settings.scale_share, self.evidence, depth,
@@ -215,6 +217,8 @@ class Trainer(Run):
         """From the photo, or as the run's cure of what lies between two stops has it."""
         if way is None:
             return self.learn(photo, background)
+        if self.between.cure == "shapes":
+            return self.learn(photo, background, way.psi_of_heads(self.encoding))
         if self.between.replaces:
             return self.learn_between(photo, way)
         eye, pull = photo.view.world_from_eye.position, self.settings.between_pull
@@ -233,7 +237,7 @@ class Trainer(Run):
             photo = own_blend(self.step, photo, way, self.encoding, background)
         loss = self.targets.loss(photo)
         target = loss.target(self.device.upload(photo.rgba), background, photo.weight)
-        self.drawing = self.step.draw(photo.view, self.encoding.encode(way.x), background)
+        self.drawing = self.step.draw(photo.view, way.psi(self.encoding), background)
         settings = self.settings
         return self.step.gradients(
             self.drawing, loss, target, settings.ssim_share, settings.opacity_share,
@@ -244,9 +248,9 @@ class Trainer(Run):
         """(loss or None, whether the guard turned back)."""
         photo = self.next_photo()
         background = self.schedule.background_of(self.iteration, photo)
-        way = self.between.way(self.iteration)
+        way = self.between.way(self.iteration, photo.modality)
         grads = self.learn_at(photo, background, way)
-        at_stop = way is None or not self.between.replaces
+        at_stop = way is None or self.between.cure == "splats"
         fraction = self.budget.fraction(self.iteration, self.elapsed)
         if self.rise.going(self.iteration):
             self.adam.set_rates(self.all_rates())

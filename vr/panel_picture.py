@@ -10,6 +10,7 @@ from renderer.letters import drawable, letters
 from renderer.palette import palette_colors, thermal_weights
 from renderer.ticks import nice_ticks, tick_text
 from runtime_models.model import Stop
+from runtime_models.stop_weights import StopBlend
 from vr.panel_layout import (
     CORNER,
     KNOB,
@@ -211,7 +212,7 @@ def _legend(
     """
     from PIL import Image
 
-    weight = float(thermal_weights(slider.stops, np.array([slider.x]))[0][0])
+    weight = float(thermal_weights(StopBlend(slider.stops), slider.x)[0][0])
     strength = FAINT + (1 - FAINT) * weight
     left, top, right, _ = box
     unit = f"{stop.palette}, {stop.unit}" if stop.unit else stop.palette

@@ -17,8 +17,9 @@ from runtime_models.package_files import MANIFEST
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_streamed import TREE
 from runtime_models.sog_files import META
+from runtime_models.stop_weights import Controls
 from runtime_models.write_plain import cut, merged, placed, told_lost, writer_of
-from scene.control import control_of
+from scene.control import control_of, covered
 from scene.framing import default_view
 from scene.scene import SceneObject
 from scene.selector import Selector
@@ -97,9 +98,9 @@ def eye_of(thing: SceneObject, look: Look) -> tuple[np.ndarray | None, tuple[Fin
     return eye, (Finding(what, 0, f"baked as seen from {place}; --eye chooses another place"),)
 
 
-def shown_colors(thing: SceneObject, x: float | np.ndarray) -> Recolor | None:
+def shown_colors(thing: SceneObject, x: Controls) -> Recolor | None:
     """Lays the palette of the thermal stop over colours, as much as x asks for."""
-    weights, stop = thermal_weights(thing.model.stops, np.atleast_1d(x))
+    weights, stop = thermal_weights(thing.model.blend, x)
     if stop is None or not stop.palette or not weights.any():
         return None
     palette_colors(stop.palette)  # an unknown one is refused before the work begins
@@ -121,10 +122,7 @@ def chosen_rows(part: Part) -> np.ndarray | None:
     model, keep = part.thing.model, None
     each = 1 if isinstance(model, SplatLayers) else model.splats_per_anchor
     if part.inside is not None:
-        # Weights of selectors mix as control values do: from 0 outside of all to 1 inside.
-        marked = tuple(replace(selector, x=1.0) for selector in part.inside)
-        weight = control_of(replace(part.thing, x=0.0, selectors=marked))
-        keep = np.repeat(np.broadcast_to(weight, model.splat_count // each) >= 0.5, each)
+        keep = np.repeat(covered(part.thing, part.inside) >= 0.5, each)
         if not keep.any():
             raise UsageError(f"nothing of {part.thing.name} lies inside; choose another place.")
     if part.label is None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.drawing import save_png
 from runtime_models.whole_file import write_whole
+from scene.json_fields import control_row
 from scene.pose import Pose
 from vr.carried import panel_row
 from vr.frame import SIDES, Frame, Hand
@@ -84,7 +85,7 @@ def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> d
         "standing": {**pose_row(standing.world_from_play), "scale": rounded(standing.scale)},
         "held": {side: world.held(side) for side in SIDES},
         "objects": {
-            thing.name: {**pose_row(thing.world_from_object), "x": rounded(thing.x)}
+            thing.name: {**pose_row(thing.world_from_object), "x": control_row(thing.x, DECIMALS)}
             for thing in world.drawn().objects
         },
         "panel": panel_row(wearing.panel.carried),

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from runtime_models.model import Stop
+from runtime_models.stop_weights import StopWeights
 from scene.follow import put_back
 from scene.thing import Thing
 from scene.world import World
@@ -82,7 +83,7 @@ def facts_of(wearing: "Wearing", note: str = "") -> Facts:
 def sliders_of(world: World) -> tuple[Slider, ...]:
     """Of the objects that are seen and have somewhere to go, in the scene's order."""
     return tuple(
-        Slider(name, stops, thing.standing.x)
+        Slider(name, stops, thing.drawn.model.blend.place(thing.standing.x))
         for name, thing in world.things.items()
         if thing.drawn.visible and len(stops := stops_of(thing)) > 1
     )
@@ -93,7 +94,8 @@ def stops_of(thing: Thing) -> tuple[Stop, ...]:
     of a ring is its beginning.
     """
     stops = {stop.x: stop for stop in thing.drawn.model.stops}
-    named = [(state.x, state.name) for state in thing.item.states]
+    states = [state for state in thing.item.states if not isinstance(state.x, StopWeights)]
+    named = [(state.x, state.name) for state in states]
     if thing.item.ring and named:
         named.append((1.0, min(named)[1]))
     for x, name in named:

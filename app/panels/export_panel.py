@@ -158,9 +158,8 @@ def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
 
     make_folder(folder)
     thing = parts[0].thing
-    name = (
-        f"{file_name(thing.name)}{f' and {len(parts) - 1} more' * (len(parts) > 1)}-x{thing.x:.2f}"
-    )
+    more = f" and {len(parts) - 1} more" * (len(parts) > 1)
+    name = f"{file_name(thing.name)}{more}-x{thing.slider_x:.2f}"
     count = 1
     while True:
         path = folder / f"{name}{f'-{count}' * (count > 1)}{ending}"

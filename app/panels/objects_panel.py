@@ -103,7 +103,7 @@ def _row(objects: "Objects", index: int, ui_scale: float) -> None:
     imgui.pop_style_color()
     tip(f"{thing.name}: {number(thing.model.splat_count)} splats", ui_scale)
     imgui.same_line()
-    right_aligned(f"x {thing.x:.2f}")
+    right_aligned(f"x {thing.slider_x:.2f}")
     imgui.pop_id()
 
 

@@ -77,7 +77,8 @@ def _row(stage: Stage, number: int, ui_scale: float) -> None:
         regions.choose(-1 if chosen else number)
     imgui.pop_style_color()
     imgui.same_line()
-    right_aligned(f"x {region.x:.2f}")
+    blend = stage.scene.objects[region.index].model.blend
+    right_aligned(f"x {blend.place(region.x):.2f}")
 
 
 def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
@@ -98,7 +99,8 @@ def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
     border = slider("border", region.border, 0.0, far, "border: %.3f m", "border: sharp")
     tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
     regions.edit(number, border=border)
-    x, held = track(things[region.index].model.stops, region.x, 46 * ui_scale)
+    model = things[region.index].model
+    x, held = track(model.stops, model.blend.place(region.x), 46 * ui_scale)
     if held:
         regions.edit(number, x=x)
     if imgui.button("Remove", Vec(-1, 0)):

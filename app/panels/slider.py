@@ -56,7 +56,7 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
     value_width = max(imgui.calc_text_size("x 0.000").x, name_width) + 20 * ui_scale
     room = imgui.get_content_region_avail().x - value_width
-    x, held = track(thing.model.stops, thing.x, height, room)
+    x, held = track(thing.model.stops, thing.slider_x, height, room)
     if held:
         sweep.playing = False
         steer(stage, index, x)
@@ -64,7 +64,7 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     origin = imgui.get_cursor_screen_pos()
     text_y = origin.y + (height - imgui.get_text_line_height()) / 2 + 9 * ui_scale
     imgui.set_cursor_screen_pos(Vec(origin.x, text_y))
-    imgui.text_disabled(f"x {thing.x:.3f}")
+    imgui.text_disabled(f"x {thing.slider_x:.3f}")
     if named:
         imgui.push_clip_rect(origin, Vec(origin.x + value_width, origin.y + height), True)
         imgui.get_window_draw_list().add_text(origin, theme.color(theme.TEXT), thing.name)

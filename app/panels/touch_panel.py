@@ -45,7 +45,7 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
     """A square to drag in: to the sides balance -1 to 1, upwards power 0 to 1."""
     thing = touch.world.things[name]
     balance, power = touch.pads[name] = pad_of(
-        axes, thing.standing.x, touch.pads.get(name, (0.0, 1.0))
+        axes, thing.machine.blend.place(thing.standing.x), touch.pads.get(name, (0.0, 1.0))
     )
     imgui.text_disabled(f"{name}: balance {balance:+.2f}, power {power:.2f}")
     corner = imgui.get_cursor_screen_pos()
@@ -59,7 +59,7 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
         balance = min(max((mouse.x - middle) / half, -1.0), 1.0)
         power = min(max((low - mouse.y) / reach, 0.0), 1.0)
         touch.pads[name] = balance, power
-        touch.control(name, axes.x(balance, power))
+        touch.control(name, axes.x(balance, power, thing.machine.blend))
     tip("To the sides: which of two; upwards: how much of it.", ui_scale)
     draw = imgui.get_window_draw_list()
     end, line = Vec(corner.x + width, corner.y + height), theme.color(theme.TRACK, 0.8)

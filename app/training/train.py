@@ -109,9 +109,10 @@ class LossOptions:
     encoding: Literal["even", "stops"] | None = None
     """stops: --control and --sigma by the capture: a number a stop, half as wide as stops lie
     apart, so that what lies between two stops learns from both."""
-    between: Literal["none", "photos", "pictures", "splats"] | None = None
+    between: Literal["none", "photos", "pictures", "shapes", "splats"] | None = None
     """How x between two stops is learned: from blends of photos taken from one place, from blends
-    of the model's own pictures, or by keeping splats on the straight way between the stops."""
+    of the model's own pictures, from photos on shapes that are on their way to the next stop, or by
+    keeping splats on the straight way between the stops."""
     between_share: float | None = None
     """Of the steps, in which x lies between two stops."""
     between_pull: float | None = None

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.viewer.document import key_of
 from runtime_models.model import BadFile
+from runtime_models.stop_weights import Control
 from scene import edits
 from scene.control import Sweep
 from scene.edits import Change, History
@@ -46,6 +47,7 @@ def redo(stage: "Stage") -> str:
 def turn_to(stage: "Stage", history: History) -> None:
     """Goes to another step of the history: only what differs is touched."""
     before = stage.document.history
+    stage.finish_shifts()
     stage.document.history = history
     if history.file is before.file:
         return
@@ -97,7 +99,7 @@ def fresh_row(
     """What the stage holds of an object that was not there."""
     source = stage.document.sources[key_of(item)]
     thing = object_of(item, stage.in_palette(source.model), label)
-    sweep = Sweep.over(source.model.stops)
+    sweep = Sweep.over(source.model.blend)
     sweep.resume_at(item.x)
     return thing, source.model, sweep, source
 
@@ -114,7 +116,7 @@ def changed_thing(thing: SceneObject, item: SceneItem, change: Change | None) ->
     return replace(thing, **values)
 
 
-def steer(stage: "Stage", index: int, x: float, together: str = "") -> None:
+def steer(stage: "Stage", index: int, x: Control, together: str = "") -> None:
     """A hand moves x: where the object starts as well, unless the world is running."""
     thing = stage.scene.objects[index]
     stage.set_x(index, x)

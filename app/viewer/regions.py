@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from runtime_models.stop_weights import Control
 from scene.pick import anchor_places
 from scene.pose import View
 from scene.scene import SceneObject
@@ -25,7 +26,7 @@ class Region:
     name: str
     index: int = 0  # of its object
     enabled: bool = True
-    x: float = 0.0  # control value inside
+    x: Control = 0.0  # inside
     border: float = 0.0  # metres over which x changes to what is outside
     centre: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) metres, object frame
     half: np.ndarray = field(default_factory=lambda: np.ones(3))  # (3,) metres; a sphere's: [0]
@@ -214,7 +215,7 @@ def same(one: object, other: object) -> bool:
 def farthest_stop(thing: SceneObject) -> float:
     """x of the stop that differs most from what the object shows."""
     xs = [stop.x for stop in thing.model.stops] or [0.0, 1.0]
-    return max(xs, key=lambda x: abs(x - thing.x))
+    return max(xs, key=lambda x: abs(x - thing.slider_x))
 
 
 def brushed(

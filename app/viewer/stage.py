@@ -14,7 +14,8 @@ from app.viewer.opened import Source
 from app.viewer.regions import Regions
 from renderer.settings import DEBUG_VIEWS, RenderSettings
 from runtime_models.model import Finding, Model
-from scene.control import Sweep
+from runtime_models.stop_weights import Control
+from scene.control import SHIFT_S, Shift, Sweep
 from scene.edits import free_name
 from scene.framing import (
     default_background,
@@ -52,6 +53,7 @@ class Stage:
         self.chosen = ""  # name of the object that is edited; "": none
         self.home: View | None = None  # the first look at the scene where a file gives one
         self.sweeps: list[Sweep] = []
+        self.shifts: dict[int, Shift] = {}  # of objects on their way to a stop, by their index
         self.settings = RenderSettings(background=BACKGROUND)
         self.palette = AS_FILED
         self.regions = Regions()
@@ -80,7 +82,7 @@ class Stage:
 
     def show(self, scene: Scene, document: Document | None = None) -> None:
         """Takes a scene over and frames it."""
-        self.scene, self.chosen = scene, ""
+        self.scene, self.chosen, self.shifts = scene, "", {}
         self.document = document or document_from(scene, self.sources)
         self.bodies.forget()
         if scene.objects:
@@ -88,7 +90,7 @@ class Stage:
             self.settings = replace(self.settings, background=background)
         self.filed = tuple(thing.model for thing in scene.objects)
         self.palette = AS_FILED
-        self.sweeps = [Sweep.over(thing.model.stops) for thing in scene.objects]
+        self.sweeps = [Sweep.over(thing.model.blend) for thing in scene.objects]
         for sweep, thing in zip(self.sweeps, scene.objects, strict=True):
             sweep.resume_at(thing.x)
         self.reframe()
@@ -246,7 +248,7 @@ class Stage:
         number = (DEBUG_VIEWS.index(self.settings.debug) + step) % len(DEBUG_VIEWS)
         self.settings = replace(self.settings, debug=DEBUG_VIEWS[number])
 
-    def set_x(self, index: int, x: float) -> None:
+    def set_x(self, index: int, x: Control) -> None:
         """Moves an object's x; what the file says stays."""
         thing = self.scene.objects[index]
         self._put(index, replace(thing, x=x))
@@ -259,14 +261,34 @@ class Stage:
         self.scene = Scene(tuple(objects))
 
     def go_to_stop(self, number: int) -> None:
-        """Every object that has a stop of that number, counted from 0, goes there and rests."""
+        """Every object that has a stop of that number, counted from 0, goes straight there and
+        rests; where it starts is there at once.
+        """
         self.rest()
         for index, thing in enumerate(self.scene.objects):
             stops = sorted(thing.model.stops, key=lambda stop: stop.x)
-            if number < len(stops):
-                self.sweeps[index].playing = False
-                steer(self, index, stops[number].x, f"stop {number + 1}")
+            if number >= len(stops):
+                continue
+            self.sweeps[index].playing = False
+            if (end := stops[number].x) != thing.x:
+                steer(self, index, end, f"stop {number + 1}")
+                self.set_x(index, thing.x)
+                self.shifts[index] = Shift(thing.x, end, thing.model.blend)
         self.rest()
+
+    def finish_shifts(self) -> None:
+        """Objects on their way to a stop are there."""
+        self._advance_shifts(SHIFT_S)
+
+    def _advance_shifts(self, seconds: float) -> None:
+        """A hand that has moved x meanwhile has the last word."""
+        for index, shift in list(self.shifts.items()):
+            taken = self.scene.objects[index].x != shift.control
+            shift.seconds += seconds
+            if not taken:
+                self.set_x(index, shift.control)
+            if taken or shift.over:
+                del self.shifts[index]
 
     def toggle_play(self, index: int | None = None) -> None:
         """Starts or stops one object's sweep, or all together: all stop if any was playing."""
@@ -309,10 +331,13 @@ class Stage:
 
     @property
     def playing(self) -> bool:
-        return any(sweep.playing for sweep in self.sweeps)
+        return bool(self.shifts) or any(sweep.playing for sweep in self.sweeps)
 
     def advance(self, seconds: float) -> None:
-        """Lets playing sweeps go on; a slider moved by hand meanwhile is where they continue."""
+        """Lets playing sweeps and shifts go on; a slider moved by hand meanwhile is where a sweep
+        continues.
+        """
+        self._advance_shifts(seconds)
         for index, sweep in enumerate(self.sweeps):
             if sweep.playing:
                 sweep.resume_at(self.scene.objects[index].x)

@@ -11,6 +11,7 @@ from app.viewer.hands import is_painting
 from app.viewer.sections import Section
 from app.viewer.touch_marks import Flash, Label, Marks
 from app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release, Wheel
+from runtime_models.stop_weights import Control
 from scene.follow import put_back
 from scene.mouse_hand import MouseHand, moved, pose, pushed, ray, rolled, take, turned
 from scene.pose import View
@@ -214,7 +215,7 @@ class Touch:
         put_back(self.world)
         self.follow([])
 
-    def control(self, name: str, x: float) -> None:
+    def control(self, name: str, x: Control) -> None:
         """A pad puts an object's x there."""
         stage = self.viewer.stage
         names = [thing.name for thing in stage.scene.objects]

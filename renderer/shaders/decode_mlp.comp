@@ -1,9 +1,9 @@
 // decode_mlp: one network for every anchor.  One invocation an anchor; a whole layer in registers.
 // Loops run over uniform counts: unrolled, the compiler of a software driver takes a minute.
-// Psi(x) is the same for all anchors and folded into the first bias, unless each has its own x.
+// Psi is the same for all anchors and folded into the first bias, unless each has its own control.
 // Needs: LAYER_VECS (vec4 of the widest layer), BLOCK_VECS (vec4 of a uniform block),
 //        STORED_WEIGHTS (1: too many for a uniform block),
-//        OWN_CONTROL (1: a control value an anchor, and Psi of it is an input as the others are).
+//        OWN_CONTROL (1: Psi of a control an anchor is an input as the others are).
 #include "common/activation.glsl"
 #include "common/direction.glsl"
 layout(local_size_x = DECODE_WORKGROUP) in;
@@ -19,9 +19,8 @@ layout(std140, binding = WEIGHTS_BLOCK) uniform Weights { vec4 weights[BLOCK_VEC
 #endif
 
 #if OWN_CONTROL
-layout(std430, binding = SLOT_CONTROL) readonly buffer Control { float control[]; };
-uniform uint control_vecs;       // vec4 of Psi
-uniform float spacing, sigma;    // Psi_t(x) = exp(-(t spacing - x)^2 / (2 sigma^2)), eq. 6 and 7
+layout(std430, binding = SLOT_CONTROL) readonly buffer Control { vec4 control[]; };
+uniform uint control_vecs;       // vec4 of Psi, an anchor
 #endif
 
 uniform uint first;              // anchor of this run's first invocation
@@ -53,10 +52,8 @@ void main() {
         values[v] = features[(first + anchor) * feature_vecs + v];
     values[feature_vecs] = vec4(direction_from(eye, anchors[first + anchor].xyz), 0.0);
 #if OWN_CONTROL
-    for (uint v = 0u; v < control_vecs; v++) {
-        vec4 away = (vec4(0.0, 1.0, 2.0, 3.0) + 4.0 * float(v)) * spacing - control[first + anchor];
-        values[feature_vecs + 1u + v] = exp(away * away / (-2.0 * sigma * sigma));
-    }
+    for (uint v = 0u; v < control_vecs; v++)
+        values[feature_vecs + 1u + v] = control[(first + anchor) * control_vecs + v];
 #endif
 
     uint from = 0u, to = LAYER_VECS, bias = layers;

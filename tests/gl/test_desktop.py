@@ -86,8 +86,13 @@ def test_number_keys_go_to_stops_and_stop_playing(viewer):
     press(viewer, glfw.KEY_SPACE)
     assert viewer.stage.playing
     press(viewer, glfw.KEY_2)
+    assert not viewer.stage.sweeps[0].playing
+    run_frames(viewer, 2, seconds=0.5)
     assert viewer.stage.scene.objects[0].x == 1.0 and not viewer.stage.playing
     press(viewer, glfw.KEY_1)
+    run_frames(viewer, 1, seconds=0.3)
+    assert 0 < viewer.stage.scene.objects[0].x < 1
+    run_frames(viewer, 1, seconds=0.4)
     assert viewer.stage.scene.objects[0].x == 0.0
     press(viewer, glfw.KEY_9)  # there is no ninth stop
     assert viewer.stage.scene.objects[0].x == 0.0

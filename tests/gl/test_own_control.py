@@ -15,11 +15,11 @@ from renderer.reference import reference_image
 from renderer.renderer import Renderer
 from renderer.tint import Tinter
 from runtime_models.evaluate import directions
-from runtime_models.model import AnchorModel, ControlEncoding
+from runtime_models.model import AnchorModel, ControlEncoding, Stop
 from runtime_models.rotation import covariance, normalize
 from scene.scene import Scene
 from tests.gl.conftest import make_layers, make_mlp, make_model, read
-from tests.models import run_in_numpy
+from tests.models import psi_of, run_in_numpy
 from tests.splat_scenes import psnr_db
 from tests.test_selected import VIEW, selected_scene
 
@@ -37,8 +37,10 @@ def controls(count: int) -> np.ndarray:
 
 def slow(model: AnchorModel, x: np.ndarray) -> tuple:
     """means, opacity, covariance (N, 6), colour by float64, with Psi in words of the paper."""
-    t = np.arange(model.encoding.d) * model.encoding.spacing
-    psi = np.exp(-((t - x[:, None].astype(np.float64)) ** 2) / (2 * model.encoding.sigma**2))
+    if x.ndim == 2:  # weights over the stops
+        psi = x.astype(np.float64) @ [psi_of(model, stop.x) for stop in model.stops]
+    else:
+        psi = np.array([psi_of(model, float(value)) for value in x])
     parts = {
         "feature": model.features, "control": psi,
         "direction": directions(model.anchors.astype(np.float64), EYE),
@@ -73,8 +75,11 @@ def decoded(gpu: Gpu, model, x, mlps: str = "gl") -> tuple:
     return mean_opacity[rows, :3], mean_opacity[rows, 3], sigma[rows, :6], color[rows, :3]
 
 
-def assert_as_slow(gpu, model, mlps="gl"):
+def assert_as_slow(gpu, model, mlps="gl", blends=False):
     x = controls(len(model.anchors))
+    if blends:
+        rows = np.random.default_rng(1).uniform(size=(len(x), len(model.stops)))
+        x = (rows / rows.sum(axis=1, keepdims=True)).astype(np.float32)
     for a, b in zip(decoded(gpu, model, x, mlps), slow(model, x), strict=True):
         np.testing.assert_allclose(a, b, atol=3e-5 * max(1.0, np.abs(b).max(initial=0)))
 
@@ -83,6 +88,17 @@ def assert_as_slow(gpu, model, mlps="gl"):
 @pytest.mark.parametrize("anchors", [1, 2, BLOCK - 1, BLOCK, BLOCK + 1, 1000])
 def test_each_anchor_at_its_own_value(gpu, mlps, anchors):
     assert_as_slow(gpu, make_model(anchors), mlps)
+
+
+@pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])
+def test_each_anchor_at_a_blend_of_its_own(gpu, mlps):
+    stops = tuple(Stop(name, x) for name, x in (("a", 0.1), ("b", 0.3), ("c", 1.0)))
+    assert_as_slow(gpu, replace(make_model(70), stops=stops), mlps, blends=True)
+
+
+@pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])
+def test_each_anchor_at_its_own_value_encoded_as_it_is(gpu, mlps):
+    assert_as_slow(gpu, replace(make_model(70), between_stops="encoding"), mlps)
 
 
 @pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])

@@ -8,7 +8,7 @@
 // with VIEW_COLOR.  CONDITIONED has a bit for each head that sees Psi.  Rows that nothing meets and
 // padding are zero, get zero gradients and so stay zero.
 //
-// Psi(x) is one vector for all anchors, so W1_control . Psi + b1 is folded into one bias a step;
+// Psi is one vector a head for all anchors, so W1_control . Psi + b1 is folded into one bias a step;
 // that is exact and halves the first layer.
 
 #define DIRECTION_ROW (FEATURES + CONTROL)
@@ -43,7 +43,7 @@ __kernel void prepare_weights(__global const float *weights, __global const floa
   __global const float *second = first + LAST_AT;
   float sum = first[INPUTS * HIDDEN + j];
   if (CONDITIONED >> m & 1)
-    for (int d = 0; d < CONTROL; d++) sum += control[d] * first[(FEATURES + d) * HIDDEN + j];
+    for (int d = 0; d < CONTROL; d++) sum += control[m * CONTROL + d] * first[(FEATURES + d) * HIDDEN + j];
   bias[m * HIDDEN + j] = sum;
   for (int i = 0; i < FEATURES; i++)
     first_t[(m * HIDDEN + j) * FEATURES + i] = first[i * HIDDEN + j];
@@ -69,5 +69,5 @@ __kernel void control_gradient(__global const float *control, __global float *gr
   __global float *first = grad + WEIGHTS_AT[m];
   for (int d = 0; d < CONTROL; d++)
     first[(FEATURES + d) * HIDDEN + j] =
-        CONDITIONED >> m & 1 ? control[d] * first[INPUTS * HIDDEN + j] : 0.0f;
+        CONDITIONED >> m & 1 ? control[m * CONTROL + d] * first[INPUTS * HIDDEN + j] : 0.0f;
 }
