@@ -80,25 +80,45 @@ def rasterize_rgba_views(
     least_through: float = LEAST_THROUGH,
 ) -> list[np.ndarray]:
     """What rasterize_rgba gives, of several views of the same size."""
+    return rasterize_with_heat(device, views, [], size, form, least_through)[0]
+
+
+def rasterize_with_heat(
+    device: Device,
+    views: list[tuple[Projected, Tiles]],
+    heats: "list[Array]",
+    size: tuple[int, int],
+    form: str | None = None,
+    least_through: float = LEAST_THROUGH,
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What rasterize_rgba gives of several views, and (H, W, 2) value and weight of their heat,
+    blended as the colours are.
+
+    heats: (N, 4) of each view, value times weight first and weight last; none: it is left out.
+    """
     width, height = size
     images = [device.empty((height, width, 4)) for _ in views]
+    hot = [device.empty((height, width, 2)) for _ in heats]
     inputs = [
         (tiles.starts, tiles.instances, projected.record, image)
         for (projected, tiles), image in zip(views, images, strict=True)
     ]
+    if heats:
+        inputs = [(*given, *pair) for given, *pair in zip(inputs, heats, hot, strict=True)]
     draw_views = {"cpu": _draw_cpu, "gpu": _draw_gpu}[form or device.kind]
     if views:
         draw_views(device, inputs, size, views[0][1].grid, float(least_through))
-    return [device.view(image) for image in images]
+    return [device.view(image) for image in images], [device.view(image) for image in hot]
 
 
 def _draw_cpu(
     device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int], least: float
 ) -> None:
     """Two views a launch, a work-item a tile of both."""
-    kernel = device.program(KERNELS / "draw_cpu.cl")["draw"]
+    width = len(inputs[0])
+    kernel = device.program(KERNELS / "draw_cpu.cl", **({"HEAT": 1} if width > 4 else {}))["draw"]
     for first in range(0, len(inputs), 2):
-        left, right = [*inputs[first : first + 2], [None] * 4][:2]
+        left, right = [*inputs[first : first + 2], [None] * width][:2]
         device.launch(kernel, grid[0] * grid[1], 1, *size, grid[0], least, *left, *right)
 
 
@@ -106,12 +126,13 @@ def _draw_gpu(
     device: Device, inputs: list, size: tuple[int, int], grid: tuple[int, int], least: float
 ) -> None:
     file, group, _ = FORMS["gpu"]
-    kernel = device.program(file, RGBA=1, STOP=least)["rasterize"]  # built once for each value
+    defines = {"RGBA": 1, "STOP": least} | ({"HEAT": 1} if len(inputs[0]) > 4 else {})
+    kernel = device.program(file, **defines)["rasterize"]  # built once for each value
     ends = device.empty(grid[0] * grid[1], np.int32)
-    for starts, instances, record, image in inputs:
+    for starts, instances, record, image, *heat in inputs:
         device.launch(
             kernel, grid[0] * grid[1] * group, group,
-            *size, grid[0], starts, instances, record, 0.0, 0.0, 0.0, image, None, ends,
+            *size, grid[0], starts, instances, record, 0.0, 0.0, 0.0, image, None, ends, *heat,
         )  # fmt: skip
 
 

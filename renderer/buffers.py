@@ -85,6 +85,24 @@ class Arena:
         self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
         self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
         self._pack = gpu.compute("pack.comp")
+        self._heats: dict[int, moderngl.Buffer] = {}  # set -> what is beside its colours
+
+    def heat_of(self, which: int) -> moderngl.Buffer:
+        """What thermal stops have in a set of colours; made, all zero, when first asked for."""
+        if which not in self._heats:
+            self._heats[which] = self.gpu.reserve(16 * self.count, "heat")
+        return self._heats[which]
+
+    @property
+    def heat(self) -> moderngl.Buffer:
+        """That of the set which decoding writes into."""
+        return self.heat_of(self.set)
+
+    def clear_heat(self, i: int) -> None:
+        """Object i has none, where there is any at all."""
+        rows = self.starts[i + 1] - self.starts[i]
+        if self.set in self._heats and rows:
+            self.heat.write(bytes(16 * rows), offset=16 * self.starts[i])
 
     def color_set(self, which: int, count: int) -> None:
         """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
@@ -93,6 +111,8 @@ class Arena:
         for buffer in self.colors[count:]:
             buffer.release()
         self.colors = self.colors[:count]
+        for gone in [kept for kept in self._heats if kept >= count]:
+            self._heats.pop(gone).release()
         while len(self.colors) < count:
             self.colors.append(self.gpu.reserve(16 * self.count, "colours of another eye"))
         self.color, self.set = self.colors[which], which
@@ -166,6 +186,8 @@ class Arena:
             self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
             self.command, self.staging,
         ):  # fmt: skip
+            buffer.release()
+        for buffer in self._heats.values():
             buffer.release()
 
     def __enter__(self) -> "Arena":

@@ -3,9 +3,13 @@
 import numpy as np
 
 from renderer.buffers import Arena
+from renderer.false_colors import Shade
 from renderer.gpu import Gpu
+from renderer.heat import Heater
 from renderer.layers import Layers
 from renderer.networks import Networks
+from renderer.palette import palette_colors
+from runtime_models.color_memory import ColorMemory
 from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import Model, SplatLayers
 from runtime_models.stop_weights import Controls
@@ -24,9 +28,8 @@ class Decoder:
     def __init__(self, gpu: Gpu, arena: Arena, models: list[Model], mlps: str = "gl") -> None:
         if mlps not in MLPS:
             raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
-        self._arena = arena
-        # Of what onnxruntime decodes, (N, 3): by object and set of colours.
-        self._colors: dict[tuple[int, int], np.ndarray] = {}
+        self._gpu, self._arena = gpu, arena
+        self._heater: Heater | None = None
         made: dict[int, Layers | Networks | Evaluator] = {}
         for model in models:
             if id(model) in made:
@@ -38,6 +41,10 @@ class Decoder:
             else:
                 made[id(model)] = Evaluator(model, keep=True)
         self._models = [made[id(model)] for model in models]
+        self._colors = {  # of what onnxruntime decodes
+            i: ColorMemory(model) for i, model in enumerate(self._models)
+            if isinstance(model, Evaluator)
+        }  # fmt: skip
         for i, on_gpu in enumerate(self._models):
             if isinstance(on_gpu, Layers):
                 on_gpu.place(arena, i)
@@ -60,16 +67,48 @@ class Decoder:
         else:
             model.geometry(arena, arena.starts[i], x)
 
-    def color(self, i: int, x: Controls, eye: np.ndarray, seen: np.ndarray | None = None) -> None:
-        """Colours of object i at x towards an eye (3,) in the object's frame; after geometry.
+    def shade(
+        self,
+        i: int,
+        shade: Shade,
+        eye: np.ndarray,
+        seen: np.ndarray | None = None,
+        at_once: bool = False,
+    ) -> None:
+        """Colours of object i towards an eye (3,) in the object's frame, and what of them is heat;
+        after geometry.
 
         seen: (A,) bool; the rest may keep what it has (compute passes colour all at once).
+        at_once: the heat becomes colours of its palettes here.
         """
+        if shade.heats and self._heater is None:
+            self._heater = Heater(self._gpu)
+        for number, heat in enumerate(shade.heats):
+            self.color(i, heat.control, eye, seen, number + 1)
+            palette = palette_colors(heat.palette) if at_once else None
+            self._heater.add(self._arena, i, heat.weights, palette, number == 0)
+        layers = isinstance(self._models[i], Layers)
+        if shade.rest is not None and not (shade.heats and layers):
+            self.color(i, shade.rest, eye, seen)
+        if i in self._colors:
+            self._colors[i].forget_after(self._arena.set, len(shade.heats))
+        if shade.heats:
+            self._heater.blend(self._arena, i, at_once)
+        else:
+            self._arena.clear_heat(i)
+
+    def color(
+        self,
+        i: int,
+        x: Controls,
+        eye: np.ndarray,
+        seen: np.ndarray | None = None,
+        part: int = 0,
+    ) -> None:
+        """Colours of object i as they are decoded at x; part: which of several that are mixed."""
         model, arena = self._models[i], self._arena
         if isinstance(model, Evaluator):
-            key = (i, arena.set)
-            self._colors[key] = model.color(x, eye, seen, self._colors.get(key))
-            arena.write_color(i, self._colors[key])
+            arena.write_color(i, self._colors[i].at((arena.set, part), x, eye, seen))
         elif isinstance(model, Layers):
             model.color(arena, arena.starts[i], eye)
         else:
@@ -79,6 +118,8 @@ class Decoder:
         for model in self._models:
             if not isinstance(model, Evaluator):
                 model.release()
+        if self._heater is not None:
+            self._heater.release()
         self._models.clear()
         self._colors.clear()
 

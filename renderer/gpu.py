@@ -47,15 +47,16 @@ class Gpu:
             buffer.write(array)
         return buffer
 
-    def target(self, size: tuple[int, int], dtype: str) -> moderngl.Framebuffer:
-        """A framebuffer with one RGBA texture; dtype one of target.DTYPES."""
+    def target(self, size: tuple[int, int], dtype: str, images: int = 1) -> moderngl.Framebuffer:
+        """A framebuffer with so many RGBA textures; dtype one of target.DTYPES."""
         if not max(size) <= self.max_side:
             raise TooLarge(
                 f"a view of {size[0]} x {size[1]} pixels was asked for and this driver draws "
                 f"{self.max_side} a side at most (GL_MAX_TEXTURE_SIZE); ask for a smaller one."
             )
-        self.allocations += 1
-        return self.ctx.framebuffer([self.ctx.texture(size, 4, dtype=dtype)])
+        self.allocations += images
+        textures = [self.ctx.texture(size, 4, dtype=dtype) for _ in range(images)]
+        return self.ctx.framebuffer(textures)
 
     def compute(self, name: str, **defines: object) -> moderngl.ComputeShader:
         """The program of a .comp file, compiled once for the same defines."""
@@ -64,11 +65,11 @@ class Gpu:
             self._programs[key] = shader.compile_compute(self.ctx, name, **defines)
         return self._programs[key]
 
-    def program(self, vertex: str, fragment: str) -> moderngl.Program:
-        """The program of two stages, compiled once."""
-        key = (vertex, fragment)
+    def program(self, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
+        """The program of two stages, compiled once for the same defines."""
+        key = (vertex, fragment, *sorted(defines.items()))
         if key not in self._programs:
-            self._programs[key] = shader.compile_program(self.ctx, vertex, fragment)
+            self._programs[key] = shader.compile_program(self.ctx, vertex, fragment, **defines)
         return self._programs[key]
 
     def run(self, program: moderngl.ComputeShader, groups: int, **uniforms: object) -> None:

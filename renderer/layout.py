@@ -47,7 +47,8 @@ SLOTS = {
     "OWN_OPACITY": 6,  # float (n,)     before the weight
     "CONTROL": 6,  # vec4 (A, d / 4)  Psi of a control an anchor
     "PALETTE": 3,  # vec4 (256,)    display sRGB
-    "TINT": 4,  # float (A,)     how much of the palette
+    "TINT": 4,  # float (A,)     weight of a thermal stop
+    "HEAT": 0,  # vec4 (N,)      value times weight 0 0 weight: what is thermal of a splat
 }
 WEIGHTS_BLOCK = 0  # uniform block
 

@@ -75,20 +75,39 @@ def thermal_weights(blend: StopBlend, controls: Controls) -> tuple[np.ndarray, S
     return np.minimum(rows[:, thermal].sum(axis=1), 1.0), blend.stops[nearest]
 
 
-def apply_palette(rgba: np.ndarray, name: str, weight: float) -> np.ndarray:
-    """Premultiplied (H, W, 4) with its colour mixed towards palette[luminance]; same shape.
+def legend_opacity(weight: float) -> float:
+    """How much of a thermal stop's legend is seen at its weight: all from one half on."""
+    return min(2 * weight, 1.0)
+
+
+def apply_palette(rgba: np.ndarray, name: str) -> np.ndarray:
+    """Premultiplied (H, W, 4) with palette[luminance] for its colour; same shape.
 
     The palette colours what is there, not the background: colour is divided by alpha first.
     """
-    if not name or not weight > 0:
-        return rgba
-    colors = palette_colors(name)
-    alpha = rgba[..., 3:]
-    luminance = (rgba[..., :3] @ LUMINANCE)[..., None] / np.maximum(alpha, 1e-6)
-    place = np.clip(luminance[..., 0], 0, 1) * (STEPS - 1)
-    false = np.stack([np.interp(place, np.arange(STEPS), c) for c in colors.T], axis=-1)
-    mixed = rgba[..., :3] * (1 - weight) + false * alpha * weight
-    return np.concatenate([mixed, alpha], axis=-1).astype(rgba.dtype)
+    alpha = rgba[..., 3]
+    false = through_palette((rgba[..., :3] @ LUMINANCE) / np.maximum(alpha, 1e-6), name)
+    shown = [false * alpha[..., None], alpha[..., None]]
+    return np.concatenate(shown, axis=-1).astype(rgba.dtype)
+
+
+def lay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
+    """Premultiplied (H, W, 4) and the heat beside it, (H, W, 2) value and weight, both times alpha:
+    with the palette's colour of the value, as much as the weight; as (H, W, 4).
+    """
+    value, weight = heat[..., 0], heat[..., 1]
+    false = through_palette(value / np.maximum(weight, 1e-6), name)
+    out = rgba.copy()
+    out[..., :3] += false * weight[..., None]
+    return out
+
+
+def through_palette(values: np.ndarray, name: str) -> np.ndarray:
+    """(..., 3) display sRGB of values (...), held to 0..1; NaN stays."""
+    place = np.clip(values, 0, 1) * (STEPS - 1)
+    return np.stack(
+        [np.interp(place, np.arange(STEPS), c) for c in palette_colors(name).T], axis=-1
+    )
 
 
 def _gray() -> np.ndarray:

@@ -16,6 +16,7 @@ from renderer.buffers import Arena
 from renderer.cadence import Cadence, sort_frames
 from renderer.context import is_software
 from renderer.decode import Decoder
+from renderer.false_colors import Shade
 from renderer.gpu import Gpu
 from renderer.layout import MOST_VIEWS
 from renderer.overdraw import count_overdraw
@@ -28,7 +29,6 @@ from renderer.surface import Surface
 from renderer.surface_quads import draw_surface
 from renderer.target import brightest, choose_target
 from renderer.timing import PassTimer
-from renderer.tint import Tinter
 from runtime_models.evaluate import follows_eye
 from runtime_models.model import Model, is_antialiased
 from runtime_models.stop_weights import Controls
@@ -55,7 +55,7 @@ class QuadsDrawing:
         self._models: list[Model] = []
         self._most: float | None = None  # brightest colour of these; None: not known yet
         self._last = 0  # row of the counts of the view drawn last
-        self._tinter: Tinter | None = None  # made when a part alone shows a thermal stop
+        self.draws_heat = False  # beside the colours, from the next frame on
         self._arena: Arena | None = None
         self._decoder: Decoder | None = None
 
@@ -97,24 +97,22 @@ class QuadsDrawing:
         self._arena.color_set(which, count)
 
     def decode_color(
-        self, i: int, x: Controls, eye_object: np.ndarray, seen: np.ndarray | None = None
+        self,
+        i: int,
+        shade: Shade,
+        eye_object: np.ndarray,
+        seen: np.ndarray | None = None,
+        at_once: bool = False,
     ) -> None:
-        """Colours of object i at x, towards an eye (3,) in the object's frame.
+        """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
 
-        seen: (A,) bool, one an anchor: the rest may keep what it has.
+        seen: (A,) bool, one an anchor: the rest may keep what it has.  at_once: the heat becomes
+        colours of its palettes here.
         """
-        self._decoder.color(i, x, eye_object, seen)
+        self._decoder.shade(i, shade, eye_object, seen, at_once)
 
     def wait_decoded(self) -> None:
         """Nothing: GL keeps the order of the passes itself."""
-
-    def tint(self, i: int, palette: np.ndarray, weights: np.ndarray) -> None:
-        """Mixes the colours of object i, just decoded, towards a palette (256, 3) by luminance;
-        weights (A,) 0..1, one an anchor (a splat of layers).
-        """
-        if self._tinter is None:
-            self._tinter = Tinter(self._gpu)
-        self._tinter.tint(self._arena, i, palette, weights)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
@@ -161,14 +159,18 @@ class QuadsDrawing:
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, shift = self._arena, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
-        if self._pair is not None and alike and settings.low_pass >= LEAST_LOW_PASS:
+        paired = self._pair is not None and alike and not self.draws_heat
+        if paired and settings.low_pass >= LEAST_LOW_PASS:
             shift = self._pair.shift(arena, group[0].size[0])
         if shift is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
             self._pair.draw(arena, pictures, shift, settings.min_alpha, self._splatter.unit)
             return
         for row, view in enumerate(group):
-            self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row)
+            heat = None
+            if self.draws_heat:
+                heat = arena.heat_of(min(i + row, len(arena.colors) - 1))
+            self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row, heat)
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
@@ -217,6 +219,14 @@ class QuadsDrawing:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._splatter.image(i)
 
+    def heat(self, i: int) -> np.ndarray:
+        """(H, W, 2) float32, row 0 on top, of the same view: value and weight, both times alpha."""
+        return self._splatter.image(i, of=1)[..., :2]
+
+    def presentable_heat(self, i: int) -> moderngl.Texture:
+        """What resolve takes beside it, of a frame with heat."""
+        return self._splatter.texture(i, of=1)
+
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
         arena = self._arena
@@ -252,7 +262,7 @@ class QuadsDrawing:
 
     def close(self) -> None:
         self._release_arena()
-        for part in (self._splatter, self._sorter, self._projector, self._tinter):
+        for part in (self._splatter, self._sorter, self._projector):
             if part is not None:
                 part.release()
 

@@ -1,15 +1,25 @@
 """The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from renderer import layout
-from renderer.false_colors import false_colors, tinted
+from renderer.false_colors import (
+    BESIDE,
+    SPLATS,
+    FalseColors,
+    Shade,
+    false_colors,
+    mixed_colors,
+    split_colors,
+)
+from renderer.palette import lay_heat
 from renderer.settings import CULL_REASONS, RenderSettings
 from runtime_models.evaluate import evaluate
-from runtime_models.model import is_antialiased
+from runtime_models.model import Model, is_antialiased
 from runtime_models.rotation import normalize, rotation_matrices
+from runtime_models.stop_weights import Controls
 from scene.control import control_of
 from scene.pose import View
 from scene.scene import Scene, SceneObject
@@ -29,7 +39,7 @@ class Projected:
     mean_px: np.ndarray  # (N, 2) row 0 on top
     covariance: np.ndarray  # (N, 2, 2) px^2, low_pass included
     opacity: np.ndarray  # (N,) after the fade
-    color: np.ndarray  # (N, 3)
+    color: np.ndarray  # (N, 3), or (N, 5) with value and weight of the heat
     mean: np.ndarray  # (N, 3) metres in the camera, OpenCV axes
     axes: np.ndarray  # (N, 3, 3) metres in the camera: the columns are one sigma long
 
@@ -41,7 +51,8 @@ def reference_image(
     eye: np.ndarray | None = None,
     middle: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top.
+    """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top; at a pure
+    thermal stop values.
 
     eye: (3,) world metres, where colours are looked at from, if not the view's own eye (shared
     colours of two eyes: the middle of both).  middle: where distances in the order "distance" are
@@ -50,7 +61,7 @@ def reference_image(
     settings = settings or RenderSettings()
     eye = view.world_from_eye.position if eye is None else eye
     middle = eye if middle is None else middle
-    objects = tint_objects(scene, [gate_object(o, view, settings, eye) for o in scene.objects])
+    objects, colors = shaded_objects(scene, view, settings, eye)
     if not objects:
         return np.zeros((view.size[1], view.size[0], 4))
     depth, place, *ellipses = (
@@ -59,20 +70,23 @@ def reference_image(
     )
     key = np.linalg.norm(place - middle, axis=1) if settings.order == "distance" else depth
     order = np.argsort(key, kind="stable")
-    return blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
+    image = blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
+    if colors.way != BESIDE:
+        return image
+    return lay_heat(image[..., [0, 1, 2, 5]], image[..., 3:5], colors.palette)
 
 
-def tint_objects(scene: Scene, objects: list[Projected]) -> list[Projected]:
-    """The visible ones, each splat in false colours where objects or parts differ in x."""
-    tints = false_colors(scene, [control_of(thing) for thing in scene.objects]).tints
-    out = []
-    for i, (thing, found) in enumerate(zip(scene.objects, objects, strict=True)):
-        if tints and tints[i]:
-            per_anchor = len(found.color) // len(tints[i].weights)
-            weights = np.repeat(tints[i].weights.astype(np.float64), per_anchor)
-            found = replace(found, color=tinted(found.color, tints[i].name, weights))
-        out += [found] if thing.visible else []
-    return out
+def shaded_objects(
+    scene: Scene, view: View, settings: RenderSettings, eye: np.ndarray
+) -> tuple[list[Projected], FalseColors]:
+    """The visible objects; colours are (N, 3), or (N, 5) with the heat that is drawn beside."""
+    colors = false_colors(scene, [control_of(thing) for thing in scene.objects])
+    found = [
+        gate_object(thing, view, settings, eye, (colors.way, shade))
+        for thing, shade in zip(scene.objects, colors.shades, strict=True)
+        if thing.visible
+    ]
+    return found, colors
 
 
 def reference_reasons(
@@ -108,19 +122,24 @@ def project_object(
 
 
 def gate_object(
-    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
-) -> Projected:
-    """Projects every splat and finds the first gate that it fails."""
+    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray,
+    shading: tuple[str, Shade] | None = None,
+) -> Projected:  # fmt: skip
+    """Projects every splat and finds the first gate that it fails.
+
+    shading: how the scene's heat is shown and what of the object is heat; None: none is.
+    """
     world_from_object = thing.world_from_object.matrix()
     camera_from_world, fx, fy, cx, cy = view.pinhole()
     camera_from_object = camera_from_world @ world_from_object
     object_from_world = np.linalg.inv(world_from_object)
     eye_object = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
     splats = evaluate(thing.model, control_of(thing), eye_object)
-    means, scales, wxyz, opacity, color = (
+    means, scales, wxyz, opacity = (
         np.asarray(a, np.float64)
-        for a in (splats.means, splats.scales, splats.wxyz, splats.opacity, splats.color)
+        for a in (splats.means, splats.scales, splats.wxyz, splats.opacity)
     )
+    color = shaded_color(thing.model, splats.color, eye_object, shading)
     scales = np.where(np.isfinite(wxyz).all(axis=1)[:, None], scales, np.nan)  # turned nowhere
     if not thing.visible:
         means = np.full_like(means, np.nan)
@@ -151,6 +170,22 @@ def gate_object(
         place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
         in_camera = camera_from_object[:3, :3] @ axes
     return Projected(reason, depth, place, mean_px, covariance, faded, color, mean, in_camera)
+
+
+def shaded_color(
+    model: Model, decoded: np.ndarray, eye: np.ndarray, shading: tuple[str, Shade] | None
+) -> np.ndarray:
+    """(N, 3) colours of splats towards an eye (3,) in the object's frame, or (N, 5) with heat."""
+    way, shade = shading or ("", Shade(0.0))
+
+    def color_at(control: Controls) -> np.ndarray:
+        return evaluate(model, control, eye).color.astype(np.float64)
+
+    if way == BESIDE:
+        return np.concatenate(split_colors(shade, model.splat_count, color_at), axis=1)
+    if way == SPLATS:
+        return mixed_colors(shade, model.splat_count, color_at)
+    return np.asarray(decoded, np.float64)
 
 
 def kept_light(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -228,9 +263,11 @@ def blend(
     size: tuple[int, int],
     min_alpha: float,
 ) -> np.ndarray:
-    """(H, W, 4): near to far, alpha = min(0.99, opacity exp(-r / 2)), dropped below min_alpha."""
+    """(H, W, C + 1) of colours (N, C): near to far, alpha = min(0.99, opacity exp(-r / 2)),
+    dropped below min_alpha.
+    """
     width, height = size
-    image, through = np.zeros((height, width, 3)), np.ones((height, width))
+    image, through = np.zeros((height, width, color.shape[1])), np.ones((height, width))
     inverse = np.linalg.inv(covariance)
     radius = np.sqrt(np.maximum(2 * np.log(np.maximum(opacity, min_alpha) / min_alpha), 0))
     extent = radius[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))  # pixels

@@ -11,9 +11,9 @@ import numpy as np
 from renderer.backends import choose_backends
 from renderer.debug import debug_image, opaque, prepare_debug
 from renderer.eye_colors import Look, drawn_together, shared_is_enough
-from renderer.false_colors import FalseColors, Tint, false_colors, same_tint
+from renderer.false_colors import BESIDE, PICTURE, SPLATS, FalseColors, Shade, false_colors
 from renderer.gpu import Gpu
-from renderer.palette import apply_palette, palette_colors
+from renderer.palette import apply_palette, lay_heat, palette_colors
 from renderer.recolor import (
     Colored,
     centre_of,
@@ -36,6 +36,7 @@ from scene.metrics import psnr
 from scene.pose import View
 from scene.scene import Scene, SceneObject
 
+NO_SHADE = Shade(None)  # nothing is decoded yet
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
 
 
@@ -48,7 +49,7 @@ class _Decoded:
     key: tuple | None = None  # control_key of x; None: not decoded yet
     x: Controls = 0.0  # of its geometry
     version: int = 0  # goes up with every other x
-    tint: Tint | None = None  # false colours of its own; None: as decoded
+    shade: Shade = NO_SHADE  # which colours are decoded
     look: Look | None = None  # made for the first pair of eyes
 
 
@@ -133,16 +134,17 @@ class Renderer:
         decoded.version += 1
 
     def _choose_false_colors(self, scene: Scene) -> None:
-        """Palettes for the picture or for single splats, as the control values ask for."""
+        """Which colours are decoded, and where palettes belong, as the controls ask for."""
         state = [(d.version, o.visible) for d, o in zip(self._decoded, scene.objects, strict=True)]
         if state == self._false_key:
             return
         self._false_key = state
+        before = self._false_colors.way
         self._false_colors = false_colors(scene, [decoded.x for decoded in self._decoded])
-        tints = self._false_colors.tints or [None] * len(self._decoded)
-        for decoded, tint in zip(self._decoded, tints, strict=True):
-            if not same_tint(tint, decoded.tint):
-                decoded.tint = tint
+        same_way = before == self._false_colors.way
+        for decoded, shade in zip(self._decoded, self._false_colors.shades, strict=True):
+            if not (same_way and shade.same(decoded.shade)):
+                decoded.shade = shade
                 forget_colors(decoded.colored)
 
     def _rebuild(self, scene: Scene) -> None:
@@ -171,6 +173,7 @@ class Renderer:
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         settings = self._settings_of_frame()
+        self._drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
         self._sizes = [view.size for view in views]  # of what is shown
         full, views = views, [scaled(view, settings.render_scale) for view in views]
         own, sorts = self._own_colors(full), 0
@@ -254,10 +257,8 @@ class Renderer:
                 wanted = self._wanted_anchors(i, thing, decoded, colored, stale, views)
                 if not colored.take(key, wanted, stale):
                     continue  # all that is seen has its colours
-            self._drawing.decode_color(i, decoded.x, eye, wanted)
-            if decoded.tint is not None:
-                palette = palette_colors(decoded.tint.name)
-                self._drawing.tint(i, palette, decoded.tint.weights)
+            at_once = self._false_colors.way == SPLATS
+            self._drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
             self._color_runs += 1
 
     def _wanted_anchors(
@@ -309,9 +310,11 @@ class Renderer:
 
     def image(self, i: int = 0) -> np.ndarray:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
-        row 0 on top.
+        row 0 on top.  At a pure thermal stop it holds values, else colours.
         """
-        return self._drawing.image(i)
+        if not self._drawing.draws_heat:
+            return self._drawing.image(i)
+        return lay_heat(self._drawing.image(i), self._drawing.heat(i), self._false_colors.palette)
 
     def resolved(self, i: int = 0) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background;
@@ -319,26 +322,30 @@ class Renderer:
         """
         if self._debug:
             return bilinear(self._debug[i][0], self._sizes[i])
-        name, weight = self._false_colors.name, self._false_colors.weight
-        rgba = apply_palette(bilinear(self.image(i), self._sizes[i]), name, weight)
+        palette, rgba = self._false_colors.palette, bilinear(self._drawing.image(i), self._sizes[i])
+        if self._drawing.draws_heat:
+            rgba = lay_heat(rgba, bilinear(self._drawing.heat(i), self._sizes[i]), palette)
+        elif self._false_colors.way == PICTURE:
+            rgba = apply_palette(rgba, palette)
         return rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(self.settings.background)
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
         """Fills a GL framebuffer with view i as resolved() shows it."""
         if self._resolve is None:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
-        name, weight = self._false_colors.name, self._false_colors.weight
-        palette = palette_colors(name) if name and not self._debug else None
+        name = "" if self._debug else self._false_colors.palette
+        palette = palette_colors(name) if name else None
         image = opaque(self._debug[i][0]) if self._debug else self._drawing.presentable(i)
+        heat = self._drawing.presentable_heat(i) if self._drawing.draws_heat else None
         background = self.settings.background
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
             if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
-                pixels = self._drawing.presentable_rgba8(i, background, palette, weight)
+                pixels = self._drawing.presentable_rgba8(i, background, palette)
                 self._resolve.copy(pixels, framebuffer)
             else:
                 unit = 1.0 if self._debug else self._drawing.unit_of(i)
-                self._resolve.draw(image, framebuffer, background, palette, weight, unit)
+                self._resolve.draw(image, framebuffer, background, palette, heat, unit)
 
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""

@@ -17,7 +17,7 @@ class Resolve:
         self._triangle = gpu.ctx.vertex_array(self._program, [])
         self._palette = gpu.ctx.texture((STEPS, 1), 3, dtype="f4")
         self._palette_now: np.ndarray | None = None
-        self._uploaded: moderngl.Texture | None = None
+        self._uploaded: dict[int, moderngl.Texture] = {}  # colours, heat
         self._bytes: moderngl.Framebuffer | None = None
         gpu.allocations += 1
 
@@ -27,29 +27,33 @@ class Resolve:
         framebuffer: moderngl.Framebuffer,
         background: tuple[float, float, float],
         palette: np.ndarray | None = None,
-        weight: float = 0.0,
+        heat: moderngl.Texture | np.ndarray | None = None,
         unit: float = 1.0,
     ) -> None:
         """Fills the framebuffer's viewport: palette applied, over the background.
 
         source: premultiplied; a texture has row 0 at the bottom, an array (H, W, 4) on top.
-        palette: (256, 3) display sRGB; weight 0..1, 0 leaves the colours alone.
-        unit: the display value that 1 in the source stands for.
+        palette: (256, 3) display sRGB; None: the colours are final.  heat: of the same kind as
+        source, value and weight times alpha first, of which the palette makes colours; None: it
+        makes them of the source.  unit: the display value that 1 in these stands for.
         """
         from_array = isinstance(source, np.ndarray)
-        texture = self._upload(source) if from_array else source
-        same_size = texture.size == tuple(framebuffer.viewport[2:])
-        texture.filter = (moderngl.NEAREST,) * 2 if same_size else (moderngl.LINEAR,) * 2
-        texture.repeat_x = texture.repeat_y = False
-        use_palette = palette is not None and weight > 0
-        if use_palette and palette is not self._palette_now:
+        images = [source] if heat is None or palette is None else [source, heat]
+        textures = [self._upload(each, i) if from_array else each for i, each in enumerate(images)]
+        same_size = textures[0].size == tuple(framebuffer.viewport[2:])
+        for texture in textures:
+            texture.filter = (moderngl.NEAREST,) * 2 if same_size else (moderngl.LINEAR,) * 2
+            texture.repeat_x = texture.repeat_y = False
+        if palette is not None and palette is not self._palette_now:
             self._palette.write(np.ascontiguousarray(palette, np.float32))
             self._palette_now = palette
-        texture.use(0)
         self._palette.use(1)
+        textures[0].use(0)
+        textures[-1].use(2)
         program = self._program
-        program["image"].value, program["palette"].value = 0, 1
-        program["weight"].value = weight if use_palette else 0.0
+        program["image"].value, program["palette"].value, program["heat"].value = 0, 1, 2
+        program["use_palette"].value = palette is not None
+        program["use_heat"].value = len(textures) > 1
         program["background"].value = tuple(background)
         program["top_first"].value, program["unit"].value = from_array, unit
         with self._gpu.drawing_into(framebuffer):
@@ -91,24 +95,27 @@ class Resolve:
             self._bytes.release()
             self._bytes = None
 
-    def _upload(self, image: np.ndarray) -> moderngl.Texture:
+    def _upload(self, image: np.ndarray, which: int) -> moderngl.Texture:
         """The array as a texture; made anew only when the size changes."""
-        size = (image.shape[1], image.shape[0])
-        if self._uploaded is None or self._uploaded.size != size:
-            if self._uploaded is not None:
-                self._uploaded.release()
-            self._uploaded = self._gpu.ctx.texture(size, 4, dtype="f4")
+        height, width, parts = image.shape
+        texture = self._uploaded.get(which)
+        if texture is None or texture.size != (width, height):
+            if texture is not None:
+                texture.release()
+            texture = self._uploaded[which] = self._gpu.ctx.texture(
+                (width, height), parts, dtype="f4"
+            )
             self._gpu.allocations += 1
-        self._uploaded.write(np.ascontiguousarray(image, np.float32))
-        return self._uploaded
+        texture.write(np.ascontiguousarray(image, np.float32))
+        return texture
 
     def release(self) -> None:
         self._triangle.release()
         self._palette.release()
         self._release_bytes()
-        if self._uploaded is not None:
-            self._uploaded.release()
-            self._uploaded = None
+        for texture in self._uploaded.values():
+            texture.release()
+        self._uploaded.clear()
 
     def __enter__(self) -> "Resolve":
         return self

@@ -6,27 +6,30 @@ Same life as renderer/quads.py: allocate, decode what changed, place, draw.  No 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from rasterizer.bin import Tiles, bin_tiles, sort_order
 from rasterizer.device import Device, open_device
+from rasterizer.heat import add_heat, blend_heat
 from rasterizer.overdraw import count_overdraw
 from rasterizer.pack import pack, pack_color, pack_opacity
 from rasterizer.project import CULL_REASONS, Camera, Projected
 from rasterizer.project_arena import Limits, SortFrames, project_arena
 from rasterizer.quantize_keys import quantize_keys
-from rasterizer.raster import rasterize_rgba_views
+from rasterizer.raster import rasterize_with_heat
 from rasterizer.resolve import resolve
 from rasterizer.shade_sh import shade_sh, upload_sh
 from rasterizer.surface import rasterize_depth, surface_arena
-from rasterizer.tint import tint
 from renderer.cadence import Cadence
+from renderer.false_colors import Shade
 from renderer.limits import check_tiles
+from renderer.palette import palette_colors
 from renderer.settings import RenderSettings
 from renderer.surface import Surface
 from renderer.timing import PassTimer
+from runtime_models.color_memory import ColorMemory
 from runtime_models.evaluate import Evaluator
 from runtime_models.model import Model, SplatLayers, is_antialiased
 from runtime_models.stop_weights import Controls
@@ -43,7 +46,7 @@ class _Slot:
     count: int
     evaluator: Evaluator
     sh: object | None  # device array of coefficients; None: the colour comes from a network
-    colors: dict[int, np.ndarray] = field(default_factory=dict)  # set -> (count, 3) of a network
+    colors: ColorMemory
     placed: bool = False  # layers: the control value changes nothing but their opacity
 
 
@@ -69,6 +72,8 @@ class TilesDrawing:
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
         self._world_from_objects = np.zeros((0, 4, 4))
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
+        self.draws_heat = False  # beside the colours, from the next frame on
+        self._heat_images: dict[int, np.ndarray] = {}
 
     def allocate(self, models: list[Model]) -> None:
         """Room for these objects; what was decoded before is gone."""
@@ -84,6 +89,7 @@ class TilesDrawing:
         self._covariance = device.zeros((self.splats, 8))
         self._colors = [device.zeros((self.splats, 4))]  # for all views, or one a view
         self._color, self._set = self._colors[0], 0  # that decoding writes into
+        self._heats = [None]  # beside them, (N, 4) once an object has any
         self._antialiased = tuple(map(is_antialiased, models))
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
@@ -91,8 +97,8 @@ class TilesDrawing:
         evaluators = {id(model): Evaluator(model, keep=True) for model in models}
         sh = {id(m): upload_sh(device, m.sh) for m in models if isinstance(m, SplatLayers)}
         self._slots = [
-            _Slot(int(start), count, evaluators[id(model)], sh.get(id(model)))
-            for start, count, model in zip(starts, counts, models, strict=False)
+            _Slot(int(start), n, evaluators[id(m)], sh.get(id(m)), ColorMemory(evaluators[id(m)]))
+            for start, n, m in zip(starts, counts, models, strict=False)
         ]
 
     def decode_geometry(
@@ -123,35 +129,54 @@ class TilesDrawing:
         self._colors = self._colors[:count]
         while len(self._colors) < count:
             self._colors.append(self.device.zeros((self.splats, 4)))
+        self._heats = [*self._heats[:count], *[None] * (count - len(self._heats))]
         self._color, self._set = self._colors[which], which
 
     def decode_color(
-        self, i: int, x: Controls, eye_object: np.ndarray, seen: np.ndarray | None = None
+        self,
+        i: int,
+        shade: Shade,
+        eye_object: np.ndarray,
+        seen: np.ndarray | None = None,
+        at_once: bool = False,
     ) -> None:
-        """Colours of object i at x, towards an eye (3,) in the object's frame.
+        """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
 
         seen: (A,) bool, one an anchor (a splat of layers): the rest may keep what it has.
+        at_once: the heat becomes colours of its palettes here.
         """
         slot = self._slots[i]
+        rows = slice(slot.start, slot.start + slot.count)
+        if self._heats[self._set] is None and shade.heats:
+            self._heats[self._set] = self.device.zeros((self.splats, 4))
+        kept = self._heats[self._set]
+        for number, heat in enumerate(shade.heats):
+            self._decode_color(slot, number + 1, heat.control, eye_object, seen)
+            palette = palette_colors(heat.palette) if at_once else None
+            parts = (heat.weights, rows, self._color, kept, palette, number == 0)
+            add_heat(self.device, *parts)
+        if shade.rest is not None and not (shade.heats and slot.sh is not None):
+            self._decode_color(slot, 0, shade.rest, eye_object, seen)
+        slot.colors.forget_after(self._set, len(shade.heats))
+        if shade.heats:
+            blend_heat(self.device, rows, self._color, kept, at_once)
+        elif kept is not None and slot.count:
+            kept[rows].fill(0)
+
+    def _decode_color(
+        self, slot: _Slot, part: int, x: Controls, eye: np.ndarray, seen: np.ndarray | None
+    ) -> None:
+        """The colours of one object at x, as they are decoded."""
         if slot.sh is not None:
             rows = slice(slot.start, slot.start + slot.count)
-            args = (slot.sh, eye_object, rows, self._mean_opacity, self._color, seen)
-            shade_sh(self.device, *args)
+            shade_sh(self.device, slot.sh, eye, rows, self._mean_opacity, self._color, seen)
         else:
-            kept = slot.colors.get(self._set)
-            slot.colors[self._set] = slot.evaluator.color(x, eye_object, seen, kept)
-            pack_color(self.device, slot.colors[self._set], slot.start, self._color)
+            key = (self._set, part)
+            pack_color(self.device, slot.colors.at(key, x, eye, seen), slot.start, self._color)
 
     def wait_decoded(self) -> None:
         """Returns when what was decoded is there: once for all objects, not after each."""
         self.device.queue.finish()
-
-    def tint(self, i: int, palette: np.ndarray, weights: np.ndarray) -> None:
-        """Mixes the colours of object i, just decoded, towards a palette (256, 3) by luminance;
-        weights (A,) 0..1, one an anchor (a splat of layers).
-        """
-        slot = self._slots[i]
-        tint(self.device, palette, weights, slice(slot.start, slot.start + slot.count), self._color)
 
     def place(self, world_from_objects: list[np.ndarray]) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
@@ -166,6 +191,7 @@ class TilesDrawing:
         if not self.splats:
             for i, view in enumerate(views):
                 self._images[first + i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
+                self._heat_images[first + i] = np.zeros((*view.size[::-1], 2), np.float32)
             return
         with timer.time("project", on_gpu=False):
             self._project(views, settings)
@@ -177,11 +203,21 @@ class TilesDrawing:
             for size in {view.size for view in views}:
                 same = [i for i, view in enumerate(views) if view.size == size]
                 drawn = [(self._projected[i], tiles[i]) for i in same]
-                images = rasterize_rgba_views(
-                    self.device, drawn, size, least_through=settings.min_through
+                heats = self._heats_of(first, same) if self.draws_heat else []
+                images, heats = rasterize_with_heat(
+                    self.device, drawn, heats, size, least_through=settings.min_through
                 )
                 numbers = [first + i for i in same]
                 self._images.update(zip(numbers, images, strict=True))
+                self._heat_images.update(zip(numbers, heats, strict=False))
+
+    def _heats_of(self, first: int, views: list[int]) -> list:
+        """(N, 4) for each of the views: its own, or that of all; made where there is none yet."""
+        own = len(self._heats) > 1
+        for which, heat in enumerate(self._heats):
+            if heat is None:
+                self._heats[which] = self.device.zeros((self.splats, 4))
+        return [self._heats[first + i if own else 0] for i in views]
 
     def _project(self, views: list[View], settings: RenderSettings) -> None:
         """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
@@ -276,15 +312,19 @@ class TilesDrawing:
         """The display value that 1 in presentable(i) stands for: floats hold any."""
         return 1.0
 
+    def presentable_heat(self, i: int) -> np.ndarray:
+        """What resolve takes beside it, of a frame with heat."""
+        return self._heat_images[i]
+
     def presentable_rgba8(
-        self,
-        i: int,
-        background: tuple[float, float, float],
-        palette: np.ndarray | None = None,
-        weight: float = 0.0,
+        self, i: int, background: tuple[float, float, float], palette: np.ndarray | None = None
     ) -> np.ndarray:
-        """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom."""
-        return resolve(self.device, self._images[i], background, palette, weight)
+        """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom.
+
+        palette: of the heat, where the frame has any, else of the picture.
+        """
+        heat = self._heat_images[i] if self.draws_heat else None
+        return resolve(self.device, self._images[i], background, palette, heat)
 
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
@@ -325,10 +365,15 @@ class TilesDrawing:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._images[i]
 
+    def heat(self, i: int) -> np.ndarray:
+        """(H, W, 2) float32, row 0 on top, of the same view: value and weight, both times alpha."""
+        return self._heat_images[i]
+
     def close(self) -> None:
         """Lets go of the scene's memory; the device outlives this drawing."""
         self.allocate([])
         self._images.clear()
+        self._heat_images.clear()
         self.device.pool.free_held()
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from runtime_models.evaluate import Evaluator, follows_eye
-from runtime_models.model import AnchorModel, BadFile, Finding, Model, ScaffoldModel, SplatLayers
+from runtime_models.model import BadFile, Finding, Model, ScaffoldModel, SplatLayers
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.spherical_harmonics import COEFFICIENTS, basis
 from runtime_models.stop_weights import Controls
@@ -15,8 +15,9 @@ LEAST_ALPHA = 1 / 255  # no renderer draws a fainter splat
 DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3
 BLOCK = 1 << 13  # splats at a time of what is colored anew: bounds the memory
 
-# (colours (n, 3) as the model has them, their rows in the model) -> colours (n, 3) as shown
-Recolor = Callable[[np.ndarray, np.ndarray], np.ndarray]
+ColorAt = Callable[[Controls], np.ndarray]  # (n, 3) as the model has them at a control
+# (those of some splats, their rows in the model) -> colours (n, 3) as shown
+Recolor = Callable[[ColorAt, np.ndarray], np.ndarray]
 
 
 def bake(
@@ -53,9 +54,18 @@ def bake(
     if isinstance(model, SplatLayers):
         sh = of_rows(model.sh[:, :count], there)
         if recolor:
-            sh = recolored(sh, lambda color, rows: recolor(color, np.flatnonzero(there)[rows]))
+            sh = recolored(sh, lambda at, rows: recolor(at, np.flatnonzero(there)[rows]))
     else:
-        sh = fit_colors(lambda d: evaluator.color_along(x, d, eye), model, count, there, recolor)
+
+        def along(direction: np.ndarray) -> np.ndarray:
+            rows = np.flatnonzero(there)
+
+            def color_at(control: Controls) -> np.ndarray:
+                return evaluator.color_along(control, direction, eye)[rows]
+
+            return recolor(color_at, rows) if recolor else color_at(x)
+
+        sh = fit_colors(along, len(model.anchors), count, int(there.sum()))
     return as_plain(
         model, [of_rows(a, there) for a in (means, scales, wxyz, opacity)], sh, there, absent
     )
@@ -120,22 +130,17 @@ def fit_rows(count: int, number: int = DIRECTIONS) -> tuple[np.ndarray, np.ndarr
 
 
 def fit_colors(
-    color_along: Callable[[np.ndarray], np.ndarray],
-    model: AnchorModel | ScaffoldModel,
-    count: int,
-    there: np.ndarray,
-    recolor: Recolor | None,
+    color_along: Callable[[np.ndarray], np.ndarray], anchors: int, count: int, splats: int
 ) -> np.ndarray:
-    """(N there, count, 3) harmonics of what the colour network gives along directions (A, 3).
+    """(splats, count, 3) harmonics of the colours (splats, 3) that are shown along directions
+    (anchors, 3).
 
     One direction after the other for all anchors: the sum over directions is the least-squares
     solution, so that nothing but it and the colours of one direction is held.
     """
-    rows, anchors = np.flatnonzero(there), len(model.anchors)
-    sh = np.zeros((len(rows), count, 3), np.float32)
+    sh = np.zeros((splats, count, 3), np.float32)
     for direction, parts in zip(*fit_rows(count), strict=True):
-        color = color_along(np.tile(direction, (anchors, 1)))[rows]
-        color = (recolor(color, rows) if recolor else color) - np.float32(0.5)
+        color = color_along(np.tile(direction, (anchors, 1))) - np.float32(0.5)
         for coefficient, part in enumerate(parts):
             sh[:, coefficient] += part * color
     return sh
@@ -150,6 +155,7 @@ def recolored(sh: np.ndarray, recolor: Recolor) -> np.ndarray:
         rows = np.arange(start, min(start + BLOCK, len(sh)))
         color = np.maximum(values @ sh[rows] + np.float32(0.5), 0)  # (n, D, 3), as shade does
         every = np.repeat(rows, len(directions))
-        shown = recolor(color.reshape(-1, 3), every).reshape(color.shape)
+        flat = color.reshape(-1, 3)
+        shown = recolor(lambda control, flat=flat: flat, every).reshape(color.shape)
         out[rows] = parts.T @ (shown - np.float32(0.5))
     return out

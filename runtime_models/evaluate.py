@@ -34,6 +34,11 @@ def shape_follows_control(model: Model) -> bool:
     return isinstance(model, SplatLayers)
 
 
+def colors_follow_control(model: Model) -> bool:
+    """Whether the colour of a splat depends on x."""
+    return isinstance(model, AnchorModel) and "control" in model.networks["color"].inputs
+
+
 def evaluate(model: Model, x: Controls, eye: np.ndarray) -> Splats:
     """The splats at control x seen from `eye` (3,), metres in the object's frame.
 

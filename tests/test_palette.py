@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from renderer.palette import LUMINANCE, PALETTES, apply_palette, palette_colors, thermal_blend
+from renderer.palette import (
+    LUMINANCE,
+    PALETTES,
+    apply_palette,
+    lay_heat,
+    legend_opacity,
+    palette_colors,
+    thermal_blend,
+)
 from runtime_models.model import BadFile, SplatLayers, Stop
 from scene.scene import Scene, SceneObject
 
@@ -86,12 +94,20 @@ def test_the_palette_colors_what_is_there_and_leaves_coverage_alone():
     gray = np.array([0.0, 0.25, 0.5, 1.0])
     for alpha in (1.0, 0.5):
         rgba = np.concatenate([np.repeat(gray[:, None], 3, 1), np.ones((4, 1))], 1) * alpha
-        out = apply_palette(rgba[None], "ironbow", 1.0)[0]
+        out = apply_palette(rgba[None], "ironbow")[0]
         np.testing.assert_array_equal(out[:, 3], rgba[:, 3])
         want = palette_colors("ironbow")[np.round(gray * 255).astype(int)] * alpha
         np.testing.assert_allclose(out[:, :3], want, atol=0.02)
-        half = apply_palette(rgba[None], "ironbow", 0.5)[0]
-        np.testing.assert_allclose(half, (out + rgba) / 2, atol=1e-9)
+        # The same values as heat of half the weight, beside colours of the other half.
+        photo = np.array([0.1, 0.9, 0.2, 0.0]) * alpha
+        heat = np.stack([gray, np.ones(4)], axis=1) * alpha / 2
+        half = lay_heat(np.broadcast_to(photo / 2, (1, 4, 4)), heat[None], "ironbow")[0]
+        np.testing.assert_allclose(half[:, :3], (out[:, :3] + photo[:3]) / 2, atol=1e-9)
     empty = np.zeros((2, 2, 4))
-    np.testing.assert_array_equal(apply_palette(empty, "turbo", 1.0), empty)
-    assert apply_palette(empty, "", 1.0) is empty
+    np.testing.assert_array_equal(apply_palette(empty, "turbo"), empty)
+    np.testing.assert_array_equal(lay_heat(empty, empty[..., :2], "turbo"), empty)
+
+
+@pytest.mark.parametrize(("weight", "shown"), [(0, 0), (0.25, 0.5), (0.5, 1), (0.75, 1), (1, 1)])
+def test_a_legend_fades_in_until_half_of_the_picture_is_thermal(weight, shown):
+    assert legend_opacity(weight) == shown

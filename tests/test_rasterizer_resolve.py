@@ -5,7 +5,7 @@ import pytest
 from rasterizer_scenes import device
 
 from rasterizer.resolve import resolve
-from renderer.palette import apply_palette, palette_colors
+from renderer.palette import apply_palette, lay_heat, palette_colors
 
 
 def image(height: int, width: int, seed: int = 0) -> np.ndarray:
@@ -18,12 +18,20 @@ def image(height: int, width: int, seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (5, 16), (7, 17), (33, 250)])
-@pytest.mark.parametrize(("name", "weight"), [("", 0.0), ("ironbow", 0.4), ("turbo", 1.0)])
-def test_it_equals_the_picture_that_numpy_resolves(size, name, weight):
+@pytest.mark.parametrize(
+    ("name", "beside"), [("", False), ("ironbow", False), ("turbo", False), ("ironbow", True)]
+)
+def test_it_equals_the_picture_that_numpy_resolves(size, name, beside):
     rgba, background = image(*size), (0.1, 0.5, 0.9)
+    rng = np.random.default_rng(1)
+    heat = rgba[..., 3:] * rng.random((*size, 1)) * [[[1.0, 1.0]]]
+    heat[..., 0] *= rng.uniform(-0.1, 1.1, size)
+    heat = heat.astype(np.float32) if beside else None
     palette = palette_colors(name) if name else None
-    got = resolve(device(), rgba, background, palette, weight)
-    rgba = apply_palette(rgba.astype(np.float64), name, weight)
+    got = resolve(device(), rgba, background, palette, heat)
+    rgba = rgba.astype(np.float64)
+    if name:
+        rgba = lay_heat(rgba, heat, name) if beside else apply_palette(rgba, name)
     shown = rgba[..., :3] + (1 - rgba[..., 3:]) * background
     want = shown.clip(0, 1)[::-1] * 255
     assert got.dtype == np.uint8 and got.shape == (*size, 4)
@@ -31,9 +39,9 @@ def test_it_equals_the_picture_that_numpy_resolves(size, name, weight):
     assert (got[..., 3] == 255).all()
 
 
-def test_a_palette_without_weight_is_none():
+def test_heat_without_weight_is_none():
     rgba = image(4, 9)
     plain = resolve(device(), rgba, (0, 0, 0))
-    np.testing.assert_array_equal(
-        resolve(device(), rgba, (0, 0, 0), palette_colors("gray"), 0.0), plain
-    )
+    nothing = np.zeros((4, 9, 2), np.float32)
+    shown = resolve(device(), rgba, (0, 0, 0), palette_colors("gray"), nothing)
+    np.testing.assert_array_equal(shown, plain)

@@ -48,9 +48,9 @@ def decoded(renderer, monkeypatch) -> list[int]:
     """How many anchors each call of decode_color was asked for; filled while frames are drawn."""
     asked, whole = [], renderer._drawing.decode_color
 
-    def count(i, x, eye, seen=None):
+    def count(i, shade, eye, seen=None, at_once=False):
         asked.append(-1 if seen is None else int(np.count_nonzero(seen)))
-        whole(i, x, eye, seen)
+        whole(i, shade, eye, seen, at_once)
 
     monkeypatch.setattr(renderer._drawing, "decode_color", count)
     return asked

@@ -5,10 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice, open_device
-from rasterizer.tint import tint
-from renderer.false_colors import FalseColors, false_colors, tinted
-from renderer.palette import apply_palette, palette_colors, thermal_blend, thermal_weights
+from renderer.palette import thermal_blend, thermal_weights
 from renderer.reference import reference_image
 from runtime_models.evaluate import evaluate
 from runtime_models.model import Stop
@@ -87,29 +84,6 @@ def thermal(model):
     return replace(model, stops=STOPS)
 
 
-def test_false_colours_are_the_pictures_where_all_is_alike():
-    model = thermal(random_model(20))
-    for x, weight in ((0.0, 0.0), (0.25, 0.5), (0.5, 1.0), (0.75, 0.5)):
-        found = false_colors(scene_of(model, x=x), [x])
-        assert found == FalseColors("ironbow" if weight else "", weight)
-    two = Scene((SceneObject("a", model, x=0.5), SceneObject("b", model, x=0.5)))
-    assert false_colors(two, [0.5, 0.5]) == FalseColors("ironbow", 1.0)
-    hidden = Scene((two.objects[0], replace(two.objects[1], x=0.0, visible=False)))
-    assert false_colors(hidden, [0.5, 0.0]) == FalseColors("ironbow", 1.0)
-    assert false_colors(Scene(()), []) == FalseColors()
-
-
-def test_false_colours_are_the_splats_where_parts_differ():
-    model, plain = thermal(random_model(20)), random_model(30)
-    x = np.linspace(0, 1, 20, dtype=np.float32)
-    found = false_colors(scene_of(model), [x])
-    assert found.name == "" and found.tints[0].name == "ironbow"
-    np.testing.assert_allclose(found.tints[0].weights, 1 - np.abs(x - 0.5) * 2, atol=1e-6)
-    two = Scene((SceneObject("a", model, x=0.5), SceneObject("b", plain, x=0.5)))
-    found = false_colors(two, [0.5, 0.5])
-    assert found.name == "" and found.tints[1] is None and (found.tints[0].weights == 1).all()
-
-
 def test_a_legend_tells_of_a_selector_too():
     model = thermal(random_model(20))
     ball = replace(BALL, x=0.4)
@@ -118,61 +92,7 @@ def test_a_legend_tells_of_a_selector_too():
     assert thermal_weights(StopBlend(()), np.zeros(3))[1] is None
 
 
-@pytest.mark.parametrize(("anchors", "k"), [(1, 1), (64, 1), (65, 3), (300, 10)])
-def test_tint_is_the_slow_twins(anchors, k):
-    try:
-        device = open_device()
-    except NoDevice as reason:
-        pytest.skip(str(reason))
-    rng = np.random.default_rng(anchors)
-    color = np.zeros((anchors * k + 5, 4), np.float32)
-    color[:, :3] = rng.uniform(-0.1, 1.3, (len(color), 3))
-    color[3, 0] = np.nan
-    weights = rng.uniform(0, 1, anchors).astype(np.float32)
-    weights[-1:] = 1
-    array = device.upload(color)
-    tint(device, palette_colors("turbo"), weights, slice(3, 3 + anchors * k), array)
-    got = device.download(array)
-    np.testing.assert_array_equal(got[[0, 1, 2, -2, -1]], color[[0, 1, 2, -2, -1]])
-    wanted = tinted(color[3:-2, :3], "turbo", np.repeat(weights, k))
-    np.testing.assert_allclose(got[3:-2, :3], wanted, atol=2e-6)
-
-
-def test_tinting_one_splat_equals_the_picture_in_false_colours():
-    color = np.random.default_rng(0).uniform(0, 1, (50, 3))
-    alpha = np.full((50, 1), 0.7)
-    picture = apply_palette(np.concatenate([color * alpha, alpha], 1)[None], "ironbow", 0.6)
-    splats = tinted(color, "ironbow", np.full(50, 0.6))
-    np.testing.assert_allclose(picture[0, :, :3], splats * alpha, atol=1e-12)
-
-
-def test_only_the_selected_part_is_in_false_colours(renderer):
-    model = thermal(random_model(300))
-    ball = Sphere(centre=(0, 0, 0), radius=0.4, x=0.5)
-    scene = scene_of(model, selectors=(ball,))
-    renderer.update(scene)
-    renderer.draw([VIEW])
-    picture = renderer.resolved()
-    inside = control_of(scene.objects[0]) == 0.5
-    splats = evaluate(model, control_of(scene.objects[0]), VIEW.world_from_eye.position)
-    expected = tinted(splats.color, "ironbow", np.repeat(inside, 10).astype(float))
-    color = renderer._drawing.device.download(renderer._drawing._color)[:, :3]
-    np.testing.assert_allclose(color, expected, atol=1e-5)
-    np.testing.assert_allclose(picture, renderer.image()[..., :3], atol=1e-6)  # on black
-    renderer.draw([front_view((160, 120), distance=3.0)])  # decoded again, and tinted again
-    color = renderer._drawing.device.download(renderer._drawing._color)[:, :3]
-    there = front_view((160, 120), distance=3.0).world_from_eye.position
-    again = evaluate(model, control_of(scene.objects[0]), there).color
-    weights = np.repeat(inside, 10).astype(float)
-    np.testing.assert_allclose(color, tinted(again, "ironbow", weights), atol=1e-5)
-    renderer.update(scene_of(model))
-    renderer.draw([VIEW])
-    color = renderer._drawing.device.download(renderer._drawing._color)[:, :3]
-    plain = evaluate(model, 0.0, VIEW.world_from_eye.position).color
-    np.testing.assert_allclose(color, plain, atol=1e-5)
-
-
-def test_skipping_the_unseen_never_tints_twice(renderer):
+def test_skipping_the_unseen_never_shares_heat_twice(renderer):
     model = thermal(random_model(300))
     scene = scene_of(model, selectors=(replace(BALL, x=0.5),))
     views = [VIEW, front_view((160, 120), distance=3.0), VIEW, front_view((90, 20), distance=1.0)]

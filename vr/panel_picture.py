@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from renderer.letters import drawable, letters
-from renderer.palette import palette_colors, thermal_weights
+from renderer.palette import legend_opacity, palette_colors, thermal_weights
 from renderer.ticks import nice_ticks, tick_text
 from runtime_models.model import Stop
 from runtime_models.stop_weights import StopBlend
@@ -213,7 +213,7 @@ def _legend(
     from PIL import Image
 
     weight = float(thermal_weights(StopBlend(slider.stops), slider.x)[0][0])
-    strength = FAINT + (1 - FAINT) * weight
+    strength = FAINT + (1 - FAINT) * legend_opacity(weight)
     left, top, right, _ = box
     unit = f"{stop.palette}, {stop.unit}" if stop.unit else stop.palette
     ink = _mixed(SURFACE, TEXT, strength)

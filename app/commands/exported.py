@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from app.errors import UsageError
-from renderer.false_colors import tinted
-from renderer.palette import palette_colors, thermal_weights
-from runtime_models.bake import Recolor, bake
+from renderer.false_colors import mixed_colors, shade_of
+from renderer.palette import palette_colors
+from runtime_models.bake import ColorAt, Recolor, bake
 from runtime_models.evaluate import follows_eye
 from runtime_models.model import Finding, SplatLayers
 from runtime_models.package_files import MANIFEST
@@ -99,17 +99,17 @@ def eye_of(thing: SceneObject, look: Look) -> tuple[np.ndarray | None, tuple[Fin
 
 
 def shown_colors(thing: SceneObject, x: Controls) -> Recolor | None:
-    """Lays the palette of the thermal stop over colours, as much as x asks for."""
-    weights, stop = thermal_weights(thing.model.blend, x)
-    if stop is None or not stop.palette or not weights.any():
-        return None
-    palette_colors(stop.palette)  # an unknown one is refused before the work begins
+    """Mixes colours and what thermal stops have in them, in their palettes, as much as x asks."""
     model = thing.model
+    shade = shade_of(model, x)
+    if not shade.heats:
+        return None
+    for heat in shade.heats:
+        palette_colors(heat.palette)  # an unknown one is refused before the work begins
     each = 1 if isinstance(model, SplatLayers) else model.splats_per_anchor
 
-    def recolor(color: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        mine = weights[rows // each] if len(weights) > 1 else np.broadcast_to(weights, len(rows))
-        return tinted(color, stop.palette, mine).astype(np.float32)
+    def recolor(color_at: ColorAt, rows: np.ndarray) -> np.ndarray:
+        return mixed_colors(shade.of_rows(rows, each), len(rows), color_at).astype(np.float32)
 
     return recolor
 

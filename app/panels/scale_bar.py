@@ -4,7 +4,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from app.panels import theme
-from renderer.palette import palette_colors, thermal_blend
+from renderer.palette import legend_opacity, palette_colors, thermal_blend
 from renderer.ticks import nice_ticks, tick_text
 from scene.scene import Scene
 
@@ -14,8 +14,9 @@ STRIPES = 128
 
 
 def draw_scale_bar(scene: Scene, ui_scale: float) -> None:
-    """Draws the bar at the right edge, as opaque as the thermal stop's weight."""
+    """Draws the bar at the right edge; it fades in with the thermal stop."""
     palette, weight, stop = thermal_blend(scene)
+    weight = legend_opacity(weight)
     if not palette or stop is None or stop.value_range is None or not weight > 0.01:
         return
     screen = imgui.get_io().display_size

@@ -5,6 +5,8 @@
 // not one a splat, and nothing of a pixel is read or written in between.
 #include "common/vector.cl"
 #include "common/tiles.cl"
+// HEAT = 1: value and weight of each splat (float4 x and w) are blended as its colour is, into a
+// second image.
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
@@ -17,7 +19,20 @@
 typedef struct {
   float splats[BATCH * RECORD];  // conic and cut times -log2(e) / 2: exponents of 2
   uint takers[BLOCKS];           // per block: bit j where it takes splat j
+#ifdef HEAT
+  float2 heat[BATCH];
+#endif
 } Batch;
+
+#ifdef HEAT
+#define AND_HEAT , __global const float4* heat, __global float2* heat_image
+#define AND_HEAT_OF(view) , __global const float4* heat_##view, __global float2* heat_image_##view
+#define GIVE_HEAT(view) , heat_##view, heat_image_##view
+#else
+#define AND_HEAT
+#define AND_HEAT_OF(view)
+#define GIVE_HEAT(view)
+#endif
 
 // 2^x as in vector.cl, with a relative error of 2.6e-6: minimax of degree 4.
 inline float16 exp2_16(float16 x) {
@@ -142,10 +157,22 @@ inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int 
   }
 }
 
+#ifdef HEAT
+inline void store_heat(float16 hot, float16 weight, int x0, int y0, int width, int height,
+                       __global float2* heat_image) {
+  float h[16], w[16];
+  vstore16(hot, 0, h);
+  vstore16(weight, 0, w);
+  for (int i = 0; i < SIDE && y0 + i < height; i++)
+    for (int j = 0; j < min(SIDE, width - x0); j++)
+      heat_image[(size_t)(y0 + i) * width + x0 + j] = (float2)(h[SIDE * i + j], w[SIDE * i + j]);
+}
+#endif
+
 // least: a block is done when less than this comes through each of its pixels.
 inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
                       __global const int* instances, __global const float* record,
-                      float least, __global float* image) {
+                      float least, __global float* image AND_HEAT) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
@@ -156,19 +183,31 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
     T[k] = select((float16)(0), (float16)(1), inside);
     R[k] = G[k] = B[k] = 0;
   }
+#ifdef HEAT
+  float16 H[BLOCKS], W[BLOCKS];
+  for (int k = 0; k < BLOCKS; k++) H[k] = W[k] = 0;
+#endif
   Batch batch;
   uint open = 0xffff;
   const int end = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end && open;) {
-    p += fetch(p, end, x0, y0, instances, record, &batch);
+    const int n = fetch(p, end, x0, y0, instances, record, &batch);
+#ifdef HEAT
+    for (int j = 0; j < n; j++) batch.heat[j] = heat[instances[p + j]].xw;
+#endif
+    p += n;
     for (int k = 0; k < BLOCKS; k++) {
       uint left = open >> k & 1 ? batch.takers[k] : 0;
       if (!left) continue;
       const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
       const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
       float16 t = T[k], r = R[k], g = G[k], b = B[k];
+#ifdef HEAT
+      float16 hot = H[k], weight = W[k];
+#endif
       for (; left; left &= left - 1) {
-        const float* s = batch.splats + RECORD * popcount(~left & (left - 1));  // lowest bit's
+        const int lowest = popcount(~left & (left - 1));
+        const float* s = batch.splats + RECORD * lowest;
         const float16 dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
         const float16 power =
             fma(dx, fma(s[CONIC_A], dx, s[CONIC_B] * dy), s[CONIC_C] * dy * dy);
@@ -177,8 +216,16 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
         r = fma(w, s[RED], r);
         g = fma(w, s[GREEN], g);
         b = fma(w, s[BLUE], b);
+#ifdef HEAT
+        hot = fma(w, batch.heat[lowest].x, hot);
+        weight = fma(w, batch.heat[lowest].y, weight);
+#endif
         t -= w;
       }
+#ifdef HEAT
+      H[k] = hot;
+      W[k] = weight;
+#endif
       T[k] = t;
       R[k] = r;
       G[k] = g;
@@ -189,16 +236,22 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   for (int k = 0; k < BLOCKS; k++)
     store_block(R[k], G[k], B[k], 1 - T[k], x0 + k % SIDE * SIDE, y0 + k / SIDE * SIDE, width,
                 height, image);
+#ifdef HEAT
+  for (int k = 0; k < BLOCKS; k++)
+    store_heat(H[k], W[k], x0 + k % SIDE * SIDE, y0 + k / SIDE * SIDE, width, height, heat_image);
+#endif
 }
 
 // One view, or the same tile of two views one after the other.
 __kernel void draw(int width, int height, int tiles_x, float least, __global const int* starts_0,
                    __global const int* instances_0, __global const float* record_0,
-                   __global float* image_0, __global const int* starts_1,
+                   __global float* image_0 AND_HEAT_OF(0), __global const int* starts_1,
                    __global const int* instances_1, __global const float* record_1,
-                   __global float* image_1) {
+                   __global float* image_1 AND_HEAT_OF(1)) {
   const int tile = get_global_id(0);
-  draw_tile(tile, width, height, tiles_x, starts_0, instances_0, record_0, least, image_0);
+  draw_tile(tile, width, height, tiles_x, starts_0, instances_0, record_0, least,
+            image_0 GIVE_HEAT(0));
   if (image_1)
-    draw_tile(tile, width, height, tiles_x, starts_1, instances_1, record_1, least, image_1);
+    draw_tile(tile, width, height, tiles_x, starts_1, instances_1, record_1, least,
+              image_1 GIVE_HEAT(1));
 }

@@ -26,6 +26,10 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
   __local int splat_of[PIXELS];
   float depth = 0;
 #endif
+#ifdef HEAT
+  __local float2 heats[PIXELS];
+  float2 hot = 0;
+#endif
   __local float batch[PIXELS * RECORD];
   __local int open;
   const int tile = get_group_id(0), l = get_local_id(0);
@@ -48,6 +52,9 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
 #ifdef SURFACE
       splat_of[l] = instances[p + l];
 #endif
+#ifdef HEAT
+      heats[l] = heat[instances[p + l]].xw;
+#endif
     }
     barrier(CLK_LOCAL_MEM_FENCE);
     for (int j = 0; j < n && T >= STOP; j++) {
@@ -59,6 +66,9 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
       r += w * s[RED];
       g += w * s[GREEN];
       b += w * s[BLUE];
+#ifdef HEAT
+      hot += w * heats[j];
+#endif
 #ifdef SURFACE
       const float8 f = vload8(splat_of[j], surface);
       depth += w * fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7);
@@ -81,6 +91,9 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
 #endif
 #ifdef SURFACE
   metres[at] = depth;
+#endif
+#ifdef HEAT
+  heat_image[at] = hot;
 #endif
 }
 

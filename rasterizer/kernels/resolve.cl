@@ -7,27 +7,29 @@ inline uchar4 eight_bits(float4 color) {
 }
 
 // palette: STEPS colours (alpha 0), then how each differs from the next.
-// image: premultiplied, row 0 on top.  weight 0: the colours stay; 1: all of them are the palette's.
-__kernel void resolve(int width, int height, float red, float green, float blue, float weight,
+// image: premultiplied, row 0 on top.  mixed 0: its colours are final, else the palette makes them
+// of its luminance; or adds those of the heat beside it (value, weight), where there is one.
+__kernel void resolve(int width, int height, float red, float green, float blue, int mixed,
                       __global const float4* image, __global const float4* palette,
-                      __global uchar4* pixels) {
+                      __global uchar4* pixels, __global const float2* heat) {
   const int y = get_global_id(0);
   __global const float4* row = image + (size_t)y * width;
   __global uchar4* out = pixels + (size_t)(height - 1 - y) * width;
   const float4 behind = (float4)(red, green, blue, 1);  // the 1 makes what is shown opaque
-  if (!(weight > 0)) {
+  if (!mixed) {
     for (int x = 0; x < width; x++) out[x] = eight_bits(row[x] + (1 - row[x].w) * behind);
     return;
   }
-  const float4 kept = (float4)(1 - weight, 1 - weight, 1 - weight, 1);  // alpha stays
   for (int x = 0; x < width; x++) {
-    float4 color = row[x];
-    // The palette colours what is there, not the background: colour is divided by alpha first.
+    const float4 color = row[x];
+    // What of the pixel's value is of how much of it: the palette colours what is there, not the
+    // background.
     const float luminance = 0.2126f * color.x + 0.7152f * color.y + 0.0722f * color.z;
-    const float place = clamp(luminance / fmax(color.w, 1e-6f), 0.0f, 1.0f) * (STEPS - 1);
+    const float2 of = heat ? heat[(size_t)y * width + x] : (float2)(luminance, color.w);
+    const float place = clamp(of.x / fmax(of.y, 1e-6f), 0.0f, 1.0f) * (STEPS - 1);
     const int below = min((int)place, STEPS - 2);
     const float4 false_color = palette[below] + (place - below) * palette[STEPS + below];
-    color = color * kept + false_color * (color.w * weight);
-    out[x] = eight_bits(color + (1 - color.w) * behind);
+    const float4 final = heat ? color : (float4)(0, 0, 0, color.w);
+    out[x] = eight_bits(final + false_color * of.y + (1 - color.w) * behind);
   }
 }

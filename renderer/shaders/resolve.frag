@@ -1,9 +1,11 @@
-// resolve: a premultiplied image over a background, its colour mixed towards palette[luminance].
-// The palette colours what is there and not the background: colour is divided by alpha first.
+// resolve: a premultiplied image over a background.  A palette makes its colours of the image's
+// luminance, or adds those of the heat that was drawn beside it.
+// The palette colours what is there and not the background: values are divided by alpha first.
 in vec2 place;
 uniform sampler2D image;
 uniform sampler2D palette;   // 256 x 1, display sRGB
-uniform float weight;        // 0: colours as they are, 1: palette alone
+uniform sampler2D heat;      // value, weight: both times alpha
+uniform bool use_palette, use_heat;
 uniform vec3 background;     // display sRGB
 uniform float unit;          // the display value that 1 in the image stands for
 uniform bool top_first;      // the image's first row is the upper one
@@ -21,11 +23,16 @@ vec3 palette_color(float luminance) {
 }
 
 void main() {
-    vec4 rgba = texture(image, top_first ? vec2(place.x, 1.0 - place.y) : place);
+    vec2 at = top_first ? vec2(place.x, 1.0 - place.y) : place;
+    vec4 rgba = texture(image, at);
     rgba.rgb *= unit;
-    if (weight > 0.0) {
+    if (use_heat) {
+        vec2 value_weight = texture(heat, at).rg;
+        float value = clamp(unit * value_weight.x / max(value_weight.y, 1e-6), 0.0, 1.0);
+        rgba.rgb += palette_color(value) * value_weight.y;
+    } else if (use_palette) {
         float luminance = clamp(dot(rgba.rgb, LUMINANCE) / max(rgba.a, 1e-6), 0.0, 1.0);
-        rgba.rgb = mix(rgba.rgb, palette_color(luminance) * rgba.a, weight);
+        rgba.rgb = palette_color(luminance) * rgba.a;
     }
     shown = vec4(rgba.rgb + (1.0 - rgba.a) * background, 1.0);
 }

@@ -2,10 +2,17 @@
 in vec2 sigmas;
 flat in vec4 color_opacity;
 uniform float min_alpha;
-out vec4 premultiplied;
+layout(location = 0) out vec4 premultiplied;
+#if HEAT
+flat in vec2 value_weight;
+layout(location = 1) out vec4 heat;  // value, weight, 0, alpha: blended as the colours are
+#endif
 
 void main() {
     float alpha = min(MAX_ALPHA, color_opacity.a * exp(-0.5 * dot(sigmas, sigmas)));
     if (!(alpha >= min_alpha)) discard;  // project lets no NaN come here: it would stay for good
     premultiplied = vec4(color_opacity.rgb * alpha, alpha);
+#if HEAT
+    heat = vec4(value_weight * alpha, 0.0, alpha);
+#endif
 }

@@ -1,4 +1,5 @@
 // splat: one triangle a splat, pulled from the records, tight around the ellipse where alpha ends.
+// Needs: HEAT (1: what is thermal of a splat is drawn into a second image).
 // Software GL needs a fifth less time than with a quad of two: its cost is that of the triangles.
 #include "common/record.glsl"
 #include "common/triangle.glsl"
@@ -6,6 +7,10 @@
 layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  // near to far
 layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
 layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
+#if HEAT
+layout(std430, binding = SLOT_HEAT) readonly buffer Heat { vec4 heat[]; };
+flat out vec2 value_weight;   // of a thermal stop: value times weight, weight
+#endif
 uniform vec2 size;   // pixels
 uniform uint first;  // record of splat 0 in this view
 uniform float per_unit;  // 1 over the display value that 1 in the picture stands for
@@ -16,8 +21,11 @@ flat out vec4 color_opacity;
 void main() {
     // The farthest splat is drawn first.
     uint triangle = uint(gl_VertexID) / 3u, corner = uint(gl_VertexID) % 3u;
-    uint i = first + order[counts[COUNT_SORTED] - 1u - triangle];
+    uint splat = order[counts[COUNT_SORTED] - 1u - triangle], i = first + splat;
     Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
+#if HEAT
+    value_weight = heat[splat].xw * vec2(per_unit, 1.0);
+#endif
     sigmas = e.cut * TRIANGLE[corner];
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
     color_opacity = vec4(e.color * per_unit, e.opacity);

@@ -8,12 +8,9 @@ import pytest
 from renderer import layout
 from renderer.buffers import Arena
 from renderer.decode import Decoder
-from renderer.false_colors import tinted
 from renderer.gpu import Gpu
-from renderer.palette import palette_colors
 from renderer.reference import reference_image
 from renderer.renderer import Renderer
-from renderer.tint import Tinter
 from runtime_models.evaluate import directions
 from runtime_models.model import AnchorModel, ControlEncoding, Stop
 from runtime_models.rotation import covariance, normalize
@@ -159,26 +156,6 @@ def test_one_head_of_many_outputs_broken_in_one_place(gpu):
     model = replace(model, networks=model.networks | {"opacity": mlp})
     opacity = decoded(gpu, model, 0.3)[1]
     assert np.isnan(opacity[1::2]).all() and np.isfinite(opacity[::2]).all()
-
-
-@pytest.mark.parametrize(("anchors", "k"), [(1, 1), (255, 1), (257, 1), (64, 10), (1, 10)])
-def test_tint_is_the_slow_twins(gpu, anchors, k):
-    rng = np.random.default_rng(anchors)
-    color = rng.uniform(-0.1, 1.3, (anchors * k, 3)).astype(np.float32)
-    color[0] = [np.nan, 0.5, 0.5]
-    weights = rng.uniform(0, 1, anchors).astype(np.float32)
-    weights[-1:] = 1
-    tinter = Tinter(gpu)
-    with Arena(gpu, [3, anchors * k, 2]) as arena:
-        for i, rows in enumerate((np.full((3, 3), 0.25), color, np.full((2, 3), 0.75))):
-            arena.write_color(i, rows)
-        tinter.tint(arena, 1, palette_colors("ironbow"), weights)
-        got = read(arena.color, np.float32, 4)[:, :3]
-    tinter.release()
-    assert (got[:3] == 0.25).all() and (got[-2:] == 0.75).all()
-    np.testing.assert_allclose(
-        got[3:-2], tinted(color, "ironbow", np.repeat(weights, k)), atol=2e-6
-    )
 
 
 @pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])

@@ -8,7 +8,7 @@ import pytest
 from renderer.buffers import Arena
 from renderer.decode import Decoder
 from renderer.gpu import Gpu
-from renderer.palette import apply_palette, palette_colors
+from renderer.palette import apply_palette, lay_heat, palette_colors
 from renderer.project import Projector
 from renderer.reference import reference_image
 from renderer.resolve import Resolve
@@ -244,21 +244,27 @@ def test_an_unknown_target_is_refused(gpu):
         Splatter(gpu, "rgb565")
 
 
-@pytest.mark.parametrize("weight", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("way", ["final", "picture", "heat"])
 @pytest.mark.parametrize("palette", ["ironbow", "turbo"])
 @pytest.mark.parametrize("as_texture", [True, False])
-def test_resolve_is_the_numpy_palette_over_the_background(gpu, palette, weight, as_texture):
+def test_resolve_is_the_numpy_palette_over_the_background(gpu, palette, way, as_texture):
     rng = np.random.default_rng(3)
     alpha = rng.choice([0.0, 1e-3, 0.5, 1.0], (12, 20, 1))
     rgba = f32(np.concatenate([rng.random((12, 20, 3)) * alpha * 1.2, alpha], axis=2))
     background = (0.1, 0.2, 0.3)
-    mixed = apply_palette(rgba, palette, weight)
+    heat = f32(np.concatenate([rng.random((12, 20, 1)) * 1.2, np.ones((12, 20, 1))], 2) * alpha)
+    heat *= rng.random((12, 20, 1))
+    mixed = rgba if way == "final" else apply_palette(rgba, palette)
+    if way == "heat":
+        mixed = lay_heat(rgba, heat, palette)
     expected = mixed[..., :3] + (1 - mixed[..., 3:]) * np.float32(background)
     target = gpu.target((20, 12), "f4")
     source = gpu.ctx.texture((20, 12), 4, f32(rgba[::-1]).tobytes(), dtype="f4")
+    beside = gpu.ctx.texture((20, 12), 2, f32(heat[::-1]).tobytes(), dtype="f4")
+    colors = None if way == "final" else palette_colors(palette)
     with Resolve(gpu) as resolve:
-        image = source if as_texture else rgba
-        resolve.draw(image, target, background, palette_colors(palette), weight)
+        image, hot = (source, beside) if as_texture else (rgba, heat)
+        resolve.draw(image, target, background, colors, hot if way == "heat" else None)
     shown = np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(12, 20, 4)
     np.testing.assert_allclose(shown[::-1, :, :3], expected, atol=1e-5)
     np.testing.assert_array_equal(shown[..., 3], 1.0)

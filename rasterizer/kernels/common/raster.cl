@@ -15,6 +15,11 @@
 #define AND_SURFACE
 #define AND_SURFACE_BACKWARD
 #endif
+#ifdef HEAT  // of the screen: value and weight of a splat, blended as its colour is
+#define AND_HEAT , __global const float4* heat, __global float2* heat_image
+#else
+#define AND_HEAT
+#endif
 #ifdef SHARE
 #define AND_SHARE , __global const float* error
 #else
@@ -25,7 +30,7 @@
   int width, int height, int tiles_x, __global const int* tile_start,                          \
       __global const int* instances, __global const float* record, float red, float green,     \
       float blue, __global float* image, __global float* transmittance, __global int* tile_end \
-      AND_SURFACE
+      AND_SURFACE AND_HEAT
 
 #define RASTERIZE_BACKWARD_TAKES                                                                 \
   int width, int height, int tiles_x, __global const int* tile_start,                            \
