@@ -1,6 +1,7 @@
 """Opens whatever this program can show, recognised by content where the format allows."""
 
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from runtime_models.read_package import read_package
 from runtime_models.read_scaffold import is_scaffold, read_scaffold
 from runtime_models.read_sog import is_sog
 from runtime_models.read_streamed import TREE, is_streamed, read_sog_folder, read_streamed
+from runtime_models.refit_encoding import encoding_findings
 from runtime_models.sog_files import META
 from runtime_models.thin import left_whole, thin
 
@@ -94,7 +96,7 @@ def read_upright(path: Path, reading: Reading) -> AnchorModel:
     model = read_package(path)
     if not reading.allow_huge:
         refuse_filling(model, path.name)
-    return model
+    return replace(model, findings=(*model.findings, *encoding_findings(model, path.name)))
 
 
 def is_package(path: Path) -> bool:
@@ -136,7 +138,15 @@ def describe(model: Model, path: str | Path) -> dict:
         facts
         | networks
         | {"encoding": {"d": encoding.d, "sigma": encoding.sigma, "spacing": encoding.spacing}}
+        | {"between_stops": model.between_stops, "paced_pairs": len(model.pace)}
+        | describe_findings(model)
     )
+
+
+def describe_findings(model: Model) -> dict:
+    """What is worth knowing of a package, where there is anything."""
+    told = [f"{finding.what}: {finding.done}" for finding in model.findings]
+    return {"findings": told} if told else {}
 
 
 def describe_labels(model: SplatLayers) -> dict:

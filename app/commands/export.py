@@ -3,6 +3,7 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import tyro
 
@@ -46,6 +47,12 @@ class Options(ReadingOptions):
     default: the first view."""
     overwrite: bool = False
     """Replace an earlier file; never what is read."""
+    encoding: Literal["kept", "stops"] = "kept"
+    """Of a package; stops: the control encoding is written anew, a unit for each stop, so that
+    programs which know of no blends of stops meet no jump between them either."""
+    pace: bool = True
+    """Of a package: measures how fast the picture changes between any two stops, so that equal ways
+    of the slider are equal changes; --no-pace: leaves it as it is."""
 
 
 def run(options: Options) -> int:
@@ -58,6 +65,8 @@ def run(options: Options) -> int:
     if not 0 <= options.sh_degree <= 3:
         raise UsageError(f"--sh-degree is {options.sh_degree}, expected 0 to 3.")
     package = is_folder(options.out) or options.out.suffix.lower() == PACKAGE
+    if options.encoding != "kept" and not package:
+        raise UsageError("--encoding is of packages; name --out NAME.shift, or leave it out.")
     if not package:
         writer_of(options.out)  # before the scene is read
     check_output(options.out, options.scenes, options.overwrite)
@@ -279,8 +288,13 @@ def export_package(options: Options, opened: list) -> int:
             f"{what} cannot become a package: it is anchors and five networks, which `launch.py "
             "train` makes of photos; write .ply, .spz or .glb."
         )
-    features = models[0].features
+    from app.pace import with_pace
+    from runtime_models.refit_encoding import refit_encoding
+
+    model = models[0] if options.encoding == "kept" else refit_encoding(models[0])
+    model = with_pace(model) if options.pace else model
+    features = model.features
     halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
-    size = write_package(models[0], options.out, "float16" if halves else "float32")
+    size = write_package(model, options.out, "float16" if halves else "float32")
     print(f"{options.out}: {size:,} bytes, every x.", file=sys.stderr)
     return 0

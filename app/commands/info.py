@@ -51,6 +51,8 @@ def print_table(facts: dict) -> None:
                 f"{name}: {' → '.join(map(str, head['layers']))}, {head['activation']}"
                 for name, head in value.items()
             )
+        elif key == "findings":
+            value = "\n".join(value)
         elif key == "objects":
             value = "\n".join(map(object_line, value))
         elif key == "labels":

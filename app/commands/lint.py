@@ -52,6 +52,7 @@ def examine(options: Options) -> dict:
 
     with progress_after(PATIENCE_S) as told:
         model = read_model(options.scene, replace(options.reading(), told=told))
+        moves = uneven(model, options.scene.name)
     facts = describe(model, options.scene)
     splats = splats_of(model)
     sample = sample_of(splats.means, splats.scales, splats.opacity)
@@ -66,8 +67,25 @@ def examine(options: Options) -> dict:
         "extent_m": extent_of(sample),
         "origin_m": [float(c) for c in getattr(model, "origin", (0, 0, 0))],
         "splats_over_a_pixel": round(fill_ratio(sample), 2),
-        "findings": [asdict(finding) for finding in model.findings],
+        "findings": [asdict(finding) for finding in (*model.findings, *moves)],
     }
+
+
+def uneven(model, file: str) -> tuple:
+    """A finding where a package's slider jumps between two stops: measured on small pictures."""
+    from renderer.pace import EVEN_ENOUGH, largest_step
+    from runtime_models.model import AnchorModel, Finding
+
+    if not isinstance(model, AnchorModel) or len(model.stops) < 2:
+        return ()
+    if not (step := largest_step(model)) > EVEN_ENOUGH:
+        return ()
+    what = (
+        f"between two stops a step of the slider by 0.01 changes the picture {step:.1f} times as "
+        f"much as an even one would, {EVEN_ENOUGH:g} times are smooth"
+    )
+    done = f"shown as it is; `launch.py export {file} --out NEW.shift` gives it an even pace"
+    return (Finding(what, 0, done, file=file, repaired=False),)
 
 
 def examine_objects(options: Options) -> dict:
@@ -102,7 +120,11 @@ def examine_objects(options: Options) -> dict:
         "extent_m": extent_of(sample),
         "origin_m": [0.0, 0.0, 0.0],
         "splats_over_a_pixel": round(fill_ratio(sample), 2) if sample else 0.0,
-        "findings": [asdict(f) for model in each.values() for f in model.findings],
+        "findings": [
+            asdict(finding)
+            for key, model in each.items()
+            for finding in (*model.findings, *uneven(model, paths[key].name))
+        ],
     }
 
 

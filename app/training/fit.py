@@ -69,6 +69,7 @@ TRIAL = 600  # steps
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
+    from app.pace import with_pace
     from app.progress import progress_bar
     from app.training.train import calibrated, say, settings_of
     from rasterizer.device import open_device
@@ -101,7 +102,7 @@ def run(options: Options) -> int:
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]
-    noted = replace(model, provenance={**model.provenance, "need": result})
+    noted = with_pace(replace(model, provenance={**model.provenance, "need": result}))
     size = write_package(noted, options.out, need.fitted.storage)
     print_report(need)
     say(f"{options.out}: {size:,} bytes, the fitted model of the first seed with this report in it")

@@ -142,6 +142,7 @@ class Options(PhotoOptions, PictureOptions, SizeOptions, LossOptions, ModelOptio
 
 
 def run(options: Options) -> int:
+    from app.pace import pace_package
     from app.training.keeping import kept_when_memory_ends, memory_for_training, refuse_place, save
     from rasterizer.device import open_device
     from runtime_models.write_package import refuse_foreign
@@ -174,6 +175,8 @@ def run(options: Options) -> int:
     with kept_when_memory_ends(trainer, options.out, checkpoint):
         interrupted = train(trainer, checkpoint)
     save(trainer, options.out, checkpoint)
+    if not interrupted:
+        pace_package(options.out)
     say(summary(trainer, options.out, interrupted))
     if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
         say(found)

@@ -24,7 +24,7 @@ sys.path[:0] = [str(HERE.parents[1])]
 
 from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
 
-from app.stability_cases.motion import SIGMA, Span  # noqa: E402
+from app.stability_cases.motion import Span  # noqa: E402
 from rasterizer.device import open_device  # noqa: E402
 from runtime_models.model import BadFile  # noqa: E402
 from scene.capture import Capture  # noqa: E402
@@ -125,7 +125,7 @@ def sweep(trainer: Trainer, view: View, low: float, high: float, steps: int) -> 
         image, cover = draw(view, float(x))
         frames[float(x)] = np.concatenate([image, cover[..., None]], axis=2), image
     # What has no Gaussians is held to those of the paper, as layers are.
-    findings = Span(frames, low, high, getattr(trainer.encoding, "sigma", SIGMA)).findings()
+    findings = Span(frames, low, high).findings()
     failed = [row.figure.partition(",")[0] for row in findings if not row.holds]
     return "; ".join(failed) or "holds"
 
