@@ -18,7 +18,11 @@ def pace_package(path: Path) -> None:
 
 
 def with_pace(model: AnchorModel) -> AnchorModel:
-    """The model with the measured pace of its pairs of stops: a second or two of a core each."""
+    """The model with the measured pace of its pairs of stops, a second or two of a core each; with
+    that which it has, where it has one.
+    """
+    if model.pace:
+        return model
     from app.opening import progress_after
     from renderer.pace import measure_pace
 

@@ -149,7 +149,7 @@ def test_what_a_format_has_no_place_for_is_said(scenes, tmp_path, capsys, monkey
 
 def test_a_package_is_written_as_it_is(scenes, tmp_path):
     for name in ("copy.shift", "folder"):
-        assert export(scenes / "random.shift", "--out", tmp_path / name) == 0
+        assert export(scenes / "random.shift", "--out", tmp_path / name, "--no-pace") == 0
         copy, model = read_model(tmp_path / name), read_model(scenes / "random.shift")
         np.testing.assert_array_equal(copy.features, model.features)
         for head, mlp in model.networks.items():

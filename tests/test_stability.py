@@ -3,6 +3,7 @@
 import csv
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from app.stability_cases.scenes import small_model
 from app.stability_cases.stage import Stage
 from app.stability_cases.table import CASES, COLUMNS, open_table
 from rasterizer.device import NoDevice
+from runtime_models.stop_weights import Pace
 from runtime_models.write_package import write_package
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -159,8 +161,20 @@ def spoiled_reopen():
 
 
 def test_networks_that_nobody_trained_flash_between_the_stops(stage):
-    wild = make_stage(stage.renderer, None, reopen, small_model())
+    """Where x is encoded as it is; a blend of the stops asks for nothing that was not trained."""
+    wild = make_stage(stage.renderer, None, reopen, direct(small_model()))
     assert any("step" in text or "way round" in text for text in failures(CASES["sweep"](wild)))
+    blended = make_stage(stage.renderer, None, reopen, small_model())
+    assert not failures(CASES["sweep"](blended))
+
+
+def test_a_switch_that_flashes_nowhere_fails_too(stage):
+    """The same blends, almost all of them within a fifth of the way: 4.8 even steps in one."""
+    model = small_model()
+    ends = [stop.name for stop in model.stops[:2]]
+    switch = replace(model, pace=(Pace(*ends, (0, 0.01, 0.02, 0.98, 0.99, 1)),))
+    told = failures(CASES["sweep"](make_stage(stage.renderer, None, reopen, switch)))
+    assert len(told) == 1 and "largest step over an even one" in told[0]
 
 
 def test_a_scene_with_one_stop_has_no_sweep(stage):
@@ -205,8 +219,13 @@ def test_broken_pixels_are_counted_once_each():
 @pytest.fixture(scope="module")
 def package(tmp_path_factory):
     path = tmp_path_factory.mktemp("stability") / "small.shift"
-    write_package(small_model(20), path)
+    write_package(direct(small_model(20)), path)
     return path
+
+
+def direct(model):
+    """x goes into the encoding as it is, where nobody has trained what lies between the stops."""
+    return replace(model, between_stops="encoding")
 
 
 def stability(package, out, *more):

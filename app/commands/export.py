@@ -51,8 +51,8 @@ class Options(ReadingOptions):
     """Of a package; stops: the control encoding is written anew, a unit for each stop, so that
     programs which know of no blends of stops meet no jump between them either."""
     pace: bool = True
-    """Of a package: measures how fast the picture changes between any two stops, so that equal ways
-    of the slider are equal changes; --no-pace: leaves it as it is."""
+    """Of a package that has none: measures how fast the picture changes between any two stops, so
+    that equal ways of the slider are equal changes; --no-pace: leaves it as it is."""
 
 
 def run(options: Options) -> int:
