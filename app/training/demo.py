@@ -5,10 +5,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-MOST_BYTES = 5_000_000  # the package lies in the repository
-ITERATIONS = 4000  # 3 to 5 minutes on two cores
-ANCHORS = 14000  # at the start
-MOST_ANCHORS = 22000
+MOST_BYTES = 2_000_000  # the package lies in the repository
+ITERATIONS = 7000  # 20 minutes of a core
+ANCHORS = 24000  # at the start
+MOST_ANCHORS = 36000
+BETWEEN, SHARE = "shapes", 0.5  # what lies between the stops, and in how many of the steps
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,8 @@ def run(options: Options) -> int:
             iterations=None if limited else options.iterations,
             anchors=ANCHORS,
             max_anchors=MOST_ANCHORS,
+            between=BETWEEN,
+            between_share=SHARE,
         )
     )
     if code == 0 and options.package is not None:

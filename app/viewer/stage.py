@@ -295,6 +295,7 @@ class Stage:
         chosen = range(len(self.sweeps)) if index is None else [index]
         start = not any(self.sweeps[i].playing for i in chosen)
         for i in chosen:
+            self.shifts.pop(i, None)
             if start:
                 self.set_x(i, self.sweeps[i].play(self.scene.objects[i].x))
             else:

@@ -1,0 +1,112 @@
+"""Shifts from any stop to any other: the keys of the viewer, and who has the last word."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.viewer import arrange
+from app.viewer.files import opened_scene
+from app.viewer.opened import Found, Source
+from app.viewer.stage import Stage
+from runtime_models.model import Stop
+from runtime_models.stop_weights import Pace, StopBlend
+from scene.control import SHIFT_S, Shift
+from tests.models import make_random_model
+
+STOPS = (Stop("RGB", 0.0), Stop("Thermal", 0.5, "thermal", "ironbow"), Stop("Opened", 1.0))
+
+
+@pytest.fixture
+def stage() -> Stage:
+    """A package of three stops, opened alone."""
+    model = replace(make_random_model(20, k=2), stops=STOPS)
+    found = Found((Source(Path("/data/a.shift"), model),))
+    made = Stage(lambda path: None)
+    scene, document = opened_scene(found)
+    made.take(found.sources, scene, None, document)
+    return made
+
+
+def shown(stage: Stage) -> np.ndarray:
+    thing = stage.scene.objects[0]
+    return thing.model.blend.weights(thing.x)
+
+
+def test_key_3_from_rgb_goes_to_opened_directly(stage):
+    stage.go_to_stop(2)
+    assert stage.playing and shown(stage).tolist() == [1, 0, 0]
+    rows, places = [], []
+    for _ in range(12):
+        stage.advance(SHIFT_S / 10)
+        rows.append(shown(stage))
+        places.append(stage.scene.objects[0].slider_x)
+    assert not any(row[1] for row in rows), "no heat on the way"
+    assert (np.diff([row[2] for row in rows]) >= 0).all() and rows[4][2] == pytest.approx(0.5)
+    assert (np.diff(places) >= 0).all() and places[4] == pytest.approx(0.5)
+    assert stage.scene.objects[0].x == 1.0 and not stage.playing
+
+
+def test_it_is_of_time_and_not_of_frames(stage):
+    stage.go_to_stop(2)
+    stage.advance(0.3)
+    at_once = shown(stage)
+    stage.go_to_stop(0)
+    stage.finish_shifts()
+    stage.go_to_stop(2)
+    for _ in range(30):
+        stage.advance(0.01)
+    np.testing.assert_allclose(shown(stage), at_once, atol=1e-9)
+
+
+def test_another_key_on_the_way_goes_on_from_there(stage):
+    stage.go_to_stop(2)
+    stage.advance(SHIFT_S / 2)
+    stage.go_to_stop(1)
+    stage.advance(SHIFT_S / 2)
+    np.testing.assert_allclose(shown(stage), [0.25, 0.5, 0.25], atol=1e-9)
+    stage.advance(SHIFT_S)
+    assert stage.scene.objects[0].x == 0.5
+
+
+def test_a_hand_on_the_slider_has_the_last_word(stage):
+    stage.go_to_stop(2)
+    stage.advance(SHIFT_S / 2)
+    arrange.steer(stage, 0, 0.3)
+    stage.advance(SHIFT_S)
+    assert stage.scene.objects[0].x == 0.3 and not stage.playing
+
+
+def test_play_goes_on_from_a_blend_to_the_next_stop(stage):
+    stage.go_to_stop(2)
+    stage.advance(SHIFT_S / 2)
+    stage.toggle_play()
+    for _ in range(200):
+        stage.advance(0.05)
+        assert 0 <= stage.scene.objects[0].slider_x <= 1
+    assert stage.sweeps[0].playing
+
+
+def test_a_key_for_where_it_is_or_a_stop_that_is_not_there_does_nothing(stage):
+    for number in (0, 3, 8):
+        stage.go_to_stop(number)
+        assert not stage.playing and stage.scene.objects[0].x == 0.0
+
+
+def test_other_objects_end_a_shift_at_its_end(stage):
+    stage.go_to_stop(2)
+    stage.advance(SHIFT_S / 2)
+    file = stage.document.file
+    arrange.edit(stage, replace(file, floor_y=0.5), "floor")
+    assert stage.scene.objects[0].x == 1.0 and not stage.shifts
+
+
+def test_a_shift_is_eased_and_at_the_pace_of_its_pair():
+    blend = StopBlend(STOPS, (Pace("RGB", "Opened", (0, 0.9, 1)),))
+    shift = Shift(0.0, 1.0, blend)
+    assert shift.control == 0.0
+    shift.seconds = SHIFT_S / 2
+    np.testing.assert_allclose(blend.weights(shift.control), [0.1, 0, 0.9], atol=1e-12)
+    shift.seconds = 9.0
+    assert shift.control == 1.0 and shift.over
