@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import BadFile, Model, SplatLayers
+from runtime_models.model import BadFile, Model, SplatLayers, Stop
 from runtime_models.plain_splats import Reading
 from runtime_models.read_scene import read_model
 from scene.framing import frame_points, framing_view, scene_points, view_from
@@ -146,6 +146,19 @@ def machine_of(item: SceneItem, model: Model) -> Machine:
         return Machine(states, item.reactions, item.ring)
     except ValueError as error:
         raise BadFile(f"object '{item.name}': 'reactions': {error}") from None
+
+
+def named_stops(item: SceneItem, model: Model) -> tuple[Stop, ...]:
+    """The stops of an object's slider, by x: the model's, named as the states that the scene has
+    there, and those states themselves; the end of a ring is its beginning.
+    """
+    stops = {stop.x: stop for stop in model.stops}
+    named = [(state.x, state.name) for state in item.states]
+    if item.ring and named:
+        named.append((1.0, min(named)[1]))
+    for x, name in named:
+        stops[x] = replace(stops.get(x, Stop("", x)), name=name)
+    return tuple(stops[x] for x in sorted(stops))
 
 
 def first_view(file: SceneFile, scene: Scene, size: tuple[int, int]) -> View:

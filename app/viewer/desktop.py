@@ -88,7 +88,7 @@ def run(options: Options) -> int:
     stage.take(found.sources, scene, home_of(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
-    stage.document.saved_regions = stage.regions.version
+    stage.keep_regions()
     with refiner, stage.bodies, Window("Shapeshift", size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             viewer = Viewer(window, renderer, stage, options)

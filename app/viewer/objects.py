@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from app.panels.objects_panel import draw_objects
 from app.viewer.adding import Adding
-from app.viewer.arrange import as_it_stands, copy_offset, edit, redo, undo
+from app.viewer.arrange import as_it_stands, copy_offset, edit, record_regions, redo, undo
 from app.viewer.gizmo import Gizmo, attach_gizmo
 from app.viewer.hands import point_at
 from app.viewer.saving import Saving, unsaved
@@ -95,8 +95,7 @@ class Objects:
         self.viewer.window.close()
 
     def status(self) -> str:
-        document = self.stage.document
-        return "not saved" if self.unsaved or (document.path and document.edited) else ""
+        return "not saved" if self.unsaved else ""
 
     # ---- input
 
@@ -155,6 +154,7 @@ class Objects:
 
     def each_frame(self) -> bool:
         """The end of a drag, the title, what is being read; True while that goes on."""
+        record_regions(self.stage)
         if not imgui.is_mouse_down(0):
             self.stage.rest()
         title = (self.stage.title, self.unsaved)

@@ -83,7 +83,7 @@ class Saving:
             return False
         self._name = ""
         document.path, document.stamp = path, stamp_of(path)
-        document.saved, document.saved_regions = document.file, stage.regions.version
+        document.saved, document.saved_regions = document.file, stage.regions.kept
         self._viewer.files.remember(path)
         self._viewer.say(f"Saved {path}")
         self._go_on()
@@ -184,9 +184,7 @@ def answer_row(words: tuple[str, ...], ui_scale: float) -> str:
 
 def unsaved(stage: "Stage") -> bool:
     """Whether something would be lost; a scene that is no file yet has no regions to lose."""
-    regions = stage.regions
-    painted = any(region.kind != "lens" for region in regions.items)
-    changed = painted and regions.version != stage.document.saved_regions
+    changed = stage.regions.kept != stage.document.saved_regions
     return stage.document.unsaved or (changed and stage.document.path is not None)
 
 

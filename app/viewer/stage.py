@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.viewer.arrange import steer
+from app.viewer.arrange import record_regions, steer, steer_by_hand
 from app.viewer.bodies import Bodies
 from app.viewer.document import Document, document_from, first_stop
 from app.viewer.opened import Source
 from app.viewer.regions import Regions
+from app.viewer.track import Grip, next_stop, stepped
 from renderer.settings import DEBUG_VIEWS, RenderSettings
-from runtime_models.model import Finding, Model
+from runtime_models.model import Finding, Model, Stop
+from scene import edits
 from scene.control import Sweep
 from scene.edits import free_name
 from scene.framing import (
@@ -27,7 +29,7 @@ from scene.framing import (
 from scene.pick import Hit, Picker
 from scene.pose import Pose, View, perspective
 from scene.scene import IDENTITY, Scene, SceneObject
-from scene.scene_file import first_view
+from scene.scene_file import SceneItem, first_view, named_stops
 
 if TYPE_CHECKING:
     from scene.world import World
@@ -50,6 +52,8 @@ class Stage:
         self.bodies = Bodies()
         self._followed: Scene | None = None  # the world's, as it was taken over last
         self.chosen = ""  # name of the object that is edited; "": none
+        self.steered = ""  # name of the object whose x a hand has moved last
+        self.grip = Grip()  # of the track that the mouse holds
         self.home: View | None = None  # the first look at the scene where a file gives one
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
@@ -94,7 +98,13 @@ class Stage:
         self.reframe()
         self.regions.clear()
         self.regions.radius = self.radius
-        self.document.saved_regions = self.regions.version
+        self.keep_regions()
+
+    def keep_regions(self) -> None:
+        """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
+        self.regions.did = ""
+        record_regions(self)
+        self.document.saved_regions = self.regions.kept
 
     def reframe(self) -> None:
         """Where the middle of all is now, and how far it reaches."""
@@ -260,13 +270,38 @@ class Stage:
 
     def go_to_stop(self, number: int) -> None:
         """Every object that has a stop of that number, counted from 0, goes there and rests."""
-        self.rest()
-        for index, thing in enumerate(self.scene.objects):
-            stops = sorted(thing.model.stops, key=lambda stop: stop.x)
+        for index in range(len(self.scene.objects)):
+            stops = self.stops(index)
             if number < len(stops):
                 self.sweeps[index].playing = False
-                steer(self, index, stops[number].x, f"stop {number + 1}")
-        self.rest()
+                steer(self, index, stops[number].x)
+
+    def stops(self, index: int) -> tuple[Stop, ...]:
+        """The stops of an object's slider, by x, under the names that the scene gives them."""
+        thing = self.scene.objects[index]
+        item = edits.find(self.document.file, thing.name)
+        return named_stops(item or SceneItem(name=thing.name, model=""), thing.model)
+
+    def step_x(self, steps: int) -> None:
+        """The arrow keys: hundredths of x to the right, or left."""
+        if (index := self.steered_index) is not None:
+            steer_by_hand(self, index, stepped(self.scene.objects[index].x, steps))
+
+    def step_stop(self, direction: int) -> None:
+        """To the nearest stop above (1) or below (-1)."""
+        if (index := self.steered_index) is not None:
+            x = next_stop(self.stops(index), self.scene.objects[index].x, direction)
+            steer_by_hand(self, index, x)
+
+    @property
+    def steered_index(self) -> int | None:
+        """The object whose x the arrow keys move: the chosen one, else the one moved last."""
+        movable = self.movable
+        names = [self.scene.objects[index].name for index in movable]
+        for name in (self.chosen, self.steered):
+            if name in names:
+                return movable[names.index(name)]
+        return movable[0] if movable else None
 
     def toggle_play(self, index: int | None = None) -> None:
         """Starts or stops one object's sweep, or all together: all stop if any was playing."""

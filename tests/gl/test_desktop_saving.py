@@ -134,7 +134,8 @@ def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
 def test_a_slider_alone_asks_nothing(viewer):
     steer(viewer.stage, 1, 0.5)
     run_frames(viewer, 1)
-    assert viewer.objects.status() == "not saved" and viewer._may_close()
+    assert viewer.objects.status() == "" and viewer._may_close()
+    assert viewer.stage.document.file.all_items[1].x == 0.5  # saved when something else is
 
 
 def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
