@@ -18,17 +18,22 @@ def draw_play(stage: Stage, ui_scale: float) -> None:
         imgui.push_id(index)
         if len(stage.sliders) > 1:
             imgui.text_disabled(stage.scene.objects[index].name)
-        _controls(stage, index, ui_scale)
+        _play(stage, index, ui_scale)
+        draw_sweep(stage, index, ui_scale)
         imgui.pop_id()
     if not stage.sliders:
         imgui.text_disabled("There is one stop: nothing to play.")
 
 
-def _controls(stage: Stage, index: int, ui_scale: float) -> None:
-    sweep = stage.sweeps[index]
-    if imgui.button("Pause" if sweep.playing else "Play", imgui.ImVec2(-1, 0)):
+def _play(stage: Stage, index: int, ui_scale: float) -> None:
+    if imgui.button("Pause" if stage.sweeps[index].playing else "Play", imgui.ImVec2(-1, 0)):
         stage.toggle_play(index)
     tip("Key Space plays and pauses all objects.", ui_scale)
+
+
+def draw_sweep(stage: Stage, index: int, ui_scale: float) -> None:
+    """How fast and which way one object's x plays, and through which stops."""
+    sweep = stage.sweeps[index]
     imgui.push_item_width(-1)
     sweep.mode = choice("mode", sweep.mode, MODES, [MODE_NAMES[mode] for mode in MODES])
     tip("What happens after the last stop.", ui_scale)
@@ -46,8 +51,7 @@ def _controls(stage: Stage, index: int, ui_scale: float) -> None:
 
 def _stops(stage: Stage, index: int, sweep: Sweep, ui_scale: float) -> None:
     """A box for each stop; two at least are visited."""
-    stops = sorted(stage.scene.objects[index].model.stops, key=lambda stop: stop.x)
-    for stop in stops:
+    for stop in stage.stops(index):
         changed, on = imgui.checkbox(f"{stop.name}##{stop.x}", stop.x in sweep.xs)
         tip("Visited while playing; two stops at least are.", ui_scale)
         if changed:

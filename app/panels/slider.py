@@ -5,17 +5,25 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from app.panels import theme
+from app.panels.panel_rows import tip
+from app.panels.play_panel import draw_sweep
 from app.panels.status_line import HEIGHT as STATUS_HEIGHT
 from app.panels.theme import Box
-from app.viewer.arrange import steer
+from app.viewer.arrange import steer_by_hand
 from app.viewer.stage import Stage
+from app.viewer.track import Grip, Track, half_ways, read_x
 from runtime_models.model import Stop
-from scene.control import SNAP, snap
+from scene.control import SNAP
 
 Vec = imgui.ImVec2
 MAX_WIDTH = 760.0  # logical pixels
 ROW = 46.0
 WIDEST_NAME = 140.0  # of an object beside its slider
+VALUE, PACE, MENU = 54.0, 46.0, 260.0  # widths: the number, the seconds, the list that they open
+ROOMY = 380.0  # less than this in a row and the seconds are left to the panel's section Play
+LINE = 0.68  # of a row's height: where the track runs, below the names of its stops
+KNOB, SLACK = 0.56, 0.2  # of a line of text: the knob's radius, and how far beside it it is taken
+PACE_MENU = "pace"
 
 
 def draw_slider_bar(stage: Stage, left: float, ui_scale: float) -> Box:
@@ -46,29 +54,72 @@ def draw_slider_bar(stage: Stage, left: float, ui_scale: float) -> Box:
 
 
 def _row(stage: Stage, index: int, ui_scale: float) -> None:
-    """Play button, track, value of one object."""
+    """Play button, seconds a way, track, value of one object."""
     thing, sweep = stage.scene.objects[index], stage.sweeps[index]
     height = ROW * ui_scale
     if _play_button(sweep.playing, height):
         stage.toggle_play(index)
-    imgui.same_line(0, 16 * ui_scale)
+    if imgui.get_content_region_avail().x > ROOMY * ui_scale:
+        imgui.same_line(0, 8 * ui_scale)
+        _pace_button(stage, index, height, ui_scale)
+    imgui.same_line(0, 14 * ui_scale)
     named = len(stage.sliders) == 1 < len(stage.movable)  # one of several: say which
     name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
-    value_width = max(imgui.calc_text_size("x 0.000").x, name_width) + 20 * ui_scale
-    room = imgui.get_content_region_avail().x - value_width
-    x, held = track(thing.model.stops, thing.x, height, room)
+    value_width = max(VALUE * ui_scale, name_width)
+    room = imgui.get_content_region_avail().x - value_width - 12 * ui_scale
+    stops = stage.stops(index)
+    x, held = track(stops, thing.x, stage.grip, height, room)
     if held:
-        sweep.playing = False
-        steer(stage, index, x)
-    imgui.same_line(0, 18 * ui_scale)
+        steer_by_hand(stage, index, x)
+    imgui.same_line(0, 0)
     origin = imgui.get_cursor_screen_pos()
-    text_y = origin.y + (height - imgui.get_text_line_height()) / 2 + 9 * ui_scale
-    imgui.set_cursor_screen_pos(Vec(origin.x, text_y))
-    imgui.text_disabled(f"x {thing.x:.3f}")
+    left = origin.x + 12 * ui_scale
     if named:
-        imgui.push_clip_rect(origin, Vec(origin.x + value_width, origin.y + height), True)
-        imgui.get_window_draw_list().add_text(origin, theme.color(theme.TEXT), thing.name)
+        imgui.push_clip_rect(origin, Vec(left + value_width, origin.y + height), True)
+        draw = imgui.get_window_draw_list()
+        draw.add_text(Vec(left, origin.y), theme.color(theme.TEXT), thing.name)
         imgui.pop_clip_rect()
+    line_y = origin.y + height * LINE - imgui.get_frame_height() / 2
+    imgui.set_cursor_screen_pos(Vec(left, line_y))
+    _value(stage, index, stops, ui_scale)
+
+
+def _value(stage: Stage, index: int, stops: Sequence[Stop], ui_scale: float) -> None:
+    """x as a number that can be typed, or a stop's name; Enter or leaving it takes it over."""
+    x = stage.scene.objects[index].x
+    imgui.set_next_item_width(VALUE * ui_scale)
+    flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
+    entered, text = imgui.input_text("##x", f"{x:.3f}", flags)
+    left = imgui.is_item_deactivated_after_edit() and not imgui.is_key_pressed(imgui.Key.escape)
+    if entered or left:
+        try:
+            typed = read_x(text, stops)
+        except ValueError as error:
+            stage.problem = str(error)
+        else:
+            if text.strip() != f"{x:.3f}":  # the rounded number that stood there is no new one
+                steer_by_hand(stage, index, typed)
+    tip("x: type a number from 0 to 1, or a stop's name. Arrow keys: a hundredth.", ui_scale)
+
+
+def _pace_button(stage: Stage, index: int, height: float, ui_scale: float) -> None:
+    """The seconds from stop to stop; its list has all that playing can be told."""
+    sweep = stage.sweeps[index]
+    corner = imgui.get_cursor_screen_pos()
+    imgui.set_cursor_screen_pos(
+        Vec(corner.x, corner.y + height * LINE - imgui.get_frame_height() / 2)
+    )
+    if imgui.button(f"{sweep.leg_s:.3g} s###pace", Vec(PACE * ui_scale, 0)):
+        imgui.open_popup(PACE_MENU)
+    tip("How playing goes: seconds from stop to stop, there and back, which stops.", ui_scale)
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    imgui.set_next_window_pos(Vec(low.x, low.y - 4 * ui_scale), 0, Vec(0, 1))
+    imgui.set_next_window_size(Vec(MENU * ui_scale, 0))
+    if imgui.begin_popup(PACE_MENU):
+        draw_sweep(stage, index, ui_scale)
+        imgui.end_popup()
+    imgui.set_cursor_screen_pos(corner)
+    imgui.dummy(Vec(high.x - low.x, height))
 
 
 def _play_button(playing: bool, height: float) -> bool:
@@ -100,51 +151,84 @@ def _play_button(playing: bool, height: float) -> bool:
     return clicked
 
 
-def track(stops: Sequence[Stop], x: float, height: float, width: float = 0.0) -> tuple[float, bool]:
-    """The line with its ticks, names and grab.  Returns x and whether the hand holds it.
+def track(
+    stops: Sequence[Stop], x: float, grip: Grip, height: float, width: float = 0.0
+) -> tuple[float, bool]:
+    """The line with its ticks, names and knob.  Returns x and whether the hand moves it.
 
-    Without a width it takes what there is, less half a grab at both ends.
+    Without a width it takes what there is.  The knob can be taken all over, also where it stands
+    out beyond an end of the line.
     """
     line = imgui.get_text_line_height()
-    if not width > 0:
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 0.5 * line)
-        width = imgui.get_content_region_avail().x - 0.5 * line
+    radius = KNOB * line
+    width = width if width > 0 else imgui.get_content_region_avail().x
     corner = imgui.get_cursor_screen_pos()
-    imgui.invisible_button("track", Vec(width, height))
+    along = Track(corner.x + radius, max(width - 2 * radius, 1.0), radius + SLACK * line)
+    y = corner.y + height * LINE
+    chosen = _stop_names(stops, x, along, corner, y)
+    reach = along.knob + 1.0  # so that a press on the very edge is within it
+    imgui.set_cursor_screen_pos(Vec(along.left - reach, y - reach))
+    imgui.invisible_button("track", Vec(along.width + 2 * reach, 2 * reach))
     held, hovered = imgui.is_item_active(), imgui.is_item_hovered()
+    io = imgui.get_io()
+    if imgui.is_item_activated():
+        grip.take(along, x, io.mouse_pos.x)
     if held:
-        at = (imgui.get_io().mouse_pos.x - corner.x) / width
-        x = snap(at, stops, 0.0 if imgui.get_io().key_alt else SNAP)
-    draw = imgui.get_window_draw_list()
-    y = corner.y + height * 0.5 + line * 0.55
+        x = grip.drag(along, x, io.mouse_pos.x, stops, 0.0 if io.key_alt else SNAP)
+    _line(stops, x, along, y)
+    _knob(along.place(x), y, radius if held or hovered else 0.86 * radius)
+    imgui.set_cursor_screen_pos(corner)
+    imgui.dummy(Vec(width, height))
+    return (chosen, True) if chosen is not None else (x, held)
+
+
+def _line(stops: Sequence[Stop], x: float, along: Track, y: float) -> None:
+    """The line up to the knob and beyond, a dot at each stop and a small tick half-way between."""
+    draw, line = imgui.get_window_draw_list(), imgui.get_text_line_height()
     half = max(2.0, line * 0.13)
-    middle = corner.x + width * x
-    draw.add_rect_filled(
-        Vec(corner.x, y - half), Vec(corner.x + width, y + half), theme.color(theme.TRACK), half
-    )
-    draw.add_rect_filled(
-        Vec(corner.x, y - half), Vec(middle, y + half), theme.color(theme.ACCENT, 0.85), half
-    )
-    _stop_names(stops, x, corner, width, y)
-    radius = line * (0.56 if held or hovered else 0.48)
-    draw.add_circle_filled(Vec(middle, y), radius, theme.color(theme.ACCENT))
-    draw.add_circle_filled(Vec(middle, y), radius * 0.45, theme.color(theme.SURFACE))
-    return x, held
+    left, middle, right = (along.place(place) for place in (0.0, x, 1.0))
+    for low, high, ink in (
+        (left, right, theme.color(theme.TRACK)),
+        (left, middle, theme.color(theme.ACCENT, 0.85)),
+    ):
+        draw.add_rect_filled(Vec(low, y - half), Vec(high, y + half), ink, half)
+    for tick in half_ways(stops):
+        at, tall = along.place(tick), line * 0.3
+        ink = theme.color(theme.MUTED)
+        draw.add_line(Vec(at, y - tall), Vec(at, y + tall), ink, max(1.0, line / 12))
+    for stop in stops:
+        draw.add_circle_filled(Vec(along.place(stop.x), y), line * 0.24, theme.color(theme.TEXT))
 
 
-def _stop_names(stops: Sequence[Stop], x: float, corner: Vec, width: float, y: float) -> None:
-    """A tick and a name at each stop; the name of the stop one stands on is lit."""
+def _knob(place: float, y: float, radius: float) -> None:
+    draw = imgui.get_window_draw_list()
+    draw.add_circle_filled(Vec(place, y), radius, theme.color(theme.ACCENT))
+    draw.add_circle_filled(Vec(place, y), radius * 0.45, theme.color(theme.SURFACE))
+
+
+def _stop_names(
+    stops: Sequence[Stop], x: float, along: Track, corner: Vec, y: float
+) -> float | None:
+    """A name above each stop, lit where x is; returns x of the one that was clicked."""
     draw = imgui.get_window_draw_list()
     line = imgui.get_text_line_height()
-    last_right = corner.x - line  # names that would overlap the one before are left out
-    for stop in sorted(stops, key=lambda stop: stop.x):
-        here = corner.x + width * stop.x
-        on = abs(stop.x - x) < 1e-3
-        draw.add_circle_filled(Vec(here, y), line * 0.24, theme.color(theme.TEXT))
-        text_width = imgui.calc_text_size(stop.name).x
-        left = min(max(here - text_width / 2, corner.x), corner.x + width - text_width)
+    low, high = along.left - KNOB * line, along.left + along.width + KNOB * line
+    last_right = low - line  # names that would overlap the one before are left out
+    clicked = None
+    for number, stop in enumerate(sorted(stops, key=lambda stop: stop.x)):
+        size = imgui.calc_text_size(stop.name)
+        left = min(max(along.place(stop.x) - size.x / 2, low), high - size.x)
         if left < last_right + line * 0.5:
             continue
-        ink = theme.color(theme.ACCENT if on else theme.TEXT)
+        last_right = left + size.x
+        imgui.set_cursor_screen_pos(Vec(left, corner.y))
+        if imgui.invisible_button(f"stop {number}", Vec(max(size.x, 1.0), line)):
+            clicked = stop.x
+        hovered = imgui.is_item_hovered()
+        if hovered:
+            key = f", key {number + 1}" if number < 9 else ""
+            imgui.set_tooltip(f"{stop.name}: x {stop.x:.3f}{key}")
+        lit = hovered or abs(stop.x - x) < 1e-3
+        ink = theme.color(theme.ACCENT if lit else theme.TEXT)
         draw.add_text(Vec(left, corner.y), ink, stop.name)
-        last_right = left + text_width
+    return clicked

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from app.panels import theme
 from app.panels.panel_rows import button_row, tip
 from scene.reactions import TwoAxes
+from scene.scene_file import named_stops
 from scene.thing import Thing
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
 
 def side_names(thing: Thing, axes: TwoAxes) -> tuple[str, str]:
     """What is at both sides: a state or a stop that lies there, "" where none does."""
-    places = (*thing.machine.states, *thing.drawn.model.stops)
-    named = (next((p.name for p in places if p.x == x), "") for x in (axes.below, axes.above))
+    stops = named_stops(thing.item, thing.drawn.model)
+    named = (next((s.name for s in stops if s.x == x), "") for x in (axes.below, axes.above))
     return tuple(named)
 
 

@@ -68,6 +68,9 @@ def press_key(viewer: "Viewer", event: KeyDown) -> None:
             camera.frame(stage.centre, stage.fit(viewer.view(), camera.fov_y, size))
         case glfw.KEY_SPACE:
             stage.toggle_play()
+        case glfw.KEY_LEFT | glfw.KEY_RIGHT:
+            direction = 1 if event.key == glfw.KEY_RIGHT else -1
+            (stage.step_stop if event.shift else stage.step_x)(direction)
         case glfw.KEY_H | glfw.KEY_TAB:
             viewer.overlay = not viewer.overlay
         case glfw.KEY_F12:

@@ -44,6 +44,7 @@ TEXT_KEYS = {  # what typing a number into a slider needs
     glfw.KEY_Z: imgui.Key.z,
 }
 SHORTCUTS = ("z", "y", "s", "d")  # with Ctrl, by what is printed on the key
+REPEATING = (glfw.KEY_LEFT, glfw.KEY_RIGHT)  # held down they go on
 MOVING = (glfw.KEY_W, glfw.KEY_A, glfw.KEY_S, glfw.KEY_D, glfw.KEY_Q, glfw.KEY_E)
 
 
@@ -200,6 +201,8 @@ class Window:
             io.add_key_event(modifier, down)
         self._unsettled = max(self._unsettled - 1, 0)
         imgui.new_frame()
+        if self._popup and imgui.is_key_pressed(imgui.Key.escape, False):
+            imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
         events, self._raw = self._raw, []
         return events
 
@@ -248,10 +251,14 @@ class Window:
             io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
         if action == glfw.RELEASE:
             self._chorded.discard(key)
-        if action != glfw.PRESS or io.want_text_input:
+        if action == glfw.RELEASE or io.want_text_input:
+            return
+        if action == glfw.REPEAT and key not in REPEATING:
             return
         if key == glfw.KEY_F11:
             self._window.fullscreen = not self._window.fullscreen
+        if key == glfw.KEY_ESCAPE and self._popup:
+            return  # for what is open
         shortcut = self._shortcut(key, scancode, mods)
         if shortcut:
             self._chorded.add(key)
