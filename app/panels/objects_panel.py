@@ -21,6 +21,11 @@ MOST_ROWS = 8  # of the list that are seen at once
 MASSES = (0.05, 5.0)  # kilograms, between which the physics holds them
 NONE = "none"  # as a collider
 MODES = {MOVE: "Move", TURN: "Turn"}
+DEEDS = {
+    "Add": "Another file or folder as an object of this scene.",
+    "Copy": "The chosen object once more, beside it. Ctrl+D.",
+    "Delete": "The chosen object. Key Delete; Ctrl+Z brings it back.",
+}
 
 
 def draw_objects(objects: "Objects", ui_scale: float) -> None:
@@ -28,7 +33,7 @@ def draw_objects(objects: "Objects", ui_scale: float) -> None:
     stage = objects.stage
     _history(objects, ui_scale)
     _list(objects, ui_scale)
-    clicked = button_row(("Add", "Copy", "Delete"), ui_scale, 3)
+    clicked = button_row(DEEDS, ui_scale, 3)
     if clicked:
         deeds = {"Add": objects.adding.ask, "Copy": objects.duplicate, "Delete": objects.delete}
         deeds[clicked]()
@@ -58,7 +63,7 @@ def _history(objects: "Objects", ui_scale: float) -> None:
         imgui.end_disabled()
         tip(what or f"Nothing to {word.lower()}.", ui_scale)
         imgui.same_line()
-    if imgui.button("Save\u2026" if document.path is None else "Save", Vec(-1, 0)):
+    if imgui.button("Save" if objects.saving.in_place else "Save\u2026", Vec(-1, 0)):
         objects.saving.save()
     tip("Ctrl+S writes the scene file; Ctrl+Shift+S asks for another name.", ui_scale)
 

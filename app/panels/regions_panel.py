@@ -17,6 +17,7 @@ DIRECTIONS = {  # name -> the way out of a half-space's plane, into what it sele
     "up": (0, 1, 0), "down": (0, -1, 0), "right": (1, 0, 0), "left": (-1, 0, 0),
     "front": (0, 0, 1), "back": (0, 0, -1),
 }  # fmt: skip
+PAINTED = {"None": "Paint nothing.", "All": "Paint everything.", "Invert": "The other part."}
 KIND_TIPS = {
     "box": "A box with its own x; click into the picture to place it.",
     "sphere": "A sphere with its own x; click into the picture to place it.",
@@ -163,7 +164,7 @@ def _brush(stage: Stage, region: Region, ui_scale: float) -> None:
     tip(KIND_TIPS["painted"], ui_scale)
     count = int(region.painted.sum())
     imgui.text_disabled(f"{count:,} of {len(region.painted):,} painted")
-    clicked = button_row(("None", "All", "Invert"), ui_scale, 3)
+    clicked = button_row(PAINTED, ui_scale, 3)
     if clicked:
         new = {"None": np.zeros_like, "All": np.ones_like, "Invert": np.logical_not}[clicked]
         regions.edit(regions.chosen, painted=new(region.painted))

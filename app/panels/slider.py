@@ -6,8 +6,7 @@ from imgui_bundle import imgui
 
 from app.panels import theme
 from app.panels.panel_rows import tip
-from app.panels.play_panel import draw_sweep
-from app.panels.status_line import HEIGHT as STATUS_HEIGHT
+from app.panels.stops_panel import pace_button
 from app.panels.theme import Box
 from app.viewer.arrange import steer_by_hand
 from app.viewer.stage import Stage
@@ -16,30 +15,22 @@ from runtime_models.model import Stop
 from scene.control import SNAP
 
 Vec = imgui.ImVec2
-MAX_WIDTH = 760.0  # logical pixels
-ROW = 46.0
+ROW = 46.0  # logical pixels
 WIDEST_NAME = 140.0  # of an object beside its slider
-VALUE, PACE, MENU = 54.0, 46.0, 260.0  # widths: the number, the seconds, the list that they open
+VALUE, PACE = 54.0, 46.0  # widths of the number and of the seconds
 ROOMY = 380.0  # less than this in a row and the seconds are left to the panel's section Play
 LINE = 0.68  # of a row's height: where the track runs, below the names of its stops
 KNOB, SLACK = 0.56, 0.2  # of a line of text: the knob's radius, and how far beside it it is taken
-PACE_MENU = "pace"
 
 
-def draw_slider_bar(stage: Stage, left: float, ui_scale: float) -> Box:
-    """One row an object at the lower edge: moves x, starts and stops playing; returns its box.
-
-    It lies in the middle of what is right of `left`, logical pixels.
-    """
+def draw_slider_bar(stage: Stage, bar: Box | None, ui_scale: float) -> Box:
+    """One row an object at the lower edge: moves x, starts and stops playing; returns its box."""
     rows = stage.sliders
-    if not rows:
+    if not rows or bar is None:
         return (0.0, 0.0, 0.0, 0.0)
-    screen = imgui.get_io().display_size
-    width = min(MAX_WIDTH * ui_scale, (screen.x - left) * 0.94)
-    middle = (left + screen.x) / 2
-    low = screen.y - (18 + STATUS_HEIGHT) * ui_scale
-    imgui.set_next_window_pos(Vec(middle, low), 0, Vec(0.5, 1.0))
-    imgui.set_next_window_size(Vec(width, 0))
+    left, _, right, low = bar
+    imgui.set_next_window_pos(Vec(left, low), 0, Vec(0.0, 1.0))
+    imgui.set_next_window_size(Vec(right - left, 0))
     flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move
     imgui.begin("##modality", None, flags | imgui.WindowFlags_.no_saved_settings)
     for index in rows:
@@ -61,7 +52,7 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
         stage.toggle_play(index)
     if imgui.get_content_region_avail().x > ROOMY * ui_scale:
         imgui.same_line(0, 8 * ui_scale)
-        _pace_button(stage, index, height, ui_scale)
+        _pace(stage, index, height, ui_scale)
     imgui.same_line(0, 14 * ui_scale)
     named = len(stage.sliders) == 1 < len(stage.movable)  # one of several: say which
     name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
@@ -102,24 +93,14 @@ def _value(stage: Stage, index: int, stops: Sequence[Stop], ui_scale: float) -> 
     tip("x: type a number from 0 to 1, or a stop's name. Arrow keys: a hundredth.", ui_scale)
 
 
-def _pace_button(stage: Stage, index: int, height: float, ui_scale: float) -> None:
-    """The seconds from stop to stop; its list has all that playing can be told."""
-    sweep = stage.sweeps[index]
+def _pace(stage: Stage, index: int, height: float, ui_scale: float) -> None:
+    """The seconds from stop to stop, on the track's line."""
     corner = imgui.get_cursor_screen_pos()
-    imgui.set_cursor_screen_pos(
-        Vec(corner.x, corner.y + height * LINE - imgui.get_frame_height() / 2)
-    )
-    if imgui.button(f"{sweep.leg_s:.3g} s###pace", Vec(PACE * ui_scale, 0)):
-        imgui.open_popup(PACE_MENU)
-    tip("How playing goes: seconds from stop to stop, there and back, which stops.", ui_scale)
-    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    imgui.set_next_window_pos(Vec(low.x, low.y - 4 * ui_scale), 0, Vec(0, 1))
-    imgui.set_next_window_size(Vec(MENU * ui_scale, 0))
-    if imgui.begin_popup(PACE_MENU):
-        draw_sweep(stage, index, ui_scale)
-        imgui.end_popup()
+    line_y = corner.y + height * LINE - imgui.get_frame_height() / 2
+    imgui.set_cursor_screen_pos(Vec(corner.x, line_y))
+    pace_button(stage, index, PACE * ui_scale, "", ui_scale)
     imgui.set_cursor_screen_pos(corner)
-    imgui.dummy(Vec(high.x - low.x, height))
+    imgui.dummy(Vec(PACE * ui_scale, height))
 
 
 def _play_button(playing: bool, height: float) -> bool:

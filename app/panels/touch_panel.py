@@ -21,8 +21,12 @@ def draw_touch(touch: "Touch", ui_scale: float) -> None:
     """Buttons for what the keys do, the pads, and the last reactions."""
     world = touch.world
     play = "Play" if world.paused else "Pause"
-    clicked = button_row((f"{play}###play", "Step", "Put back"), ui_scale, 3)
-    tip("T, Shift+T, R. While things move, drag one to carry it.", ui_scale)
+    tips = {
+        f"{play}###play": "Key T. While things move, drag one to carry it.",
+        "Step": "One step of 1/90 s. Shift+T.",
+        "Put back": "Everything where it was before it was touched. Key R.",
+    }
+    clicked = button_row(tips, ui_scale, 3)
     deeds = {f"{play}###play": touch.toggle, "Step": touch.step, "Put back": touch.put_back}
     if clicked:
         deeds[clicked]()

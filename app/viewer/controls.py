@@ -15,6 +15,10 @@ SMOOTH_S = 0.06  # the picture follows the hand with this time constant
 BRAKE_S = 0.09  # so does the flying speed follow the keys
 SPEED_RADII = 0.8  # metres a second with a key held, in scene radii
 FAST, SLOW = 5.0, 0.2  # Shift, Ctrl
+DIRECTIONS = {  # name -> yaw, pitch of an eye that looks from there, radians
+    "front": (0.0, 0.0), "right": (np.pi / 2, 0.0), "top": (0.0, -np.pi / 2),
+    "back": (np.pi, 0.0), "left": (-np.pi / 2, 0.0), "bottom": (0.0, np.pi / 2),
+}  # fmt: skip
 STILL = 2e-4  # radians, or scene radii: less is not seen, the camera counts as at rest
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
@@ -112,7 +116,19 @@ class Camera:
         """Orbits around the anchor, or looks about when flying, by radians."""
         goal = self._goal.copy()
         goal[YAW] += self._upright * yaw
-        goal[PITCH] = np.clip(goal[PITCH] + self._upright * pitch, -POLE, POLE)
+        limit = max(POLE, abs(goal[PITCH]))  # from straight above it turns on without a jump
+        goal[PITCH] = np.clip(goal[PITCH] + self._upright * pitch, -limit, limit)
+        self._move_to(goal)
+
+    def look_from(self, name: str) -> None:
+        """From one of DIRECTIONS, level, at the same distance from what is orbited.
+
+        In flight the eye stays where it is and turns.
+        """
+        yaw, pitch = DIRECTIONS[name]
+        goal = self._goal.copy()
+        goal[YAW] += _half_turn_at_most(yaw - goal[YAW])
+        goal[PITCH], goal[ROLL] = pitch, 0.0
         self._move_to(goal)
 
     def pan(self, right: float, up: float) -> None:

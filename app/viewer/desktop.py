@@ -11,10 +11,12 @@ from app.camera_files import camera_reading
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.opening import ReadingOptions
-from app.paths import plain
-from app.viewer.files import TOUCH, home_of, named_cameras, opened_scene
+from app.paths import DEMO, TOUCH, config_folder, plain
+from app.viewer.files import home_of, named_cameras, opened_scene
 from app.viewer.opened import read_files
+from app.viewer.own_files import OwnFiles
 from app.viewer.refine import Refiner, attach_refiner
+from app.viewer.settings import Settings
 from app.viewer.stage import Stage
 from app.viewer.viewer import Viewer
 from app.viewer.window import Window
@@ -22,8 +24,6 @@ from app.viewer.wipe import comparing
 from renderer.renderer import Renderer
 from scene.read_selector import read_selector
 from scene.selector import Selector
-
-DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,9 @@ class Options(ReadingOptions):
     select: tuple[str, ...] = ()
     """Regions with an x of their own, one after the other: sphere:x,y,z:radius:X[:border],
     box:x,y,z:hx,hy,hz:X[:border], half:x,y,z:nx,ny,nz:X[:border], lens:degrees:X[:border]."""
-    pictures: Path = Path("pictures")
-    """Folder for the pictures that F12 saves and the views that K keeps."""
+    pictures: Path | None = None
+    """Folder for the pictures that F12 saves and the views that K keeps; scenes and exports go
+    beside it.  Without it Shapeshift/pictures among your documents."""
     screenshot: Path | None = None
     """Write a picture of the whole window here after --frames frames, and end."""
     frames: int = 3
@@ -89,9 +90,11 @@ def run(options: Options) -> int:
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
     stage.keep_regions()
-    with refiner, stage.bodies, Window("Shapeshift", size) as window:
+    settings = Settings.read(config_folder()) if options.screenshot is None else Settings()
+    with refiner, stage.bodies, Window("Shapeshift", size, settings.text_size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
-            viewer = Viewer(window, renderer, stage, options)
+            own_files = OwnFiles(settings.folder)
+            viewer = Viewer(window, renderer, stage, options, settings, own_files)
             attach_refiner(viewer, refiner)
             viewer.files.read = refiner.open
             viewer.files.started(found, options)

@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 
 KEYS = (
     ("click", "choose a thing"),
-    ("Ctrl+Z, Ctrl+Y", "undo, redo an edit"),
+    ("M", "handles: move, turn, none"),
     ("Ctrl+D, Delete", "copy, delete the chosen one"),
-    ("Ctrl+S", "save the scene; Shift: as"),
 )
 
 
@@ -44,9 +43,14 @@ def attach_objects(viewer: "Viewer") -> "Objects":
     hooks.opened.append(objects.forget)
     hooks.closing.append(objects.may_close)
     hooks.sections.append(
-        Section("Objects", lambda s: draw_objects(objects, s), above=True, opens=objects.opens)
+        Section(
+            "Objects",
+            lambda s: draw_objects(objects, s),
+            opens=objects.opens,
+            early=lambda: len(objects.stage.scene.objects) > 1,
+        )
     )
-    hooks.keys += KEYS
+    hooks.keys["Objects"] = list(KEYS)
     return objects
 
 
@@ -55,7 +59,7 @@ class Objects:
 
     def __init__(self, viewer: "Viewer") -> None:
         self.viewer = viewer
-        self.saving = Saving(viewer)
+        self.saving = Saving(viewer, viewer.own_files)
         self.gizmo: Gizmo = attach_gizmo(viewer)
         self.adding = Adding(viewer, self._count_changed)
         self._click: tuple[float, float] | None = None  # where a press was that may be a click
@@ -173,7 +177,7 @@ class Objects:
         try:
             edit(stage, change(stage.document.file, *values), what, together)
         except ValueError as error:  # BadFile is one
-            self.viewer.say(str(error))
+            self.viewer.messages.fail(str(error))
             return False
         return True
 
@@ -252,6 +256,5 @@ class Objects:
 
     def draw_boxes(self, ui_scale: float) -> None:
         """The boxes that ask for a name, before something is lost, for what to add."""
-        if not self.stage.problem:  # which has a box of its own
-            self.saving.draw(ui_scale)
-            self.adding.draw(ui_scale)
+        self.saving.draw(ui_scale)
+        self.adding.draw(ui_scale)

@@ -9,15 +9,16 @@ import numpy as np
 
 from app.viewer.arrange import record_regions, steer, steer_by_hand
 from app.viewer.bodies import Bodies
-from app.viewer.document import Document, document_from, first_stop
+from app.viewer.document import Document, document_from
+from app.viewer.messages import Messages
 from app.viewer.opened import Source
 from app.viewer.regions import Regions
+from app.viewer.scene_objects import origin_of, scene_of, stood_as, with_palette
 from app.viewer.track import Grip, next_stop, stepped
 from renderer.settings import DEBUG_VIEWS, RenderSettings
 from runtime_models.model import Finding, Model, Stop
 from scene import edits
 from scene.control import Sweep
-from scene.edits import free_name
 from scene.framing import (
     default_background,
     default_view,
@@ -28,14 +29,13 @@ from scene.framing import (
 )
 from scene.pick import Hit, Picker
 from scene.pose import Pose, View, perspective
-from scene.scene import IDENTITY, Scene, SceneObject
+from scene.scene import Scene, SceneObject
 from scene.scene_file import SceneItem, first_view, named_stops
 
 if TYPE_CHECKING:
     from scene.world import World
 
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
-MOST_SLIDERS = 2  # at the lower edge; more would take the picture's place
 AS_FILED = ""  # the palette that the scene's own stops name
 
 
@@ -54,13 +54,14 @@ class Stage:
         self.chosen = ""  # name of the object that is edited; "": none
         self.steered = ""  # name of the object whose x a hand has moved last
         self.grip = Grip()  # of the track that the mouse holds
+        self.most_sliders = 2  # that there is room for
         self.home: View | None = None  # the first look at the scene where a file gives one
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
         self.palette = AS_FILED
         self.regions = Regions()
         self.measure_now = False  # compare the picture with the exact one in the next frame
-        self.problem = ""  # one sentence for the message box; "" = nothing is wrong
+        self.messages = Messages()
         self.centre, self.radius = np.zeros(3), 1.0
         self._points = (np.zeros((0, 3)), np.zeros(0))
         self._picker = Picker()
@@ -331,7 +332,7 @@ class Stage:
     def sliders(self) -> list[int]:
         """Of those, the ones that there is room for: all of a few, else the chosen one."""
         movable = self.movable
-        if len(movable) <= MOST_SLIDERS:
+        if len(movable) <= self.most_sliders:
             return movable
         chosen = self.chosen_index
         return [chosen if chosen in movable else movable[0]]
@@ -341,6 +342,19 @@ class Stage:
         """Where the chosen object is in the scene; None: none is."""
         names = [thing.name for thing in self.scene.objects]
         return names.index(self.chosen) if self.chosen in names else None
+
+    @property
+    def problem(self) -> str:
+        """The newest problem that nobody has taken away; "": nothing is wrong."""
+        return (self.messages.problems or [""])[-1]
+
+    @problem.setter
+    def problem(self, sentence: str) -> None:
+        """Tells another one; "" takes all away."""
+        if sentence:
+            self.messages.fail(sentence)
+        else:
+            self.messages.problems = []
 
     @property
     def playing(self) -> bool:
@@ -371,38 +385,9 @@ class Stage:
         """Whether any thermal stop is drawn through a palette at all."""
         return any(stop.palette for thing in self.scene.objects for stop in thing.model.stops)
 
-
-def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
-    """The scene of what has been opened: each at x or its first stop, in the first one's place."""
-    objects = []
-    for source in sources:
-        path, model = source.path, source.model
-        moved = origin_of(model) - origin_of(sources[0].model)
-        pose = Pose(moved, IDENTITY.wxyz) if moved.any() else IDENTITY
-        start = first_stop(model).x if x is None else x
-        name = path.name if path.is_dir() else path.stem
-        name = free_name({thing.name for thing in objects}, name)
-        objects.append(SceneObject(name, model, pose, x=start))
-    return Scene(tuple(objects))
-
-
-def stood_as(thing: SceneObject, other: SceneObject | None) -> SceneObject:
-    """The object where another of its name is; the very same where nothing differs."""
-    if other is None:
-        return thing
-    here, there = thing.world_from_object, other.world_from_object
-    same = (*here.position, *here.wxyz) == (*there.position, *there.wxyz)
-    if same and thing.x == other.x:
-        return thing
-    return replace(thing, world_from_object=there, x=other.x)
-
-
-def origin_of(model: Model) -> np.ndarray:
-    """(3,) metres that were taken off a model's places."""
-    return np.array(getattr(model, "origin", (0.0, 0.0, 0.0)), np.float64)
-
-
-def with_palette(model: Model, name: str) -> Model:
-    """The model with another palette on those thermal stops that have one."""
-    stops = [replace(stop, palette=name) if stop.palette else stop for stop in model.stops]
-    return replace(model, stops=tuple(stops))
+    @property
+    def has_legend(self) -> bool:
+        """Whether any thermal stop that may be seen has values to tell."""
+        seen = [thing for thing in self.scene.objects if thing.visible]
+        stops = [stop for thing in seen for stop in thing.model.stops]
+        return any(stop.palette and stop.value_range is not None for stop in stops)

@@ -81,7 +81,7 @@ class Wipe:
         hooks.marks.append(self.draw_marks)
         hooks.takes.append(self.take)
         hooks.status.append(self.status)
-        hooks.keys += KEYS
+        hooks.keys["Comparing"] = list(KEYS)
         hooks.each_frame.append(lambda: self.on and self._waiting)
 
     @property
