@@ -10,7 +10,7 @@ from app.panels.theme import Box
 Vec = imgui.ImVec2
 Row = tuple[str, str]  # key, what it does
 COLUMN = 330.0  # logical pixels, of a group
-KEY_PART = 0.40  # of a column, where what a key does begins
+KEY_PART = 0.38  # of a column, where what a key does begins
 MOUSE_AND_CAMERA = (
     ("drag", "orbit; look about when flying"),
     ("right drag", "pan; look about when flying"),
@@ -77,31 +77,35 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
         | flags.always_auto_resize,
     )  # fmt: skip
     imgui.pop_style_color()
-    if imgui.begin_table("groups", columns):
-        for names in spread(groups, columns):
-            imgui.table_next_column()
-            for name in names:
-                _group(name, groups[name], ui_scale)
-        imgui.end_table()
+    start, each = imgui.get_cursor_pos(), imgui.get_content_region_avail().x / columns
+    lowest = start.y
+    for column, names in enumerate(spread(groups, columns)):
+        imgui.set_cursor_pos(Vec(start.x + column * each, start.y))
+        for name in names:
+            _group(name, groups[name], each, ui_scale)
+        lowest = max(lowest, imgui.get_cursor_pos_y())
+    imgui.set_cursor_pos(Vec(start.x, lowest))
     closed = imgui.button("Close", Vec(110 * ui_scale, 0))
     box = theme.window_box()
     imgui.end()
     return box, closed
 
 
-def _group(name: str, rows: Sequence[Row], ui_scale: float) -> None:
+def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> None:
+    """A heading and its rows, one below the other from the cursor on."""
+    left, gap = imgui.get_cursor_pos_x(), 16 * ui_scale
     imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), name)
-    width = imgui.get_content_region_avail().x
-    start = imgui.get_cursor_pos_x()
     for key, what in rows:
+        imgui.set_cursor_pos_x(left)
+        y = imgui.get_cursor_pos_y()
         imgui.text_unformatted(key)
-        imgui.same_line(start + KEY_PART * width)
-        imgui.push_text_wrap_pos(start + width)
+        imgui.set_cursor_pos(Vec(left + KEY_PART * width, y))
+        imgui.push_text_wrap_pos(left + width - gap)
         imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
         imgui.text_unformatted(what)
         imgui.pop_style_color()
         imgui.pop_text_wrap_pos()
-    imgui.dummy(Vec(0, 6 * ui_scale))
+    imgui.set_cursor_pos(Vec(left, imgui.get_cursor_pos_y() + gap / 2))
 
 
 def spread(groups: dict[str, Sequence[Row]], columns: int) -> list[list[str]]:

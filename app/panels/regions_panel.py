@@ -99,9 +99,10 @@ def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
     border = slider("border", region.border, 0.0, far, "border: %.3f m", "border: sharp")
     tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
     regions.edit(number, border=border)
-    x, held = track(stage.stops(region.index), region.x, stage.grip, 46 * ui_scale)
-    if held:
-        regions.edit(number, x=x)
+    stops = stage.stops(region.index)
+    x, held, stop = track(stops, region.x, stage.grip, 46 * ui_scale)
+    if held or stop is not None:
+        regions.edit(number, x=x if stop is None else stops[stop].x)
     if imgui.button("Remove", Vec(-1, 0)):
         regions.remove(number)
 

@@ -8,7 +8,7 @@ from app.panels import theme
 from app.panels.panel_rows import tip
 from app.panels.stops_panel import pace_button
 from app.panels.theme import Box
-from app.viewer.arrange import steer_by_hand
+from app.viewer.arrange import go_to_stop, steer_by_hand
 from app.viewer.stage import Stage
 from app.viewer.track import Grip, Track, half_ways, read_x
 from runtime_models.model import Stop
@@ -59,8 +59,10 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     value_width = max(VALUE * ui_scale, name_width)
     room = imgui.get_content_region_avail().x - value_width - 12 * ui_scale
     stops = stage.stops(index)
-    x, held = track(stops, thing.x, stage.grip, height, room)
-    if held:
+    x, held, stop = track(stops, thing.x, stage.grip, height, room)
+    if stop is not None:
+        go_to_stop(stage, index, stop)
+    elif held:
         steer_by_hand(stage, index, x)
     imgui.same_line(0, 0)
     origin = imgui.get_cursor_screen_pos()
@@ -134,8 +136,9 @@ def _play_button(playing: bool, height: float) -> bool:
 
 def track(
     stops: Sequence[Stop], x: float, grip: Grip, height: float, width: float = 0.0
-) -> tuple[float, bool]:
-    """The line with its ticks, names and knob.  Returns x and whether the hand moves it.
+) -> tuple[float, bool, int | None]:
+    """The line with its ticks, names and knob.  Returns x, whether the hand moves it, and the
+    number of the stop whose name was clicked.
 
     Without a width it takes what there is.  The knob can be taken all over, also where it stands
     out beyond an end of the line.
@@ -160,7 +163,7 @@ def track(
     _knob(along.place(x), y, radius if held or hovered else 0.86 * radius)
     imgui.set_cursor_screen_pos(corner)
     imgui.dummy(Vec(width, height))
-    return (chosen, True) if chosen is not None else (x, held)
+    return x, held, chosen
 
 
 def _line(stops: Sequence[Stop], x: float, along: Track, y: float) -> None:
@@ -187,10 +190,8 @@ def _knob(place: float, y: float, radius: float) -> None:
     draw.add_circle_filled(Vec(place, y), radius * 0.45, theme.color(theme.SURFACE))
 
 
-def _stop_names(
-    stops: Sequence[Stop], x: float, along: Track, corner: Vec, y: float
-) -> float | None:
-    """A name above each stop, lit where x is; returns x of the one that was clicked."""
+def _stop_names(stops: Sequence[Stop], x: float, along: Track, corner: Vec, y: float) -> int | None:
+    """A name above each stop, lit where x is; returns the number of the one that was clicked."""
     draw = imgui.get_window_draw_list()
     line = imgui.get_text_line_height()
     low, high = along.left - KNOB * line, along.left + along.width + KNOB * line
@@ -204,7 +205,7 @@ def _stop_names(
         last_right = left + size.x
         imgui.set_cursor_screen_pos(Vec(left, corner.y))
         if imgui.invisible_button(f"stop {number}", Vec(max(size.x, 1.0), line)):
-            clicked = stop.x
+            clicked = number
         hovered = imgui.is_item_hovered()
         if hovered:
             key = f", key {number + 1}" if number < 9 else ""

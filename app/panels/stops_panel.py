@@ -4,7 +4,7 @@ from imgui_bundle import imgui
 
 from app.panels import theme
 from app.panels.panel_rows import choice, slider, tip
-from app.viewer.arrange import steer_by_hand
+from app.viewer.arrange import go_to_stop
 from app.viewer.stage import Stage
 from scene.control import EASES, MODES, Sweep
 
@@ -50,7 +50,7 @@ def _stop_buttons(stage: Stage, index: int, ui_scale: float) -> None:
         if lit:
             imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
         if imgui.button(f"{stop.name}###stop {number}", Vec(width, 0)):
-            steer_by_hand(stage, index, stop.x)
+            go_to_stop(stage, index, number)
         if lit:
             imgui.pop_style_color()
         key = f", key {number + 1}" if number < 9 else ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.viewer.document import key_of
+from app.viewer.track import next_stop, stepped
 from runtime_models.model import BadFile
 from scene import edits
 from scene.control import Sweep
@@ -169,6 +170,38 @@ def steer_by_hand(stage: "Stage", index: int, x: float) -> None:
     stage.sweeps[index].playing = False
     stage.steered = stage.scene.objects[index].name
     steer(stage, index, x)
+
+
+def steered_index(stage: "Stage") -> int | None:
+    """The object whose x the arrow keys move: the chosen one, else the one moved last."""
+    movable = stage.movable
+    names = [stage.scene.objects[index].name for index in movable]
+    for name in (stage.chosen, stage.steered):
+        if name in names:
+            return movable[names.index(name)]
+    return movable[0] if movable else None
+
+
+def step_x(stage: "Stage", steps: int) -> None:
+    """The arrow keys: hundredths of x to the right, or left."""
+    if (index := steered_index(stage)) is not None:
+        steer_by_hand(stage, index, stepped(stage.scene.objects[index].x, steps))
+
+
+def step_stop(stage: "Stage", direction: int) -> None:
+    """To the nearest stop above (1) or below (-1)."""
+    if (index := steered_index(stage)) is not None:
+        stops = stage.stops(index)
+        x = next_stop(stops, stage.scene.objects[index].x, direction)
+        numbers = [number for number, stop in enumerate(stops) if stop.x == x]
+        if numbers:
+            go_to_stop(stage, index, numbers[0])
+
+
+def go_to_stop(stage: "Stage", index: int, number: int) -> None:
+    """One object goes to a stop, counted from 0 by x; the arrow keys go on with that object."""
+    stage.steered = stage.scene.objects[index].name
+    stage.go_to_stop(number, index)
 
 
 def place(stage: "Stage", index: int, pose: Pose) -> None:

@@ -12,7 +12,7 @@ from app.drawing import parse_size
 from app.errors import UsageError
 from app.opening import ReadingOptions
 from app.paths import DEMO, TOUCH, config_folder, plain
-from app.viewer.files import home_of, named_cameras, opened_scene
+from app.viewer.files import first_look, named_cameras, opened_scene
 from app.viewer.opened import read_files
 from app.viewer.own_files import OwnFiles
 from app.viewer.refine import Refiner, attach_refiner
@@ -86,7 +86,7 @@ def run(options: Options) -> int:
     if found.file is not None and options.x is not None:
         raise UsageError(f"--x is for one model; {found.path.name} is a scene of objects.")
     scene, document = opened_scene(found, options.x)
-    stage.take(found.sources, scene, home_of(found), document)
+    stage.take(found.sources, scene, first_look(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
     stage.keep_regions()

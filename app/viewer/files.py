@@ -15,13 +15,14 @@ from app.panels.theme import Box
 from app.paths import DEMO, TOUCH, config_folder
 from app.viewer.controls import Camera
 from app.viewer.document import Document, document_from, document_of
+from app.viewer.first_look import FirstLook
 from app.viewer.opened import Found, Opener, ReadModel, read_files
 from app.viewer.recent import RecentFiles
 from app.viewer.scene_objects import scene_of
 from app.viewer.window import Drop, Event, KeyDown
 from runtime_models.model import BadFile
 from scene import edits
-from scene.pose import View
+from scene.framing import common_side
 from scene.read_cameras import read_camera_list
 from scene.scene import Scene
 from scene.scene_file import scene_of as scene_of_file
@@ -118,7 +119,7 @@ class Files:
                 stage.problem = str(error)
                 viewer.shown.forget()
                 return
-            stage.take(found.sources, scene, home_of(found), document)
+            stage.take(found.sources, scene, first_look(found), document)
             self._at_demo = False
             viewer.show_scene()
         self.take_cameras(found, stand=not found.sources)
@@ -230,20 +231,25 @@ def told_of(found: Found) -> str:
     return "\n".join([*lines[:MOST_TOLD], *more, *found.notes])
 
 
-def home_of(found: Found) -> View | None:
-    """The view that stands on the floor which lies with the first scene."""
-    if found.floor is None or not found.sources:
-        return None
-    return in_scene(found.floor, found.sources[0].model).views[0]
+def first_look(found: Found) -> FirstLook:
+    """What lies beside the first scene and tells from where to look: a floor, cameras of a side."""
+    if not found.sources:
+        return FirstLook()
+    model, home, front = found.sources[0].model, None, None
+    if found.floor is not None:
+        home = in_scene(found.floor, model).views[0]
+    if found.cameras is not None:
+        front = common_side(in_scene(found.cameras, model).views)
+    return FirstLook(home, front)
 
 
 def first_camera(viewer: "Viewer") -> Camera:
     """The camera of a new scene: on its floor where one is given, else the whole in view."""
     stage = viewer.stage
     camera = Camera(stage.first_view(viewer.free_size()), stage.first_target, stage.radius)
-    if stage.home is not None:
+    if stage.first_look.home is not None:
         camera.toggle_flying()
-        camera.stand(stage.home.world_from_eye, stage.home_fov_y)
+        camera.stand(stage.first_look.home.world_from_eye, stage.first_look.fov_y)
     return camera
 
 

@@ -6,6 +6,7 @@ import glfw
 import numpy as np
 
 from app.panels.camera_panel import keep_view, move_camera, step_to_camera
+from app.viewer.arrange import step_stop, step_x
 from app.viewer.controls import FAST, SLOW, Push
 from app.viewer.window import DoubleClick, Drag, Drop, Event, KeyDown, Press, Release, Wheel, Window
 from scene.pick import Hit
@@ -75,7 +76,7 @@ def press_key(viewer: "Viewer", event: KeyDown) -> None:
             stage.toggle_play()
         case glfw.KEY_LEFT | glfw.KEY_RIGHT:
             direction = 1 if event.key == glfw.KEY_RIGHT else -1
-            (stage.step_stop if event.shift else stage.step_x)(direction)
+            (step_stop if event.shift else step_x)(stage, direction)
         case glfw.KEY_H | glfw.KEY_TAB:
             viewer.overlay = not viewer.overlay
         case glfw.KEY_F12:

@@ -7,30 +7,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.viewer.arrange import record_regions, steer, steer_by_hand
+from app.viewer.arrange import record_regions, steer
 from app.viewer.bodies import Bodies
 from app.viewer.document import Document, document_from
+from app.viewer.first_look import FirstLook
 from app.viewer.messages import Messages
 from app.viewer.opened import Source
 from app.viewer.regions import Regions
 from app.viewer.scene_objects import origin_of, scene_of, stood_as, with_palette
-from app.viewer.track import Grip, next_stop, stepped
+from app.viewer.track import Grip
 from renderer.settings import DEBUG_VIEWS, RenderSettings
 from runtime_models.model import Finding, Model, Stop
 from scene import edits
 from scene.control import Sweep
 from scene.framing import (
     default_background,
-    default_view,
     fit_points,
     frame_points,
-    framing_view,
     scene_points,
 )
 from scene.pick import Hit, Picker
 from scene.pose import Pose, View, perspective
 from scene.scene import Scene, SceneObject
-from scene.scene_file import SceneItem, first_view, named_stops
+from scene.scene_file import SceneItem, named_stops
 
 if TYPE_CHECKING:
     from scene.world import World
@@ -55,7 +54,7 @@ class Stage:
         self.steered = ""  # name of the object whose x a hand has moved last
         self.grip = Grip()  # of the track that the mouse holds
         self.most_sliders = 2  # that there is room for
-        self.home: View | None = None  # the first look at the scene where a file gives one
+        self.first_look = FirstLook()
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
         self.palette = AS_FILED
@@ -76,11 +75,11 @@ class Stage:
         self,
         sources: Sequence[Source],
         scene: Scene,
-        home: View | None = None,
+        first_look: FirstLook | None = None,
         document: Document | None = None,
     ) -> None:
         """Shows what has been opened; `scene` is `scene_of(sources)` or of the document's file."""
-        self.sources, self.home = tuple(sources), home
+        self.sources, self.first_look = tuple(sources), first_look or FirstLook()
         self.show(scene, document)
 
     def show(self, scene: Scene, document: Document | None = None) -> None:
@@ -127,24 +126,13 @@ class Stage:
 
     def first_view(self, size: tuple[int, int]) -> View:
         """The view of a single package if it gives one, else everything framed."""
-        if self.home is not None:
-            return replace(self.home, tangents=perspective(self.home_fov_y, size), size=size)
-        if self.document.file.view is not None:
-            return first_view(self.document.file, self.scene, size)
-        if len(self.scene.objects) == 1:
-            return default_view(self.scene.objects[0].model, size)
-        return framing_view(*self._points, size)
+        return self.first_look.view(self.document.file, self.scene, self._points, size)
 
     @property
     def first_target(self) -> np.ndarray:
         """(3,) metres: what the first view looks at and turns about."""
         view = self.document.file.view
         return self.centre if view is None else np.array(view.target)
-
-    @property
-    def home_fov_y(self) -> float:
-        """Radians from top to bottom of the home view."""
-        return float(np.arctan(self.home.tangents[3]) - np.arctan(self.home.tangents[2]))
 
     @property
     def origin(self) -> np.ndarray:
@@ -269,9 +257,9 @@ class Stage:
         objects[index] = thing
         self.scene = Scene(tuple(objects))
 
-    def go_to_stop(self, number: int) -> None:
+    def go_to_stop(self, number: int, only: int | None = None) -> None:
         """Every object that has a stop of that number, counted from 0, goes there and rests."""
-        for index in range(len(self.scene.objects)):
+        for index in range(len(self.scene.objects)) if only is None else [only]:
             stops = self.stops(index)
             if number < len(stops):
                 self.sweeps[index].playing = False
@@ -282,27 +270,6 @@ class Stage:
         thing = self.scene.objects[index]
         item = edits.find(self.document.file, thing.name)
         return named_stops(item or SceneItem(name=thing.name, model=""), thing.model)
-
-    def step_x(self, steps: int) -> None:
-        """The arrow keys: hundredths of x to the right, or left."""
-        if (index := self.steered_index) is not None:
-            steer_by_hand(self, index, stepped(self.scene.objects[index].x, steps))
-
-    def step_stop(self, direction: int) -> None:
-        """To the nearest stop above (1) or below (-1)."""
-        if (index := self.steered_index) is not None:
-            x = next_stop(self.stops(index), self.scene.objects[index].x, direction)
-            steer_by_hand(self, index, x)
-
-    @property
-    def steered_index(self) -> int | None:
-        """The object whose x the arrow keys move: the chosen one, else the one moved last."""
-        movable = self.movable
-        names = [self.scene.objects[index].name for index in movable]
-        for name in (self.chosen, self.steered):
-            if name in names:
-                return movable[names.index(name)]
-        return movable[0] if movable else None
 
     def toggle_play(self, index: int | None = None) -> None:
         """Starts or stops one object's sweep, or all together: all stop if any was playing."""
