@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from app.panels import theme
+from app.panels.panel_rows import tip
 from app.panels.theme import Box
 
 Vec = imgui.ImVec2
@@ -77,6 +78,7 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
         | flags.always_auto_resize,
     )  # fmt: skip
     imgui.pop_style_color()
+    closed = _heading(ui_scale)
     start, each = imgui.get_cursor_pos(), imgui.get_content_region_avail().x / columns
     lowest = start.y
     for column, names in enumerate(spread(groups, columns)):
@@ -85,10 +87,21 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
             _group(name, groups[name], each, ui_scale)
         lowest = max(lowest, imgui.get_cursor_pos_y())
     imgui.set_cursor_pos(Vec(start.x, lowest))
-    closed = imgui.button("Close", Vec(110 * ui_scale, 0))
     box = theme.window_box()
     imgui.end()
     return box, closed
+
+
+def _heading(ui_scale: float) -> bool:
+    """What this is, and the button that closes it, at the right; True when it was clicked."""
+    start, room = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
+    imgui.text_unformatted("Keys and mouse")
+    below, width = imgui.get_cursor_pos(), 80 * ui_scale
+    imgui.set_cursor_pos(Vec(start.x + room - width, start.y))
+    closed = imgui.button("Close", Vec(width, 0))
+    tip("F1 or Esc.", ui_scale)
+    imgui.set_cursor_pos(Vec(below.x, below.y + 10 * ui_scale))
+    return closed
 
 
 def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> None:

@@ -3,6 +3,7 @@
 from imgui_bundle import imgui
 
 from app.panels import theme
+from app.panels.panel_rows import tip
 from app.panels.theme import Box
 from app.viewer.messages import Messages
 
@@ -68,7 +69,7 @@ def _problem(
     imgui.text_unformatted(sentence)
     imgui.pop_text_wrap_pos()
     imgui.set_cursor_pos(Vec(start.x + room + GAP * ui_scale, start.y))
-    if _cross(side):
+    if _cross(side, ui_scale):
         messages.dismiss(sentence)
     box = theme.window_box()
     imgui.get_window_draw_list().add_rect_filled(
@@ -82,13 +83,13 @@ def _problem(
     return box
 
 
-def _cross(side: float) -> bool:
+def _cross(side: float, ui_scale: float) -> bool:
     corner = imgui.get_cursor_screen_pos()
     clicked = imgui.invisible_button("dismiss", Vec(side, side))
     hovered = imgui.is_item_hovered()
+    tip("Take this away. Esc.", ui_scale)
     draw, inset = imgui.get_window_draw_list(), 0.28 * side
     if hovered:
-        imgui.set_tooltip("Take this away (Esc)")
         end = Vec(corner.x + side, corner.y + side)
         draw.add_rect_filled(corner, end, theme.color(theme.RAISED), 4.0)
     low, high = corner.x + inset, corner.x + side - inset

@@ -77,6 +77,7 @@ def _row(stage: Stage, number: int, ui_scale: float) -> None:
     if imgui.selectable(region.name or "(no name)", chosen, 0, Vec(width, 0))[0]:
         regions.choose(-1 if chosen else number)
     imgui.pop_style_color()
+    tip("Choose it to edit it; click again to leave it.", ui_scale)
     imgui.same_line()
     right_aligned(f"x {region.x:.2f}")
 
@@ -86,11 +87,13 @@ def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
     regions, number = stage.regions, stage.regions.chosen
     things = stage.scene.objects
     changed, name = imgui.input_text("##name", region.name)
+    tip("Its name.", ui_scale)
     if changed:
         regions.edit(number, name=name[:LONGEST_NAME])
     if len(things) > 1 and region.kind != "painted":
         names = [f"of {thing.name}" for thing in things]
         index = choice("object", region.index, range(len(things)), names)
+        tip("The object whose part it is.", ui_scale)
         regions.edit(number, index=index)
     if region.is_placed:
         _place(stage, ui_scale)
@@ -100,11 +103,14 @@ def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
     tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
     regions.edit(number, border=border)
     stops = stage.stops(region.index)
-    x, held, stop = track(stops, region.x, stage.grip, 46 * ui_scale)
-    if held or stop is not None:
-        regions.edit(number, x=x if stop is None else stops[stop].x)
+    moved = track(stops, (region.x,), stage.grip, 46 * ui_scale)
+    if moved.knob is not None:
+        regions.edit(number, x=moved.x)
+    elif moved.stop is not None:
+        regions.edit(number, x=stops[moved.stop].x)
     if imgui.button("Remove", Vec(-1, 0)):
         regions.remove(number)
+    tip("Ctrl+Z brings it back.", ui_scale)
 
 
 def _place(stage: Stage, ui_scale: float) -> None:
@@ -127,16 +133,17 @@ def _sizes(stage: Stage, region: Region, ui_scale: float) -> None:
     low, high = 0.01 * stage.radius, LARGEST * stage.radius
     if region.kind == "box":
         names = ("half width", "half height", "half depth")
-        half = [
-            slider(name, float(metres), low, high, f"{name}: %.2f m")
-            for name, metres in zip(names, region.half, strict=True)
-        ]
+        half = []
+        for name, metres in zip(names, region.half, strict=True):
+            half.append(slider(name, float(metres), low, high, f"{name}: %.2f m"))
+            tip("From the middle of the box to its side.", ui_scale)
         regions.edit(number, half=np.array(half))
     elif region.kind == "sphere":
         radius = slider("radius", float(region.half[0]), low, high, "radius: %.2f m")
+        tip("From the middle of the sphere to its skin.", ui_scale)
         regions.edit(number, half=np.full(3, radius))
     elif region.kind == "half-space":
-        _direction(stage, region)
+        _direction(stage, region, ui_scale)
     elif region.kind == "lens":
         degrees = float(np.degrees(np.arctan(region.tangent)))
         degrees = slider("lens", degrees, 1.0, 60.0, "half its angle: %.0f\u00b0")
@@ -147,13 +154,14 @@ def _sizes(stage: Stage, region: Region, ui_scale: float) -> None:
         _brush(stage, region, ui_scale)
 
 
-def _direction(stage: Stage, region: Region) -> None:
+def _direction(stage: Stage, region: Region, ui_scale: float) -> None:
     """Which side of the plane is selected."""
     regions = stage.regions
     names = list(DIRECTIONS)
     near = [float(np.dot(region.normal, DIRECTIONS[name])) for name in names]
     at = names[int(np.argmax(near))]
     chosen = choice("direction", at, names, [f"towards: {name}" for name in names])
+    tip("The side of the plane that it selects.", ui_scale)
     if chosen != at:
         regions.edit(regions.chosen, normal=np.array(DIRECTIONS[chosen], float))
 

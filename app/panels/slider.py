@@ -1,6 +1,7 @@
 """The modality slider: a bar at the bottom with play, named stops that catch the hand, and x."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
@@ -17,8 +18,9 @@ from scene.control import SNAP
 Vec = imgui.ImVec2
 ROW = 46.0  # logical pixels
 WIDEST_NAME = 140.0  # of an object beside its slider
-VALUE, PACE = 54.0, 46.0  # widths of the number and of the seconds
+VALUE, PACE, SPLIT = 54.0, 46.0, 30.0  # widths: the number, the seconds, the split's button
 ROOMY = 380.0  # less than this in a row and the seconds are left to the panel's section Play
+KNOB_INKS = (theme.ACCENT, theme.SECOND)
 LINE = 0.68  # of a row's height: where the track runs, below the names of its stops
 KNOB, SLACK = 0.56, 0.2  # of a line of text: the knob's radius, and how far beside it it is taken
 
@@ -48,7 +50,7 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     """Play button, seconds a way, track, value of one object."""
     thing, sweep = stage.scene.objects[index], stage.sweeps[index]
     height = ROW * ui_scale
-    if _play_button(sweep.playing, height):
+    if _play_button(sweep.playing, height, ui_scale):
         stage.toggle_play(index)
     if imgui.get_content_region_avail().x > ROOMY * ui_scale:
         imgui.same_line(0, 8 * ui_scale)
@@ -57,13 +59,18 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     named = len(stage.sliders) == 1 < len(stage.movable)  # one of several: say which
     name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
     value_width = max(VALUE * ui_scale, name_width)
-    room = imgui.get_content_region_avail().x - value_width - 12 * ui_scale
+    after = SPLIT * ui_scale if stage.split.possible else 0.0
+    room = imgui.get_content_region_avail().x - value_width - after - 12 * ui_scale
     stops = stage.stops(index)
-    x, held, stop = track(stops, thing.x, stage.grip, height, room)
-    if stop is not None:
-        go_to_stop(stage, index, stop)
-    elif held:
-        steer_by_hand(stage, index, x)
+    second = stage.split.on and stage.split.name == thing.name
+    xs = (thing.x, stage.split.x) if second else (thing.x,)
+    moved = track(stops, xs, stage.grip, height, room)
+    if moved.stop is not None:
+        go_to_stop(stage, index, moved.stop)
+    elif moved.knob == 1:
+        stage.split.x = moved.x
+    elif moved.knob == 0:
+        steer_by_hand(stage, index, moved.x)
     imgui.same_line(0, 0)
     origin = imgui.get_cursor_screen_pos()
     left = origin.x + 12 * ui_scale
@@ -75,6 +82,25 @@ def _row(stage: Stage, index: int, ui_scale: float) -> None:
     line_y = origin.y + height * LINE - imgui.get_frame_height() / 2
     imgui.set_cursor_screen_pos(Vec(left, line_y))
     _value(stage, index, stops, ui_scale)
+    if stage.split.possible:
+        imgui.set_cursor_screen_pos(Vec(left + VALUE * ui_scale + 6 * ui_scale, line_y))
+        _split_button(stage, index, second, ui_scale)
+
+
+def _split_button(stage: Stage, index: int, on: bool, ui_scale: float) -> None:
+    """A square with a line down its middle."""
+    side = imgui.get_frame_height()
+    corner = imgui.get_cursor_screen_pos()
+    if imgui.button("##split", Vec(side, side)):
+        stage.split.toggle(stage, index)
+    tip("Split: another stop right of a line, with a knob of its own. Key C.", ui_scale)
+    draw, inset = imgui.get_window_draw_list(), 0.26 * side
+    low = Vec(corner.x + inset, corner.y + inset)
+    high = Vec(corner.x + side - inset, corner.y + side - inset)
+    middle = corner.x + side / 2
+    ink = theme.color(theme.SECOND if on else theme.TEXT)
+    draw.add_rect(low, high, ink, 1.0, 0, max(1.0, side / 18))
+    draw.add_rect_filled(Vec(middle, low.y), high, ink)
 
 
 def _value(stage: Stage, index: int, stops: Sequence[Stop], ui_scale: float) -> None:
@@ -105,7 +131,7 @@ def _pace(stage: Stage, index: int, height: float, ui_scale: float) -> None:
     imgui.dummy(Vec(PACE * ui_scale, height))
 
 
-def _play_button(playing: bool, height: float) -> bool:
+def _play_button(playing: bool, height: float, ui_scale: float) -> bool:
     """A round button with a triangle or two bars; True when it is clicked."""
     radius = height * 0.36
     corner = imgui.get_cursor_screen_pos()
@@ -129,18 +155,25 @@ def _play_button(playing: bool, height: float) -> bool:
             Vec(centre.x + r * 1.1, centre.y),
             ink,
         )
-    if hovered:
-        imgui.set_tooltip("Pause (Space)" if playing else "Play through the stops (Space)")
+    tip("Pause. Space." if playing else "Play through the stops. Space.", ui_scale)
     return clicked
 
 
-def track(
-    stops: Sequence[Stop], x: float, grip: Grip, height: float, width: float = 0.0
-) -> tuple[float, bool, int | None]:
-    """The line with its ticks, names and knob.  Returns x, whether the hand moves it, and the
-    number of the stop whose name was clicked.
+@dataclass(frozen=True)
+class Moved:
+    """What a hand does to a track in this frame."""
 
-    Without a width it takes what there is.  The knob can be taken all over, also where it stands
+    knob: int | None = None  # that it holds; None: none
+    x: float = 0.0  # of that knob
+    stop: int | None = None  # number of the stop whose name was clicked
+
+
+def track(
+    stops: Sequence[Stop], xs: Sequence[float], grip: Grip, height: float, width: float = 0.0
+) -> Moved:
+    """The line with its ticks, names and knobs, the first one's part of it filled.
+
+    Without a width it takes what there is.  A knob can be taken all over, also where it stands
     out beyond an end of the line.
     """
     line = imgui.get_text_line_height()
@@ -149,21 +182,26 @@ def track(
     corner = imgui.get_cursor_screen_pos()
     along = Track(corner.x + radius, max(width - 2 * radius, 1.0), radius + SLACK * line)
     y = corner.y + height * LINE
-    chosen = _stop_names(stops, x, along, corner, y)
+    chosen = _stop_names(stops, xs, along, corner)
     reach = along.knob + 1.0  # so that a press on the very edge is within it
     imgui.set_cursor_screen_pos(Vec(along.left - reach, y - reach))
     imgui.invisible_button("track", Vec(along.width + 2 * reach, 2 * reach))
     held, hovered = imgui.is_item_active(), imgui.is_item_hovered()
-    io = imgui.get_io()
+    tip("Drag from stop to stop. Alt: without snapping to them.", line / theme.FONT_SIZE)
+    io, xs = imgui.get_io(), list(xs)
     if imgui.is_item_activated():
-        grip.take(along, x, io.mouse_pos.x)
+        grip.take(along, xs, io.mouse_pos.x)
+    held = held and grip.knob < len(xs)
     if held:
-        x = grip.drag(along, x, io.mouse_pos.x, stops, 0.0 if io.key_alt else SNAP)
-    _line(stops, x, along, y)
-    _knob(along.place(x), y, radius if held or hovered else 0.86 * radius)
+        reached = 0.0 if io.key_alt else SNAP
+        xs[grip.knob] = grip.drag(along, xs[grip.knob], io.mouse_pos.x, stops, reached)
+    _line(stops, xs[0], along, y)
+    for number, (x, ink) in enumerate(zip(xs, KNOB_INKS, strict=False)):
+        lit = grip.knob == number if held else hovered
+        _knob(along.place(x), y, radius if lit else 0.86 * radius, ink)
     imgui.set_cursor_screen_pos(corner)
     imgui.dummy(Vec(width, height))
-    return x, held, chosen
+    return Moved(grip.knob, xs[grip.knob], chosen) if held else Moved(stop=chosen)
 
 
 def _line(stops: Sequence[Stop], x: float, along: Track, y: float) -> None:
@@ -184,14 +222,16 @@ def _line(stops: Sequence[Stop], x: float, along: Track, y: float) -> None:
         draw.add_circle_filled(Vec(along.place(stop.x), y), line * 0.24, theme.color(theme.TEXT))
 
 
-def _knob(place: float, y: float, radius: float) -> None:
+def _knob(place: float, y: float, radius: float, ink: tuple[float, float, float]) -> None:
     draw = imgui.get_window_draw_list()
-    draw.add_circle_filled(Vec(place, y), radius, theme.color(theme.ACCENT))
+    draw.add_circle_filled(Vec(place, y), radius, theme.color(ink))
     draw.add_circle_filled(Vec(place, y), radius * 0.45, theme.color(theme.SURFACE))
 
 
-def _stop_names(stops: Sequence[Stop], x: float, along: Track, corner: Vec, y: float) -> int | None:
-    """A name above each stop, lit where x is; returns the number of the one that was clicked."""
+def _stop_names(
+    stops: Sequence[Stop], xs: Sequence[float], along: Track, corner: Vec
+) -> int | None:
+    """A name above each stop, lit where a knob is; returns the number of the one clicked."""
     draw = imgui.get_window_draw_list()
     line = imgui.get_text_line_height()
     low, high = along.left - KNOB * line, along.left + along.width + KNOB * line
@@ -207,10 +247,9 @@ def _stop_names(stops: Sequence[Stop], x: float, along: Track, corner: Vec, y: f
         if imgui.invisible_button(f"stop {number}", Vec(max(size.x, 1.0), line)):
             clicked = number
         hovered = imgui.is_item_hovered()
-        if hovered:
-            key = f", key {number + 1}" if number < 9 else ""
-            imgui.set_tooltip(f"{stop.name}: x {stop.x:.3f}{key}")
-        lit = hovered or abs(stop.x - x) < 1e-3
-        ink = theme.color(theme.ACCENT if lit else theme.TEXT)
+        key = f", key {number + 1}" if number < 9 else ""
+        tip(f"{stop.name}: x {stop.x:.3f}{key}", line / theme.FONT_SIZE)
+        on = [ink for x, ink in zip(xs, KNOB_INKS, strict=False) if abs(stop.x - x) < 1e-3]
+        ink = theme.color(theme.ACCENT if hovered else (on or [theme.TEXT])[0])
         draw.add_text(Vec(left, corner.y), ink, stop.name)
     return clicked

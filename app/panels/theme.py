@@ -17,6 +17,7 @@ TEXT = (0.90, 0.90, 0.91)
 MUTED = (0.58, 0.59, 0.62)
 SURFACE = (0.105, 0.108, 0.118)
 RAISED = (0.175, 0.180, 0.195)
+SECOND = (0.47, 0.72, 0.95)  # what stands for a second x
 WARNING = (0.93, 0.36, 0.27)
 TRACK = (0.30, 0.31, 0.33)
 

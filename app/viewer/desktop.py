@@ -17,6 +17,7 @@ from app.viewer.opened import read_files
 from app.viewer.own_files import OwnFiles
 from app.viewer.refine import Refiner, attach_refiner
 from app.viewer.settings import Settings
+from app.viewer.split import splitting
 from app.viewer.stage import Stage
 from app.viewer.viewer import Viewer
 from app.viewer.window import Window
@@ -98,7 +99,10 @@ def run(options: Options) -> int:
             attach_refiner(viewer, refiner)
             viewer.files.read = refiner.open
             viewer.files.started(found, options)
-            with comparing(viewer, options):
+            with comparing(viewer, options) if options.compare else splitting(
+                window, stage, viewer.hooks, stage.messages, lambda: viewer.layout.free,
+                lambda: Renderer(window.ctx, drawing=options.drawing),
+            ):  # fmt: skip
                 viewer.loop()
     return 0
 

@@ -33,6 +33,7 @@ class Layout:
     folded: bool = False  # `panel` is the button that unfolds it
     bar: Box | None = None
     legend: Box | None = None
+    left_legend: Box | None = None
     status: Box | None = None
 
 
@@ -43,11 +44,13 @@ def lay_out(
     legend: bool,
     panel_open: bool | None = None,
     overlay: bool = True,
+    both: bool = False,
 ) -> Layout:
     """The parts in a window of `size` (W, H) logical pixels.
 
     `rows` is the number of sliders; `legend`: the scene has a thermal stop, so that room is kept
-    for its legend at every x; `panel_open` None: as there is room.
+    for its legend at every x, and `both`: at the left as well.  `panel_open` None: as there is
+    room.
     """
     if not overlay:
         return Layout((0.0, 0.0, *map(float, size)))
@@ -59,20 +62,24 @@ def lay_out(
     beside = width - left >= BAR_LEAST  # else the bar has the whole width, and the panel ends above
     bar = _bar(width, height, left if beside else 0.0, rows)
     low = bar[1] if bar else height - STATUS
-    keep_legend = legend and width - left - LEGEND >= LEAST_BESIDE_LEGEND
-    free = (left, 0.0, width - LEGEND * keep_legend, low)
+    legends = LEGEND * (1 + both)
+    keep_legend = legend and width - left - legends >= LEAST_BESIDE_LEGEND
+    edge = LEGEND * keep_legend
+    free = (left + edge * both, 0.0, width - edge, low)
     if not (free[2] - free[0] >= LEAST_FREE and low >= LEAST_FREE):
         free, keep_legend = (0.0, 0.0, width, height), False
     status_top = height - STATUS
     panel_low = (status_top if beside else low) - MARGIN
     panel = (MARGIN, MARGIN, MARGIN + PANEL, max(panel_low, MARGIN + 1.0))
+    top = 0.0 if panel_open else MARGIN + FOLDED  # below the button
     if not panel_open:
         panel = (MARGIN, MARGIN, MARGIN + FOLDED, MARGIN + FOLDED)
     parts = {
         "free": free,
         "panel": panel,
         "bar": bar,
-        "legend": _legend(width, free) if keep_legend else None,
+        "legend": _legend(free[2], free) if keep_legend else None,
+        "left_legend": _legend(free[0] - LEGEND, free, top) if keep_legend and both else None,
         "status": (0.0, status_top, width, height),
     }
     scaled = {name: box and tuple(side * scale for side in box) for name, box in parts.items()}
@@ -93,9 +100,8 @@ def _bar(width: float, height: float, left: float, rows: int) -> Box | None:
     return (middle - half, low - bar_height(rows), middle + half, low)
 
 
-def _legend(width: float, free: Box) -> Box:
-    """At the right edge, as high as the free part allows."""
-    tall = min(LEGEND_TALL, 0.86 * (free[3] - free[1]))
-    middle = (free[1] + free[3]) / 2
-    right = width - MARGIN / 2
-    return (free[2] + MARGIN / 2, middle - tall / 2, right, middle + tall / 2)
+def _legend(left: float, free: Box, top: float = 0.0) -> Box:
+    """From `left` on, as high as the free part allows below `top`."""
+    tall = min(LEGEND_TALL, 0.86 * (free[3] - max(free[1], top)))
+    middle, gap = (max(free[1], top) + free[3]) / 2, MARGIN / 2
+    return (left + gap, middle - tall / 2, left + LEGEND - gap, middle + tall / 2)

@@ -15,6 +15,7 @@ from app.viewer.messages import Messages
 from app.viewer.opened import Source
 from app.viewer.regions import Regions
 from app.viewer.scene_objects import origin_of, scene_of, stood_as, with_palette
+from app.viewer.split_state import SplitState
 from app.viewer.track import Grip
 from renderer.settings import DEBUG_VIEWS, RenderSettings
 from runtime_models.model import Finding, Model, Stop
@@ -54,6 +55,7 @@ class Stage:
         self.steered = ""  # name of the object whose x a hand has moved last
         self.grip = Grip()  # of the track that the mouse holds
         self.most_sliders = 2  # that there is room for
+        self.split = SplitState()
         self.first_look = FirstLook()
         self.sweeps: list[Sweep] = []
         self.settings = RenderSettings(background=BACKGROUND)
@@ -85,6 +87,7 @@ class Stage:
     def show(self, scene: Scene, document: Document | None = None) -> None:
         """Takes a scene over and frames it."""
         self.scene, self.chosen = scene, ""
+        self.split.on, self.split.name = False, ""
         self.document = document or document_from(scene, self.sources)
         self.bodies.forget()
         if scene.objects:

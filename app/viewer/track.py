@@ -35,16 +35,19 @@ class Track:
 class Grip:
     """What the mouse holds of a track between press and release.
 
-    Pressed on the knob, the knob stays under the finger where it was taken; pressed beside it, the
-    knob comes to the mouse.
+    Pressed on a knob, it stays under the finger where it was taken; pressed beside them, the
+    nearest comes to the mouse.
     """
 
+    knob: int = 0  # which of the track's knobs
     offset: float = 0.0  # from the mouse to the knob's middle
     start: float | None = None  # where the mouse took the knob and has not moved since
 
-    def take(self, track: Track, x: float, mouse: float) -> None:
-        """The button went down at `mouse`, with the knob at x."""
-        offset = track.place(x) - mouse
+    def take(self, track: Track, xs: Sequence[float], mouse: float) -> None:
+        """The button went down at `mouse`, with knobs at `xs`; the last one lies above."""
+        offsets = [track.place(x) - mouse for x in xs]
+        self.knob = min(reversed(range(len(xs))), key=lambda knob: abs(offsets[knob]))
+        offset = offsets[self.knob]
         on_knob = abs(offset) <= track.knob
         self.offset = offset if on_knob else 0.0
         self.start = mouse if on_knob else None
@@ -52,7 +55,7 @@ class Grip:
     def drag(
         self, track: Track, x: float, mouse: float, stops: Sequence[Stop], reach: float = SNAP
     ) -> float:
-        """x while the button is down: within 0..1, on a stop that is at most `reach` away."""
+        """The held knob's x, before at `x`: within 0..1, on a stop at most `reach` away."""
         if self.start == mouse:
             return x  # a press alone moves nothing
         self.start = None

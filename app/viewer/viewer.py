@@ -197,7 +197,8 @@ class Viewer:
         size, scale = window.logical_size, window.ui_scale
         stage.most_sliders = MOST_SLIDERS if size[1] >= LOW_WINDOW * scale else 1
         rows, wanted = len(stage.sliders), self.settings.panel_open
-        return lay_out(size, scale, rows, stage.has_legend, wanted, self.overlay)
+        both = stage.split.on
+        return lay_out(size, scale, rows, stage.has_legend, wanted, self.overlay, both)
 
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
@@ -287,8 +288,10 @@ class Viewer:
         if not self.save_picture:
             self._draw_marks(scale)
         if self.overlay:
-            if layout.legend is not None:
-                draw_scale_bar(stage.scene, layout.legend, scale)
+            right = stage.split.right(stage.scene) if stage.split.on else stage.scene
+            for scene, box in ((stage.scene, layout.left_legend), (right, layout.legend)):
+                if box is not None:
+                    draw_scale_bar(scene, box, scale)
             debug, stats = stage.settings.debug, self.readings.stats
             draw_legend(debug_legend(debug, stats), layout.free, scale)
             hooks, words = self.hooks, [words() for words in self.hooks.status]

@@ -35,9 +35,10 @@ class RealHands:
     def move(self, x: float, y: float) -> None:
         """The pointer goes to logical pixels from the window's upper left."""
         left, top = glfw.get_window_pos(self.viewer.window._handle)
-        xtest.fake_input(self._display, X.MotionNotify, x=round(left + x), y=round(top + y))
+        x, y = round(x), round(y)
+        xtest.fake_input(self._display, X.MotionNotify, x=left + x, y=top + y)
         self._settle()
-        assert self.viewer.window.cursor == (round(x), round(y)), "the pointer did not arrive"
+        assert self.viewer.window.cursor == (x, y), "the pointer did not arrive"
 
     def button(self, down: bool, name: str = "left") -> None:
         kind = X.ButtonPress if down else X.ButtonRelease
@@ -70,7 +71,9 @@ class RealHands:
     def type(self, text: str) -> None:
         names = {".": "period", " ": "space", ",": "comma", "/": "slash", "-": "minus"}
         for letter in text:
-            self.key(names.get(letter, letter), *["Shift_L"] * letter.isupper())
+            shifted = letter.isupper() or letter == "_"
+            name = "minus" if letter == "_" else names.get(letter, letter)
+            self.key(name, *["Shift_L"] * shifted)
 
     def _key(self, name: str, down: bool) -> None:
         code = self._display.keysym_to_keycode(XK.string_to_keysym(name))

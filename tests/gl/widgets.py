@@ -32,10 +32,10 @@ class Widgets:
         return call
 
     def _hovered(self, function):
-        def call(*flags):
-            if self._last:
+        def call(flags=0):
+            if self._last and flags & imgui.HoveredFlags_.for_tooltip:
                 self.explained[self._last] = True
-            return function(*flags)
+            return function(flags)
 
         return call
 
