@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.headset.worn_panel import sliders_of
 from app.viewer import arrange
 from app.viewer.files import opened_scene
 from app.viewer.opened import Found, Source, read_files
@@ -146,6 +147,20 @@ def test_the_chosen_object_follows_its_name(stage):
     arrange.undo(stage)
     arrange.undo(stage)
     assert stage.chosen == ""
+
+
+def test_a_stop_has_one_name_on_the_desktop_and_in_the_headset(stage, monkeypatch):
+    """The cube's last stop is called "again" in its folder, and is the ring's beginning."""
+    monkeypatch.setattr(collider_files, "one_collider", lambda *_: cube())
+    ready(stage)
+    worn = {slider.name: slider.stops for slider in sliders_of(stage.world)}
+    assert len(worn) >= 3
+    for index, thing in enumerate(stage.scene.objects):
+        if thing.name in worn:
+            assert stage.stops(index) == worn[thing.name]
+    assert [stop.name for stop in stage.stops(1)] == [
+        "normal", "ice", "fire", "charcoal", "normal",
+    ]  # fmt: skip
 
 
 def test_regions_go_with_their_objects(stage):

@@ -9,11 +9,11 @@ from app.panels.theme import Box
 Vec = imgui.ImVec2
 WIDTH = 420.0  # logical pixels
 FORMATS = ".shift  .ply  .spz  .splat  .ksplat  .sog  .glb  .scene.json"
-DEMO, TOUCH, OPEN = "The demo", "Things to touch", "Open\u2026"
+DEMO_LABEL, TOUCH_LABEL, OPEN = "The demo", "Things to touch", "Open\u2026"
 CHOICES = {
     OPEN: "Name a file or folder. Ctrl+O.",
-    DEMO: "A workshop bench in three stops: photo, thermal, opened.",
-    TOUCH: "A table with things that can be grabbed and thrown.",
+    DEMO_LABEL: "A workshop bench in three stops: photo, thermal, opened.",
+    TOUCH_LABEL: "A table with things that can be grabbed and thrown.",
 }
 
 

@@ -14,11 +14,8 @@ CROSS = 20.0  # side of the button that takes a problem away
 STRIPE = 4.0  # its mark at the left
 
 
-def draw_messages(messages: Messages, free: Box, note: bool, ui_scale: float) -> list[Box]:
-    """At the upper edge of what is free; returns where problems lie: they take clicks.
-
-    `note`: also the one that fades.
-    """
+def draw_messages(messages: Messages, free: Box, ui_scale: float) -> list[Box]:
+    """At the upper edge of what is free; returns where problems lie: they take clicks."""
     left, top, right, _ = free
     width = min(WIDEST * ui_scale, 0.94 * (right - left))
     middle, y = (left + right) / 2, top + MARGIN * ui_scale
@@ -27,7 +24,7 @@ def draw_messages(messages: Messages, free: Box, note: bool, ui_scale: float) ->
         box = _problem(messages, number, sentence, Vec(middle - width / 2, y), width, ui_scale)
         boxes.append(box)
         y = box[3] + GAP * ui_scale
-    if messages.note and note:
+    if messages.note:
         _note(messages.note, Vec(middle, y), width)
     return boxes
 

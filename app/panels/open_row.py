@@ -5,6 +5,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
+from app.panels.empty_panel import CHOICES
 from app.panels.panel_rows import tip
 from app.viewer.recent import RecentFiles
 
@@ -24,7 +25,7 @@ class OpenRow:
     ) -> tuple[bool, Path | None]:
         """Returns whether a box is wanted that asks for a file, and the file that was chosen.
 
-        `others` have a button each.
+        `others` of CHOICES have a button each.
         """
         listed = recent is not None and bool(recent.paths)
         gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
@@ -37,7 +38,7 @@ class OpenRow:
         for label, path in others.items():
             if imgui.button(label, Vec(-1, 0)):
                 chosen = path
-            tip("A table with things that can be grabbed and thrown.", ui_scale)
+            tip(CHOICES[label], ui_scale)
         return wants, chosen
 
     def _recent(self, recent: RecentFiles, ui_scale: float) -> Path | None:

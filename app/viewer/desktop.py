@@ -26,6 +26,8 @@ from renderer.renderer import Renderer
 from scene.read_selector import read_selector
 from scene.selector import Selector
 
+SIZE = "1280x720"  # of the window, pixels at a text size of 1
+
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
@@ -38,8 +40,8 @@ class Options(ReadingOptions):
     """Degrees from top to bottom, for a camera file that says nothing about the lens."""
     x: float | None = None
     """Control value to start at, 0..1; without it the first stop."""
-    size: str = "1280x720"
-    """Of the window, WxH in pixels."""
+    size: str = ""
+    """Of the window, WxH in pixels; without it 1280x720, and as much larger as the text is."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
     """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
     target_ms: float | None = None
@@ -61,7 +63,7 @@ class Options(ReadingOptions):
     compare: str = ""
     """Another scene (or scene@stop, scene@x) to compare with: a line parts the two pictures."""
     touch: bool = False
-    """Without a scene: the bundled one that can be touched, a table with three objects."""
+    """Without a scene: the bundled one that can be touched, a table where things move."""
     play: bool = False
     """Let the things of a scene file fall and be carried from the start; T switches it."""
     panel: Annotated[bool, tyro.conf.arg(help="Show the overlay; H switches it.")] = True
@@ -69,7 +71,7 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     """Opens the window and stays until it is closed; 0.  Errors for people say why not."""
-    size = parse_size(options.size)
+    size = parse_size(options.size or SIZE)
     if options.x is not None and not 0 <= options.x <= 1:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
     if options.frames < 1:
@@ -94,6 +96,8 @@ def run(options: Options) -> int:
     settings = Settings.read(config_folder()) if options.screenshot is None else Settings()
     with refiner, stage.bodies, Window("Shapeshift", size, settings.text_size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
+            if not options.size and options.screenshot is None:
+                window.grow_with_text()
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, stage, options, settings, own_files)
             attach_refiner(viewer, refiner)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.camera_files import camera_reading, in_scene
 from app.opening import sentence
-from app.panels.empty_panel import OPEN, draw_empty
-from app.panels.empty_panel import TOUCH as TOUCH_LABEL
+from app.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
 from app.panels.open_row import OpenRow
 from app.panels.path_box import PathBox
 from app.panels.theme import Box
@@ -120,7 +119,8 @@ class Files:
                 viewer.shown.forget()
                 return
             stage.take(found.sources, scene, first_look(found), document)
-            self._at_demo = False
+            self._at_demo = [source.path for source in found.sources] == [DEMO]
+            viewer.messages.problems = []
             viewer.show_scene()
         self.take_cameras(found, stand=not found.sources)
         self.remember_all(found)
@@ -144,7 +144,9 @@ class Files:
 
     def draw_row(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""
-        others = {TOUCH_LABEL: TOUCH} if self._at_demo else {}
+        here = self._viewer.stage.document.path
+        others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
+        others = others if self._at_demo or here == TOUCH else {}
         wants, chosen = self._row.draw(self.recent, others, ui_scale)
         if wants:
             self.ask()

@@ -66,11 +66,9 @@ class Shell:
             self._messages.fail(f"The settings cannot be kept: {error.strerror or error}.")
             self._settings.folder = None  # said once
 
-    def draw(
-        self, free: Box, more_keys: dict[str, list[Row]], note: bool, ui_scale: float
-    ) -> list[Box]:
+    def draw(self, free: Box, more_keys: dict[str, list[Row]], ui_scale: float) -> list[Box]:
         """Messages in what is free, the sheet of keys over all; returns what takes clicks."""
-        boxes = draw_messages(self._messages, free, note, ui_scale)
+        boxes = draw_messages(self._messages, free, ui_scale)
         if self.keys_open:
             box, closed = draw_keys(more_keys, ui_scale)
             boxes.append(box)

@@ -67,6 +67,7 @@ class Stage:
         self._points = (np.zeros((0, 3)), np.zeros(0))
         self._picker = Picker()
         self._shown: tuple = (None, None)  # what `shown` was made of, and what it was
+        self._movable: tuple[Scene | None, list[int]] = (None, [])
 
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
         """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
@@ -295,8 +296,11 @@ class Stage:
     @property
     def movable(self) -> list[int]:
         """Indices of the objects that have somewhere to go: two stops or more."""
-        things = enumerate(self.scene.objects)
-        return [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+        if self._movable[0] is not self.scene:  # asked several times a frame, of many objects
+            things = enumerate(self.scene.objects)
+            found = [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+            self._movable = (self.scene, found)
+        return self._movable[1]
 
     @property
     def sliders(self) -> list[int]:

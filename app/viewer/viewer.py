@@ -303,8 +303,8 @@ class Viewer:
                 draw_status(stage, words, layout.status, scale),
                 *[box for draw in hooks.cards if (box := draw(layout.free, scale)) is not None],
             ]
-        note = not self.save_picture  # a note is no part of a picture
-        covered += self.shell.draw(layout.free, self.hooks.keys, note, scale)
+        if not self.save_picture:  # what is said is no part of a picture
+            covered += self.shell.draw(layout.free, self.hooks.keys, scale)
         self.window.covered = tuple(covered)
 
     def _draw_marks(self, scale: float) -> None:
