@@ -125,7 +125,7 @@ def move_camera(viewer: "Viewer", word: str) -> None:
         distance = viewer.stage.fit(viewer.view(), camera.fov_y, viewer.free_size())
         camera.frame(viewer.stage.centre, distance)
     elif word == "First view":
-        camera.reset()
+        camera.come_home(viewer.stage.first_view(viewer.free_size()))
     else:
         camera.toggle_flying()
 

@@ -19,9 +19,10 @@ from app.panels.status_line import draw_status
 from app.panels.stops_panel import draw_stops
 from app.paths import WorkFolders
 from app.viewer.bodies import attach_bodies
-from app.viewer.controls import SMOOTH_S
+from app.viewer.controls import EVERYTHING, FIRST, SMOOTH_S
 from app.viewer.dial import FLOOR_DB, TARGET_MS, Dial
 from app.viewer.files import Files, first_camera
+from app.viewer.framed import Framed
 from app.viewer.hands import is_erasing, is_painting, push, take
 from app.viewer.layout import Layout, lay_out
 from app.viewer.objects import attach_objects
@@ -90,6 +91,9 @@ class Viewer:
             wanted=(options.target_ms or options.floor_db) is not None,
         )
         self._add_sections()
+        self._framed = Framed(self.free_size, self._refit)
+        self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
+        self.hooks.opened.append(self._framed.forget)
         self.hooks.takes.insert(0, self.shell.take)
         self.seconds = 0.0  # that the frame which is under way lets pass
         self.frames = 0  # drawn since the window opened
@@ -232,6 +236,16 @@ class Viewer:
             height = (view.tangents[3] - view.tangents[2]) * (bottom - top) / view.size[1]
             self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
             self.steps.leave()
+
+    def _refit(self, size: tuple[int, int]) -> None:
+        """The free part has another size: what no hand has moved is fitted into it."""
+        if self.steps.standing:
+            return
+        if self.camera.framed == FIRST and self.stage.first_look.home is None:
+            self.camera.come_home(self.stage.first_view(size))
+        elif self.camera.framed == EVERYTHING:
+            distance = self.stage.fit(self.view(), self.camera.fov_y, size)
+            self.camera.frame(self.stage.centre, distance)
 
     def free_size(self) -> tuple[int, int]:
         left, top, right, bottom = self._free_wanted()

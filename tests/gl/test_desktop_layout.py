@@ -1,5 +1,7 @@
 """The overlay in windows of several sizes and scales: what is drawn lies where the layout says."""
 
+import time
+
 import glfw
 import numpy as np
 import pytest
@@ -7,8 +9,11 @@ from desktop_stand import run_frames
 from real_hands import RealHands
 from widgets import Widgets
 
+from app.panels.camera_panel import move_camera
+from app.viewer.framed import SETTLED_S
 from app.viewer.settings import Settings
 from app.viewer.split import splitting
+from app.viewer.window import Drag
 from renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
@@ -56,6 +61,41 @@ def test_nothing_lies_over_the_scenes_middle(any_size, size, text_size, wanted):
     seen = [box for box in (*viewer.window.covered, layout.legend) if box is not None]
     for box in seen:
         assert not (box[0] <= middle[0] <= box[2] and box[1] <= middle[1] <= box[3])
+
+
+def ball_px(viewer) -> float:
+    """Half of what the ball of a metre's radius is wide in the picture, logical pixels."""
+    view = viewer.view()
+    away = np.linalg.norm(view.world_from_eye.position - viewer.stage.centre)
+    per_pixel = (view.tangents[1] - view.tangents[0]) / viewer.window.logical_size[0]
+    return float(np.tan(np.arcsin(1.04 / away)) / per_pixel)
+
+
+def settle(viewer) -> None:
+    """Until the scene has been fitted into a free part of another size."""
+    time.sleep(1.2 * SETTLED_S)
+    run_frames(viewer, 3)
+    run_frames(viewer, 40, seconds=0.1)
+
+
+@pytest.mark.parametrize("framed", ["first", "everything", "by hand"])
+def test_what_no_hand_has_moved_is_fitted_into_any_window(any_size, framed):
+    viewer = any_size
+    if framed == "everything":
+        move_camera(viewer, "Frame all")
+    elif framed == "by hand":
+        viewer.take(Drag("left", 3, 0))
+    run_frames(viewer, 40, seconds=0.1)
+    distance = viewer.camera.distance
+    for size in ((1900, 700), (700, 900), (1280, 720)):
+        resize(viewer, size)
+        settle(viewer)
+        left, top, right, low = viewer.layout.free
+        part = 2 * ball_px(viewer) / min(right - left, low - top)
+        if framed == "by hand":
+            assert viewer.camera.distance == pytest.approx(distance)
+        else:
+            assert 0.6 < part < 1.0  # whole, and not small
 
 
 @pytest.mark.parametrize("size", SIZES)
