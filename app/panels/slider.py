@@ -186,7 +186,9 @@ def track(
     reach = along.knob + 1.0  # so that a press on the very edge is within it
     imgui.set_cursor_screen_pos(Vec(along.left - reach, y - reach))
     imgui.invisible_button("track", Vec(along.width + 2 * reach, 2 * reach))
-    held, hovered = imgui.is_item_active(), imgui.is_item_hovered()
+    # Where frames are slow the mouse has moved far between the last one and letting go.
+    held = imgui.is_item_active() or imgui.is_item_deactivated()
+    hovered = imgui.is_item_hovered()
     tip("Drag from stop to stop. Alt: without snapping to them.", line / theme.FONT_SIZE)
     io, xs = imgui.get_io(), list(xs)
     if imgui.is_item_activated():

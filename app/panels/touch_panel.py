@@ -59,7 +59,7 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
     half, reach = width / 2 - inset, height - 2 * inset
     imgui.invisible_button(f"pad {name}", Vec(width, height))
     middle, low = corner.x + width / 2, corner.y + height - inset
-    if imgui.is_item_active():
+    if imgui.is_item_active() or imgui.is_item_deactivated():  # also where it was let go
         mouse = imgui.get_io().mouse_pos
         balance = min(max((mouse.x - middle) / half, -1.0), 1.0)
         power = min(max((low - mouse.y) / reach, 0.0), 1.0)

@@ -59,6 +59,17 @@ class RealHands:
             self.move(*(a + (b - a) * part for a, b in zip(start, end, strict=True)))
         self.button(False)
 
+    def flick(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press, move and let go before the program draws another frame."""
+        left, top = glfw.get_window_pos(self.viewer.window._handle)
+        self.move(*start)
+        xtest.fake_input(self._display, X.ButtonPress, BUTTONS["left"])
+        for part in (0.3, 0.7, 1.0):
+            x, y = (round(a + (b - a) * part) for a, b in zip(start, end, strict=True))
+            xtest.fake_input(self._display, X.MotionNotify, x=left + x, y=top + y)
+        xtest.fake_input(self._display, X.ButtonRelease, BUTTONS["left"])
+        self._settle()
+
     def key(self, name: str, *held: str) -> None:
         """One press of a key by its X name ("Left", "KP_1", "s") while others are held."""
         for modifier in held:

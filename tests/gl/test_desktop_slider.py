@@ -77,6 +77,16 @@ def test_the_knob_is_gripped_all_over(viewer, hands, x, place):
     assert x_of(viewer) == pytest.approx(x + far / (high - low), abs=1.5 / (high - low))
 
 
+def test_a_drag_between_two_frames_is_whole(viewer, hands):
+    """Where a frame takes half a second, a hand is faster than that."""
+    low, high = track_ends(viewer)
+    x, y, _ = knob(viewer)
+    hands.flick((x, y), (x + 0.3 * (high - low), y))
+    assert x_of(viewer) == pytest.approx(0.3, abs=1.5 / (high - low))
+    hands.move(x, y - 60)
+    assert x_of(viewer) == pytest.approx(0.3, abs=1.5 / (high - low))
+
+
 @pytest.mark.parametrize("x", [0.0, 1.0])
 def test_the_knob_comes_back_to_its_end_and_beyond_it_stays(viewer, hands, x):
     middle_x, y, _ = knob(viewer) if x == 0 else (put(viewer, x), knob(viewer))[1]
