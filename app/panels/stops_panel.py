@@ -34,7 +34,10 @@ def draw_stops(stage: Stage, ui_scale: float) -> None:
         pace_button(stage, index, width, "a stop", ui_scale)
         imgui.pop_id()
     if not stage.sliders:
-        imgui.text_disabled("There is one stop: nothing to slide.")
+        nothing = (
+            "There is one stop: nothing to slide." if stage.scene.objects else "Nothing is open."
+        )
+        imgui.text_disabled(nothing)
 
 
 def _stop_buttons(stage: Stage, index: int, ui_scale: float) -> None:
