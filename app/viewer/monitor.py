@@ -11,17 +11,29 @@ def monitor_height(handle: object) -> tuple[float, float]:
     return glfw.get_video_mode(monitor).size.height, glfw.get_monitor_physical_size(monitor)[1]
 
 
-def work_area(handle: object) -> tuple[int, int, int, int]:
-    """Left, top, right and bottom of what bars of the desktop leave of it; zeros for none."""
+def grow_window(handle: object, times: float) -> None:
+    """Makes a window larger, as far as the desktop leaves room, and puts it in the middle."""
     monitor = _monitor_of(handle)
     if monitor is None:
-        return 0, 0, 0, 0
-    left, top, width, height = glfw.get_monitor_workarea(monitor)
-    return left, top, left + width, top + height
+        return
+    left, top, widest, highest = glfw.get_monitor_workarea(monitor)
+    now = glfw.get_window_size(handle)
+    width, height = min(round(now[0] * times), widest), min(round(now[1] * times), highest)
+    if width > now[0] and height > now[1]:
+        glfw.set_window_size(handle, width, height)
+        if tells_places():
+            glfw.set_window_pos(handle, left + (widest - width) // 2, top + (highest - height) // 2)
+
+
+def tells_places() -> bool:
+    """Whether a window may know and choose where on the desktop it is."""
+    return glfw.get_platform() != glfw.PLATFORM_WAYLAND
 
 
 def _monitor_of(handle: object) -> object | None:
-    """The monitor that most of a window lies on."""
+    """The monitor that most of a window lies on; under Wayland, which does not tell, the first."""
+    if not tells_places():
+        return glfw.get_primary_monitor()
     left, top = glfw.get_window_pos(handle)
     width, height = glfw.get_window_size(handle)
 

@@ -13,7 +13,7 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from app.panels import theme
 from app.paths import plain
-from app.viewer.monitor import monitor_height, work_area
+from app.viewer.monitor import grow_window, monitor_height
 from app.viewer.settings import default_text_size
 from renderer.context import NoContext
 
@@ -175,16 +175,7 @@ class Window:
 
     def grow_with_text(self) -> None:
         """A window as much larger as its text is, in the middle of its monitor."""
-        left, top, right, low = work_area(self._handle)
-        wanted = (round(side * self.text_size) for side in self.logical_size)
-        width, height = (
-            min(side, most) for side, most in zip(wanted, (right - left, low - top), strict=True)
-        )
-        if width > self.logical_size[0] and height > self.logical_size[1]:
-            glfw.set_window_size(self._handle, width, height)
-            glfw.set_window_pos(
-                self._handle, (left + right - width) // 2, (top + low - height) // 2
-            )
+        grow_window(self._handle, self.text_size)
 
     @property
     def closing(self) -> bool:

@@ -10,6 +10,7 @@ from real_hands import RealHands
 from widgets import Widgets
 
 from app.panels.camera_panel import move_camera
+from app.viewer import monitor
 from app.viewer.framed import SETTLED_S
 from app.viewer.settings import Settings
 from app.viewer.split import splitting
@@ -275,3 +276,23 @@ def test_right_of_the_line_is_the_picture_of_the_other_x(split_viewer):
     assert (alone[:, cut + 2 :] != alone[0, 0]).any()
     np.testing.assert_array_equal(picture[:, cut + 2 :], alone[:, cut + 2 :])
     assert (picture[:, : cut - 2] == picture[0, 0]).all()  # the stand-in renderer draws nothing
+
+
+@pytest.mark.parametrize(
+    ("times", "wanted"), [(1.0, None), (1.2, (1080, 768)), (9.0, (1280, 720)), (0.5, None)]
+)
+def test_a_window_grows_with_its_text_as_far_as_the_monitor_goes(any_size, times, wanted):
+    """The X server's screen has 1280x720; 900x640 grows in both directions or not at all."""
+    viewer = any_size
+    before = viewer.window.logical_size
+    monitor.grow_window(viewer.window._handle, times)
+    for _ in range(20):
+        glfw.wait_events_timeout(0.01)
+    size = viewer.window.logical_size
+    if wanted is None:
+        assert size == before
+    else:
+        assert size == tuple(min(a, b) for a, b in zip(wanted, (1280, 720), strict=True))
+        left, top = glfw.get_window_pos(viewer.window._handle)
+        assert abs(2 * left + size[0] - 1280) <= 1 and abs(2 * top + size[1] - 720) <= 1
+    glfw.set_window_pos(viewer.window._handle, 0, 0)
