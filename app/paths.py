@@ -2,10 +2,13 @@
 
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
 SCHEME = "file:"
+ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
+DEMO, TOUCH = ASSETS / "workshop.shift", ASSETS / "touch.scene.json"
 LONGEST_NAME = 100  # letters, of a file that is named after a thing
 
 
@@ -33,6 +36,30 @@ def file_name(text: str) -> str:
     """A name that is a file's on every system, of one that people or files have given a thing."""
     plain = "".join(c if c.isalnum() or c in " -_.,()+" else "_" for c in text)
     return plain.strip(" .")[:LONGEST_NAME] or "scene"
+
+
+def is_bundled(path: Path) -> bool:
+    """Whether it lies in what the program brought along, also by a link."""
+    return path.resolve().is_relative_to(ASSETS.resolve())
+
+
+@dataclass(frozen=True)
+class WorkFolders:
+    """Where what a person makes goes: absolute, and not there before something is written."""
+
+    pictures: Path
+    scenes: Path
+    exports: Path
+
+    @staticmethod
+    def of(pictures: Path | None = None) -> "WorkFolders":
+        """All beside the pictures; without these in Shapeshift, in the person's documents."""
+        if pictures is None:
+            import platformdirs
+
+            pictures = platformdirs.user_documents_path() / "Shapeshift" / "pictures"
+        pictures = pictures.absolute()
+        return WorkFolders(pictures, pictures.parent / "scenes", pictures.parent / "exports")
 
 
 def config_folder(environment: dict[str, str] | None = None, platform: str = sys.platform) -> Path:

@@ -16,6 +16,7 @@ LONGEST_NAME = 100  # letters, as the reader takes them
 MOST_OBJECTS = 1000  # as the reader takes them
 DECIMALS, FINER = 6, 9  # of metres and of a quaternion: hands are no finer, files are short
 MOST_STEPS = 500  # that can be undone
+MOST_BYTES = 256 << 20  # of what the steps keep beside the file: painted regions of large scenes
 
 
 def find(file: SceneFile, name: str) -> SceneItem | None:
@@ -155,7 +156,7 @@ def changes(before: SceneFile, after: SceneFile) -> list[Change]:
     gone = [item for name, item in old.items() if name not in new]
     come = [item for name, item in new.items() if name not in old]
     out = []
-    if len(gone) == len(come) == 1 and Change(gone[0], come[0]).fields == {"name"}:
+    if len(gone) == len(come) == 1 and Change(gone[0], come[0]).fields - {"x"} == {"name"}:
         out, gone, come = [Change(gone[0], come[0])], [], []
     out += [Change(item, None) for item in gone]
     out += [
@@ -166,6 +167,25 @@ def changes(before: SceneFile, after: SceneFile) -> list[Change]:
     return out + [Change(None, item) for item in come]
 
 
+def with_x_of(file: SceneFile, other: SceneFile) -> SceneFile:
+    """The file with each object's x as it is in the other: a look, which no undoing changes."""
+    now = {item.name: item for item in other.all_items}
+    pairs = ((change.before, change.after) for change in changes(other, file))
+    now |= {after.name: before for before, after in pairs if before and after}  # renamed
+
+    def looked(item: SceneItem) -> SceneItem:
+        """With the x of now; the very object of the other file where that says the same."""
+        known = now.get(item.name, item)
+        moved = item if item.x == known.x else replace(item, x=known.x)
+        return known if moved == known else moved
+
+    items = tuple(looked(item) for item in file.items)
+    background = looked(file.background) if file.background else None
+    if items == file.items and background == file.background:
+        return file
+    return replace(file, items=items, background=background)
+
+
 @dataclass(frozen=True)
 class Step:
     """A file, and in words the edit that led to it."""
@@ -173,6 +193,8 @@ class Step:
     file: SceneFile
     what: str = ""
     together: str = ""  # edits in a row with the same word are one step: a drag
+    regions: tuple = ()  # edited beside the file, until it is saved
+    bytes: int = 0  # that this step alone keeps
 
 
 @dataclass(frozen=True)
@@ -183,12 +205,16 @@ class History:
     at: int = 0  # the step that holds now
 
     @staticmethod
-    def of(file: SceneFile) -> "History":
-        return History((Step(file),))
+    def of(file: SceneFile, regions: tuple = ()) -> "History":
+        return History((Step(file, regions=regions),))
 
     @property
     def file(self) -> SceneFile:
         return self.steps[self.at].file
+
+    @property
+    def regions(self) -> tuple:
+        return self.steps[self.at].regions
 
     @property
     def undoes(self) -> str:
@@ -199,15 +225,29 @@ class History:
     def redoes(self) -> str:
         return self.steps[self.at + 1].what if self.at + 1 < len(self.steps) else ""
 
-    def take(self, file: SceneFile, what: str, together: str = "") -> "History":
-        """After another edit; what had been undone is forgotten."""
-        if file is self.file:
+    def take(
+        self, file: SceneFile, what: str, together: str = "", regions: tuple | None = None,
+        more_bytes: int = 0,
+    ) -> "History":  # fmt: skip
+        """After another edit of the file or of the regions; what had been undone is forgotten."""
+        regions = self.regions if regions is None else regions
+        if file is self.file and regions == self.regions:
             return self
         now = self.steps[self.at]
         keep = self.at if together and now.together == together else self.at + 1
-        steps = (*self.steps[:keep], Step(file, what, together))
+        steps = (*self.steps[:keep], Step(file, what, together, regions, more_bytes))
         steps = steps[-MOST_STEPS - 1 :]
+        while len(steps) > 2 and sum(step.bytes for step in steps) > MOST_BYTES:
+            steps = steps[1:]
         return History(steps, len(steps) - 1)
+
+    def amend(self, file: SceneFile, regions: tuple | None = None) -> "History":
+        """What holds now is another, but no edit of its own: a slider has moved."""
+        regions = self.regions if regions is None else regions
+        if file is self.file and regions == self.regions:
+            return self
+        now = replace(self.steps[self.at], file=file, regions=regions)
+        return replace(self, steps=(*self.steps[: self.at], now, *self.steps[self.at + 1 :]))
 
     def rest(self) -> "History":
         """The hand has let go: the next edit is a step of its own."""

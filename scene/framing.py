@@ -1,5 +1,7 @@
 """Where to stand: robust bounds of splats, the views that show them, the point under a ray."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from runtime_models.model import Model, SplatLayers
@@ -13,6 +15,7 @@ MIN_OPACITY = 0.1  # fainter splats are mostly floaters; they do not count for t
 PERCENTILES = (2, 98)
 ROUND_ENOUGH = 1.3  # length over depth below which no side is the long one
 OUTLYING = 1.25  # times the distance for 98 % of the splats: more only floaters ask for
+COMMON = 0.5  # mean length of the cameras' directions: of a full circle 0, of a half one 0.64
 FAR_RADII = 200.0
 NEAR_RADII = 0.01
 RAY_POINTS = 24
@@ -155,10 +158,31 @@ def distances_from(points: tuple[np.ndarray, np.ndarray], view: View) -> np.ndar
     return np.linalg.norm(there - view.world_from_eye.position, axis=1)
 
 
-def framing_view(means: np.ndarray, opacity: np.ndarray, size: tuple[int, int]) -> View:
-    """The view that shows splats whole, from their long side and slightly from above."""
+def common_side(views: Sequence[View]) -> float | None:
+    """The side from which cameras look, radians about +Y from +Z; None where they look from all.
+
+    The mean of their directions over the ground, where it is longer than COMMON: photos of one
+    side of a thing say which side is its front.
+    """
+    ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views]).reshape(-1, 3)
+    level = ahead[:, [0, 2]]  # (V, 2) x, z
+    length = np.linalg.norm(level, axis=1)
+    level = level[length > 1e-6] / length[length > 1e-6, None]
+    if not len(level):
+        return None
+    x, z = -level.mean(axis=0)
+    return float(np.arctan2(x, z)) if np.hypot(x, z) > COMMON else None
+
+
+def framing_view(
+    means: np.ndarray, opacity: np.ndarray, size: tuple[int, int], start: float | None = None
+) -> View:
+    """The view that shows splats whole and slightly from above.
+
+    From `start`, radians about +Y from +Z; where nobody knows, from their long side.
+    """
     centre, radius = frame_points(means, opacity)
-    start = broadside(means, opacity)
+    start = broadside(means, opacity) if start is None else start
     view = orbit_path(1, centre, radius, size, start=start)[0]
     axes = view.world_from_eye.matrix()
     distance = fit_points(means, opacity, centre, axes, view.tangents)

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import BadFile, Model, SplatLayers
+from runtime_models.model import BadFile, Model, SplatLayers, Stop
 from runtime_models.plain_splats import Reading
 from runtime_models.read_scene import read_model
-from runtime_models.stop_weights import Control
+from runtime_models.stop_weights import Control, StopWeights
 from scene.framing import frame_points, framing_view, scene_points, view_from
 from scene.pose import Pose, View
 from scene.reactions import Machine, Reaction, State, TwoAxes
@@ -150,6 +150,20 @@ def machine_of(item: SceneItem, model: Model) -> Machine:
         return Machine(states, item.reactions, item.ring, model.blend)
     except ValueError as error:
         raise BadFile(f"object '{item.name}': 'reactions': {error}") from None
+
+
+def named_stops(item: SceneItem, model: Model) -> tuple[Stop, ...]:
+    """The stops of an object's slider, by x: the model's, named as the states that the scene has
+    there, and those states themselves; a state in a blend of stops has no place on it; the end of a
+    ring is its beginning.
+    """
+    stops = {stop.x: stop for stop in model.stops}
+    named = [(state.x, state.name) for state in item.states if not isinstance(state.x, StopWeights)]
+    if item.ring and named:
+        named.append((1.0, min(named)[1]))
+    for x, name in named:
+        stops[x] = replace(stops.get(x, Stop("", x)), name=name)
+    return tuple(stops[x] for x in sorted(stops))
 
 
 def first_view(file: SceneFile, scene: Scene, size: tuple[int, int]) -> View:

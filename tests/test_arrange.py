@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.headset.worn_panel import sliders_of
 from app.viewer import arrange
 from app.viewer.files import opened_scene
 from app.viewer.opened import Found, Source, read_files
@@ -98,7 +99,7 @@ def test_every_edit_is_shown_and_taken_back(stage):
     steps = [
         (edits.remove, "cube"), (edits.duplicate, "ball", (0.1, 0.0, 0.0)),
         (edits.rename, "ring", "torus"), (edits.hide, "plate"), (edits.place, "torus", pose),
-        (edits.set_x, "ball 2", 1.0), (edits.remove, "background"), (edits.remove, "ball"),
+        (edits.ground, -0.3), (edits.remove, "background"), (edits.remove, "ball"),
     ]  # fmt: skip
     scenes = [first]
     for step in steps:
@@ -148,6 +149,20 @@ def test_the_chosen_object_follows_its_name(stage):
     assert stage.chosen == ""
 
 
+def test_a_stop_has_one_name_on_the_desktop_and_in_the_headset(stage, monkeypatch):
+    """The cube's last stop is called "again" in its folder, and is the ring's beginning."""
+    monkeypatch.setattr(collider_files, "one_collider", lambda *_: cube())
+    ready(stage)
+    worn = {slider.name: slider.stops for slider in sliders_of(stage.world)}
+    assert len(worn) >= 3
+    for index, thing in enumerate(stage.scene.objects):
+        if thing.name in worn:
+            assert stage.stops(index) == worn[thing.name]
+    assert [stop.name for stop in stage.stops(1)] == [
+        "normal", "ice", "fire", "charcoal", "normal",
+    ]  # fmt: skip
+
+
 def test_regions_go_with_their_objects(stage):
     inside = Sphere(centre=(0, 0, 0), radius=0.05, x=1.0)
     stage.regions.take((inside,), 3)
@@ -161,20 +176,115 @@ def test_regions_go_with_their_objects(stage):
     assert len(stage.shown(view).objects[2].selectors) == 2  # the file's and the region's
 
 
-def test_a_hand_on_the_slider_is_one_step(plain):
-    for x in (0.1, 0.2, 0.3):
-        arrange.steer(plain, 0, x)
-    plain.rest()
-    arrange.steer(plain, 0, 0.9)
-    assert plain.document.history.undoes == "x of a" and not plain.document.unsaved
-    assert arrange.undo(plain) == "x of a" and plain.scene.objects[0].x == 0.3
-    arrange.undo(plain)
-    assert plain.scene.objects[0].x == 0.0
+def test_a_hand_on_the_slider_is_a_look_that_is_saved_but_not_undone(plain):
+    arrange.steer(plain, 0, 0.3)
+    assert plain.document.file.items[0].x == 0.3  # where it starts, once it is saved
+    assert arrange.undo(plain) == "" and not plain.document.unsaved
+    edit(plain, edits.hide, "b")
+    arrange.steer(plain, 0, 0.7)
     plain.go_to_stop(1)
     plain.advance(1.0)
     assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
-    assert arrange.undo(plain) == "stop 2"
-    assert [thing.x for thing in plain.scene.objects] == [0.0, 0.0]
+    assert arrange.undo(plain) == "hide"
+    same_as_file(plain)
+    assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
+    assert all(thing.visible for thing in plain.scene.objects) and arrange.undo(plain) == ""
+    arrange.steer(plain, 1, 0.2)
+    assert arrange.redo(plain) == "hide"  # a look between them takes nothing away
+    same_as_file(plain)
+    assert [(thing.x, thing.visible) for thing in plain.scene.objects] == [
+        (1.0, True),
+        (0.2, False),
+    ]
+
+
+def test_a_look_goes_with_an_object_that_is_renamed_back(plain):
+    edit(plain, edits.rename, "a", "c")
+    arrange.steer(plain, 0, 0.6)
+    arrange.undo(plain)
+    same_as_file(plain)
+    assert (plain.scene.objects[0].name, plain.scene.objects[0].x) == ("a", 0.6)
+
+
+def test_what_is_deleted_comes_back_with_the_x_it_had(plain):
+    arrange.steer(plain, 0, 0.4)
+    edit(plain, edits.remove, "a")
+    arrange.undo(plain)
+    same_as_file(plain)
+    assert plain.scene.objects[0].x == 0.4
+
+
+def test_regions_are_undone_with_everything_else_in_the_order_it_was_done(plain):
+    regions = plain.regions
+    plain.add_region("sphere")
+    arrange.record_regions(plain)
+    for x in (0.1, 0.2, 0.3):  # a drag on its slider
+        regions.edit(0, x=x)
+        arrange.record_regions(plain)
+    plain.rest()
+    edit(plain, edits.hide, "b")
+    regions.edit(0, name="lid")
+    regions.toggle_lens(plain.scene.objects[0])  # a look
+    assert arrange.undo(plain) == "rename sphere 1"
+    assert [r.name for r in regions.items] == ["sphere 1", "lens 1"]
+    assert arrange.undo(plain) == "hide" and plain.scene.objects[1].visible
+    assert arrange.undo(plain) == "x of sphere 1" and regions.items[0].x == 1.0
+    assert arrange.undo(plain) == "add sphere 1"
+    assert [r.name for r in regions.items] == ["lens 1"]
+    assert arrange.undo(plain) == "" and [r.name for r in regions.items] == ["lens 1"]
+    for what in ("add sphere 1", "x of sphere 1", "hide", "rename sphere 1"):
+        assert arrange.redo(plain) == what
+    assert [(r.name, r.x) for r in regions.items] == [("lid", 0.3), ("lens 1", 1.0)]
+    assert arrange.redo(plain) == ""
+
+
+def test_strokes_are_undone_one_by_one(plain):
+    regions, view = plain.regions, plain.first_view((64, 64))
+    plain.paint(view, (32, 32), 0.0, False)  # nothing is under the brush: the region alone
+    arrange.record_regions(plain)
+    for mask in ([1, 0, 0], [1, 1, 0]):
+        regions.edit(0, painted=np.array(mask, bool))
+        arrange.record_regions(plain)
+    plain.rest()
+    regions.edit(0, painted=np.array([1, 1, 1], bool))
+    assert arrange.undo(plain) == "paint painted 1" and regions.items[0].painted.sum() == 2
+    assert arrange.undo(plain) == "paint painted 1" and regions.items[0].painted.sum() == 0
+    assert arrange.undo(plain) == "add painted 1" and regions.items == ()
+    arrange.redo(plain)
+    assert arrange.redo(plain) == "paint painted 1" and regions.items[0].painted.sum() == 2
+
+
+def test_a_region_comes_back_with_its_deleted_object(stage):
+    stage.chosen = "cube"
+    stage.regions.take((Sphere(centre=(0, 0, 0), radius=0.05, x=1.0),), 3)
+    stage.keep_regions()
+    assert stage.document.history.undoes == ""
+    edit(stage, edits.remove, "ring")
+    assert stage.regions.items == ()
+    edit(stage, edits.remove, "cube")
+    arrange.undo(stage)
+    arrange.undo(stage)
+    assert [region.index for region in stage.regions.items] == [3]
+    assert names(stage)[3] == "ring" and stage.regions.kept == stage.document.saved_regions
+    arrange.redo(stage)
+    assert stage.regions.items == ()
+
+
+def test_paint_of_another_level_of_detail_is_none_after_undoing(plain):
+    plain.paint(plain.first_view((64, 64)), (32, 32), 0.0, False)
+    arrange.record_regions(plain)
+    plain.regions.edit(0, painted=np.ones(3, bool))
+    arrange.record_regions(plain)
+    plain.rest()
+    edit(plain, edits.hide, "b")
+    finer = replace(model("a"), **{
+        name: np.repeat(getattr(model("a"), name), 2, axis=0)
+        for name in ("means", "scales", "wxyz", "opacity", "sh", "layer")
+    })  # fmt: skip
+    plain.replace_model(0, finer)
+    assert len(plain.regions.items[0].painted) == 6
+    arrange.undo(plain)
+    assert plain.regions.items[0].painted.tolist() == [False] * 6
 
 
 def test_what_was_opened_alone_is_a_scene_that_is_not_saved(plain):
@@ -220,7 +330,7 @@ def test_whatever_is_edited_undone_and_redone_all_stay_one(stage, seed, monkeypa
     ready(stage)
     same_as_file(stage)
     same_in_world(stage)
-    assert names(stage) == NAMES and not stage.document.edited
+    assert names(stage) == NAMES and not stage.document.unsaved
 
 
 def do_something(stage: Stage, rng: np.random.Generator) -> None:

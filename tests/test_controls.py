@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from app.viewer.controls import MAX_RADII, MIN_RADII, POLE, Camera, Push
+from app.viewer.controls import DIRECTIONS, MAX_RADII, MIN_RADII, POLE, Camera, Push
 from app.viewer.stage import Stage
 from runtime_models.model import Stop
 from runtime_models.stop_weights import StopBlend, StopWeights
@@ -77,6 +77,44 @@ def test_the_pole_is_never_reached():
         settle(cam)
         up = matrix(cam)[:3, 1]
         assert up[1] == pytest.approx(np.cos(POLE)) and up[1] > 0  # never upside down
+
+
+@pytest.mark.parametrize("flying", [False, True])
+@pytest.mark.parametrize("name", DIRECTIONS)
+def test_views_from_the_sides_are_level_and_keep_their_distance(flying, name):
+    cam = camera()
+    if flying:
+        cam.toggle_flying()
+    cam.turn(2.0, 0.7)
+    settle(cam)
+    eye, target, distance = cam.position, cam.target, cam.distance
+    cam.look_from(name)
+    settle(cam)
+    sides = {
+        "front": (0, 0, 1), "back": (0, 0, -1), "right": (1, 0, 0), "left": (-1, 0, 0),
+        "top": (0, 1, 0), "bottom": (0, -1, 0),
+    }  # fmt: skip
+    axes = matrix(cam)[:3, :3]
+    np.testing.assert_allclose(axes[:, 2], sides[name], atol=1e-6)
+    assert axes[1, 0] == pytest.approx(0, abs=1e-9)  # right is level
+    assert np.linalg.det(axes) == pytest.approx(1)
+    wanted = eye if flying else target + distance * np.array(sides[name])
+    np.testing.assert_allclose(cam.position, wanted, atol=1e-6)
+
+
+def test_from_straight_above_it_turns_on_without_a_jump():
+    cam = camera()
+    cam.look_from("top")
+    settle(cam)
+    cam.turn(0.2, 0.0)
+    settle(cam)
+    np.testing.assert_allclose(matrix(cam)[:3, 2], (0, 1, 0), atol=1e-6)
+    cam.turn(0.0, 0.01)
+    settle(cam)
+    assert matrix(cam)[1, 2] == pytest.approx(np.cos(0.01), abs=1e-6)
+    cam.turn(0.0, -9.0)  # back to the pole that hands may reach, not beyond
+    settle(cam)
+    assert matrix(cam)[:3, 1][1] >= 0
 
 
 def test_dolly_stays_between_its_limits_and_is_undone():

@@ -18,7 +18,8 @@ from app.paths import config_folder, plain, plain_path
 from app.viewer.files import told_of
 from app.viewer.opened import Opener, means_cameras, read_files
 from app.viewer.recent import FILE, MOST, RecentFiles
-from app.viewer.stage import Stage, scene_of
+from app.viewer.scene_objects import scene_of
+from app.viewer.stage import Stage
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_scene import read_model

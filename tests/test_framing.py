@@ -8,15 +8,17 @@ import pytest
 from runtime_models.model import SplatLayers, Stop
 from scene.framing import (
     broadside,
+    common_side,
     default_background,
     default_view,
     fit_distance,
     frame_points,
+    framing_view,
     orbit_path,
     point_under,
     scene_points,
 )
-from scene.pose import Pose
+from scene.pose import Pose, View, look_at
 from scene.scene import Scene, SceneObject
 from tests.models import make_random_model
 
@@ -171,3 +173,31 @@ def test_a_background_that_is_no_colour_is_passed_over(found):
 def test_the_background_of_the_photos_is_taken():
     model = replace(make_random_model(3), provenance={"background": [1, 0.5, 0]})
     assert default_background(model, (0.1, 0.2, 0.3)) == (1.0, 0.5, 0.0)
+
+
+def ring(centre_deg: float, spread_deg: float, count: int = 24) -> list:
+    """Views on a circle, spread evenly about one side, degrees about +Y from +Z."""
+    angles = np.radians(centre_deg + np.linspace(-1, 1, count) * spread_deg / 2)
+    return [
+        orbit_path(1, np.zeros(3), 1.0, (64, 48), start=angle, elevation=0.4)[0] for angle in angles
+    ]
+
+
+@pytest.mark.parametrize("side", [0, 40, 90, 170, -120])
+@pytest.mark.parametrize("spread", [0, 60, 180])
+def test_photos_of_one_side_say_which_it_is(side, spread):
+    found = common_side(ring(side, spread))
+    assert np.exp(1j * found) == pytest.approx(np.exp(1j * np.radians(side)), abs=1e-6)
+
+
+def test_photos_from_all_around_say_nothing():
+    assert common_side(ring(30, 360 * 23 / 24)) is None and common_side([]) is None
+    assert common_side(ring(30, 260)) is None and common_side(ring(30, 200)) is not None
+    above = View(look_at(np.array([0.0, 5, 1e-9]), np.zeros(3)), (-1, 1, -1, 1), 0.1, 9.0, (8, 8))
+    assert common_side([above]) is None  # straight down there is no side
+
+
+def test_a_scene_is_framed_from_the_side_that_is_wanted():
+    view = framing_view(ball(), np.ones(2000), (64, 48), np.pi)
+    x, _, z = view.world_from_eye.position
+    assert z < -1 and x == pytest.approx(0, abs=0.05)

@@ -10,10 +10,10 @@ from vr_hands import a_frame, hand_at
 
 from app.headset.pacing import Pacing
 from app.headset.person import Person
-from app.headset.worn_panel import HINT, WornPanel, grant, sliders_of, stops_of
+from app.headset.worn_panel import HINT, WornPanel, grant, sliders_of
 from runtime_models.model import Stop
 from scene.reactions import State
-from scene.scene_file import SceneFile, SceneItem
+from scene.scene_file import SceneFile, SceneItem, named_stops
 from scene.world import World
 from vr.carried import panel_row
 from vr.panel_state import (
@@ -81,8 +81,9 @@ def test_sliders_are_of_what_is_seen_and_goes_somewhere():
 
 def test_a_ring_ends_where_it_begins():
     states = (State("normal", 0.0), State("fire", 0.5))
-    ring = replace(a_world().things["leg"], item=item("leg", states=states, ring=True))
-    assert [(stop.name, stop.x) for stop in stops_of(ring)] == [
+    ring = item("leg", states=states, ring=True)
+    leg = a_world().things["leg"].drawn.model
+    assert [(stop.name, stop.x) for stop in named_stops(ring, leg)] == [
         ("normal", 0.0), ("fire", 0.5), ("normal", 1.0)
     ]  # fmt: skip
 

@@ -4,10 +4,8 @@ from collections import deque
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from runtime_models.model import Stop
-from runtime_models.stop_weights import StopWeights
 from scene.follow import put_back
-from scene.thing import Thing
+from scene.scene_file import named_stops
 from scene.world import World
 from vr.carried import Carried, carry
 from vr.frame import Frame
@@ -85,22 +83,8 @@ def sliders_of(world: World) -> tuple[Slider, ...]:
     return tuple(
         Slider(name, stops, thing.drawn.model.blend.place(thing.standing.x))
         for name, thing in world.things.items()
-        if thing.drawn.visible and len(stops := stops_of(thing)) > 1
+        if thing.drawn.visible and len(stops := named_stops(thing.item, thing.drawn.model)) > 1
     )
-
-
-def stops_of(thing: Thing) -> tuple[Stop, ...]:
-    """The model's stops, under the names of the states that the scene has there, and these; the end
-    of a ring is its beginning.
-    """
-    stops = {stop.x: stop for stop in thing.drawn.model.stops}
-    states = [state for state in thing.item.states if not isinstance(state.x, StopWeights)]
-    named = [(state.x, state.name) for state in states]
-    if thing.item.ring and named:
-        named.append((1.0, min(named)[1]))
-    for x, name in named:
-        stops[x] = replace(stops.get(x, Stop("", x)), name=name)
-    return tuple(stops[x] for x in sorted(stops))
 
 
 def grant(wish: Wish, wearing: "Wearing", frame: Frame) -> None:

@@ -2,7 +2,7 @@
 
 from imgui_bundle import imgui
 
-from app.panels.panel_rows import tip
+from app.panels.panel_rows import labelled_slider, tip
 from app.viewer.dial import Dial
 from app.viewer.stage import Stage
 
@@ -14,13 +14,13 @@ def draw_budget(stage: Stage, dial: Dial, ui_scale: float) -> None:
     """Moves the dial, starts and stops measuring, says what was chosen and what it costs."""
     imgui.push_item_width(-1)
     flags = imgui.SliderFlags_
-    moved, ms = imgui.slider_float(
-        "##target", dial.target_ms, *MS_RANGE, "at most %.1f ms",
+    moved, ms = labelled_slider(
+        "target", dial.target_ms, *MS_RANGE, "a frame in at most %.1f ms",
         flags.logarithmic | flags.always_clamp,
     )  # fmt: skip
     tip("Whole frame. A headset of 90 Hz needs 11 ms.", ui_scale)
-    changed, db = imgui.slider_float(
-        "##floor", dial.floor_db, *DB_RANGE, "at least %.0f dB", flags.always_clamp
+    changed, db = labelled_slider(
+        "floor", dial.floor_db, *DB_RANGE, "as the exact picture to %.0f dB"
     )
     tip(
         "PSNR against the exact picture. 30 dB is visible, 40 dB hardly, 50 dB is not.", ui_scale

@@ -1,4 +1,4 @@
-"""The panel's section "Cameras": steps through those of a file, keeps views in one."""
+"""The panel's section "Camera": views from all sides, those of a file, and keeping views in one."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +19,17 @@ if TYPE_CHECKING:
     from app.viewer.viewer import Viewer
 
 Vec = imgui.ImVec2
+SIDES = {
+    "front": "From +Z. Numpad 1.",
+    "right": "From +X. Numpad 3; Ctrl: the left side.",
+    "top": "From above. Numpad 7; Ctrl: from below.",
+    "back": "From -Z. Ctrl and numpad 1.",
+}
+STEPS = {
+    "Previous": "Key P; moving leaves the camera.",
+    "Next": "Key N; moving leaves the camera.",
+}
+KEEP = "Key K. All views of this start go into one file; drop one on the window to step through it."
 FORM_NAMES = {
     "ours": "our own list",
     "inria": "3DGS cameras.json",
@@ -58,7 +69,9 @@ class KeptViews:
 
 def attach_cameras(viewer: "Viewer") -> None:
     """Adds the section, and what the status line says of cameras."""
-    viewer.hooks.sections.append(Section("Cameras", lambda scale: draw_cameras(viewer, scale)))
+    viewer.hooks.sections.append(
+        Section("Camera", lambda scale: draw_cameras(viewer, scale), open_first=True)
+    )
     viewer.hooks.status.append(lambda: viewer.steps.text)
     viewer.hooks.marks.append(lambda scale: draw_edges(viewer, scale))
 
@@ -77,20 +90,44 @@ def draw_edges(viewer: "Viewer", ui_scale: float) -> None:
 
 def draw_cameras(viewer: "Viewer", ui_scale: float) -> None:
     steps, kept = viewer.steps, viewer.kept
+    sides = {name.title(): what for name, what in SIDES.items()}
+    if clicked := button_row(sides, ui_scale, len(sides)):
+        viewer.leave_camera()
+        viewer.camera.look_from(clicked.lower())
+    moves = {
+        "Frame all": "Everything into the picture. Key F.",
+        "First view": "As it was opened. Shift+F.",
+        "Orbit" if viewer.camera.flying else "Fly": "Key V; W A S D Q E move.",
+    }
+    if clicked := button_row(moves, ui_scale, len(moves)):
+        viewer.leave_camera()
+        move_camera(viewer, clicked)
     if steps.count:
         imgui.text_disabled(steps.text)
-        clicked = button_row(("Previous", "Next"), ui_scale, 2)
+        clicked = button_row(STEPS, ui_scale, 2)
         if clicked:
             step_to_camera(viewer, 1 if clicked == "Next" else -1)
-        tip("Keys P and N; moving leaves the camera.", ui_scale)
-    else:
-        imgui.text_wrapped("Drop a file of cameras on the window to step through them.")
+    gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
+    if imgui.button("Keep view", Vec((room - gap) / 2, 0)):
+        keep_view(viewer)
+    tip(KEEP, ui_scale)
+    imgui.same_line()
     imgui.push_item_width(-1)
     kept.form = choice("form", kept.form, FORMS, [f"as {FORM_NAMES[form]}" for form in FORMS])
+    tip("What the file of kept views is written for.", ui_scale)
     imgui.pop_item_width()
-    if imgui.button("Keep this view", Vec(-1, 0)):
-        keep_view(viewer)
-    tip("Key K. All views of this start go into one file beside the pictures.", ui_scale)
+
+
+def move_camera(viewer: "Viewer", word: str) -> None:
+    """What a button of the section, or its key, does to the camera."""
+    camera = viewer.camera
+    if word == "Frame all":
+        distance = viewer.stage.fit(viewer.view(), camera.fov_y, viewer.free_size())
+        camera.frame(viewer.stage.centre, distance)
+    elif word == "First view":
+        camera.come_home(viewer.stage.first_view(viewer.free_size()))
+    else:
+        camera.toggle_flying()
 
 
 def step_to_camera(viewer: "Viewer", by: int) -> None:
@@ -110,8 +147,8 @@ def keep_view(viewer: "Viewer") -> None:
     try:
         path = viewer.kept.keep(view)
     except BadFile as error:
-        viewer.say(str(error))
+        viewer.messages.fail(str(error))
     except OSError as error:
-        viewer.say(f"The view cannot be kept: {error.strerror}: {error.filename}")
+        viewer.messages.fail(f"The view cannot be kept: {error.strerror}: {error.filename}")
     else:
-        viewer.say(f"Kept in {path}")
+        viewer.say(f"Kept in {path.absolute()}")

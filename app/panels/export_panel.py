@@ -19,7 +19,6 @@ from runtime_models.write_plain import WRITERS, writer_of
 if TYPE_CHECKING:
     from app.viewer.viewer import Viewer
 
-FOLDER = "exports"  # beside the folder of the pictures
 EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
 DEGREES = ("colours: one from all sides", *(f"colours: SH degree {n}" for n in (1, 2, 3)))
 FORMAT_TIPS = {
@@ -126,7 +125,7 @@ class ExportPanel:
         eye = tuple(map(float, viewer.view().world_from_eye.position)) if seen else None
         look = Look(self.sh_degree, self.palette, eye, tuple(viewer.stage.origin))
         try:
-            self._path = claim_name(viewer.options.pictures.parent / FOLDER, parts, self.ending)
+            self._path = claim_name(viewer.folders.exports, parts, self.ending)
         except (OSError, UsageError) as error:
             viewer.stage.problem = str(error)
             return

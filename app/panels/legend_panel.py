@@ -5,17 +5,25 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from app.panels import theme
+from app.panels.theme import Box
 
 Vec = imgui.ImVec2
 Row = tuple[str, tuple[float, float, float]]  # text, display sRGB
 
 
-def draw_legend(rows: Sequence[Row], left: float, ui_scale: float) -> None:
-    """Draws rows of swatch and text at the upper edge, right of `left`, logical pixels."""
+def draw_legend(rows: Sequence[Row], free: Box, ui_scale: float) -> None:
+    """Draws rows of swatch and text in the upper left corner of what is free.
+
+    No more rows than leave the middle of the scene to be seen.
+    """
+    left, top, right, bottom = free
+    step = imgui.get_text_line_height() + 4 * ui_scale
+    high, wide = 0.45 * (bottom - top) - 36 * ui_scale, 0.45 * (right - left)
+    narrow = max((imgui.calc_text_size(text).x for text, _ in rows), default=0.0) < wide
+    rows = rows if narrow else rows[: max(int(high / step), 1)]
     if not rows:
         return
     line, pad, margin = imgui.get_text_line_height(), 10 * ui_scale, 16 * ui_scale
-    step = line + 4 * ui_scale
     width = max(imgui.calc_text_size(text).x for text, _ in rows) + line + 3 * pad
     left += margin if left <= 0 else margin / 2
     draw = imgui.get_background_draw_list()

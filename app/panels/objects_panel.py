@@ -21,6 +21,11 @@ MOST_ROWS = 8  # of the list that are seen at once
 MASSES = (0.05, 5.0)  # kilograms, between which the physics holds them
 NONE = "none"  # as a collider
 MODES = {MOVE: "Move", TURN: "Turn"}
+DEEDS = {
+    "Add": "Another file or folder as an object of this scene.",
+    "Copy": "The chosen object once more, beside it. Ctrl+D.",
+    "Delete": "The chosen object. Key Delete; Ctrl+Z brings it back.",
+}
 
 
 def draw_objects(objects: "Objects", ui_scale: float) -> None:
@@ -28,7 +33,7 @@ def draw_objects(objects: "Objects", ui_scale: float) -> None:
     stage = objects.stage
     _history(objects, ui_scale)
     _list(objects, ui_scale)
-    clicked = button_row(("Add", "Copy", "Delete"), ui_scale, 3)
+    clicked = button_row(DEEDS, ui_scale, 3)
     if clicked:
         deeds = {"Add": objects.adding.ask, "Copy": objects.duplicate, "Delete": objects.delete}
         deeds[clicked]()
@@ -58,7 +63,7 @@ def _history(objects: "Objects", ui_scale: float) -> None:
         imgui.end_disabled()
         tip(what or f"Nothing to {word.lower()}.", ui_scale)
         imgui.same_line()
-    if imgui.button("Save\u2026" if document.path is None else "Save", Vec(-1, 0)):
+    if imgui.button("Save" if objects.saving.in_place else "Save\u2026", Vec(-1, 0)):
         objects.saving.save()
     tip("Ctrl+S writes the scene file; Ctrl+Shift+S asks for another name.", ui_scale)
 
@@ -110,7 +115,7 @@ def _row(objects: "Objects", index: int, ui_scale: float) -> None:
 def _chosen(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
     """Name, handles, place and body of the chosen object."""
     if item.name != BACKGROUND:
-        _rename(objects, item)
+        _rename(objects, item, ui_scale)
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     for mode, word in MODES.items():
         lit = objects.gizmo.mode == mode
@@ -123,11 +128,11 @@ def _chosen(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
         tip("Handles on the thing in the picture. Key M.", ui_scale)
         if mode == MOVE:
             imgui.same_line()
-    _place(objects)
+    _place(objects, ui_scale)
     _body(objects, item, ui_scale)
 
 
-def _rename(objects: "Objects", item: SceneItem) -> None:
+def _rename(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
     """The name, taken over by Enter or by leaving the field."""
     before, typed = objects.typed
     if before != item.name:
@@ -136,12 +141,14 @@ def _rename(objects: "Objects", item: SceneItem) -> None:
             objects.edit(edits.rename, before, typed, what=f"rename {before}")
     _, text = imgui.input_text("##name", objects.typed[1])
     objects.typed = (item.name, text)
-    if imgui.is_item_deactivated_after_edit():
+    left = imgui.is_item_deactivated_after_edit()
+    tip("Its name; Enter takes it over.", ui_scale)
+    if left:
         objects.typed = ("", "")  # the name that it has then
         objects.edit(edits.rename, item.name, text, what=f"rename {item.name}")
 
 
-def _place(objects: "Objects") -> None:
+def _place(objects: "Objects", ui_scale: float) -> None:
     """Metres, as numbers to drag; a double click types them."""
     stage = objects.stage
     index = stage.chosen_index
@@ -151,6 +158,7 @@ def _place(objects: "Objects") -> None:
     values = [float(metres) for metres in pose.position]
     speed = 0.002 * stage.radius
     moved, values = imgui.drag_float3("##place", values, speed, -FAR_M, FAR_M, "%.3f m")
+    tip("Where it stands: x, y up, z. Drag, or double click to type.", ui_scale)
     if moved and np.isfinite(values).all():
         place(stage, index, Pose(np.clip(np.array(values, np.float64), -FAR_M, FAR_M), pose.wxyz))
 
@@ -165,6 +173,7 @@ def _body(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
     names = ["cannot be touched", "touched: its splats", f"touched: {mesh}"][: len(kinds)]
     now = item.collider or NONE
     chosen = choice("collider", now, kinds, names)
+    tip("What hands and other things meet: nothing, or pieces made from its splats.", ui_scale)
     if chosen != now:
         collider = None if chosen == NONE else chosen
         objects.change(item, f"body of {item.name}", collider=collider)
@@ -176,6 +185,7 @@ def _body(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
     tip("What does not move is touched all the same: a table, a wall.", ui_scale)
     if not item.static:
         mass = slider("mass", item.mass_kg, *MASSES, "mass: %.2f kg")
+        tip("How heavy it is in the hand and in collisions.", ui_scale)
         if mass != item.mass_kg:
             mass = round(mass, 3)
             objects.change(item, f"mass of {item.name}", f"mass {item.name}", mass_kg=mass)
@@ -195,6 +205,7 @@ def _scene(objects: "Objects", ui_scale: float) -> None:
         imgui.set_next_item_width(-1)
         speed = 0.002 * stage.radius
         moved, y = imgui.drag_float("##floor", floor_y, speed, -FAR_M, FAR_M, "y %.3f m")
+        tip("How high the floor lies. Drag, or double click to type.", ui_scale)
         if moved and np.isfinite(y):
             objects.edit(edits.ground, float(y), what="move the floor", together="floor")
     if imgui.button("Look from here first", Vec(-1, 0)):

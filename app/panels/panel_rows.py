@@ -1,6 +1,6 @@
 """What sections of the panel are made of: headings that fold, rows, sliders with an open end."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from imgui_bundle import imgui
@@ -25,12 +25,11 @@ def section(name: str, open_first: bool = False, unfold: bool = False) -> bool:
     return is_open
 
 
-def subsection(name: str, lit: bool) -> bool:
-    """A heading within a section, in the accent's colour when `lit`."""
+def subsection(name: str, lit: bool, muted: bool = True) -> bool:
+    """A heading within a section, in the accent's colour when `lit`, else `muted` or plain."""
+    ink = theme.ACCENT if lit else theme.MUTED if muted else theme.TEXT
     flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
-    imgui.push_style_color(
-        imgui.Col_.text, imgui.ImVec4(*(theme.ACCENT if lit else theme.MUTED), 1)
-    )
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(0, 1))
     is_open = imgui.tree_node_ex(name, flags)
     imgui.pop_style_var()
@@ -79,9 +78,7 @@ def open_slider(
     """
     flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
     shown = min(value, high)
-    moved, new = imgui.slider_float(
-        f"##{name}", shown, low, high, any_text if shown >= high else text, flags
-    )
+    moved, new = labelled_slider(name, shown, low, high, any_text if shown >= high else text, flags)
     if not moved:
         return value
     return new if new < high else float(np.inf)
@@ -92,15 +89,32 @@ def slider(
 ) -> float:
     """A plain slider; `zero_text` stands there instead of `text` at its lower end."""
     at_zero = zero_text and value <= low
-    moved, new = imgui.slider_float(
-        f"##{name}",
-        value,
-        low,
-        high,
-        zero_text if at_zero else text,
-        imgui.SliderFlags_.always_clamp,
-    )
+    moved, new = labelled_slider(name, value, low, high, zero_text if at_zero else text)
     return new if moved else value
+
+
+def labelled_slider(
+    name: str, value: float, low: float, high: float, text: str,
+    flags: int = imgui.SliderFlags_.always_clamp,
+) -> tuple[bool, float]:  # fmt: skip
+    """A line of text, with the value where it has a %, and under it the slider.
+
+    The two are one item for a tip.  No knob lies over its own number.
+    """
+    imgui.begin_group()
+    imgui.text_unformatted(text % value if "%" in text else text)
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(imgui.get_style().frame_padding.x, 0))
+    imgui.push_style_var(imgui.StyleVar_.frame_rounding, imgui.get_text_line_height() / 2)
+    imgui.push_style_var(imgui.StyleVar_.grab_rounding, imgui.get_text_line_height() / 2)
+    width = imgui.calc_item_width()
+    imgui.set_next_item_width(width if width > 0 else -1)
+    if isinstance(value, int):
+        moved, new = imgui.slider_int(f"##{name}", value, int(low), int(high), "", flags)
+    else:
+        moved, new = imgui.slider_float(f"##{name}", value, low, high, "", flags)
+    imgui.pop_style_var(3)
+    imgui.end_group()
+    return moved, new
 
 
 def choice(name: str, value: object, values: Iterable, labels: Iterable[str]) -> object:
@@ -110,16 +124,20 @@ def choice(name: str, value: object, values: Iterable, labels: Iterable[str]) ->
     return values[chosen] if changed else value
 
 
-def button_row(names: Iterable[str], ui_scale: float, columns: int) -> str:
-    """Buttons of equal width, some to a line; the name of the one that was clicked, or ""."""
+def button_row(tips: Mapping[str, str], ui_scale: float, columns: int) -> str:
+    """Buttons of equal width, some to a line; the name of the one that was clicked, or "".
+
+    `tips` says what each name does.
+    """
     gap = imgui.get_style().item_spacing.x
     width = (imgui.get_content_region_avail().x - gap * (columns - 1)) / columns
     clicked = ""
-    for index, name in enumerate(names):
+    for index, (name, what) in enumerate(tips.items()):
         if index % columns:
             imgui.same_line()
         if imgui.button(name, Vec(width, 0)):
             clicked = name
+        tip(what, ui_scale)
     return clicked
 
 

@@ -8,6 +8,7 @@ from app.charts.comparison import exact, is_exact, shortcuts
 from app.panels.panel_rows import (
     choice,
     db_text,
+    labelled_slider,
     open_slider,
     right_aligned,
     slider,
@@ -153,9 +154,7 @@ def _cadence(settings: RenderSettings, ui_scale: float) -> tuple[int, float]:
     place = min(settings.resort_frames, BY_TURN - 1) or BY_TURN
     text = "sort every frame" if place == 1 else f"sort every {place} frames"
     text = "sort by turning alone" if place == BY_TURN else text
-    moved, place = imgui.slider_int(
-        "##cadence", place, 1, BY_TURN, text, imgui.SliderFlags_.always_clamp
-    )
+    moved, place = labelled_slider("cadence", place, 1, BY_TURN, text)
     tip(
         "Keeps an order for some frames. Saves sorts while you move; edges shimmer where the "
         "order is old. At rest the picture is sorted anew.", ui_scale,

@@ -17,6 +17,7 @@ DIRECTIONS = {  # name -> the way out of a half-space's plane, into what it sele
     "up": (0, 1, 0), "down": (0, -1, 0), "right": (1, 0, 0), "left": (-1, 0, 0),
     "front": (0, 0, 1), "back": (0, 0, -1),
 }  # fmt: skip
+PAINTED = {"None": "Paint nothing.", "All": "Paint everything.", "Invert": "The other part."}
 KIND_TIPS = {
     "box": "A box with its own x; click into the picture to place it.",
     "sphere": "A sphere with its own x; click into the picture to place it.",
@@ -76,6 +77,7 @@ def _row(stage: Stage, number: int, ui_scale: float) -> None:
     if imgui.selectable(region.name or "(no name)", chosen, 0, Vec(width, 0))[0]:
         regions.choose(-1 if chosen else number)
     imgui.pop_style_color()
+    tip("Choose it to edit it; click again to leave it.", ui_scale)
     imgui.same_line()
     blend = stage.scene.objects[region.index].model.blend
     right_aligned(f"x {blend.place(region.x):.2f}")
@@ -86,11 +88,13 @@ def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
     regions, number = stage.regions, stage.regions.chosen
     things = stage.scene.objects
     changed, name = imgui.input_text("##name", region.name)
+    tip("Its name.", ui_scale)
     if changed:
         regions.edit(number, name=name[:LONGEST_NAME])
     if len(things) > 1 and region.kind != "painted":
         names = [f"of {thing.name}" for thing in things]
         index = choice("object", region.index, range(len(things)), names)
+        tip("The object whose part it is.", ui_scale)
         regions.edit(number, index=index)
     if region.is_placed:
         _place(stage, ui_scale)
@@ -99,12 +103,15 @@ def _chosen(stage: Stage, region: Region, ui_scale: float) -> None:
     border = slider("border", region.border, 0.0, far, "border: %.3f m", "border: sharp")
     tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
     regions.edit(number, border=border)
-    model = things[region.index].model
-    x, held = track(model.stops, model.blend.place(region.x), 46 * ui_scale)
-    if held:
-        regions.edit(number, x=x)
+    stops, blend = stage.stops(region.index), things[region.index].model.blend
+    moved = track(stops, (blend.place(region.x),), stage.grip, 46 * ui_scale)
+    if moved.knob is not None:
+        regions.edit(number, x=moved.x)
+    elif moved.stop is not None:
+        regions.edit(number, x=stops[moved.stop].x)
     if imgui.button("Remove", Vec(-1, 0)):
         regions.remove(number)
+    tip("Ctrl+Z brings it back.", ui_scale)
 
 
 def _place(stage: Stage, ui_scale: float) -> None:
@@ -127,16 +134,17 @@ def _sizes(stage: Stage, region: Region, ui_scale: float) -> None:
     low, high = 0.01 * stage.radius, LARGEST * stage.radius
     if region.kind == "box":
         names = ("half width", "half height", "half depth")
-        half = [
-            slider(name, float(metres), low, high, f"{name}: %.2f m")
-            for name, metres in zip(names, region.half, strict=True)
-        ]
+        half = []
+        for name, metres in zip(names, region.half, strict=True):
+            half.append(slider(name, float(metres), low, high, f"{name}: %.2f m"))
+            tip("From the middle of the box to its side.", ui_scale)
         regions.edit(number, half=np.array(half))
     elif region.kind == "sphere":
         radius = slider("radius", float(region.half[0]), low, high, "radius: %.2f m")
+        tip("From the middle of the sphere to its skin.", ui_scale)
         regions.edit(number, half=np.full(3, radius))
     elif region.kind == "half-space":
-        _direction(stage, region)
+        _direction(stage, region, ui_scale)
     elif region.kind == "lens":
         degrees = float(np.degrees(np.arctan(region.tangent)))
         degrees = slider("lens", degrees, 1.0, 60.0, "half its angle: %.0f\u00b0")
@@ -147,13 +155,14 @@ def _sizes(stage: Stage, region: Region, ui_scale: float) -> None:
         _brush(stage, region, ui_scale)
 
 
-def _direction(stage: Stage, region: Region) -> None:
+def _direction(stage: Stage, region: Region, ui_scale: float) -> None:
     """Which side of the plane is selected."""
     regions = stage.regions
     names = list(DIRECTIONS)
     near = [float(np.dot(region.normal, DIRECTIONS[name])) for name in names]
     at = names[int(np.argmax(near))]
     chosen = choice("direction", at, names, [f"towards: {name}" for name in names])
+    tip("The side of the plane that it selects.", ui_scale)
     if chosen != at:
         regions.edit(regions.chosen, normal=np.array(DIRECTIONS[chosen], float))
 
@@ -165,7 +174,7 @@ def _brush(stage: Stage, region: Region, ui_scale: float) -> None:
     tip(KIND_TIPS["painted"], ui_scale)
     count = int(region.painted.sum())
     imgui.text_disabled(f"{count:,} of {len(region.painted):,} painted")
-    clicked = button_row(("None", "All", "Invert"), ui_scale, 3)
+    clicked = button_row(PAINTED, ui_scale, 3)
     if clicked:
         new = {"None": np.zeros_like, "All": np.ones_like, "Invert": np.logical_not}[clicked]
         regions.edit(regions.chosen, painted=new(region.painted))

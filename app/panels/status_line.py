@@ -11,7 +11,6 @@ from app.panels.theme import Box
 from app.viewer.stage import Stage
 
 Vec = imgui.ImVec2
-HEIGHT = 24.0  # logical pixels
 GAP = "   \u00b7   "
 UNITS = ("bytes", "kB", "MB", "GB", "TB")
 
@@ -42,12 +41,11 @@ def bytes_text(count: int) -> str:
     return f"{value:.{0 if unit == 0 or value >= 99.95 else 1}f} {UNITS[unit]}"
 
 
-def draw_status(stage: Stage, more: Sequence[str], ui_scale: float) -> Box:
+def draw_status(stage: Stage, more: Sequence[str], box: Box, ui_scale: float) -> Box:
     """Draws the line; `more` are words of others, "" has nothing to say.  Returns where it is."""
-    screen = imgui.get_io().display_size
-    height = HEIGHT * ui_scale
-    imgui.set_next_window_pos(Vec(0, screen.y - height))
-    imgui.set_next_window_size(Vec(screen.x, height))
+    left, top, right, low = box
+    imgui.set_next_window_pos(Vec(left, top))
+    imgui.set_next_window_size(Vec(right - left, low - top))
     flags = imgui.WindowFlags_
     imgui.push_style_var(imgui.StyleVar_.window_padding, Vec(16 * ui_scale, 3 * ui_scale))
     imgui.push_style_var(imgui.StyleVar_.window_rounding, 0.0)

@@ -17,6 +17,8 @@ TEXT = (0.90, 0.90, 0.91)
 MUTED = (0.58, 0.59, 0.62)
 SURFACE = (0.105, 0.108, 0.118)
 RAISED = (0.175, 0.180, 0.195)
+SECOND = (0.47, 0.72, 0.95)  # what stands for a second x
+WARNING = (0.93, 0.36, 0.27)
 TRACK = (0.30, 0.31, 0.33)
 
 
@@ -32,13 +34,18 @@ def window_box() -> Box:
 
 
 def apply(ui_scale: float, pixels_per_unit: float) -> None:
-    """Styles the current ImGui context; fonts are rastered at the density of the framebuffer."""
+    """Styles the current ImGui context; fonts are rastered at the density of the framebuffer.
+
+    Between frames alone, and whoever draws needs the texture of the fonts anew.
+    """
     io = imgui.get_io()
+    io.fonts.clear()
     size = round(FONT_SIZE * ui_scale * pixels_per_unit)
     io.fonts.add_font_from_file_ttf(str(FONT), size, glyph_ranges_as_int_list=GLYPHS)
     io.font_global_scale = 1 / pixels_per_unit
 
     style = imgui.get_style()
+    _unscale(style)
     imgui.style_colors_dark(style)
     style.window_rounding = style.popup_rounding = 8
     style.frame_rounding = style.grab_rounding = 4
@@ -52,6 +59,15 @@ def apply(ui_scale: float, pixels_per_unit: float) -> None:
     for where, (rgb, alpha) in _colors().items():
         style.set_color_(where, imgui.ImVec4(*rgb, alpha))
     style.scale_all_sizes(ui_scale)
+
+
+def _unscale(style: imgui.Style) -> None:
+    """Every length as ImGui has it at first: scaling what was scaled before rounds twice."""
+    fresh = imgui.Style()
+    for name in dir(fresh):
+        value = getattr(fresh, name)
+        if isinstance(value, float | imgui.ImVec2) and not name.startswith("_"):
+            setattr(style, name, value)
 
 
 def _colors() -> dict:

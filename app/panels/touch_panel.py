@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from app.panels import theme
 from app.panels.panel_rows import button_row, tip
 from scene.reactions import TwoAxes
+from scene.scene_file import named_stops
 from scene.thing import Thing
 
 if TYPE_CHECKING:
@@ -20,8 +21,12 @@ def draw_touch(touch: "Touch", ui_scale: float) -> None:
     """Buttons for what the keys do, the pads, and the last reactions."""
     world = touch.world
     play = "Play" if world.paused else "Pause"
-    clicked = button_row((f"{play}###play", "Step", "Put back"), ui_scale, 3)
-    tip("T, Shift+T, R. While things move, drag one to carry it.", ui_scale)
+    tips = {
+        f"{play}###play": "Key T. While things move, drag one to carry it.",
+        "Step": "One step of 1/90 s. Shift+T.",
+        "Put back": "Everything where it was before it was touched. Key R.",
+    }
+    clicked = button_row(tips, ui_scale, 3)
     deeds = {f"{play}###play": touch.toggle, "Step": touch.step, "Put back": touch.put_back}
     if clicked:
         deeds[clicked]()
@@ -54,7 +59,7 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
     half, reach = width / 2 - inset, height - 2 * inset
     imgui.invisible_button(f"pad {name}", Vec(width, height))
     middle, low = corner.x + width / 2, corner.y + height - inset
-    if imgui.is_item_active():
+    if imgui.is_item_active() or imgui.is_item_deactivated():  # also where it was let go
         mouse = imgui.get_io().mouse_pos
         balance = min(max((mouse.x - middle) / half, -1.0), 1.0)
         power = min(max((low - mouse.y) / reach, 0.0), 1.0)
@@ -78,8 +83,8 @@ def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
 
 def side_names(thing: Thing, axes: TwoAxes) -> tuple[str, str]:
     """What is at both sides: a state or a stop that lies there, "" where none does."""
-    places = (*thing.machine.states, *thing.drawn.model.stops)
-    named = (next((p.name for p in places if p.x == x), "") for x in (axes.below, axes.above))
+    stops = named_stops(thing.item, thing.drawn.model)
+    named = (next((s.name for s in stops if s.x == x), "") for x in (axes.below, axes.above))
     return tuple(named)
 
 

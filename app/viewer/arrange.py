@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.viewer.document import key_of
+from app.viewer.track import next_stop, stepped
 from runtime_models.model import BadFile
 from runtime_models.stop_weights import Control
 from scene import edits
@@ -28,20 +29,57 @@ COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
 def edit(stage: "Stage", file: SceneFile, what: str, together: str = "") -> None:
     """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
+    record_regions(stage)
     turn_to(stage, stage.document.history.take(file, what, together))
+    amend_regions(stage)
 
 
 def undo(stage: "Stage") -> str:
-    """Takes the last edit back; returns what it was, "" where there was none."""
+    """Takes the last edit back; returns what it was, "" where there was none.
+
+    Looks are no edits: the camera and every slider stay where they are.
+    """
+    record_regions(stage)
     what = stage.document.history.undoes
-    turn_to(stage, stage.document.history.undo())
+    go_back(stage, stage.document.history.undo())
     return what
 
 
 def redo(stage: "Stage") -> str:
+    record_regions(stage)
     what = stage.document.history.redoes
-    turn_to(stage, stage.document.history.redo())
+    go_back(stage, stage.document.history.redo())
     return what
+
+
+def go_back(stage: "Stage", history: History) -> None:
+    """Goes to a step that has been before, with every x as it is now."""
+    now = stage.document.history
+    turn_to(stage, history.amend(edits.with_x_of(history.file, now.file)))
+    if history.regions != now.regions:
+        stage.regions.restore(history.regions)
+        for index, thing in enumerate(stage.scene.objects):
+            stage.regions.fit_painted(index, thing)
+    amend_regions(stage)
+
+
+def record_regions(stage: "Stage") -> None:
+    """Makes what was done to the regions since the last call a step of the history."""
+    regions, history = stage.regions, stage.document.history
+    if not regions.did:
+        amend_regions(stage)
+        return
+    stage.document.history = history.take(
+        history.file, regions.did, regions.together, regions.kept, regions.bytes
+    )
+    regions.did = ""
+
+
+def amend_regions(stage: "Stage") -> None:
+    """Takes regions over that nobody's hand has changed: their objects have."""
+    history = stage.document.history
+    stage.document.history = history.amend(history.file, stage.regions.kept)
+    stage.regions.did = ""
 
 
 def turn_to(stage: "Stage", history: History) -> None:
@@ -116,17 +154,56 @@ def changed_thing(thing: SceneObject, item: SceneItem, change: Change | None) ->
     return replace(thing, **values)
 
 
-def steer(stage: "Stage", index: int, x: Control, together: str = "") -> None:
-    """A hand moves x: where the object starts as well, unless the world is running."""
+def steer(stage: "Stage", index: int, x: Control) -> None:
+    """A hand moves x: where the object starts as well, unless the world is running.
+
+    It is a look and no edit: undoing leaves it as it is.
+    """
     thing = stage.scene.objects[index]
     stage.set_x(index, x)
-    item = edits.find(stage.document.file, thing.name)
-    if not stage.running and item is not None:
-        file = edits.set_x(stage.document.file, thing.name, x)
+    if not stage.running and edits.find(stage.document.file, thing.name) is not None:
         history = stage.document.history
-        word = together or f"x of {thing.name}"
-        stage.document.history = history.take(file, word, together or f"x {thing.name}")
+        stage.document.history = history.amend(edits.set_x(history.file, thing.name, x))
         stage.bodies.follow(stage.document)
+
+
+def steer_by_hand(stage: "Stage", index: int, x: float) -> None:
+    """The same by a slider, a key or a number: what played stops, and keys go on with this one."""
+    stage.sweeps[index].playing = False
+    stage.steered = stage.scene.objects[index].name
+    steer(stage, index, x)
+
+
+def steered_index(stage: "Stage") -> int | None:
+    """The object whose x the arrow keys move: the chosen one, else the one moved last."""
+    movable = stage.movable
+    names = [stage.scene.objects[index].name for index in movable]
+    for name in (stage.chosen, stage.steered):
+        if name in names:
+            return movable[names.index(name)]
+    return movable[0] if movable else None
+
+
+def step_x(stage: "Stage", steps: int) -> None:
+    """The arrow keys: hundredths of x to the right, or left."""
+    if (index := steered_index(stage)) is not None:
+        steer_by_hand(stage, index, stepped(stage.scene.objects[index].slider_x, steps))
+
+
+def step_stop(stage: "Stage", direction: int) -> None:
+    """To the nearest stop above (1) or below (-1)."""
+    if (index := steered_index(stage)) is not None:
+        stops = stage.stops(index)
+        x = next_stop(stops, stage.scene.objects[index].slider_x, direction)
+        numbers = [number for number, stop in enumerate(stops) if stop.x == x]
+        if numbers:
+            go_to_stop(stage, index, numbers[0])
+
+
+def go_to_stop(stage: "Stage", index: int, number: int) -> None:
+    """One object goes to a stop, counted from 0 by x; the arrow keys go on with that object."""
+    stage.steered = stage.scene.objects[index].name
+    stage.go_to_stop(number, index)
 
 
 def place(stage: "Stage", index: int, pose: Pose) -> None:

@@ -15,7 +15,13 @@ SMOOTH_S = 0.06  # the picture follows the hand with this time constant
 BRAKE_S = 0.09  # so does the flying speed follow the keys
 SPEED_RADII = 0.8  # metres a second with a key held, in scene radii
 FAST, SLOW = 5.0, 0.2  # Shift, Ctrl
+DIRECTIONS = {  # name -> yaw, pitch of an eye that looks from there, radians
+    "front": (0.0, 0.0), "right": (np.pi / 2, 0.0), "top": (0.0, -np.pi / 2),
+    "back": (np.pi, 0.0), "left": (-np.pi / 2, 0.0), "bottom": (0.0, np.pi / 2),
+}  # fmt: skip
 STILL = 2e-4  # radians, or scene radii: less is not seen, the camera counts as at rest
+
+BY_HAND, FIRST, EVERYTHING = "", "first view", "everything"  # what a camera shows
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 
@@ -58,6 +64,7 @@ class Camera:
 
     def __init__(self, view: View, centre: np.ndarray, radius: float) -> None:
         self.flying = False
+        self.framed = FIRST  # what it shows until a hand moves it
         self._home = (view, np.asarray(centre, np.float64), radius)
         self._goal = np.zeros(7)
         self._lag = np.zeros(7)  # goal - shown
@@ -112,7 +119,19 @@ class Camera:
         """Orbits around the anchor, or looks about when flying, by radians."""
         goal = self._goal.copy()
         goal[YAW] += self._upright * yaw
-        goal[PITCH] = np.clip(goal[PITCH] + self._upright * pitch, -POLE, POLE)
+        limit = max(POLE, abs(goal[PITCH]))  # from straight above it turns on without a jump
+        goal[PITCH] = np.clip(goal[PITCH] + self._upright * pitch, -limit, limit)
+        self._move_to(goal)
+
+    def look_from(self, name: str) -> None:
+        """From one of DIRECTIONS, level, at the same distance from what is orbited.
+
+        In flight the eye stays where it is and turns.
+        """
+        yaw, pitch = DIRECTIONS[name]
+        goal = self._goal.copy()
+        goal[YAW] += _half_turn_at_most(yaw - goal[YAW])
+        goal[PITCH], goal[ROLL] = pitch, 0.0
         self._move_to(goal)
 
     def pan(self, right: float, up: float) -> None:
@@ -134,6 +153,7 @@ class Camera:
 
     def step(self, seconds: float, push: Push = Push()) -> None:
         """Lets time pass: the keys move the camera, the picture catches up with its goal."""
+        self.framed = BY_HAND if push.any else self.framed
         right, _, forward = axes_of(*self._goal[3:5], self._goal[ROLL])
         up = np.array([0, self._upright, 0])
         wanted = push.right * right + push.up * up + push.forward * forward
@@ -157,7 +177,7 @@ class Camera:
         for state in (goal, shown):
             forward = axes_of(state[YAW], state[PITCH])[2]
             state[ANCHOR] += reach * np.exp(state[LOG_DISTANCE]) * forward
-        self.flying = not self.flying
+        self.flying, self.framed = not self.flying, BY_HAND
         self._lag = goal - shown
 
     def focus(self, point: np.ndarray) -> None:
@@ -177,6 +197,7 @@ class Camera:
     def frame(self, centre: np.ndarray, distance: float) -> None:
         """Looks at the centre (3,) from that many metres, in the same direction as before."""
         self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance, self._goal[ROLL])
+        self.framed = EVERYTHING
 
     def stand(self, pose: Pose, fov_y: float) -> None:
         """Stands at a pose at once, then turns level; the orbit goes around what it sees there."""
@@ -192,6 +213,7 @@ class Camera:
         level = 0.0 if abs(roll) <= np.pi / 2 else float(np.copysign(np.pi, roll))
         self.fov_y = fov_y
         log_distance = self._bounded(np.log(distance))
+        self.framed = BY_HAND
         # The reach is bounded, so the anchor follows from it: the eye must not move.
         anchor = eye if self.flying else eye + np.exp(log_distance) * ahead
         self._goal = np.r_[anchor, yaw, pitch, log_distance, level]
@@ -212,6 +234,12 @@ class Camera:
         if not distance > MIN_RADII * radius:  # the scene lies behind or around the eye
             distance = radius
         self._stand(eye + distance * forward, yaw, pitch, distance)
+        self.framed = FIRST
+
+    def come_home(self, view: View) -> None:
+        """Another first view, of a window of another size."""
+        self._home = (view, *self._home[1:])
+        self.reset()
 
     def _stand(
         self, target: np.ndarray, yaw: float, pitch: float, distance: float, roll: float = 0.0
@@ -232,6 +260,7 @@ class Camera:
 
     def _move_to(self, goal: np.ndarray) -> None:
         """A new goal; what is shown stays and will catch up."""
+        self.framed = BY_HAND
         self._lag += goal - self._goal
         self._goal = goal
 

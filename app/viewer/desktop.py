@@ -11,10 +11,13 @@ from app.camera_files import camera_reading
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.opening import ReadingOptions
-from app.paths import plain
-from app.viewer.files import TOUCH, home_of, named_cameras, opened_scene
+from app.paths import DEMO, TOUCH, config_folder, plain
+from app.viewer.files import first_look, named_cameras, opened_scene
 from app.viewer.opened import read_files
+from app.viewer.own_files import OwnFiles
 from app.viewer.refine import Refiner, attach_refiner
+from app.viewer.settings import Settings
+from app.viewer.split import splitting
 from app.viewer.stage import Stage
 from app.viewer.viewer import Viewer
 from app.viewer.window import Window
@@ -23,7 +26,7 @@ from renderer.renderer import Renderer
 from scene.read_selector import read_selector
 from scene.selector import Selector
 
-DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
+SIZE = "1280x720"  # of the window, pixels at a text size of 1
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,8 @@ class Options(ReadingOptions):
     """Degrees from top to bottom, for a camera file that says nothing about the lens."""
     x: float | None = None
     """Control value to start at, 0..1; without it the first stop."""
-    size: str = "1280x720"
-    """Of the window, WxH in pixels."""
+    size: str = ""
+    """Of the window, WxH in pixels; without it 1280x720, and as much larger as the text is."""
     drawing: Literal["auto", "quads", "tiles"] = "auto"
     """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
     target_ms: float | None = None
@@ -50,8 +53,9 @@ class Options(ReadingOptions):
     select: tuple[str, ...] = ()
     """Regions with an x of their own, one after the other: sphere:x,y,z:radius:X[:border],
     box:x,y,z:hx,hy,hz:X[:border], half:x,y,z:nx,ny,nz:X[:border], lens:degrees:X[:border]."""
-    pictures: Path = Path("pictures")
-    """Folder for the pictures that F12 saves and the views that K keeps."""
+    pictures: Path | None = None
+    """Folder for the pictures that F12 saves and the views that K keeps; scenes and exports go
+    beside it.  Without it Shapeshift/pictures among your documents."""
     screenshot: Path | None = None
     """Write a picture of the whole window here after --frames frames, and end."""
     frames: int = 3
@@ -59,7 +63,7 @@ class Options(ReadingOptions):
     compare: str = ""
     """Another scene (or scene@stop, scene@x) to compare with: a line parts the two pictures."""
     touch: bool = False
-    """Without a scene: the bundled one that can be touched, a table with three objects."""
+    """Without a scene: the bundled one that can be touched, a table where things move."""
     play: bool = False
     """Let the things of a scene file fall and be carried from the start; T switches it."""
     panel: Annotated[bool, tyro.conf.arg(help="Show the overlay; H switches it.")] = True
@@ -67,7 +71,7 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     """Opens the window and stays until it is closed; 0.  Errors for people say why not."""
-    size = parse_size(options.size)
+    size = parse_size(options.size or SIZE)
     if options.x is not None and not 0 <= options.x <= 1:
         raise UsageError(f"--x is {options.x}, expected 0 to 1.")
     if options.frames < 1:
@@ -85,17 +89,24 @@ def run(options: Options) -> int:
     if found.file is not None and options.x is not None:
         raise UsageError(f"--x is for one model; {found.path.name} is a scene of objects.")
     scene, document = opened_scene(found, options.x)
-    stage.take(found.sources, scene, home_of(found), document)
+    stage.take(found.sources, scene, first_look(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)
     stage.regions.take(read_selectors(options.select, stage), 0)
-    stage.document.saved_regions = stage.regions.version
-    with refiner, stage.bodies, Window("Shapeshift", size) as window:
+    stage.keep_regions()
+    settings = Settings.read(config_folder()) if options.screenshot is None else Settings()
+    with refiner, stage.bodies, Window("Shapeshift", size, settings.text_size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
-            viewer = Viewer(window, renderer, stage, options)
+            if not options.size and options.screenshot is None:
+                window.grow_with_text()
+            own_files = OwnFiles(settings.folder)
+            viewer = Viewer(window, renderer, stage, options, settings, own_files)
             attach_refiner(viewer, refiner)
             viewer.files.read = refiner.open
             viewer.files.started(found, options)
-            with comparing(viewer, options):
+            with comparing(viewer, options) if options.compare else splitting(
+                window, stage, viewer.hooks, stage.messages, lambda: viewer.layout.free,
+                lambda: Renderer(window.ctx, drawing=options.drawing),
+            ):  # fmt: skip
                 viewer.loop()
     return 0
 

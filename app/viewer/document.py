@@ -24,7 +24,7 @@ class Document:
     history: History
     path: Path | None = None  # of the scene file; None: it is none yet
     saved: SceneFile | None = None  # as it lies there; an edit gives another object
-    saved_regions: int = 0  # version of the regions then
+    saved_regions: tuple = ()  # the regions then
     stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
     sources: dict[ModelKey, Source] = field(default_factory=dict)
     _compared: tuple | None = None  # two files, and how they differ

@@ -5,20 +5,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from imgui_bundle import imgui
-
 from app.camera_files import camera_reading, in_scene
 from app.opening import sentence
-from app.panels.recent_panel import RecentMenu
-from app.paths import config_folder
+from app.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
+from app.panels.open_row import OpenRow
+from app.panels.path_box import PathBox
+from app.panels.theme import Box
+from app.paths import DEMO, TOUCH, config_folder
 from app.viewer.controls import Camera
 from app.viewer.document import Document, document_from, document_of
+from app.viewer.first_look import FirstLook
 from app.viewer.opened import Found, Opener, ReadModel, read_files
 from app.viewer.recent import RecentFiles
-from app.viewer.stage import scene_of
+from app.viewer.scene_objects import scene_of
+from app.viewer.window import Drop, Event, KeyDown
 from runtime_models.model import BadFile
 from scene import edits
-from scene.pose import View
+from scene.framing import common_side
 from scene.read_cameras import read_camera_list
 from scene.scene import Scene
 from scene.scene_file import scene_of as scene_of_file
@@ -27,7 +30,6 @@ if TYPE_CHECKING:
     from app.viewer.desktop import Options
     from app.viewer.viewer import Viewer
 
-TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
 
 
@@ -41,9 +43,14 @@ class Files:
         self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
         # Reads one scene, in the thread that opens; replaced where progress can be told.
         self.read: ReadModel = lambda path, told: viewer.stage.read_model(path)
-        self._menu = RecentMenu()
-        viewer.hooks.each_frame.append(self.poll)
-        viewer.hooks.top.append(self.draw_recent)
+        self._row = OpenRow()
+        self._box = PathBox("Open a scene", "Open")
+        hooks = viewer.hooks
+        hooks.each_frame.append(self.poll)
+        hooks.top.append(self.draw_row)
+        hooks.marks.append(self.draw_box)
+        hooks.cards.append(self.draw_empty)
+        hooks.takes.append(self.take_event)
 
     @property
     def busy(self) -> bool:
@@ -70,9 +77,28 @@ class Files:
         self.take_cameras(found, stand=options.camera is not None)
         viewer.say(told_of(found))
 
+    def ask(self) -> None:
+        """Opens the box that takes a path; what is dropped meanwhile is opened as well."""
+        self._box.ask()
+
+    def take_event(self, event: Event) -> bool:
+        """True for Ctrl+O, for keys while the box is open, and for what is dropped on it."""
+        match event:
+            case KeyDown(shortcut="o") if not self._box.asking:
+                self.ask()
+            case KeyDown() if self._box.asking:
+                pass
+            case Drop() if self._box.asking:
+                self._box.close()
+                return False
+            case _:
+                return False
+        return True
+
     def poll(self) -> bool:
-        """Takes over what has been read; True while something is being read."""
-        return take_over(self._viewer, self._opener, self._ask_and_take)
+        """Takes over what has been read; True while something is being read or looked for."""
+        busy = take_over(self._viewer, self._opener, self._ask_and_take)
+        return busy or self._box.browsing
 
     def _ask_and_take(self, found: Found) -> None:
         if found.sources:
@@ -92,8 +118,9 @@ class Files:
                 stage.problem = str(error)
                 viewer.shown.forget()
                 return
-            stage.take(found.sources, scene, home_of(found), document)
-            self._at_demo = False
+            stage.take(found.sources, scene, first_look(found), document)
+            self._at_demo = [source.path for source in found.sources] == [DEMO]
+            viewer.messages.problems = []
             viewer.show_scene()
         self.take_cameras(found, stand=not found.sources)
         self.remember_all(found)
@@ -115,13 +142,32 @@ class Files:
             viewer.steps.go_to(0, now if viewer.frames else None)
             viewer.steps.untold = ()  # said with the file's other notes
 
-    def draw_recent(self, ui_scale: float) -> None:
+    def draw_row(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""
-        if self._at_demo and imgui.button("Things to touch", imgui.ImVec2(-1, 0)):
-            self.open_soon((TOUCH,))
-        chosen = self._menu.draw(self.recent, ui_scale)
-        if chosen is not None:
+        here = self._viewer.stage.document.path
+        others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
+        others = others if self._at_demo or here == TOUCH else {}
+        wants, chosen = self._row.draw(self.recent, others, ui_scale)
+        if wants:
+            self.ask()
+        elif chosen is not None:
             self.open_soon((chosen,))
+
+    def draw_box(self, ui_scale: float) -> None:
+        """The box for a path, while it is open."""
+        if chosen := self._box.draw(self.recent.paths if self.recent else (), ui_scale):
+            self.open_soon(chosen)
+
+    def draw_empty(self, free: Box, ui_scale: float) -> Box | None:
+        """What can be opened, while nothing is."""
+        if self._viewer.stage.scene.objects or self.busy:
+            return None
+        box, clicked = draw_empty(free, ui_scale)
+        if clicked == OPEN:
+            self.ask()
+        elif clicked:
+            self.open_soon((TOUCH if clicked == TOUCH_LABEL else DEMO,))
+        return box
 
     def remember_all(self, found: Found) -> None:
         """What was opened by name: the scene file, not what is in it."""
@@ -136,7 +182,8 @@ class Files:
         try:
             self.recent.add(path)
         except OSError as error:
-            self._viewer.say(f"The list of recent files cannot be kept: {error.strerror}.")
+            sentence = f"The list of recent files cannot be kept: {error.strerror}."
+            self._viewer.messages.fail(sentence)
             self.recent = None
 
 
@@ -186,20 +233,25 @@ def told_of(found: Found) -> str:
     return "\n".join([*lines[:MOST_TOLD], *more, *found.notes])
 
 
-def home_of(found: Found) -> View | None:
-    """The view that stands on the floor which lies with the first scene."""
-    if found.floor is None or not found.sources:
-        return None
-    return in_scene(found.floor, found.sources[0].model).views[0]
+def first_look(found: Found) -> FirstLook:
+    """What lies beside the first scene and tells from where to look: a floor, cameras of a side."""
+    if not found.sources:
+        return FirstLook()
+    model, home, front = found.sources[0].model, None, None
+    if found.floor is not None:
+        home = in_scene(found.floor, model).views[0]
+    if found.cameras is not None:
+        front = common_side(in_scene(found.cameras, model).views)
+    return FirstLook(home, front)
 
 
 def first_camera(viewer: "Viewer") -> Camera:
     """The camera of a new scene: on its floor where one is given, else the whole in view."""
     stage = viewer.stage
     camera = Camera(stage.first_view(viewer.free_size()), stage.first_target, stage.radius)
-    if stage.home is not None:
+    if stage.first_look.home is not None:
         camera.toggle_flying()
-        camera.stand(stage.home.world_from_eye, stage.home_fov_y)
+        camera.stand(stage.first_look.home.world_from_eye, stage.first_look.fov_y)
     return camera
 
 

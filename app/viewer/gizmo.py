@@ -27,7 +27,6 @@ OPERATIONS = {
     MOVE: imguizmo.im_guizmo.OPERATION.translate,
     TURN: imguizmo.im_guizmo.OPERATION.rotate,
 }
-KEYS = (("M", "handles: move, turn, none"),)
 
 
 def attach_gizmo(viewer: "Viewer") -> "Gizmo":
@@ -35,7 +34,6 @@ def attach_gizmo(viewer: "Viewer") -> "Gizmo":
     gizmo = Gizmo(viewer)
     viewer.hooks.takes.insert(0, gizmo.take)
     viewer.hooks.marks.append(gizmo.draw)
-    viewer.hooks.keys += KEYS
     return gizmo
 
 

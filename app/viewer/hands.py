@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import glfw
 import numpy as np
 
-from app.panels.camera_panel import keep_view, step_to_camera
+from app.panels.camera_panel import keep_view, move_camera, step_to_camera
+from app.viewer.arrange import step_stop, step_x
 from app.viewer.controls import FAST, SLOW, Push
 from app.viewer.window import DoubleClick, Drag, Drop, Event, KeyDown, Press, Release, Wheel, Window
 from scene.pick import Hit
@@ -13,6 +14,11 @@ from scene.pick import Hit
 if TYPE_CHECKING:
     from app.viewer.viewer import Viewer
 
+VIEWS = {  # of the numeric keypad, as Blender has them; the second with Ctrl
+    glfw.KEY_KP_1: ("front", "back"),
+    glfw.KEY_KP_3: ("right", "left"),
+    glfw.KEY_KP_7: ("top", "bottom"),
+}
 TURN = 0.006  # radians a logical pixel of mouse movement
 LOOK = 0.003
 
@@ -50,7 +56,7 @@ def take(viewer: "Viewer", event: Event) -> None:
 
 def press_key(viewer: "Viewer", event: KeyDown) -> None:
     """Keys that act once; the held ones are asked for in `push`."""
-    stage, camera = viewer.stage, viewer.camera
+    stage = viewer.stage
     match event.key:
         case glfw.KEY_N | glfw.KEY_P:
             step_to_camera(viewer, 1 if event.key == glfw.KEY_N else -1)
@@ -60,14 +66,17 @@ def press_key(viewer: "Viewer", event: KeyDown) -> None:
             viewer.leave_camera()
             press_key(viewer, event)
         case glfw.KEY_V:
-            camera.toggle_flying()
-        case glfw.KEY_F if event.shift:
-            camera.reset()
+            move_camera(viewer, "Fly")
         case glfw.KEY_F:
-            size = viewer.free_size()
-            camera.frame(stage.centre, stage.fit(viewer.view(), camera.fov_y, size))
+            move_camera(viewer, "First view" if event.shift else "Frame all")
+        case key if key in VIEWS:
+            viewer.leave_camera()
+            viewer.camera.look_from(VIEWS[key][event.ctrl])
         case glfw.KEY_SPACE:
             stage.toggle_play()
+        case glfw.KEY_LEFT | glfw.KEY_RIGHT:
+            direction = 1 if event.key == glfw.KEY_RIGHT else -1
+            (step_stop if event.shift else step_x)(stage, direction)
         case glfw.KEY_H | glfw.KEY_TAB:
             viewer.overlay = not viewer.overlay
         case glfw.KEY_F12:

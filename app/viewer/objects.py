@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from app.panels.objects_panel import draw_objects
 from app.viewer.adding import Adding
-from app.viewer.arrange import as_it_stands, copy_offset, edit, redo, undo
+from app.viewer.arrange import as_it_stands, copy_offset, edit, record_regions, redo, undo
 from app.viewer.gizmo import Gizmo, attach_gizmo
 from app.viewer.hands import point_at
 from app.viewer.saving import Saving, unsaved
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 
 KEYS = (
     ("click", "choose a thing"),
-    ("Ctrl+Z, Ctrl+Y", "undo, redo an edit"),
+    ("M", "handles: move, turn, none"),
     ("Ctrl+D, Delete", "copy, delete the chosen one"),
-    ("Ctrl+S", "save the scene; Shift: as"),
 )
 
 
@@ -44,9 +43,14 @@ def attach_objects(viewer: "Viewer") -> "Objects":
     hooks.opened.append(objects.forget)
     hooks.closing.append(objects.may_close)
     hooks.sections.append(
-        Section("Objects", lambda s: draw_objects(objects, s), above=True, opens=objects.opens)
+        Section(
+            "Objects",
+            lambda s: draw_objects(objects, s),
+            opens=objects.opens,
+            early=lambda: len(objects.stage.scene.objects) > 1,
+        )
     )
-    hooks.keys += KEYS
+    hooks.keys["Objects"] = list(KEYS)
     return objects
 
 
@@ -55,7 +59,7 @@ class Objects:
 
     def __init__(self, viewer: "Viewer") -> None:
         self.viewer = viewer
-        self.saving = Saving(viewer)
+        self.saving = Saving(viewer, viewer.own_files)
         self.gizmo: Gizmo = attach_gizmo(viewer)
         self.adding = Adding(viewer, self._count_changed)
         self._click: tuple[float, float] | None = None  # where a press was that may be a click
@@ -95,8 +99,7 @@ class Objects:
         self.viewer.window.close()
 
     def status(self) -> str:
-        document = self.stage.document
-        return "not saved" if self.unsaved or (document.path and document.edited) else ""
+        return "not saved" if self.unsaved else ""
 
     # ---- input
 
@@ -155,6 +158,7 @@ class Objects:
 
     def each_frame(self) -> bool:
         """The end of a drag, the title, what is being read; True while that goes on."""
+        record_regions(self.stage)
         if not imgui.is_mouse_down(0):
             self.stage.rest()
         title = (self.stage.title, self.unsaved)
@@ -173,7 +177,7 @@ class Objects:
         try:
             edit(stage, change(stage.document.file, *values), what, together)
         except ValueError as error:  # BadFile is one
-            self.viewer.say(str(error))
+            self.viewer.messages.fail(str(error))
             return False
         return True
 
@@ -252,6 +256,5 @@ class Objects:
 
     def draw_boxes(self, ui_scale: float) -> None:
         """The boxes that ask for a name, before something is lost, for what to add."""
-        if not self.stage.problem:  # which has a box of its own
-            self.saving.draw(ui_scale)
-            self.adding.draw(ui_scale)
+        self.saving.draw(ui_scale)
+        self.adding.draw(ui_scale)

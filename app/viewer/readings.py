@@ -67,4 +67,3 @@ class Readings:
     error_db: float | None = None  # of the picture as set against the exact one; None: not known
     error_is_old: bool = False  # view, x or setting have changed since
     stale_db: float | None = None  # of a kept order against a new one; None: the order is new
-    note: str = ""  # said for a few seconds at the upper edge

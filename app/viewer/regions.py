@@ -15,10 +15,11 @@ FIRST_SIZE = 0.25  # of the scene's radius: half a box's side, a sphere's radius
 FIRST_BORDER = 0.01  # of the scene's radius: on the way x may pass other stops, which shows
 LENS = 0.25  # tangent of half the lens' angle at first
 BRUSH = 24.0  # logical pixels, radius
+WORDS = {"painted": "paint", "x": "x of", "centre": "move", "name": "rename"}  # by what changes
 DEEP = 2.0  # brush radii behind the front: what lies deeper is another surface
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # the same only where nothing was edited: arrays are large
 class Region:
     """One region of one object; which of the sizes count depends on its kind."""
 
@@ -43,7 +44,8 @@ class Region:
 class Regions:
     """The list of regions, which of them is being edited, and what the mouse does to it.
 
-    `version` goes up with every edit, so that whoever depends on regions knows when they changed.
+    `version` goes up with every edit, so that whoever depends on regions knows when they changed;
+    `did` says in words what the last one was, "" where nobody edited: undoing passes over it.
     """
 
     def __init__(self, radius: float = 1.0) -> None:
@@ -54,6 +56,7 @@ class Regions:
         self.holding = False  # the mouse is down since such a click and moves the region
         self.brush = BRUSH
         self.version = 0
+        self.did, self.together = "", ""  # edits in a row that are `together` are one: a drag
 
     @property
     def current(self) -> Region | None:
@@ -79,7 +82,7 @@ class Regions:
         self.items = (*self.items, region)
         self.choose(len(self.items) - 1)
         self.placing = region.is_placed
-        self.version += 1
+        self._changed(f"add {region.name}" if kind != "lens" else "")
         return region
 
     def take(self, selectors: tuple[Selector, ...], index: int) -> None:
@@ -88,7 +91,7 @@ class Regions:
             region = region_of(selector, "", index)
             count = sum(other.kind == region.kind for other in self.items) + 1
             self.items = (*self.items, replace(region, name=f"{region.kind} {count}"))
-        self.version += 1
+        self._changed()
 
     def selectors(self, index: int, view: View) -> tuple[Selector, ...]:
         """Of the enabled regions of object `index`, in the list's order: a later one lies above."""
@@ -100,15 +103,43 @@ class Regions:
         """Whether any enabled region is a lens."""
         return any(region.kind == "lens" and region.enabled for region in self.items)
 
+    @property
+    def kept(self) -> tuple[Region, ...]:
+        """Those that are edited, saved and undone: a lens is nobody's but the eye's."""
+        return tuple(region for region in self.items if region.kind != "lens")
+
+    @property
+    def bytes(self) -> int:
+        """Of the mask that was painted last, which every stroke makes anew."""
+        region = self.current
+        return region.painted.nbytes if region is not None and region.painted is not None else 0
+
+    def restore(self, kept: tuple[Region, ...]) -> None:
+        """Other regions, as they were before or after some edit; a lens stays as it is."""
+        current = self.current
+        lenses = tuple(region for region in self.items if region.kind == "lens")
+        self.items = (*kept, *lenses)
+        names = [region.name for region in self.items]
+        self.choose(names.index(current.name) if current and current.name in names else -1)
+        self._changed()
+
     def remove(self, number: int) -> None:
+        gone = self.items[number]
         self.items = self.items[:number] + self.items[number + 1 :]
         self.choose(min(number, len(self.items) - 1))
-        self.version += 1
+        self._changed(f"remove {gone.name}" if gone.kind != "lens" else "")
 
     def clear(self) -> None:
         """Forgets all, for another scene."""
-        self.items, self.version = (), self.version + 1
+        self.items = ()
+        self._changed()
         self.choose(-1)
+
+    def _changed(self, did: str = "", together: str = "") -> None:
+        """Tells of a change; `did` is "" for one that nobody undoes: a lens, another scene."""
+        self.version += 1
+        if did:
+            self.did, self.together = did, together
 
     def renumber(self, moved: dict[int, int]) -> None:
         """The objects are others: index before -> index now; regions of one that is gone go."""
@@ -119,7 +150,7 @@ class Regions:
         self.items = tuple(after for _, after in kept)
         stays = [n for n, (before, _) in enumerate(kept) if before is current]
         self.choose(stays[0] if stays else -1)
-        self.version += 1
+        self._changed()
 
     def edit(self, number: int, **changes: object) -> None:
         """Changes fields of one region; `version` tells only when something is different."""
@@ -128,7 +159,9 @@ class Regions:
             return
         after = replace(before, **changes)
         self.items = (*self.items[:number], after, *self.items[number + 1 :])
-        self.version += 1
+        (word, *_) = [WORDS[name] for name in changes if name in WORDS] or ["edit"]
+        did = f"{word} {before.name}" if before.kind != "lens" else ""
+        self._changed(did, did)
 
     def place(self, point: np.ndarray, index: int, things: tuple[SceneObject, ...]) -> None:
         """Moves the chosen region to a world point (3,), into the object that was met there.
@@ -146,6 +179,7 @@ class Regions:
             painted = region.painted
             if region.index == index and painted is not None and len(painted) != count:
                 self.edit(number, painted=np.zeros(count, bool))
+                self.did = ""  # by nobody's hand
 
     def toggle_lens(self, thing: SceneObject) -> bool:
         """Switches the lens on or off, adding one the first time; returns whether it is on."""

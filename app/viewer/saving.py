@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.paths import plain
+from app.panels.question_box import answer_row, question_box
+from app.paths import is_bundled, plain
 from app.viewer.document import beside, stamp_of, with_regions
+from app.viewer.own_files import OwnFiles
 from scene.scene_file import ENDING, FAR_M, SceneFile
 from scene.write_scene_file import write_scene_file
 
@@ -16,17 +18,16 @@ if TYPE_CHECKING:
     from app.viewer.viewer import Viewer
 
 Vec = imgui.ImVec2
-FOLDER = "scenes"  # beside the folder of the pictures: where a first name is proposed
+OVER = "Over it"  # writes over the file that was opened
 SAVE, LOSE = "Save the scene", "Changes are not saved"
-WIDTH = 460.0  # logical pixels
 LONGEST_PATH = 1000
 
 
 class Saving:
     """What is asked now, and what is done once it has been answered."""
 
-    def __init__(self, viewer: "Viewer") -> None:
-        self._viewer = viewer
+    def __init__(self, viewer: "Viewer", own: OwnFiles) -> None:
+        self._viewer, self._own = viewer, own
         self._name = ""  # as it is typed; "" = the box is not open
         self._taken = False  # a file of that name is there, and nobody has said to replace it
         self._then: Callable[[], None] | None = None  # what waits for an answer
@@ -35,10 +36,16 @@ class Saving:
     def asking(self) -> bool:
         return bool(self._name) or self._then is not None
 
+    @property
+    def in_place(self) -> bool:
+        """Whether saving writes at once: over a file that this person has saved before."""
+        path = self._viewer.stage.document.path
+        return path is not None and self._own.has(path, self._viewer.stage.document.stamp)
+
     def save(self) -> bool:
-        """Writes to where it was opened or saved before, else asks where; True when it did."""
+        """Writes over what was saved before, else asks for a name; True when it did."""
         document = self._viewer.stage.document
-        if document.path is None:
+        if not self.in_place:
             self.ask_name()
             return False
         if document.stamp != stamp_of(document.path):  # somebody else has written it since
@@ -48,11 +55,16 @@ class Saving:
 
     def ask_name(self) -> None:
         """Opens the box that asks for a name; nothing that is there is replaced unasked."""
-        viewer = self._viewer
-        path = viewer.stage.document.path
-        if path is None:
-            path = viewer.options.pictures.parent / FOLDER / viewer.stage.document.name
-        self._name, self._taken = str(path), False
+        document = self._viewer.stage.document
+        folder = self._viewer.folders.scenes
+        path = document.path if self.in_place else free_path(folder / document.name)
+        self._name, self._taken = str(path.absolute()), False
+
+    @property
+    def original(self) -> Path | None:
+        """The file that was opened and that somebody else has made, where it may be replaced."""
+        path = self._viewer.stage.document.path
+        return None if path is None or self.in_place or is_bundled(path) else path
 
     def named(self, text: str, replace: bool = False) -> bool:
         """Saves under a name that was typed; a file that is there is asked about first."""
@@ -61,16 +73,22 @@ class Saving:
             return False
         if not path.name.lower().endswith(ENDING):
             path = path.with_name(path.name.removesuffix(".json") + ENDING)
-        document = self._viewer.stage.document
-        own = document.path is not None and path.absolute() == document.path.absolute()
-        untouched = own and document.stamp == stamp_of(path)
+        if is_bundled(path):
+            sentence = f"{path.name} came with the program; choose another folder for yours."
+            self._viewer.messages.fail(sentence)
+            return False
+        untouched = self._own.has(path, stamp_of(path)) and self._is_open(path)
         if path.exists() and not untouched and not replace:
             self._name, self._taken = str(path), True
             return False
         return self.write(path)
 
+    def _is_open(self, path: Path) -> bool:
+        document = self._viewer.stage.document
+        return document.path is not None and document.path.absolute() == path.absolute()
+
     def write(self, path: Path) -> bool:
-        """Writes the file; what is wrong is said in the box for problems."""
+        """Writes the file; what is wrong is said."""
         stage = self._viewer.stage
         document = stage.document
         try:
@@ -82,8 +100,15 @@ class Saving:
             stage.problem = f"{path.name} cannot be saved: {reason}."
             return False
         self._name = ""
+        path = path.absolute()
         document.path, document.stamp = path, stamp_of(path)
-        document.saved, document.saved_regions = document.file, stage.regions.version
+        try:
+            self._own.wrote(path, document.stamp)
+        except OSError as error:
+            self._viewer.messages.fail(
+                f"That this file is yours cannot be remembered: {error.strerror or error}."
+            )
+        document.saved, document.saved_regions = document.file, stage.regions.kept
         self._viewer.files.remember(path)
         self._viewer.say(f"Saved {path}")
         self._go_on()
@@ -118,10 +143,10 @@ class Saving:
     def draw(self, ui_scale: float) -> None:
         """Whichever box is open."""
         if self._name:
-            if box(SAVE, ui_scale):
+            if question_box(SAVE, ui_scale):
                 self._draw_name(ui_scale)
                 imgui.end_popup()
-        elif self._then is not None and box(LOSE, ui_scale):
+        elif self._then is not None and question_box(LOSE, ui_scale):
             self._draw_lose(ui_scale)
             imgui.end_popup()
 
@@ -138,10 +163,16 @@ class Saving:
             imgui.push_text_wrap_pos(0)
             imgui.text_unformatted(f"{Path(self._name).name} is there already.")
             imgui.pop_text_wrap_pos()
-        label = "Replace it" if self._taken else "Save"
-        clicked = answer_row((label, "Cancel"), ui_scale)
+        label, original = "Replace it" if self._taken else "Save", self.original
+        words = (label, "Cancel")
+        if original is not None and not self._taken:
+            imgui.text_disabled(f"{original.name} was not written by you here.")
+            words = (label, OVER, "Cancel")
+        clicked = answer_row(words, ui_scale)
         if clicked == label or (entered and not self._taken):
             self.named(self._name, replace=self._taken)
+        elif clicked == OVER:
+            self._name, self._taken = str(original.absolute()), True  # asked once more
         elif clicked == "Cancel":
             self.cancel_name()
         if not self._name:
@@ -159,34 +190,18 @@ class Saving:
             self.answer(clicked)
 
 
-def box(name: str, ui_scale: float) -> bool:
-    """Opens a box in the middle of the window; True while it is to be filled, then end_popup."""
-    if not imgui.is_popup_open(name):
-        imgui.open_popup(name)
-    screen = imgui.get_io().display_size
-    imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
-    imgui.set_next_window_size(Vec(min(WIDTH * ui_scale, screen.x * 0.9), 0))
-    flags = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_saved_settings
-    return imgui.begin_popup_modal(name, None, flags)[0]
-
-
-def answer_row(words: tuple[str, ...], ui_scale: float) -> str:
-    """Buttons; the word that was clicked, the last one for Escape, else ""."""
-    imgui.dummy(Vec(0, 4 * ui_scale))
-    clicked = ""
-    for number, word in enumerate(words):
-        if number:
-            imgui.same_line()
-        if imgui.button(word, Vec(110 * ui_scale, 0)):
-            clicked = word
-    return words[-1] if imgui.is_key_pressed(imgui.Key.escape, False) else clicked
+def free_path(path: Path) -> Path:
+    """The path, with the next free number where something is there."""
+    stem, count = path.name.removesuffix(ENDING), 1
+    while path.exists():
+        count += 1
+        path = path.with_name(f"{stem} {count}{ENDING}")
+    return path
 
 
 def unsaved(stage: "Stage") -> bool:
     """Whether something would be lost; a scene that is no file yet has no regions to lose."""
-    regions = stage.regions
-    painted = any(region.kind != "lens" for region in regions.items)
-    changed = painted and regions.version != stage.document.saved_regions
+    changed = stage.regions.kept != stage.document.saved_regions
     return stage.document.unsaved or (changed and stage.document.path is not None)
 
 

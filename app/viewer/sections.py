@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from app.viewer.layout import Box
+
 if TYPE_CHECKING:
     from app.viewer.shown import Wish
     from app.viewer.window import Event
@@ -16,16 +18,16 @@ class Section:
     name: str
     draw: Callable[[float], None]  # called with ui_scale between imgui.begin and end
     open_first: bool = False
-    above: bool = False  # under the title, before what is about frames
     opens: Callable[[], bool] | None = None  # True: unfold it now
     shown: Callable[[], bool] | None = None  # False: leave it out, there is nothing in it
+    early: Callable[[], bool] | None = None  # True: second from above now, whatever its name
 
 
 @dataclass
 class Hooks:
     """Lists that whoever adds to the viewer appends to, before or while it runs."""
 
-    sections: list[Section] = field(default_factory=list)  # after Regions, in this order
+    sections: list[Section] = field(default_factory=list)  # the panel knows their order by name
     top: list[Callable[[float], None]] = field(default_factory=list)  # under the title, ui_scale
     each_frame: list[Callable[[], bool]] = field(default_factory=list)
     # each_frame: called in every frame, in the window's thread, before the splats are drawn;
@@ -33,7 +35,11 @@ class Hooks:
     opened: list[Callable[[], None]] = field(default_factory=list)  # after every change of scene
     status: list[Callable[[], str]] = field(default_factory=list)  # short words for the status
     #                                                                line; "" = nothing to say
-    keys: list[tuple[str, str]] = field(default_factory=list)  # (key, what it does), under Keys
+    # keys: name of a group -> (key, what it does), on the sheet of keys
+    keys: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    # cards: called with the free part of the window and ui_scale; draws over it and returns where,
+    # None for nothing
+    cards: list[Callable[[Box, float], Box | None]] = field(default_factory=list)
     # over: called once the splats are on the screen, before the overlay, in every frame
     over: list[Callable[["Wish"], None]] = field(default_factory=list)
     # marks: called with ui_scale; over the picture, under the panel, not in saved pictures

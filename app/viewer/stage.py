@@ -7,34 +7,36 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.viewer.arrange import steer
+from app.viewer.arrange import record_regions, steer
 from app.viewer.bodies import Bodies
-from app.viewer.document import Document, document_from, first_stop
+from app.viewer.document import Document, document_from
+from app.viewer.first_look import FirstLook
+from app.viewer.messages import Messages
 from app.viewer.opened import Source
 from app.viewer.regions import Regions
+from app.viewer.scene_objects import origin_of, scene_of, stood_as, with_palette
+from app.viewer.split_state import SplitState
+from app.viewer.track import Grip
 from renderer.settings import DEBUG_VIEWS, RenderSettings
-from runtime_models.model import Finding, Model
+from runtime_models.model import Finding, Model, Stop
 from runtime_models.stop_weights import Control
+from scene import edits
 from scene.control import SHIFT_S, Shift, Sweep
-from scene.edits import free_name
 from scene.framing import (
     default_background,
-    default_view,
     fit_points,
     frame_points,
-    framing_view,
     scene_points,
 )
 from scene.pick import Hit, Picker
 from scene.pose import Pose, View, perspective
-from scene.scene import IDENTITY, Scene, SceneObject
-from scene.scene_file import first_view
+from scene.scene import Scene, SceneObject
+from scene.scene_file import SceneItem, named_stops
 
 if TYPE_CHECKING:
     from scene.world import World
 
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
-MOST_SLIDERS = 2  # at the lower edge; more would take the picture's place
 AS_FILED = ""  # the palette that the scene's own stops name
 
 
@@ -51,18 +53,23 @@ class Stage:
         self.bodies = Bodies()
         self._followed: Scene | None = None  # the world's, as it was taken over last
         self.chosen = ""  # name of the object that is edited; "": none
-        self.home: View | None = None  # the first look at the scene where a file gives one
+        self.steered = ""  # name of the object whose x a hand has moved last
+        self.grip = Grip()  # of the track that the mouse holds
+        self.most_sliders = 2  # that there is room for
+        self.split = SplitState()
+        self.first_look = FirstLook()
         self.sweeps: list[Sweep] = []
         self.shifts: dict[int, Shift] = {}  # of objects on their way to a stop, by their index
         self.settings = RenderSettings(background=BACKGROUND)
         self.palette = AS_FILED
         self.regions = Regions()
         self.measure_now = False  # compare the picture with the exact one in the next frame
-        self.problem = ""  # one sentence for the message box; "" = nothing is wrong
+        self.messages = Messages()
         self.centre, self.radius = np.zeros(3), 1.0
         self._points = (np.zeros((0, 3)), np.zeros(0))
         self._picker = Picker()
         self._shown: tuple = (None, None)  # what `shown` was made of, and what it was
+        self._movable: tuple[Scene | None, list[int]] = (None, [])
 
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
         """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
@@ -73,16 +80,17 @@ class Stage:
         self,
         sources: Sequence[Source],
         scene: Scene,
-        home: View | None = None,
+        first_look: FirstLook | None = None,
         document: Document | None = None,
     ) -> None:
         """Shows what has been opened; `scene` is `scene_of(sources)` or of the document's file."""
-        self.sources, self.home = tuple(sources), home
+        self.sources, self.first_look = tuple(sources), first_look or FirstLook()
         self.show(scene, document)
 
     def show(self, scene: Scene, document: Document | None = None) -> None:
         """Takes a scene over and frames it."""
         self.scene, self.chosen, self.shifts = scene, "", {}
+        self.split.on, self.split.name = False, ""
         self.document = document or document_from(scene, self.sources)
         self.bodies.forget()
         if scene.objects:
@@ -96,7 +104,13 @@ class Stage:
         self.reframe()
         self.regions.clear()
         self.regions.radius = self.radius
-        self.document.saved_regions = self.regions.version
+        self.keep_regions()
+
+    def keep_regions(self) -> None:
+        """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
+        self.regions.did = ""
+        record_regions(self)
+        self.document.saved_regions = self.regions.kept
 
     def reframe(self) -> None:
         """Where the middle of all is now, and how far it reaches."""
@@ -118,24 +132,13 @@ class Stage:
 
     def first_view(self, size: tuple[int, int]) -> View:
         """The view of a single package if it gives one, else everything framed."""
-        if self.home is not None:
-            return replace(self.home, tangents=perspective(self.home_fov_y, size), size=size)
-        if self.document.file.view is not None:
-            return first_view(self.document.file, self.scene, size)
-        if len(self.scene.objects) == 1:
-            return default_view(self.scene.objects[0].model, size)
-        return framing_view(*self._points, size)
+        return self.first_look.view(self.document.file, self.scene, self._points, size)
 
     @property
     def first_target(self) -> np.ndarray:
         """(3,) metres: what the first view looks at and turns about."""
         view = self.document.file.view
         return self.centre if view is None else np.array(view.target)
-
-    @property
-    def home_fov_y(self) -> float:
-        """Radians from top to bottom of the home view."""
-        return float(np.arctan(self.home.tangents[3]) - np.arctan(self.home.tangents[2]))
 
     @property
     def origin(self) -> np.ndarray:
@@ -260,21 +263,25 @@ class Stage:
         objects[index] = thing
         self.scene = Scene(tuple(objects))
 
-    def go_to_stop(self, number: int) -> None:
+    def go_to_stop(self, number: int, only: int | None = None) -> None:
         """Every object that has a stop of that number, counted from 0, goes straight there and
         rests; where it starts is there at once.
         """
-        self.rest()
-        for index, thing in enumerate(self.scene.objects):
-            stops = sorted(thing.model.stops, key=lambda stop: stop.x)
+        for index in range(len(self.scene.objects)) if only is None else [only]:
+            thing, stops = self.scene.objects[index], self.stops(index)
             if number >= len(stops):
                 continue
             self.sweeps[index].playing = False
             if (end := stops[number].x) != thing.x:
-                steer(self, index, end, f"stop {number + 1}")
+                steer(self, index, end)
                 self.set_x(index, thing.x)
                 self.shifts[index] = Shift(thing.x, end, thing.model.blend)
-        self.rest()
+
+    def stops(self, index: int) -> tuple[Stop, ...]:
+        """The stops of an object's slider, by x, under the names that the scene gives them."""
+        thing = self.scene.objects[index]
+        item = edits.find(self.document.file, thing.name)
+        return named_stops(item or SceneItem(name=thing.name, model=""), thing.model)
 
     def finish_shifts(self) -> None:
         """Objects on their way to a stop are there."""
@@ -312,14 +319,17 @@ class Stage:
     @property
     def movable(self) -> list[int]:
         """Indices of the objects that have somewhere to go: two stops or more."""
-        things = enumerate(self.scene.objects)
-        return [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+        if self._movable[0] is not self.scene:  # asked several times a frame, of many objects
+            things = enumerate(self.scene.objects)
+            found = [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+            self._movable = (self.scene, found)
+        return self._movable[1]
 
     @property
     def sliders(self) -> list[int]:
         """Of those, the ones that there is room for: all of a few, else the chosen one."""
         movable = self.movable
-        if len(movable) <= MOST_SLIDERS:
+        if len(movable) <= self.most_sliders:
             return movable
         chosen = self.chosen_index
         return [chosen if chosen in movable else movable[0]]
@@ -329,6 +339,19 @@ class Stage:
         """Where the chosen object is in the scene; None: none is."""
         names = [thing.name for thing in self.scene.objects]
         return names.index(self.chosen) if self.chosen in names else None
+
+    @property
+    def problem(self) -> str:
+        """The newest problem that nobody has taken away; "": nothing is wrong."""
+        return (self.messages.problems or [""])[-1]
+
+    @problem.setter
+    def problem(self, sentence: str) -> None:
+        """Tells another one; "" takes all away."""
+        if sentence:
+            self.messages.fail(sentence)
+        else:
+            self.messages.problems = []
 
     @property
     def playing(self) -> bool:
@@ -362,38 +385,9 @@ class Stage:
         """Whether any thermal stop is drawn through a palette at all."""
         return any(stop.palette for thing in self.scene.objects for stop in thing.model.stops)
 
-
-def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
-    """The scene of what has been opened: each at x or its first stop, in the first one's place."""
-    objects = []
-    for source in sources:
-        path, model = source.path, source.model
-        moved = origin_of(model) - origin_of(sources[0].model)
-        pose = Pose(moved, IDENTITY.wxyz) if moved.any() else IDENTITY
-        start = first_stop(model).x if x is None else x
-        name = path.name if path.is_dir() else path.stem
-        name = free_name({thing.name for thing in objects}, name)
-        objects.append(SceneObject(name, model, pose, x=start))
-    return Scene(tuple(objects))
-
-
-def stood_as(thing: SceneObject, other: SceneObject | None) -> SceneObject:
-    """The object where another of its name is; the very same where nothing differs."""
-    if other is None:
-        return thing
-    here, there = thing.world_from_object, other.world_from_object
-    same = (*here.position, *here.wxyz) == (*there.position, *there.wxyz)
-    if same and thing.x == other.x:
-        return thing
-    return replace(thing, world_from_object=there, x=other.x)
-
-
-def origin_of(model: Model) -> np.ndarray:
-    """(3,) metres that were taken off a model's places."""
-    return np.array(getattr(model, "origin", (0.0, 0.0, 0.0)), np.float64)
-
-
-def with_palette(model: Model, name: str) -> Model:
-    """The model with another palette on those thermal stops that have one."""
-    stops = [replace(stop, palette=name) if stop.palette else stop for stop in model.stops]
-    return replace(model, stops=tuple(stops))
+    @property
+    def has_legend(self) -> bool:
+        """Whether any thermal stop that may be seen has values to tell."""
+        seen = [thing for thing in self.scene.objects if thing.visible]
+        stops = [stop for thing in seen for stop in thing.model.stops]
+        return any(stop.palette and stop.value_range is not None for stop in stops)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import glfw
 
 from app.panels.touch_panel import draw_touch
+from app.paths import is_bundled
 from app.viewer.arrange import steer
 from app.viewer.hands import is_painting
 from app.viewer.sections import Section
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from app.viewer.desktop import Viewer
 
 HAND = "mouse"
+HOW, HOW_S = "Drag a thing. X shoots. T stops.", 9.0  # said once, for so many seconds
+STILL, MOVING = "things hold still: T lets them move", "drag a thing, X shoots, T stops"
 REMEMBERED = 6  # reactions that the panel lists
 WORDS = {"collision": "struck", "grab": "taken", "ray": "hit by a ray", "enter": "arrived"}
 KEYS = (
@@ -47,17 +50,15 @@ def attach_touch(viewer: "Viewer") -> "Touch":
     hooks.marks.append(touch.marks.draw)
     hooks.opened.append(touch.forget)
     hooks.status.append(touch.status)
-    hooks.sections.insert(  # first: its buttons stay where they are, whatever is chosen
-        0,
+    hooks.sections.append(
         Section(
             "Touch",
             lambda ui_scale: draw_touch(touch, ui_scale),
-            above=True,
             opens=touch.opens,
             shown=lambda: touch.world is not None,
-        ),
+        )
     )
-    hooks.keys += KEYS
+    hooks.keys["Touch"] = list(KEYS)
     return touch
 
 
@@ -97,14 +98,24 @@ class Touch:
     def meet(self, world: World) -> None:
         """The bodies of what was opened are there, or there anew on another floor."""
         if self._known is None:
-            self._unfold, world.paused = True, not self.viewer.options.play
+            self._unfold, world.paused = True, not self.opens_playing
+            if self.opens_playing:
+                self.viewer.say(HOW, HOW_S)
         self._known = world
+
+    @property
+    def opens_playing(self) -> bool:
+        """The scene that the program brings along is there to be touched, not edited."""
+        path = self.viewer.stage.document.path
+        return self.viewer.options.play or (path is not None and is_bundled(path))
 
     def status(self) -> str:
         """Words for the status line."""
         if self.held:
             return f"carrying {self.held}"
-        return "things hold still: T lets them move" if self.world and self.world.paused else ""
+        if self.world is None:
+            return ""
+        return STILL if self.world.paused else MOVING
 
     # ---- input
 
@@ -199,7 +210,7 @@ class Touch:
         """Lets things move, or holds them still."""
         self.let_go()
         self.world.paused = not self.world.paused
-        self.viewer.say("Things hold still" if self.world.paused else "Things move")
+        self.viewer.say("Things hold still. T lets them move." if self.world.paused else HOW)
 
     def step(self) -> None:
         """One step by hand; things hold still after it."""
@@ -237,6 +248,8 @@ class Touch:
         world, viewer = self.world, self.viewer
         if world is None:
             self.hand = None
+            if viewer.stage.bodies.busy and self.opens_playing:
+                viewer.say("Getting things ready to be touched \u2026")
             return False
         if world is not self._known:
             self.meet(world)

@@ -9,20 +9,30 @@ import numpy as np
 from app.panels.camera_panel import KeptViews, attach_cameras
 from app.panels.export_panel import attach_export
 from app.panels.legend_panel import draw_legend
-from app.panels.panel import draw_note, draw_panel, draw_problem, free_area
+from app.panels.look_panel import draw_look
+from app.panels.panel import draw_panel
+from app.panels.performance_panel import draw_performance
+from app.panels.regions_panel import draw_regions
 from app.panels.scale_bar import draw_scale_bar
 from app.panels.slider import draw_slider_bar
 from app.panels.status_line import draw_status
+from app.panels.stops_panel import draw_stops
+from app.paths import WorkFolders
 from app.viewer.bodies import attach_bodies
-from app.viewer.controls import SMOOTH_S
+from app.viewer.controls import EVERYTHING, FIRST, SMOOTH_S
 from app.viewer.dial import FLOOR_DB, TARGET_MS, Dial
 from app.viewer.files import Files, first_camera
+from app.viewer.framed import Framed
 from app.viewer.hands import is_erasing, is_painting, push, take
+from app.viewer.layout import Layout, lay_out
 from app.viewer.objects import attach_objects
 from app.viewer.outlines import draw_brush, draw_outlines
+from app.viewer.own_files import OwnFiles
 from app.viewer.pictures import write_numbered_png, write_png
 from app.viewer.readings import Readings
-from app.viewer.sections import Hooks
+from app.viewer.sections import Hooks, Section
+from app.viewer.settings import Settings
+from app.viewer.shell import Shell
 from app.viewer.shown import Shown, Wish
 from app.viewer.stage import Stage
 from app.viewer.stepping import Steps
@@ -37,9 +47,9 @@ if TYPE_CHECKING:
     from app.viewer.desktop import Options
 
 WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
-NOTE_S = 3.0  # how long a note stays
 SLEEP_S = 0.5  # longest wait for input while nothing moves
 POLL_S = 0.03  # the same while a thread works at something that the window waits for
+MOST_SLIDERS, LOW_WINDOW = 2, 420.0  # at the lower edge; one in a window lower than so many units
 LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took long
 
 
@@ -47,11 +57,17 @@ class Viewer:
     """One window, one renderer, one stage, one camera, and the loop that ties them."""
 
     def __init__(
-        self, window: Window, renderer: Renderer, stage: Stage, options: "Options"
-    ) -> None:
+        self, window: Window, renderer: Renderer, stage: Stage, options: "Options",
+        settings: Settings | None = None, own_files: OwnFiles | None = None,
+    ) -> None:  # fmt: skip
         self.window, self.renderer, self.stage, self.options = window, renderer, stage, options
         self.overlay = options.panel
+        self.settings = settings or Settings()  # of the program; stage.settings are the picture's
+        self.messages = stage.messages
+        self.folders = WorkFolders.of(options.pictures)
+        self.own_files = own_files or OwnFiles()
         self.hooks = Hooks()
+        self.shell = Shell(window, self.settings, self.messages, time.perf_counter)
         self._polling = False  # a hook waits for something that is under way
         names = describe(window.ctx) | renderer.backends
         self.readings = Readings(
@@ -61,7 +77,7 @@ class Viewer:
         self._free = self._free_wanted()  # where the picture's middle is; follows the overlay
         self.camera = first_camera(self)
         self.steps = Steps()
-        self.kept = KeptViews(options.pictures)
+        self.kept = KeptViews(self.folders.pictures)
         self.files = Files(self)
         attach_bodies(self)
         self.objects = attach_objects(self)
@@ -74,7 +90,11 @@ class Viewer:
             options.floor_db or FLOOR_DB,
             wanted=(options.target_ms or options.floor_db) is not None,
         )
-        self._note_until = 0.0
+        self._add_sections()
+        self._framed = Framed(self.free_size, self._refit)
+        self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
+        self.hooks.opened.append(self._framed.forget)
+        self.hooks.takes.insert(0, self.shell.take)
         self.seconds = 0.0  # that the frame which is under way lets pass
         self.frames = 0  # drawn since the window opened
         self._overlay_ms = 0.0
@@ -93,7 +113,8 @@ class Viewer:
                 continue
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
-            if busy or redraw or self._polling or self._note_ends(now) or self._idle_work_due(now):
+            due = self.messages.ended(now) or self._idle_work_due(now)
+            if busy or redraw or self._polling or due:
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
@@ -108,6 +129,7 @@ class Viewer:
     def frame(self, seconds: float) -> None:
         """One frame of the window: `seconds` have passed since the last one."""
         start, self.seconds = time.perf_counter(), seconds
+        self.messages.ended(start)
         for event in self.window.begin_frame():
             self.take(event)
         self.stage.advance(seconds)
@@ -141,10 +163,28 @@ class Viewer:
         """Opens files and folders, scenes or cameras, while the window goes on."""
         self.files.open_soon(paths)
 
-    def say(self, text: str) -> None:
+    def say(self, text: str, seconds: float | None = None) -> None:
         """Shows a note for a few seconds, longer for more lines; "" takes it away."""
-        self.readings.note = text
-        self._note_until = time.perf_counter() + NOTE_S * (1 + text.count("\n"))
+        self.messages.say(text, time.perf_counter(), seconds)
+
+    def _add_sections(self) -> None:
+        """What of the panel needs no more than the stage and what was measured."""
+        stage, dial, readings = self.stage, self.dial, self.readings
+        asked = dial.wanted
+        self.hooks.sections += [
+            Section("Stops", lambda scale: draw_stops(stage, scale), open_first=True),
+            Section("Look", lambda scale: draw_look(stage, scale), open_first=True),
+            Section(
+                "Regions",
+                lambda scale: draw_regions(stage, scale),
+                open_first=bool(stage.regions.items),
+            ),
+            Section(
+                "Performance",
+                lambda scale: draw_performance(stage, dial, readings, scale),
+                open_first=asked,
+            ),
+        ]
 
     def _busy(self) -> bool:
         """Whether the next frame is due without waiting for input."""
@@ -154,13 +194,20 @@ class Viewer:
         first = self.frames < WARM_UP
         return self._moving or waiting or sliding or measuring or first
 
+    @property
+    def layout(self) -> Layout:
+        """Where the parts of the overlay lie now, logical pixels."""
+        window, stage = self.window, self.stage
+        size, scale = window.logical_size, window.ui_scale
+        stage.most_sliders = MOST_SLIDERS if size[1] >= LOW_WINDOW * scale else 1
+        rows, wanted = len(stage.sliders), self.settings.panel_open
+        both = stage.split.on
+        return lay_out(size, scale, rows, stage.has_legend, wanted, self.overlay, both)
+
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
         window = self.window
-        pixels = window.ui_scale * window.size[0] / max(window.logical_size[0], 1)
-        if not self.overlay:
-            return np.array([0.0, 0.0, *window.size])
-        return np.array(free_area(window.size, len(self.stage.sliders), pixels))
+        return np.array(self.layout.free) * window.size[0] / max(window.logical_size[0], 1)
 
     def _follow_overlay(self, seconds: float) -> None:
         """The picture moves over when the overlay comes or goes, in the same soft way."""
@@ -190,16 +237,19 @@ class Viewer:
             self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
             self.steps.leave()
 
+    def _refit(self, size: tuple[int, int]) -> None:
+        """The free part has another size: what no hand has moved is fitted into it."""
+        if self.steps.standing:
+            return
+        if self.camera.framed == FIRST and self.stage.first_look.home is None:
+            self.camera.come_home(self.stage.first_view(size))
+        elif self.camera.framed == EVERYTHING:
+            distance = self.stage.fit(self.view(), self.camera.fov_y, size)
+            self.camera.frame(self.stage.centre, distance)
+
     def free_size(self) -> tuple[int, int]:
         left, top, right, bottom = self._free_wanted()
         return int(right - left), int(bottom - top)
-
-    def _note_ends(self, now: float) -> bool:
-        """True once when the note's time is over; it is taken away then."""
-        over = bool(self.readings.note) and now >= self._note_until
-        if over:
-            self.readings.note = ""
-        return over
 
     def _wish(self) -> Wish:
         """What the screen should show now."""
@@ -246,25 +296,29 @@ class Viewer:
         return fresh
 
     def _draw_overlay(self) -> None:
-        scale = self.window.ui_scale
+        scale, stage, layout = self.window.ui_scale, self.stage, self.layout
         self.readings.flying = self.camera.flying
         covered = []
-        free = free_area(self.window.logical_size, len(self.stage.sliders), scale)
-        left = free[0] if self.overlay else 0.0
         if not self.save_picture:
             self._draw_marks(scale)
         if self.overlay:
-            draw_scale_bar(self.stage.scene, scale)
-            debug, stats = self.stage.settings.debug, self.readings.stats
-            draw_legend(debug_legend(debug, stats), left, scale)
+            right = stage.split.right(stage.scene) if stage.split.on else stage.scene
+            for scene, box in ((stage.scene, layout.left_legend), (right, layout.legend)):
+                if box is not None:
+                    draw_scale_bar(scene, box, scale)
+            debug, stats = stage.settings.debug, self.readings.stats
+            draw_legend(debug_legend(debug, stats), layout.free, scale)
+            hooks, words = self.hooks, [words() for words in self.hooks.status]
             covered = [
-                draw_panel(self.stage, self.dial, self.readings, scale, self.hooks),
-                draw_slider_bar(self.stage, left, scale),
-                draw_status(self.stage, [words() for words in self.hooks.status], scale),
+                draw_panel(
+                    stage.title, hooks.sections, hooks.top, self.shell.actions, layout, scale
+                ),
+                draw_slider_bar(stage, layout.bar, scale),
+                draw_status(stage, words, layout.status, scale),
+                *[box for draw in hooks.cards if (box := draw(layout.free, scale)) is not None],
             ]
-        if not self.save_picture:  # a note is no part of a picture
-            draw_note(self.readings.note, left, scale)
-        draw_problem(self.stage, scale)
+        if not self.save_picture:  # what is said is no part of a picture
+            covered += self.shell.draw(layout.free, self.hooks.keys, scale)
         self.window.covered = tuple(covered)
 
     def _draw_marks(self, scale: float) -> None:
@@ -303,5 +357,5 @@ class Viewer:
             write_png(self.window.picture(), self.options.screenshot)
         if self.save_picture:
             self.save_picture = False
-            path = write_numbered_png(self.window.picture(), self.options.pictures)
+            path = write_numbered_png(self.window.picture(), self.folders.pictures)
             self.say(f"Saved {path}")

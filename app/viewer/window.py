@@ -13,6 +13,8 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from app.panels import theme
 from app.paths import plain
+from app.viewer.monitor import grow_window, monitor_height
+from app.viewer.settings import default_text_size
 from renderer.context import NoContext
 
 BUTTONS = {0: "left", 1: "right", 2: "middle"}
@@ -43,7 +45,8 @@ TEXT_KEYS = {  # what typing a number into a slider needs
     glfw.KEY_Y: imgui.Key.y,
     glfw.KEY_Z: imgui.Key.z,
 }
-SHORTCUTS = ("z", "y", "s", "d")  # with Ctrl, by what is printed on the key
+SHORTCUTS = ("z", "y", "s", "d", "o", "+", "=", "-", "0")  # with Ctrl, as printed on the key
+REPEATING = (glfw.KEY_LEFT, glfw.KEY_RIGHT)  # held down they go on
 MOVING = (glfw.KEY_W, glfw.KEY_A, glfw.KEY_S, glfw.KEY_D, glfw.KEY_Q, glfw.KEY_E)
 
 
@@ -52,6 +55,7 @@ class KeyDown:
     key: int  # glfw.KEY_*: the physical key, named after what is printed there on a US keyboard
     shift: bool
     shortcut: str = ""  # one of SHORTCUTS, with Ctrl: the letter that is printed on the key
+    ctrl: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,16 +104,17 @@ class Window:
     `events` is what the scene gets: input that the overlay wants for itself is not in it.
     """
 
-    def __init__(self, title: str, size: tuple[int, int]) -> None:
+    def __init__(self, title: str, size: tuple[int, int], text_size: float | None = None) -> None:
         self._window = _open(title, size)
         self._handle = self._window._window  # moderngl-window keeps glfw's own handle private
         self._window.exit_key = None  # Escape belongs to the overlay
         self.ctx: moderngl.Context = self._window.ctx
         self._imgui = imgui.create_context()
         imgui.get_io().set_ini_filename("")  # leaves no imgui.ini behind
-        density = self._window.pixel_ratio
-        self.ui_scale = max(1.0, glfw.get_window_content_scale(self._handle)[0] / density)
-        theme.apply(self.ui_scale, density)
+        self._chosen_size = text_size  # None: by the monitor
+        self._monitor_size = self._size_for_monitor()
+        theme.apply(self.ui_scale, self._window.pixel_ratio)
+        self._restyle = False  # the next frame's type has another size
         self._overlay = ModernGLRenderer(wnd=None, ctx=self.ctx, display_size=self.logical_size)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
         self._popup = False  # a list or a box is open, and the next click is for it
@@ -137,9 +142,40 @@ class Window:
         return self._window.buffer_size
 
     @property
+    def ui_scale(self) -> float:
+        """Logical pixels a unit of the overlay: what the desktop asks for, times the text size."""
+        return self._desktop_scale * self.text_size
+
+    @property
+    def _desktop_scale(self) -> float:
+        """What is set for the monitor; where input is in finer units already (macOS), 1."""
+        content = glfw.get_window_content_scale(self._handle)[0]
+        return max(1.0, content / self._window.pixel_ratio)
+
+    @property
+    def text_size(self) -> float:
+        """1: as large as the desktop asks for."""
+        return self._chosen_size or self._monitor_size
+
+    @text_size.setter
+    def text_size(self, size: float | None) -> None:
+        """None: as the monitor asks for."""
+        self._chosen_size, self._restyle = size, True
+        self._note()
+
+    def _size_for_monitor(self) -> float:
+        """What the monitor under the window asks for, where nobody has chosen a size."""
+        high_px, high_mm = monitor_height(self._handle)
+        return default_text_size(high_px / self._window.pixel_ratio, high_mm, self._desktop_scale)
+
+    @property
     def logical_size(self) -> tuple[int, int]:
         """What input and overlay are measured in."""
         return self._window.size
+
+    def grow_with_text(self) -> None:
+        """A window as much larger as its text is, in the middle of its monitor."""
+        grow_window(self._handle, self.text_size)
 
     @property
     def closing(self) -> bool:
@@ -188,6 +224,10 @@ class Window:
 
     def begin_frame(self) -> list[Event]:
         """Starts an overlay frame; returns the input since the last one that is for the scene."""
+        if self._restyle:
+            self._restyle = False
+            theme.apply(self.ui_scale, self._window.pixel_ratio)
+            self._overlay.refresh_font_texture()
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*self.logical_size)
         density = self._window.pixel_ratio
@@ -200,6 +240,8 @@ class Window:
             io.add_key_event(modifier, down)
         self._unsettled = max(self._unsettled - 1, 0)
         imgui.new_frame()
+        if self._popup and imgui.is_key_pressed(imgui.Key.escape, False):
+            imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
         events, self._raw = self._raw, []
         return events
 
@@ -235,6 +277,7 @@ class Window:
         glfw.set_drop_callback(handle, self._on_drop)
         glfw.set_window_refresh_callback(handle, lambda _: self._note())
         glfw.set_framebuffer_size_callback(handle, lambda *_: self._note())
+        glfw.set_window_content_scale_callback(handle, self._on_content_scale)
 
     def _note(self, event: Event | None = None) -> None:
         self._unsettled = SETTLE_FRAMES
@@ -248,14 +291,19 @@ class Window:
             io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
         if action == glfw.RELEASE:
             self._chorded.discard(key)
-        if action != glfw.PRESS or io.want_text_input:
+        if action == glfw.RELEASE or io.want_text_input:
+            return
+        if action == glfw.REPEAT and key not in REPEATING:
             return
         if key == glfw.KEY_F11:
             self._window.fullscreen = not self._window.fullscreen
+        if key == glfw.KEY_ESCAPE and self._popup:
+            return  # for what is open
         shortcut = self._shortcut(key, scancode, mods)
         if shortcut:
             self._chorded.add(key)
-        self._note(KeyDown(key, bool(mods & glfw.MOD_SHIFT), shortcut))
+        ctrl = bool(mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER))
+        self._note(KeyDown(key, bool(mods & glfw.MOD_SHIFT), shortcut, ctrl))
 
     def _shortcut(self, key: int, scancode: int, mods: int) -> str:
         """The letter of a shortcut; "" while keys are held to move, where Ctrl means slowly."""
@@ -305,6 +353,12 @@ class Window:
     def _on_scroll(self, handle, dx: float, dy: float) -> None:
         imgui.get_io().add_mouse_wheel_event(dx, dy)
         self._note(None if self._over_overlay(*self._cursor) else Wheel(dy))
+
+    def _on_content_scale(self, handle, x: float, y: float) -> None:
+        """The desktop's scale has changed, or the window has gone to another monitor."""
+        self._monitor_size = self._size_for_monitor()
+        self._restyle = True
+        self._note()
 
     def _on_drop(self, handle, paths: list[str]) -> None:
         self._note(Drop(tuple(map(plain, paths))))

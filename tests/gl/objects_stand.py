@@ -13,6 +13,7 @@ from app.viewer.files import opened_scene
 from app.viewer.opened import Found, Source, read_files
 from app.viewer.outlines import pixels
 from app.viewer.stage import Stage
+from app.viewer.touch import Touch
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.write_ply import write_ply
 from scene.camera_list import CameraReading
@@ -43,8 +44,17 @@ def viewer_of(window, found: Found, folder: Path) -> Viewer:
 
 
 @pytest.fixture
-def touch_viewer(window, touch_found, tmp_path):
-    """The touch scene, its world there, things holding still."""
+def touch_viewer(window, touch_found, tmp_path, monkeypatch):
+    """The touch scene, its world there, things holding still as in a scene of one's own."""
+    monkeypatch.setattr(Touch, "opens_playing", False)
+    viewer = viewer_of(window, touch_found, tmp_path)
+    yield viewer
+    release(viewer)
+
+
+@pytest.fixture
+def playing_viewer(window, touch_found, tmp_path):
+    """The touch scene as the program opens it."""
     viewer = viewer_of(window, touch_found, tmp_path)
     yield viewer
     release(viewer)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from camera_files import NAMES, assert_same, cameras
 from desktop_stand import run_frames, until_opened
+from widgets import Widgets
 
 from app.viewer.recent import RecentFiles
 from app.viewer.window import Drag, Drop, KeyDown, Wheel
@@ -36,7 +37,7 @@ def dropped(viewer, tmp_path):
     path = tmp_path / "ansichten ä.json"
     write_cameras(cameras(), path, "ours")
     viewer.take(Drop((path,)))
-    assert "ansichten ä.json" in viewer.readings.note
+    assert "ansichten ä.json" in viewer.messages.note
     until_opened(viewer)
     run_frames(viewer, 30)
     return viewer
@@ -92,7 +93,7 @@ def test_keys_that_move_leave_a_camera(dropped, key):
 
 def test_without_cameras_n_says_so(viewer):
     press(viewer, glfw.KEY_N)
-    assert "no cameras" in viewer.readings.note and not viewer.steps.standing
+    assert "no cameras" in viewer.messages.note and not viewer.steps.standing
 
 
 def test_k_keeps_views_in_one_file_of_this_start(dropped):
@@ -107,7 +108,7 @@ def test_k_keeps_views_in_one_file_of_this_start(dropped):
     viewer.take(Drag("left", 50, 4))
     run_frames(viewer, 60)
     press(viewer, glfw.KEY_K)
-    assert "views-0002.ours.json" in viewer.readings.note
+    assert str((folder / "views-0002.ours.json").absolute()) in viewer.messages.note
     kept = read_camera_list(folder / "views-0002.ours.json").views
     assert_same(kept[:2], cameras().views[:2])
     left, right, low, high = kept[2].tangents
@@ -120,7 +121,7 @@ def test_k_keeps_views_in_one_file_of_this_start(dropped):
     assert len(read_camera_list(folder / "views-0002").views) == 4
     viewer.kept.form = "nerfstudio"  # which cannot hold pictures of several sizes
     press(viewer, glfw.KEY_K)
-    assert "camera path cannot" in viewer.readings.note and len(viewer.kept.views) == 4
+    assert "camera path cannot" in viewer.stage.problem and len(viewer.kept.views) == 4
     assert (folder / "views-0001.ours.json").read_text() == "mine"
 
 
@@ -151,7 +152,8 @@ def test_a_floor_beside_a_scene_is_stood_on(viewer, tmp_path):
     )
 
 
-def test_recent_files_are_kept_and_offered(viewer, tmp_path):
+def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
+    widgets = Widgets(monkeypatch)
     viewer.files.recent = RecentFiles.read(tmp_path / "settings")
     scene, gone = tmp_path / "one.shift", tmp_path / "gone.shift"
     for path in (gone, scene):
@@ -161,12 +163,12 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path):
     assert viewer.files.recent.paths == (scene, gone)
     before = viewer.stage.scene
     gone.unlink()
-    left, top, *_ = viewer.window.covered[0]
-    click(viewer, left + 100, top + 44)  # on the button
+    run_frames(viewer, 2)
+    click(viewer, *widgets.middle("Recent"))
     assert viewer.window._popup  # the list is open
-    click(viewer, left + 60, top + 90)  # the second, which is not there any more
+    click(viewer, *widgets.middle("gone.shift"))  # which is not there any more
     assert not viewer.files.busy and viewer.window._popup
-    click(viewer, left + 60, top + 72)  # the first
+    click(viewer, *widgets.middle("one.shift"))
     until_opened(viewer)
     assert viewer.stage.scene.objects[0].name == "one" and not viewer.stage.problem
     assert viewer.stage.scene is not before
@@ -180,7 +182,7 @@ def test_a_list_that_cannot_be_kept_is_said_once(viewer, tmp_path):
     blocked.write_bytes(b"")
     viewer.files.recent = RecentFiles.read(blocked)
     viewer.files.remember(Path("a"))
-    assert "cannot be kept" in viewer.readings.note and viewer.files.recent is None
+    assert "cannot be kept" in viewer.stage.problem and viewer.files.recent is None
 
 
 def test_the_status_line_is_there_with_the_overlay(viewer):

@@ -39,7 +39,7 @@ def test_every_format_is_written_and_said(viewer, panel, writer):
     finish(viewer, panel)
     (path,) = exported(viewer)
     assert path.name == f"ball-x0.00{writer.ending}"
-    assert path.name in viewer.readings.note and "splats" in viewer.readings.note
+    assert path.name in viewer.messages.note and "splats" in viewer.messages.note
     assert len(read_plain(path).means) == len(ball().means)
 
 

@@ -13,7 +13,8 @@ from test_streamed import random_sog, rewrite, write_streamed
 from app.viewer.desktop import Options, Viewer
 from app.viewer.opened import Source
 from app.viewer.refine import Refiner, attach_refiner
-from app.viewer.stage import Stage, scene_of
+from app.viewer.scene_objects import scene_of
+from app.viewer.stage import Stage
 from renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures display and window

@@ -125,12 +125,13 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     key(viewer, glfw.KEY_DELETE)
     assert names(viewer) == [*NAMES[:2], "ball", "ring", "plate"] or viewer.stage.chosen == ""
     assert not objects.edit(edits.rename, "ball", "cube", what="rename")
-    assert "taken" in viewer.readings.note
+    assert "taken" in viewer.stage.problem
+    key(viewer, glfw.KEY_ESCAPE)
     while viewer.stage.document.history.undoes:
         key(viewer, glfw.KEY_Z, CTRL)
     assert names(viewer) == NAMES and list(viewer.stage.world.things) == NAMES
     key(viewer, glfw.KEY_Z, CTRL)
-    assert "Nothing" in viewer.readings.note
+    assert "Nothing" in viewer.messages.note
 
 
 def test_objects_are_added_by_dropping_while_the_box_is_open(viewer, tmp_path):

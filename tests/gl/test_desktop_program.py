@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from desktop_stand import ball
 from PIL import Image
+from Xlib import Xatom
+from Xlib.display import Display
 
 from app.viewer.window import Window
 from renderer.context import NoContext
@@ -67,6 +69,32 @@ def test_screenshot_of_the_whole_window(display, scene_file, tmp_path):
     panel = np.abs(picture[:500, :290] - ACCENT).max(axis=2) < 12
     assert panel.sum() > 40  # the title and the bars of the passes
     assert out.parent.exists() and [p.name for p in out.parent.iterdir()] == ["window.png"]
+
+
+@pytest.mark.parametrize("percent", [100, 150, 200])
+def test_a_desktop_that_is_scaled_has_the_same_window_in_more_pixels(
+    display, scene_file, tmp_path, percent
+):
+    """By Xft.dpi, as desktops on X11 say it: the ball is in the middle of what is free."""
+    out = tmp_path / "window.png"
+    screen = Display(display)
+    text = f"Xft.dpi:\t{96 * percent / 100:.0f}\n".encode()
+    root = screen.screen().root
+    try:
+        root.change_property(Xatom.RESOURCE_MANAGER, Xatom.STRING, 8, text)
+        screen.sync()
+        done = start(display, "view", scene_file, "--screenshot", out, "--size", "800x600")
+    finally:
+        root.delete_property(Xatom.RESOURCE_MANAGER)
+        screen.close()
+    assert done.returncode == 0, done.stderr
+    picture = np.asarray(Image.open(out)).astype(int)
+    assert picture.shape[:2] == (600 * percent // 100, 800 * percent // 100)
+    green = (picture[..., 1] > 120) & (picture[..., 0] < 90) & (picture[..., 2] < 90)
+    rows, columns = np.nonzero(green)
+    scale = percent / 100
+    assert columns.mean() / scale == pytest.approx((292 + 800) / 2, abs=8)
+    assert rows.mean() / scale == pytest.approx((600 - 24) / 2, abs=8)
 
 
 def test_any_name_and_a_file_of_cameras(display, scene_file, tmp_path):

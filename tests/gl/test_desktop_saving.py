@@ -6,9 +6,12 @@ import glfw
 import numpy as np
 import pytest
 from desktop_stand import ball, run_frames, until_opened
-from objects_stand import CTRL, NAMES, SHIFT, TOUCH, key, names
+from objects_stand import CTRL, NAMES, SHIFT, TOUCH, button, key, mouse, names
+from real_hands import RealHands
+from widgets import Widgets
 
 from app.viewer.arrange import steer
+from app.viewer.document import stamp_of
 from app.viewer.opened import read_files
 from scene import edits
 from scene.camera_list import CameraReading
@@ -27,16 +30,83 @@ def plain(splats_viewer):
     return splats_viewer
 
 
-def test_ctrl_s_does_not_move_the_camera_and_asks_nothing_for_an_opened_file(viewer, tmp_path):
-    before = TOUCH.read_bytes()
-    viewer.stage.document.path = tmp_path / "own.scene.json"
-    viewer.stage.document.stamp = ()
+def test_what_the_program_brought_along_is_never_written_over(viewer, tmp_path, display):
+    """Ctrl+S by the keyboard itself: a name is asked for, and the one proposed is one's own."""
+    before = {path: path.read_bytes() for path in TOUCH.parent.rglob("*") if path.is_file()}
     view = viewer.view().eye_from_world()
-    key(viewer, glfw.KEY_S, CTRL)
-    run_frames(viewer, 30)
+    viewer.stage.chosen = "ball"
+    viewer.objects.delete()
+    with RealHands(viewer, display) as hands:
+        hands.key("s", "Control_L")
+        assert viewer.objects.saving.asking
+        hands.key("Return")  # the proposed name
+    wanted = tmp_path / "scenes" / "touch.scene.json"
+    assert not viewer.objects.saving.asking and not viewer.objects.unsaved
+    assert str(wanted) in viewer.messages.note  # absolute
+    assert [item.name for item in read_scene_file(wanted).items] == ["cube", "ring", "plate"]
     np.testing.assert_array_equal(viewer.view().eye_from_world(), view)
-    assert [item.name for item in read_scene_file(tmp_path / "own.scene.json").items] == NAMES[1:]
+    after = {path: path.read_bytes() for path in TOUCH.parent.rglob("*") if path.is_file()}
+    assert after == before
+    again = read_files([wanted], None, CameraReading(), lambda *_: None)
+    assert len(again.sources) == 4  # what it names is found from there
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_a_name_among_what_the_program_brought_along_is_refused(viewer, tmp_path, link):
+    before, path = TOUCH.read_bytes(), TOUCH
+    if link:
+        path = tmp_path / "mine.scene.json"
+        path.symlink_to(TOUCH)
+    viewer.objects.saving.ask_name()
+    assert not viewer.objects.saving.named(str(path), replace=True)
+    assert "came with the program" in viewer.stage.problem and viewer.objects.saving.asking
     assert TOUCH.read_bytes() == before
+    viewer.objects.saving.cancel_name()
+
+
+def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
+    saving, document = viewer.objects.saving, viewer.stage.document
+    path = tmp_path / "own.scene.json"
+    assert not saving.in_place and saving.named(str(path)) and saving.in_place
+    viewer.stage.chosen = "ball"
+    viewer.objects.delete()
+    key(viewer, glfw.KEY_S, CTRL)
+    assert not saving.asking and not viewer.objects.unsaved
+    assert [item.name for item in read_scene_file(path).items] == ["cube", "ring", "plate"]
+    other = tmp_path / "other.scene.json"  # as somebody has sent it, and as it was opened
+    other.write_bytes(path.read_bytes())
+    document.path, document.stamp = other, stamp_of(other)
+    assert saving.original == other
+    key(viewer, glfw.KEY_S, CTRL)
+    assert saving.asking and other.read_bytes() == path.read_bytes()
+    assert saving._name == str(tmp_path / "scenes" / "other.scene.json")
+    saving.cancel_name()
+
+
+def test_a_file_that_was_opened_is_replaced_when_it_is_said_twice(viewer, tmp_path, monkeypatch):
+    saving, document, widgets = viewer.objects.saving, viewer.stage.document, Widgets(monkeypatch)
+    path = tmp_path / "theirs.scene.json"
+    path.write_text("{}")
+    document.path, document.stamp = path, stamp_of(path)
+    key(viewer, glfw.KEY_S, CTRL)
+    run_frames(viewer, 3)
+    for word in ("Over it", "Replace it"):
+        assert path.read_text() == "{}"
+        mouse(viewer, *widgets.middle(word))
+        button(viewer, True)
+        button(viewer, False)
+        run_frames(viewer, 3)
+    assert json.loads(path.read_text())["objects"] and not saving.asking
+
+
+def test_a_proposed_name_is_free(plain, tmp_path):
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    for name in ("ball.scene.json", "ball 2.scene.json"):
+        (folder / name).write_text("mine")
+    plain.objects.saving.ask_name()
+    assert plain.objects.saving._name == str(folder / "ball 3.scene.json")
+    plain.objects.saving.cancel_name()
 
 
 def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_path):
@@ -50,6 +120,7 @@ def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_pat
     key(viewer, glfw.KEY_ESCAPE)
     run_frames(viewer, 2)
     assert not objects.saving.asking and path.read_text() == "{}" and names(viewer) == NAMES
+    assert objects.saving.in_place  # by its name; what lies there is asked about all the same
     objects.saving.save()
     assert objects.saving.named(str(path), replace=True) and not objects.saving.asking
     assert json.loads(path.read_text())["objects"] and document.path == path
@@ -82,10 +153,12 @@ def test_a_name_is_typed_and_what_goes_wrong_is_said_until_it_is_read(viewer, tm
         run_frames(viewer, 3)
         assert (tmp_path / "mine.scene.json").is_file() == right
         assert ("cannot be saved" in viewer.stage.problem) != right
-        key(viewer, glfw.KEY_ENTER)  # it is read
+        key(viewer, glfw.KEY_ESCAPE)  # out of the field, which had taken the key before
         key(viewer, glfw.KEY_ESCAPE)
         run_frames(viewer, 3)
-        assert viewer.stage.problem == "" and not viewer.objects.saving.asking
+        assert not viewer.objects.saving.asking
+        key(viewer, glfw.KEY_ESCAPE)  # it is read
+        assert viewer.stage.problem == ""
     assert viewer.stage.document.path == tmp_path / "mine.scene.json"
 
 
@@ -134,7 +207,8 @@ def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
 def test_a_slider_alone_asks_nothing(viewer):
     steer(viewer.stage, 1, 0.5)
     run_frames(viewer, 1)
-    assert viewer.objects.status() == "not saved" and viewer._may_close()
+    assert viewer.objects.status() == "" and viewer._may_close()
+    assert viewer.stage.document.file.all_items[1].x == 0.5  # saved when something else is
 
 
 def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):

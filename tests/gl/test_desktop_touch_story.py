@@ -15,8 +15,8 @@ pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window; touch_viewer, 
 
 
 @pytest.fixture
-def viewer(touch_viewer):
-    return touch_viewer
+def viewer(playing_viewer):
+    return playing_viewer
 
 
 def place(viewer, name: str) -> np.ndarray:
@@ -33,8 +33,7 @@ def glide(viewer, points: list, steps: int = 12) -> None:
 def test_a_person_plays_with_the_bundled_scene(viewer):
     world = viewer.stage.world
     start = {name: place(viewer, name).copy() for name in ("cube", "ball", "ring")}
-    assert world.paused
-    key(viewer, glfw.KEY_T)
+    assert not world.paused and "Drag a thing" in viewer.messages.note
     run_frames(viewer, 10)
 
     rim = place(viewer, "ring") + np.array([0.06, 0.015, 0.0])
@@ -81,8 +80,9 @@ def test_a_person_plays_with_the_bundled_scene(viewer):
 def test_steps_by_hand_and_turning_with_shift(viewer):
     world = viewer.stage.world
     key(viewer, glfw.KEY_T, SHIFT)
+    steps = world.steps
     key(viewer, glfw.KEY_T, SHIFT)
-    assert world.paused and world.steps == 2
+    assert world.paused and world.steps == steps + 1
     key(viewer, glfw.KEY_T)
     at = place_of(viewer, place(viewer, "cube"))
     mouse(viewer, *at)

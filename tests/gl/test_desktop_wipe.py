@@ -128,15 +128,6 @@ def test_a_scene_file_is_drawn_where_it_says_beside_itself_at_another_x(window, 
         wipe.release()
 
 
-def test_the_panel_lists_its_keys(stand, monkeypatch):
-    import app.panels.panel
-
+def test_the_sheet_lists_its_keys(stand):
     viewer, _, _ = stand
-    listed = []
-    monkeypatch.setattr(app.panels.panel, "section", lambda name, *_, **__: name == "Keys")
-    monkeypatch.setattr(app.panels.panel, "rows", lambda pairs, share: listed.append(tuple(pairs)))
-    viewer.overlay = True
-    run_frames(viewer, 1)
-    (keys,) = listed
-    assert keys[: len(app.panels.panel.KEYS)] == app.panels.panel.KEYS
-    assert keys[-len(KEYS) :] == KEYS and {k for k, _ in KEYS} == {", .", "C"}
+    assert tuple(viewer.hooks.keys["Comparing"]) == KEYS and {k for k, _ in KEYS} == {", .", "C"}

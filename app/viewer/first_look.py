@@ -1,0 +1,38 @@
+"""From where a scene is looked at first: by its file, its floor, its cameras, else all of it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scene.framing import default_view, framing_view
+from scene.pose import View, perspective
+from scene.scene import Scene
+from scene.scene_file import SceneFile, first_view
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """What was found beside a scene that tells from where to look."""
+
+    home: View | None = None  # on a floor
+    front: float | None = None  # the side that was photographed, radians about +Y from +Z
+
+    @property
+    def fov_y(self) -> float:
+        """Radians from top to bottom of the home view."""
+        return float(np.arctan(self.home.tangents[3]) - np.arctan(self.home.tangents[2]))
+
+    def view(
+        self, file: SceneFile, scene: Scene, points: tuple[np.ndarray, np.ndarray],
+        size: tuple[int, int],
+    ) -> View:  # fmt: skip
+        """The view in size (W, H); `points` are those of the scene, and how opaque they are."""
+        if self.home is not None:
+            return replace(self.home, tangents=perspective(self.fov_y, size), size=size)
+        if file.view is not None:
+            return first_view(file, scene, size)
+        if len(scene.objects) == 1:
+            model = scene.objects[0].model
+            if self.front is None or model.provenance.get("view"):
+                return default_view(model, size)
+        return framing_view(*points, size, self.front)

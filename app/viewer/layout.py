@@ -1,0 +1,107 @@
+"""Where the overlay's parts lie in a window of any size, and what they leave free for the scene.
+
+Numbers only: whoever draws asks for boxes.  Lengths of the constants are units of the overlay: of
+`scale` logical pixels each.
+"""
+
+from dataclasses import dataclass
+
+Box = tuple[float, float, float, float]  # left, top, right, bottom
+
+MARGIN = 16.0
+STATUS = 24.0  # height of the line at the lower edge
+PANEL = 268.0  # width
+PANEL_ROOM = PANEL + 1.5 * MARGIN
+FOLDED = 40.0  # side of the button that stands for a folded panel
+BAR, BAR_FIRST, BAR_ROW = 92.0, 46.0, 71.0  # height with one slider; a row alone, and named
+BAR_WIDEST, BAR_LEAST = 760.0, 300.0
+BAR_PART = 0.94  # of the width that is there
+BAR_BELOW = 18.0  # between the bar and the status line
+LEGEND = 100.0  # width of the thermal legend with what lies at its right
+LEGEND_TALL = 348.0
+ROOMY = (320.0, 380.0)  # beside the panel, and high: with less it is folded until it is asked for
+LEAST_BESIDE_LEGEND = 180.0  # with less the legend is left out
+LEAST_FREE = 60.0  # with less of the window left the scene has all of it
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Logical pixels from the window's upper left corner; None: that part is not shown."""
+
+    free: Box  # what nothing covers: the scene is framed in it
+    panel: Box | None = None  # as far down as it may reach
+    folded: bool = False  # `panel` is the button that unfolds it
+    bar: Box | None = None
+    legend: Box | None = None
+    left_legend: Box | None = None
+    status: Box | None = None
+
+
+def lay_out(
+    size: tuple[float, float],
+    scale: float,
+    rows: int,
+    legend: bool,
+    panel_open: bool | None = None,
+    overlay: bool = True,
+    both: bool = False,
+) -> Layout:
+    """The parts in a window of `size` (W, H) logical pixels.
+
+    `rows` is the number of sliders; `legend`: the scene has a thermal stop, so that room is kept
+    for its legend at every x, and `both`: at the left as well.  `panel_open` None: as there is
+    room.
+    """
+    if not overlay:
+        return Layout((0.0, 0.0, *map(float, size)))
+    width, height = (side / scale for side in size)
+    if panel_open is None:
+        room = width - PANEL_ROOM - LEGEND * legend
+        panel_open = room >= ROOMY[0] and height >= ROOMY[1]
+    left = PANEL_ROOM if panel_open else 0.0
+    beside = width - left >= BAR_LEAST  # else the bar has the whole width, and the panel ends above
+    bar = _bar(width, height, left if beside else 0.0, rows)
+    low = bar[1] if bar else height - STATUS
+    legends = LEGEND * (1 + both)
+    keep_legend = legend and width - left - legends >= LEAST_BESIDE_LEGEND
+    edge = LEGEND * keep_legend
+    free = (left + edge * both, 0.0, width - edge, low)
+    if not (free[2] - free[0] >= LEAST_FREE and low >= LEAST_FREE):
+        free, keep_legend = (0.0, 0.0, width, height), False
+    status_top = height - STATUS
+    panel_low = (status_top if beside else low) - MARGIN
+    panel = (MARGIN, MARGIN, MARGIN + PANEL, max(panel_low, MARGIN + 1.0))
+    top = 0.0 if panel_open else MARGIN + FOLDED  # below the button
+    if not panel_open:
+        panel = (MARGIN, MARGIN, MARGIN + FOLDED, MARGIN + FOLDED)
+    parts = {
+        "free": free,
+        "panel": panel,
+        "bar": bar,
+        "legend": _legend(free[2], free) if keep_legend else None,
+        "left_legend": _legend(free[0] - LEGEND, free, top) if keep_legend and both else None,
+        "status": (0.0, status_top, width, height),
+    }
+    scaled = {name: box and tuple(side * scale for side in box) for name, box in parts.items()}
+    return Layout(folded=not panel_open, **scaled)
+
+
+def bar_height(rows: int) -> float:
+    """Height of the slider bar, without what lies below it."""
+    return 0.0 if rows < 1 else (BAR if rows < 2 else BAR_ROW * rows + BAR - BAR_FIRST) - BAR_BELOW
+
+
+def _bar(width: float, height: float, left: float, rows: int) -> Box | None:
+    """In the middle of what is right of `left`."""
+    if rows < 1:
+        return None
+    half = min(BAR_WIDEST, BAR_PART * (width - left)) / 2
+    middle, low = (left + width) / 2, height - STATUS - BAR_BELOW
+    return (middle - half, low - bar_height(rows), middle + half, low)
+
+
+def _legend(left: float, free: Box, top: float = 0.0) -> Box:
+    """From `left` on, as high as the free part allows below `top`."""
+    tall = min(LEGEND_TALL, 0.86 * (free[3] - max(free[1], top)))
+    middle, gap = (max(free[1], top) + free[3]) / 2, MARGIN / 2
+    return (left + gap, middle - tall / 2, left + LEGEND - gap, middle + tall / 2)

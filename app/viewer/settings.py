@@ -1,0 +1,69 @@
+"""What a person has set and finds again at the next start: the size of the text, the panel."""
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from runtime_models.whole_file import write_whole
+
+FILE = "settings.json"
+LARGEST = 1 << 16  # bytes; a few numbers are never so long
+TEXT_SIZES = (0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
+PLAIN_DPI = 110.0  # pixels an inch up to which text of 15 pixels is read without leaning forward
+HIGH_PX = 1440.0  # of a monitor: above, such text is small, whatever inches the monitor tells
+PLAUSIBLE_MM = (120.0, 1500.0)  # height of a monitor; projectors and screens in memory say 0 or 1
+
+
+@dataclass
+class Settings:
+    """In a file of the folder; a broken or missing one counts as empty."""
+
+    folder: Path | None = None  # None: nothing is kept
+    text_size: float | None = None  # None: by the monitor
+    panel_open: bool | None = None  # None: as there is room
+
+    @staticmethod
+    def read(folder: Path) -> "Settings":
+        path = folder / FILE
+        try:
+            if path.stat().st_size > LARGEST:
+                return Settings(folder)
+            data = json.loads(path.read_bytes())
+        except (OSError, ValueError, RecursionError):
+            return Settings(folder)
+        found = data if isinstance(data, dict) else {}
+        size, panel = found.get("text_size"), found.get("panel_open")
+        sound = isinstance(size, int | float) and not isinstance(size, bool)
+        sound = sound and TEXT_SIZES[0] <= size <= TEXT_SIZES[-1]
+        return Settings(
+            folder, float(size) if sound else None, panel if isinstance(panel, bool) else None
+        )
+
+    def keep(self) -> None:
+        """Writes the file; OSError where the folder cannot be written."""
+        if self.folder is None:
+            return
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "folder"}
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_whole(self.folder / FILE, json.dumps(values, indent=1).encode())
+
+
+def default_text_size(high_px: float, high_mm: float, desktop_scale: float) -> float:
+    """The text size for a monitor that is so high, in logical pixels and in millimetres.
+
+    A desktop that has been set to a scale has been set by a person: only what it lacks to a
+    readable size is added.  From the inches where they can be true, never less than from the
+    pixels alone: 1.5 at 3840x2160.
+    """
+    by_inches = 1.0
+    if PLAUSIBLE_MM[0] <= high_mm <= PLAUSIBLE_MM[1]:
+        by_inches = high_px / (high_mm / 25.4) / PLAIN_DPI
+    wanted = max(by_inches, high_px / HIGH_PX) / desktop_scale
+    at_least_1 = [size for size in TEXT_SIZES if size >= 1]
+    return min(at_least_1, key=lambda size: abs(size - wanted))
+
+
+def other_text_size(now: float, step: int) -> float:
+    """The next larger (1) or smaller (-1) of the sizes; the same at the end."""
+    sizes = [size for size in TEXT_SIZES if (size - now) * step > 1e-6]
+    return min(sizes, key=lambda size: abs(size - now), default=now)

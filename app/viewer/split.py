@@ -1,0 +1,99 @@
+"""Two stops at once: the scene at another x right of a line, by a second knob on the same track."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import glfw
+
+from app.panels import theme
+from app.viewer.layout import Box
+from app.viewer.messages import Messages
+from app.viewer.shown import Wish
+from app.viewer.split_state import SplitState, told
+from app.viewer.two_pictures import TwoPictures
+from app.viewer.window import Event, KeyDown, Window
+from renderer.renderer import Renderer
+from runtime_models.model import BadFile
+
+if TYPE_CHECKING:
+    from app.viewer.sections import Hooks
+    from app.viewer.stage import Stage
+
+KEYS = (
+    ("C", "another stop right of a line, on and off"),
+    (", .", "move the line; or drag it"),
+)
+
+
+class Split(TwoPictures):
+    """Draws what a `SplitState` asks for."""
+
+    def __init__(self, window: Window, renderer: Renderer, state: SplitState, free: Box) -> None:
+        super().__init__(window, renderer, (free[0] + free[2]) / 2 / window.logical_size[0])
+        self._state = state
+        self._made: tuple = (None, 0.0, None)  # A's scene and x that B's scene was made of, and it
+
+    def draw(self, wish: Wish) -> None:
+        """Lays the other x over the right part of the window.  Raises BadFile for no room."""
+        scene, x, other = self._made
+        if scene is not wish.scene or x != self._state.x:
+            other = self._state.right(wish.scene)
+            self._made = (wish.scene, self._state.x, other)
+        self.draw_right(replace(wish, scene=other))
+
+
+@contextmanager
+def splitting(
+    window: Window, stage: "Stage", hooks: "Hooks", messages: Messages,
+    free: Callable[[], Box], make_renderer: Callable[[], Renderer],
+) -> Iterator[None]:  # fmt: skip
+    """Adds the split view to a viewer; its renderer is made when it is first wanted."""
+    state, made = stage.split, []
+
+    def split() -> Split:
+        if not made:
+            renderer = make_renderer()
+            made.extend((Split(window, renderer, state, free()), renderer))
+        return made[0]
+
+    def draw(wish: Wish) -> None:
+        state.on = state.on and any(thing.name == state.name for thing in wish.scene.objects)
+        if not state.on:
+            return
+        try:
+            split().draw(wish)
+        except BadFile as error:
+            state.on = False
+            messages.fail(f"There is no room for a second picture: {error}")
+
+    def draw_marks(ui_scale: float) -> None:
+        if state.on and made:
+            names = [f"{name}  {text}" for name, text in zip("AB", told(stage), strict=True)]
+            split().draw_line(names, (theme.ACCENT, theme.SECOND), ui_scale)
+
+    def take(event: Event) -> bool:
+        if isinstance(event, KeyDown) and event.key == glfw.KEY_C and not event.ctrl:
+            index = next(iter(stage.sliders), None)
+            if index is not None:
+                state.toggle(stage, index)
+            return True
+        return state.on and bool(made) and split().take_line(event)
+
+    hooks.over.append(draw)
+    hooks.marks.append(draw_marks)
+    hooks.takes.append(take)
+    hooks.keys["Two stops at once"] = list(KEYS)
+    stage.split.possible = True
+    try:
+        yield
+    finally:
+        state.on = state.possible = False
+        hooks.over.remove(draw)
+        hooks.marks.remove(draw_marks)
+        hooks.takes.remove(take)
+        for thing in made[:1]:
+            thing.release()
+        for renderer in made[1:]:
+            renderer.close()

@@ -1,0 +1,96 @@
+"""The slider's track in numbers: where stops, ticks and knob lie, and what a hand does with them.
+
+Lengths are logical pixels of the window.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from runtime_models.model import Stop
+from scene.control import SNAP, snap
+
+STEP = 0.01  # of x: one press of an arrow key
+SAME_X = 1e-6  # nearer than this to a stop is on it
+
+
+@dataclass(frozen=True)
+class Track:
+    """A line from x = 0 to x = 1, and the knob on it."""
+
+    left: float
+    width: float
+    knob: float  # the knob's radius
+
+    def place(self, x: float) -> float:
+        """Where x lies."""
+        return self.left + self.width * x
+
+    def x(self, place: float) -> float:
+        """x at a place; not clamped."""
+        return (place - self.left) / max(self.width, 1.0)
+
+
+@dataclass
+class Grip:
+    """What the mouse holds of a track between press and release.
+
+    Pressed on a knob, it stays under the finger where it was taken; pressed beside them, the
+    nearest comes to the mouse.
+    """
+
+    knob: int = 0  # which of the track's knobs
+    offset: float = 0.0  # from the mouse to the knob's middle
+    start: float | None = None  # where the mouse took the knob and has not moved since
+
+    def take(self, track: Track, xs: Sequence[float], mouse: float) -> None:
+        """The button went down at `mouse`, with knobs at `xs`; the last one lies above."""
+        offsets = [track.place(x) - mouse for x in xs]
+        self.knob = min(reversed(range(len(xs))), key=lambda knob: abs(offsets[knob]))
+        offset = offsets[self.knob]
+        on_knob = abs(offset) <= track.knob
+        self.offset = offset if on_knob else 0.0
+        self.start = mouse if on_knob else None
+
+    def drag(
+        self, track: Track, x: float, mouse: float, stops: Sequence[Stop], reach: float = SNAP
+    ) -> float:
+        """The held knob's x, before at `x`: within 0..1, on a stop at most `reach` away."""
+        if self.start == mouse:
+            return x  # a press alone moves nothing
+        self.start = None
+        return snap(track.x(mouse + self.offset), stops, reach)
+
+
+def half_ways(stops: Sequence[Stop]) -> list[float]:
+    """x half-way between each stop and the next."""
+    xs = sorted({stop.x for stop in stops})
+    return [(a + b) / 2 for a, b in pairwise(xs)]
+
+
+def next_stop(stops: Sequence[Stop], x: float, direction: int) -> float:
+    """x of the nearest stop above (1) or below (-1); x itself where there is none."""
+    beyond = [stop.x for stop in stops if (stop.x - x) * direction > SAME_X]
+    return min(beyond, key=lambda stop_x: abs(stop_x - x), default=x)
+
+
+def stepped(x: float, steps: int) -> float:
+    """x some STEPs further, within 0..1 and without the rounding that adds up."""
+    return min(max(round(x + steps * STEP, 6), 0.0), 1.0)
+
+
+def read_x(text: str, stops: Sequence[Stop]) -> float:
+    """x of what was typed: a number from 0 to 1, or a stop's name.  ValueError, one sentence."""
+    word = text.strip()
+    named = {stop.name.casefold(): stop.x for stop in reversed(stops)}  # the first of a ring's ends
+    if word.casefold() in named:
+        return named[word.casefold()]
+    try:
+        x = float(word.replace(",", "."))
+    except ValueError:
+        x = float("nan")
+    if not 0 <= x <= 1:
+        names = ", ".join(stop.name for stop in stops)
+        or_stop = f" or a stop ({names})" if names else ""
+        raise ValueError(f"x is '{word[:40]}'; a number from 0 to 1{or_stop} is wanted.")
+    return x
