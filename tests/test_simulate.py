@@ -80,7 +80,10 @@ def test_the_same_run_gives_the_same_bytes(example, tmp_path):
 
 
 def test_pictures_show_what_moves(tmp_path):
-    options = Options(SCENE, tmp_path, SCRIPT, 1.2, 54, "160x90", "tiles", "none")
+    options = Options(
+        SCENE, tmp_path, SCRIPT, seconds=1.2, pictures=54, size="160x90", drawing="tiles",
+        context="none",
+    )  # fmt: skip
     assert run(options) == 0
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == ["00000.png", "00054.png", "00108.png", "run.jsonl"]

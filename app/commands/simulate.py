@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -19,22 +19,25 @@ LONGEST_S = 24 * 3600.0
 class Options:
     """Let hands and rays of a script act on a scene; poses, contacts, x and events come out."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
+    scene: Annotated[Path, POSITIONAL]
     """A scene file, see docs/scene.md."""
     out: Path
     """Folder for run.jsonl and the pictures."""
     script: Path | None = None
-    """JSON lines with times: hands, grabs, releases, rays; without it things only fall."""
+    """JSON lines with times: hands, grabs, releases, rays.  Default: none, things only fall."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the sliders of all objects stand at the start: a stop or state by its name, or a number
+    from 0 to 1.  Default: what the scene file says for each."""
     seconds: float | None = None
-    """How long; default: two seconds more than the script."""
+    """How long.  Default: two seconds more than the script."""
     pictures: int = 0
     """A picture every so many steps of 1/90 s; 0: none."""
-    size: str = "640x360"
+    size: Annotated[str, SIZE] = "640x360"
     """WIDTHxHEIGHT of a picture."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
     overwrite: bool = False
     """Replace what an earlier run has left in --out."""
 
@@ -56,7 +59,7 @@ def run(options: Options) -> int:
     if not 0 < seconds <= LONGEST_S:
         raise UsageError(f"--seconds is {seconds:g}; above 0 and at most a day is wanted.")
     steps = math.ceil(seconds * HZ - 1e-6)
-    simulation = make_simulation(file, acts)
+    simulation = make_simulation(file, acts, options.x)
     every = options.pictures
     paths = [options.out / f"{i:05d}.png" for i in range(0, steps + 1, every)] if every else []
     result = options.out / RESULT
@@ -75,10 +78,10 @@ def run(options: Options) -> int:
     return 0
 
 
-def make_simulation(file, acts: tuple):
-    """The scene with its models, bodies and physics.  Raises BadFile."""
+def make_simulation(file, acts: tuple, x: str = ""):
+    """The scene with its models, bodies and physics.  Raises BadFile, UsageError."""
     from app.opening import PATIENCE_S, progress_after, sentence
-    from app.scene_files import tell_findings
+    from app.scene_files import file_at, tell_findings
     from runtime_models.plain_splats import Reading
     from scene.collider_files import colliders_of
     from scene.scene_file import read_models
@@ -87,6 +90,7 @@ def make_simulation(file, acts: tuple):
 
     with progress_after(PATIENCE_S) as shown:
         models = read_models(file, Reading(told=shown))
+        file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown)
     world = World(file, models, colliders, hz=HZ)
     tell_findings(models)

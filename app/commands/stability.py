@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
 
 FAILED = 1  # exit code: a case went past its bound
@@ -24,24 +23,24 @@ class Options(ReadingOptions):
     docs/stability.md says what each case means.
     """
 
-    scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
+    scene: Annotated[Path, POSITIONAL]
+    """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
     out: Path
     """Folder for stability.csv and the pictures."""
-    cases: tuple[str, ...] = ()
-    """Names of cases; default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
+    cases: Annotated[tuple[str, ...], Opt(metavar="CASE")] = ()
+    """Names of cases.  Default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
     far-origin, depth-range, inside, lenses, random-eyes, needles, limits, counts, crowd,
     extrapolated-x, broken-heads, life."""
-    size: str = "640x360"
+    size: Annotated[str, SIZE] = "640x360"
     """WIDTHxHEIGHT in pixels."""
-    steps: int = 24
+    steps: Annotated[int, EXPERT] = 24
     """Frames between two stops of the x sweep, and of the 90-degree turn."""
-    rounds: int = 50
+    rounds: Annotated[int, EXPERT] = 50
     """Contexts made and closed by the case life."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
     overwrite: bool = False
     """Start anew where the folder holds the table of another scene, size or drawing."""
 

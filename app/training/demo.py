@@ -4,6 +4,9 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from app.command_line import EXPERT, SIZE
 
 MOST_BYTES = 5_000_000  # the package lies in the repository
 ITERATIONS = 4000  # 3 to 5 minutes on two cores
@@ -18,19 +21,20 @@ class Options:
     out: Path = Path("out/workshop")
     """Folder for the capture, workshop.shift and its checkpoint."""
     package: Path | None = None
-    """Copy the package there too when it is done; the bundled one is assets/workshop.shift."""
+    """Copy the package to this file, too; the bundled one is assets/workshop.shift.  Default: no
+    copy."""
     seconds: float | None = None
-    """Train for so long instead of a fixed number of steps."""
+    """Train for this long instead of --iterations.  Default: no limit."""
     iterations: int = ITERATIONS
     """Steps of training; the same number gives the same bits."""
-    size: str = "384x288"
+    size: Annotated[str, SIZE] = "384x288"
     """WIDTHxHEIGHT of the photos."""
-    views: int = 72
-    """Photos to train on, a stop."""
-    test_views: int = 8
-    """Photos held out, a stop."""
-    processes: int = 0
-    """That trace rays at the same time; 0 = one a core, at most 8."""
+    views: Annotated[int, EXPERT] = 72
+    """Photos of each stop to train on."""
+    test_views: Annotated[int, EXPERT] = 8
+    """Photos of each stop that are held out."""
+    processes: Annotated[int, EXPERT] = 0
+    """Processes that trace rays at the same time; 0: one for each core, at most 8."""
 
 
 def run(options: Options) -> int:
