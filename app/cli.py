@@ -49,6 +49,7 @@ COMMANDS = {
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
 LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
+OPEN_ENDED = ("view", "vr")  # they last as long as somebody looks
 BAD_INPUT = 2  # exit code
 FAULT = 3
 INTERRUPTED = 130
@@ -141,6 +142,7 @@ def report_fault(command: str, error: Exception) -> int:
 def run_command(command: str, arguments: list[str]) -> int:
     from app.command_line import parse, wants_help
     from app.program import program
+    from app.progress import lines
 
     module, prog = importlib.import_module(f"app.{COMMANDS[command][0]}"), f"{program()} {command}"
     if wants_help(arguments):
@@ -149,7 +151,11 @@ def run_command(command: str, arguments: list[str]) -> int:
         defaults = getattr(module, "defaults", dict)()
         print(help_text(module.Options, prog, defaults))
         return 0
-    return module.run(parse(module.Options, arguments, prog))
+    options = parse(module.Options, arguments, prog)
+    if command in OPEN_ENDED:
+        return module.run(options)
+    with lines(command):
+        return module.run(options)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -86,12 +86,13 @@ def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
     from rich.markup import escape
 
-    from app.progress import progress_bar
+    from app.progress import Words, listed, progress_bar
 
-    began, bar, task = time.monotonic(), None, None
+    began, bar, task, words = time.monotonic(), None, None, Words()
 
     def told(what: str, part: float) -> None:
         nonlocal bar, task
+        words.text = f"{what}, {part:.0%}"
         if bar is None:
             if time.monotonic() - began < seconds:
                 return
@@ -101,7 +102,8 @@ def progress_after(seconds: float) -> Iterator:
         bar.update(task, description=escape(what), completed=part)
 
     try:
-        yield told
+        with listed(words):
+            yield told
     finally:
         if bar is not None:
             bar.stop()

@@ -106,10 +106,10 @@ def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
 
 def measure(work, options, quality_size: tuple[int, int]) -> dict:
     """All rows of a Measure, with what was asked; says on stderr what it is at."""
-    from rich.console import Console
+    from app.progress import working
 
-    with Console(stderr=True).status("starting") as status:
-        result = work.all(options.frames, options.sweep, quality_size, status.update)
+    with working("starting") as tell:
+        result = work.all(options.frames, options.sweep, quality_size, tell)
     return result | {"command": command_line(), "scene": options.scene.name}
 
 

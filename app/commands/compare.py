@@ -188,11 +188,15 @@ def artist(renderer, side, background: tuple[float, float, float]):
 
 def score(compared: Iterator[Compared], names: tuple[str, str], options: Options) -> dict:
     """What is printed; the sheets are written on the way."""
+    from app.progress import working
+
     rows, kept = [], []
-    for pair in compared:
-        rows.append(pair.scores())
-        if options.out is not None:
-            kept.append(pair)
+    with working("comparing") as tell:
+        for pair in compared:
+            rows.append(pair.scores())
+            tell(f"comparing: {len(rows)} views done")
+            if options.out is not None:
+                kept.append(pair)
     decibels = [row["psnr_db"] for row in rows]
     numbers = [db for db in decibels if db != "equal"]
     mean = {

@@ -65,7 +65,7 @@ def run(options: Options) -> int:
     result = options.out / RESULT
     refuse_taken([result, *paths], options)
     make_folder(options.out)
-    told = tell(simulation, steps, result, options)
+    told = shown(tell(simulation, steps, result, options), steps)
     if every:
         draw_run(told, simulation, file, size, options)
     else:
@@ -127,6 +127,17 @@ def tell(simulation, steps: int, path: Path, options: Options):
                 out.write(line(record.row()))
             yield number
         out.write(line({"end": steps, "hash": world.physics.hash()}))
+
+
+def shown(told, steps: int):
+    """The same steps, with a bar of how many are done."""
+    from app.progress import progress_bar
+
+    with progress_bar() as bar:
+        task = bar.add_task("simulating", total=steps)
+        for number in told:
+            bar.update(task, completed=number)
+            yield number
 
 
 def line(row: dict) -> str:

@@ -111,14 +111,15 @@ def perform(stage, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
     from rich.console import Console
 
+    from app.progress import working
     from app.stability_cases.table import CASES, save_panels
 
     console = Console(stderr=True, highlight=False)
-    with console.status("starting") as status:
+    with working("starting") as tell:
         for i, name in enumerate(names):
             if name in table.rows:
                 continue
-            status.update(f"{name} ({i + 1} of {len(names)})")
+            tell(f"{name} ({i + 1} of {len(names)})")
             result = CASES[name](stage)
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)

@@ -43,6 +43,7 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
+    from app.progress import working
     from rasterizer.device import open_device
     from scene.read_capture import read_capture
     from scene.scene_file import is_scene_file
@@ -63,10 +64,11 @@ def run(options: Options) -> int:
     model = open_model(options.scene, options)
     capture = with_found(capture, rig_of(model.provenance))
     downscale = options.downscale or trained_downscale(model.provenance)
-    scores = evaluate_model(
-        open_device(), model, capture, downscale, options.masks, options.background,
-        distance,
-    )  # fmt: skip
+    with working("comparing with the photos"):
+        scores = evaluate_model(
+            open_device(), model, capture, downscale, options.masks, options.background,
+            distance,
+        )  # fmt: skip
     result = report(options.scene, scores, started)
     if distance is not None:
         result["vgg_file"] = distance.name

@@ -162,6 +162,7 @@ def defaults() -> dict[str, str]:
 
 
 def run(options: Options) -> int:
+    from app.progress import working
     from app.training.keeping import kept_when_memory_ends, memory_for_training, refuse_place, save
     from rasterizer.device import open_device
     from runtime_models.write_package import refuse_foreign
@@ -182,12 +183,13 @@ def run(options: Options) -> int:
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options, resume[1]["settings"] if resume else None)
-    capture = read_capture(options.capture)
+    with working("reading the capture"):
+        capture = read_capture(options.capture)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-    with memory_for_training():
+    with memory_for_training(), working("reading photos, finding the first anchors"):
         trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
     say("\n".join([describe(trainer), *trainer.doubts]))
     options.out.parent.mkdir(parents=True, exist_ok=True)
