@@ -1,7 +1,10 @@
 """What this program is called where it was started, and which version it is."""
 
 import os
+import shlex
 from pathlib import Path
+
+from app.paths import full
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -12,10 +15,13 @@ def is_installed() -> bool:
 
 
 def program() -> str:
-    """The words that start it."""
+    """The words that start it from where this one was started."""
     if is_installed():
         return "shapeshift"
-    return "py launch.py" if os.name == "nt" else "python3 launch.py"
+    door, python = str(ROOT / "launch.py"), "py" if os.name == "nt" else "python3"
+    if full("launch.py") == door:
+        return f"{python} launch.py"
+    return f'{python} "{door}"' if os.name == "nt" else f"{python} {shlex.quote(door)}"
 
 
 def version() -> str:

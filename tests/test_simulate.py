@@ -114,6 +114,15 @@ def test_wrong_options_are_one_sentence(tmp_path, changes, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("name", ["workshop.shift", "a.ply", "folder"])
+def test_what_is_no_scene_file_is_told_what_is(tmp_path, name):
+    path = tmp_path / name
+    path.mkdir() if name == "folder" else path.write_bytes(b"PK")
+    with pytest.raises(UsageError, match=rf"{name} is no scene file: .* NAME\.scene\.json"):
+        run(Options(path, tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_wrong_line_ends_it_before_anything_is_written(tmp_path):
     (tmp_path / "s.jsonl").write_text('# hm\n{"t": 0, "do": "garb"}\n')
     with pytest.raises(BadFile, match=r"s.jsonl, line 2: 'do' is"):

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from app.opening import ReadingOptions
+from app.paths import full
 
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
@@ -197,5 +198,5 @@ def print_front(front: list, count: int, out: Path) -> None:
         ssim = f"{row.ssim:.4f}" if row.ssim == row.ssim else "-"
         table.add_row(row.name, f"{row.ms:.2f}", f"{row.ratio:.3f}", f"{row.db:.1f}", ssim)
     Console(stderr=True, highlight=False).print(table)
-    print(f"{count} settings in {out / 'rows.csv'}; {out / 'chart.png'} shows them.",
+    print(f"{count} settings in {full(out / 'rows.csv')}; {full(out / 'chart.png')} shows them.",
           file=sys.stderr)  # fmt: skip

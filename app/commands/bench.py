@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
+from app.paths import full
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -80,7 +81,7 @@ def run(options: Options) -> int:
         print(json.dumps(result, indent=1, allow_nan=False))
     elif options.json is not None:
         write_json(options.json, result)
-        print(f"written to {options.json}", file=sys.stderr)
+        print(f"written to {full(options.json)}", file=sys.stderr)
     return 0
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from app.command_line import POSITIONAL
+from app.paths import full
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def write(options: Options, cameras) -> None:
     if form == "vr" and count > 1:
         print(f"A floor has one view: the first of {count} is taken.", file=sys.stderr)
         count = 1
-    names = f"{written[0]}" if len(written) == 1 else f"{written[0].parent}"
+    names = full(written[0] if len(written) == 1 else written[0].parent)
     print(f"{count} camera{'s' * (count > 1)} in {names}", file=sys.stderr)
 
 

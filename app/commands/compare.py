@@ -12,6 +12,7 @@ import numpy as np
 
 from app.command_line import EXPERT, POSITIONAL, SIZE
 from app.opening import ReadingOptions
+from app.paths import full
 
 VIEWS = 8  # of the orbit where no cameras are given
 DEFAULT_SIZE = (640, 360)
@@ -237,7 +238,7 @@ def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options
         save_png(sheet(pair.a, pair.b, names, amplify), both)
         difference = difference_picture(pair.a, pair.b, amplify)
         save_png(written(difference, scale_text(amplify)), alone)
-    print(f"{len(pairs)} sheets in {options.out}", file=sys.stderr)
+    print(f"{len(pairs)} sheets in {full(options.out)}", file=sys.stderr)
     return amplify
 
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
+from app.paths import full
 
 PACKAGE = ".shift"
 
@@ -85,7 +86,7 @@ def run(options: Options) -> int:
         print(sentence(finding), file=sys.stderr)
     degree = round(splats.sh.shape[1] ** 0.5) - 1
     print(
-        f"{options.out}: {len(splats.means):,} splats, SH degree {degree}, "
+        f"{full(options.out)}: {len(splats.means):,} splats, SH degree {degree}, "
         f"{options.out.stat().st_size:,} bytes, {told_x(parts)}.",
         file=sys.stderr,
     )
@@ -266,5 +267,5 @@ def export_package(options: Options, opened: list) -> int:
     features = models[0].features
     halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
     size = write_package(models[0], options.out, "float16" if halves else "float32")
-    print(f"{options.out}: {size:,} bytes, every x.", file=sys.stderr)
+    print(f"{full(options.out)}: {size:,} bytes, every x.", file=sys.stderr)
     return 0

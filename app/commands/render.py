@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
 from app.opening import ReadingOptions, open_model
+from app.paths import full
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LEGEND = "legend.json"  # of --output
@@ -124,7 +125,7 @@ def run(options: Options) -> int:
             draw_all(*work)
         else:
             draw_outputs(*work, options.output, unit_of(options, opened.subject, views))
-    print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {options.out}", file=sys.stderr)
+    print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}", file=sys.stderr)
     return 0
 
 

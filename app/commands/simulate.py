@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
+from app.paths import full
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -51,6 +52,7 @@ def run(options: Options) -> int:
     size = parse_size(options.size)
     if options.pictures < 0:
         raise UsageError(f"--pictures is {options.pictures}; steps, 0 or more, are wanted.")
+    refuse_model(options.scene)
     file = read_scene_file(options.scene)
     acts = read_script(options.script, file.all_items) if options.script else ()
     seconds = options.seconds
@@ -72,10 +74,20 @@ def run(options: Options) -> int:
         for _ in told:
             pass
     pictures = f" and {len(paths)} pictures" if paths else ""
-    print(
-        f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {options.out}", file=sys.stderr
-    )
+    summary = f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {full(options.out)}"
+    print(summary, file=sys.stderr)
     return 0
+
+
+def refuse_model(path: Path) -> None:
+    """Raises UsageError for a scene that is no file of objects, and would be read as none."""
+    from app.errors import UsageError
+
+    if path.exists() and path.suffix.lower() != ".json":
+        raise UsageError(
+            f"{path} is no scene file: simulate moves the objects of a NAME.scene.json (see "
+            "docs/scene.md), which the viewer writes of a scene by Ctrl+S."
+        )
 
 
 def make_simulation(file, acts: tuple, x: str = ""):

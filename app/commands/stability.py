@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
+from app.paths import full
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -71,7 +72,7 @@ def run(options: Options) -> int:
     failed = [name for name in names if table.failed(name)]
     told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
-    print(f"{count}, {told}; {table.path} and pictures beside it", file=sys.stderr)
+    print(f"{count}, {told}; {full(table.path)} and pictures beside it", file=sys.stderr)
     return FAILED if failed else 0
 
 

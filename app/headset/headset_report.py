@@ -1,12 +1,14 @@
 """What a run in the headset leaves behind for tests and benchmarks: a report, lines, pictures."""
 
 import json
+import sys
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from app.drawing import save_png
+from app.paths import full
 from runtime_models.whole_file import write_whole
 from scene.pose import Pose
 from vr.carried import panel_row
@@ -47,10 +49,13 @@ class Report:
                 save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
 
     def write(self, told: dict) -> None:
-        """The report itself."""
+        """The report itself; and a word on what has been written."""
         if self._path is not None:
             text = json.dumps({**told, "ended": self.ended}, indent=1) + "\n"
             write_whole(self._path, text.encode())
+        written = [self._path, self._lines and self._lines.name, self._pictures]
+        if names := [full(path) for path in written if path]:
+            print(f"written to {', '.join(names)}", file=sys.stderr)
 
     def close(self) -> None:
         if self._lines is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from app.command_line import EXPERT, SIZE
+from app.paths import full
 
 MOST_BYTES = 5_000_000  # the package lies in the repository
 ITERATIONS = 4000  # 3 to 5 minutes on two cores
@@ -45,7 +46,7 @@ def run(options: Options) -> int:
     folder = options.out / "capture"
     recipe = {"size": list(size), "views": options.views, "test_views": options.test_views}
     if made_before(folder, recipe):
-        say(f"Using the photos that are in {folder}; delete it to trace them again.")
+        say(f"Using the photos that are in {full(folder)}; delete it to trace them again.")
     else:
         photograph(folder, size, options)
     package = options.out / "workshop.shift"
@@ -78,7 +79,7 @@ def publish(package: Path, target: Path) -> None:
     beside = target.with_name(target.name + ".part")
     beside.write_bytes(data)
     os.replace(beside, target)
-    say(f"{target}: {len(data) / 1e6:.2f} MB")
+    say(f"{full(target)}: {len(data) / 1e6:.2f} MB")
 
 
 def made_before(folder: Path, recipe: dict) -> bool:

@@ -43,6 +43,7 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
+    from app.paths import full
     from app.progress import working
     from rasterizer.device import open_device
     from scene.read_capture import read_capture
@@ -83,6 +84,7 @@ def run(options: Options) -> int:
         print(json.dumps(result, indent=1))
     elif options.json is not None:
         write_json(options.json, result)
+        print(f"written to {full(options.json)}", file=sys.stderr)
     return 0
 
 

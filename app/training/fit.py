@@ -71,6 +71,7 @@ def defaults() -> dict[str, str]:
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
+    from app.paths import full
     from app.progress import progress_bar
     from app.training.train import calibrated, say, settings_of
     from rasterizer.device import open_device
@@ -106,11 +107,13 @@ def run(options: Options) -> int:
     noted = replace(model, provenance={**model.provenance, "need": result})
     size = write_package(noted, options.out, need.fitted.storage)
     print_report(need)
-    say(f"{options.out}: {size:,} bytes, the fitted model of the first seed with this report in it")
+    what = "the fitted model of the first seed with this report in it"
+    say(f"{full(options.out)}: {size:,} bytes, {what}")
     if options.json == Path("-"):
         print(json.dumps(result, indent=1))
     elif options.json is not None:
         write_json(options.json, result)
+        say(f"written to {full(options.json)}")
     return 0
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL
+from app.paths import full
 from app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
 from app.training.train import INTERRUPTED, say
 from app.training.train import Options as TrainOptions
@@ -100,7 +101,7 @@ def run(options: Options) -> int:
     capture = with_found(capture, rig)
     for method in sorted(set(options.methods), key=list(PLACES).index):
         if any(row.method == method and row.modality == MEAN for row in table.rows):
-            say(f"{NAMES[method]}: already in {table.path}")
+            say(f"{NAMES[method]}: already in {full(table.path)}")
             continue
         say(f"{NAMES[method]}:")
         if method == "spz":
@@ -113,6 +114,7 @@ def run(options: Options) -> int:
         for row in rows_of(method, device, capture, options, runs, distance):
             table.add(row)
     finish(table.rows, options.out, head)
+    say(f"written to {full(options.out)}: table.csv, table.md and the models")
     return 0
 
 

@@ -1,5 +1,6 @@
 """launch.py train: posed photos of one or several modalities to a scene."""
 
+import shlex
 import signal
 import sys
 import time
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL, Opt
+from app.paths import full
+from app.program import program
 from app.training.train_options import (
     ModelOptions,
     PhotoOptions,
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # exit code
 SAVE_EVERY = 60.0  # seconds between checkpoints
 LOOKS = 10  # at held-out photos in a run
+FEW_STEPS = 1000  # half of what is usual: scenes that are worth looking at need about so many
 
 
 @dataclass(frozen=True)
@@ -199,6 +203,8 @@ def run(options: Options) -> int:
     say(summary(trainer, options.out, interrupted))
     if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
         say(found)
+    for line in what_next(options, trainer.iteration, trainer.elapsed, interrupted):
+        say(line)
     return INTERRUPTED if interrupted else 0
 
 
@@ -327,6 +333,26 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
     return False
 
 
+def what_next(options: Options, steps: int, seconds: float, interrupted: bool) -> list[str]:
+    """The last lines: how to train on where that was little, and how to look at the scene."""
+    from training.settings import preset
+
+    again = [program(), "train", shlex.quote(full(options.capture))]
+    out = shlex.quote(full(options.out))
+    again += ["--out", out, "--resume"]
+    usual, lines = preset(options.preset).iterations, []
+    if interrupted:
+        lines = [f"go on: {' '.join(again)}"]
+    elif steps < FEW_STEPS:
+        more = seconds / max(steps, 1) * (usual - steps)
+        took = f"{more / 60:.0f} minutes" if more >= 90 else f"{more:.0f} seconds"
+        lines = [
+            f"{steps} steps are few: {usual:,} are usual, about {took} more on this machine. "
+            f"Go on: {' '.join(again)} --iterations {usual}"
+        ]
+    return [*lines, f"look: {program()} {out}"]
+
+
 def decibels(psnr: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.2f} dB" for name, value in psnr.items())
 
@@ -336,6 +362,6 @@ def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:
     quality = f"held-out photos: {psnr}" if psnr else "no photo was held out"
     state = "interrupted, --resume goes on" if interrupted else "done"
     return (
-        f"{out}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} s, "
+        f"{full(out)}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} s, "
         f"{trainer.anchors_count:,} anchors; {quality}"
     )
