@@ -132,8 +132,9 @@ def wear(options: Options) -> int:
             for profile in session.hands.refused:
                 print(f"{instance.runtime} does not know {profile}.", file=sys.stderr)
             wearing = Wearing(
-                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand
-            )
+                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand,
+                options.floor,
+            )  # fmt: skip
             try:
                 with interrupting(wearing):
                     wearing.loop(options.frames)

@@ -88,6 +88,10 @@ def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> d
         "hands": {side: hand_row(hand) for side, hand in frame.hands.items()},
         "standing": {**pose_row(standing.world_from_play), "scale": rounded(standing.scale)},
         "held": {side: world.held(side) for side in SIDES},
+        "offers": [
+            {"hand": offer.side, "object": offer.object, "by": offer.by}
+            for offer in wearing.person.touched.offers
+        ],
         "objects": {
             thing.name: {**pose_row(thing.world_from_object), "x": rounded(thing.x)}
             for thing in world.drawn().objects
