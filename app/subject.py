@@ -12,7 +12,7 @@ from app.command_line import nearest
 from app.errors import UsageError
 from app.opening import ReadingOptions, open_model
 from runtime_models.model import Model, Stop
-from runtime_models.stop_weights import Control, StopWeights, parse_control
+from runtime_models.stop_weights import Control, Pace, StopWeights, parse_control
 from scene.framing import default_background, default_view, frame_points, scene_points
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene, SceneObject
@@ -121,13 +121,20 @@ def placed(
     out = []
     for thing, mine in zip(things, stops, strict=True):
         try:
-            out.append(replace(thing, x=control_of_text(text, mine, said)))
+            out.append(replace(thing, x=control_of_text(text, mine, said, pace_of(thing.model))))
         except UsageError:  # a stop that others have
             out.append(thing)
     return tuple(out)
 
 
-def control_of_text(text: str, stops: Sequence[Stop], said: str = "--x") -> Control:
+def pace_of(model: Model) -> tuple[Pace, ...]:
+    """How fast the model's stops are mixed into each other, where it says so."""
+    return getattr(model, "pace", ())
+
+
+def control_of_text(
+    text: str, stops: Sequence[Stop], said: str = "--x", pace: tuple[Pace, ...] = ()
+) -> Control:
     """What `parse_control` reads; of stops whose names differ in case alone, the one spelt so.
 
     Raises UsageError that begins with `said`.
@@ -139,7 +146,7 @@ def control_of_text(text: str, stops: Sequence[Stop], said: str = "--x") -> Cont
     if alike:
         return alike[word if word in alike else next(iter(alike))].x
     try:
-        control = parse_control(word, stops)
+        control = parse_control(word, stops, pace)
     except ValueError:
         raise UsageError(f"{said}: {no_control(word, stops)}") from None
     if isinstance(control, StopWeights):

@@ -207,13 +207,13 @@ def make_part(path: Path, model, position, options: Options, known=None):
     return Part(thing, inside or None, options.label)
 
 
-def choose_x(text: str, model) -> float:
-    """Where the slider of one model stands.  Raises UsageError."""
-    from app.subject import control_of_text
+def choose_x(text: str, model):
+    """The Control of one model.  Raises UsageError."""
+    from app.subject import control_of_text, pace_of
 
     if not text:
         return min((stop.x for stop in model.stops), default=0.0)
-    return control_of_text(text, model.stops)
+    return control_of_text(text, model.stops, pace=pace_of(model))
 
 
 def with_x(text: str) -> str:

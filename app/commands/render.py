@@ -163,16 +163,18 @@ def subject_at(subject, control: float | str | None):
     return replace(subject, scene=subject.at(control))
 
 
-def label_of(control: float | str | None, x: float | None = None) -> str:
-    """A control in the name of a picture; x: of all objects, where that is known."""
+def label_of(control: float | str | None, x=None) -> str:
+    """A control in the name of a picture; x: the Control of all objects, where that is known."""
     from app.paths import file_name
 
-    if x is None and isinstance(control, str):
-        try:
-            x = float(control)
-        except ValueError:
-            return file_name(control)
-    return f"x{(control or 0) if x is None else x:.3f}"
+    if isinstance(x, float | int):
+        return f"x{x:.3f}"
+    if not isinstance(control, str):
+        return f"x{control or 0:.3f}"
+    try:
+        return f"x{float(control):.3f}"
+    except ValueError:
+        return file_name(control)
 
 
 def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Opened:

@@ -39,6 +39,8 @@ class Options(ReadingOptions):
     """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black."""
     floor: bool = True
     """Show a faint grid on the floor and a horizon; the panel switches it, too."""
+    hints: bool = True
+    """Name the buttons beside the gloves for ten seconds, and say when frames are late."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
     target_ms: Annotated[float | None, EXPERT] = None
@@ -133,7 +135,7 @@ def wear(options: Options) -> int:
                 print(f"{instance.runtime} does not know {profile}.", file=sys.stderr)
             wearing = Wearing(
                 session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand,
-                options.floor,
+                options.floor, options.hints,
             )  # fmt: skip
             try:
                 with interrupting(wearing):

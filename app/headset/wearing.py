@@ -72,6 +72,7 @@ class Wearing:
         rules: Rules = RULES,
         panel_hand: str = "left",
         floor: bool = True,
+        hints: bool = True,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.scene, self.world = scene, scene.world
@@ -79,7 +80,7 @@ class Wearing:
         self.person = Person(scene.world, scene.eye, scene.floor_y, rules)
         self.panel = WornPanel(panel_hand)
         self.standing = Standing()
-        self.floor_shown = floor
+        self.floor_shown, self._hints = floor, hints
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
         self._outlines, self._late = Outlines(), Late()
@@ -167,6 +168,8 @@ class Wearing:
 
     def _cards(self, frame: Frame) -> tuple[Card, ...]:
         """What buttons do, at first; and that frames are late."""
+        if not self._hints:
+            return ()
         side, rules = self.panel.carried.home, self.person.rules
         cards = hints(frame, self._worn_s, self.session.profiles, rules, side)
         if self._late.watch(frame.seen_s, self.session.pace.dropped):

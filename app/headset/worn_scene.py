@@ -8,7 +8,7 @@ import numpy as np
 
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
 from app.scene_files import file_at, open_scene_file
-from app.subject import control_of_text
+from app.subject import control_of_text, pace_of
 from runtime_models.model import Model
 from scene.collider_files import colliders_of
 from scene.framing import default_background, default_view, frame_points, scene_points
@@ -59,7 +59,7 @@ def open_alone(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
     """One model that nothing can touch, where its file has it."""
     model = open_model(path, options)
     first = min((stop.x for stop in model.stops), default=0.0)
-    start = control_of_text(x, model.stops) if x else first
+    start = control_of_text(x, model.stops, pace=pace_of(model)) if x else first
     item = SceneItem(name=path.stem or path.name, model=str(path), x=start, static=True)
     file = SceneFile(folder=Path(), items=(item,), gravity_m_s2=0.0)
     world = World(file, {item.name: model}, {}, hz=HZ)
