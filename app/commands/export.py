@@ -8,6 +8,7 @@ from typing import Annotated
 from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
 from app.paths import full
+from app.program import program
 
 PACKAGE = ".shift"
 
@@ -261,8 +262,8 @@ def export_package(options: Options, opened: list) -> int:
         what = "several scenes" if len(models) != 1 else "plain splats"
         what = "objects of a scene file, which have places," if opened[0].file else what
         raise UsageError(
-            f"{what} cannot become a package: it is anchors and five networks, which `launch.py "
-            "train` makes of photos; write .ply, .spz or .glb."
+            f"{what} cannot become a package: it is anchors and five networks, which "
+            f"`{program()} train` makes of photos; write .ply, .spz or .glb."
         )
     features = models[0].features
     halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 from app.command_line import SIZE
+from app.program import program
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
 TOUCH = "touch.png"
@@ -44,7 +45,7 @@ def run(options: Options) -> int:
     size = parse_size(options.size)
     check_counts(options)
     if options.scene == DEMO and not DEMO.exists():
-        raise UsageError(f"the bundled demo {DEMO} is missing; `launch.py demo` makes one.")
+        raise UsageError(f"the bundled demo {DEMO} is missing; `{program()} demo` makes one.")
     subject = open_subject(options.scene, ReadingOptions())
     result_path = options.out / "bench.json"
     make_folder(options.out)

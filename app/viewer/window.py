@@ -13,6 +13,7 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from app.panels import theme
 from app.paths import plain
+from app.program import program
 from renderer.context import NoContext
 
 BUTTONS = {0: "left", 1: "right", 2: "middle"}
@@ -330,5 +331,5 @@ def _open(title: str, size: tuple[int, int]) -> GlfwWindow:
             reason = (reasons or [str(error)])[0].rstrip(".")
     raise NoContext(
         f"no window with OpenGL 4.3 could be opened ({reason}); "
-        "`launch.py headless` and `launch.py render` need none."
+        f"`{program()} headless` and `{program()} render` need none."
     )

@@ -14,6 +14,7 @@ from app.charts.comparison import MOST_DB, Comparison
 from app.commands.compare_sides import SceneSide, open_side
 from app.errors import UsageError
 from app.panels import theme
+from app.program import program
 from app.viewer.readings import Readings
 from app.viewer.shown import Shown, Wish, picture_key
 from app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release
@@ -48,7 +49,7 @@ def comparing(viewer: "Viewer", options: "Options") -> Iterator["Wipe | None"]:
     if not isinstance(side, SceneSide):
         raise UsageError(
             f"--compare is {options.compare}, a folder of pictures; the viewer compares scenes, "
-            "`launch.py compare` also pictures."
+            f"`{program()} compare` also pictures."
         )
     drawing = viewer.renderer.backends["drawing"].split()[0]
     with Renderer(viewer.window.ctx, drawing) as renderer:
