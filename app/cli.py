@@ -198,7 +198,7 @@ def run(arguments: list[str]) -> int:
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
         print(usage())
         return 0
-    if arguments[:1] == ["--version"]:
+    if arguments[:1] in (["--version"], ["-V"], ["version"]):
         from app.program import version
 
         print(f"shapeshift {version()}")

@@ -19,12 +19,11 @@ const float GLOW = 0.045, GLOW_RISE = 0.05, GROUND = 0.012;  // at the horizon, 
 const float WIDTH_PX = 0.75;              // half of a line's
 
 // 0..1 where a line of the grid lies, none where lines are closer than three pixels.
-float lines(vec2 at, float apart) {
-    vec2 cell = at / apart;
-    vec2 pixel = max(fwidth(cell), vec2(1e-7));          // of a cell
-    vec2 away = abs(fract(cell - 0.5) - 0.5) / pixel;    // pixels to the next line
-    vec2 line = 1.0 - smoothstep(WIDTH_PX - 0.5, WIDTH_PX + 0.5, away);
-    line *= 1.0 - smoothstep(0.15, 0.35, pixel);
+float lines(vec2 at, vec2 pixel_m, float apart) {
+    vec2 pixel = pixel_m / apart;                               // of a cell
+    vec2 away = abs(fract(at / apart - 0.5) - 0.5) / pixel;     // pixels to the next line
+    vec2 line = clamp(WIDTH_PX + 0.5 - away, 0.0, 1.0);         // its edge is a pixel wide
+    line *= clamp((0.35 - pixel) / 0.2, 0.0, 1.0);
     return max(line.x, line.y);
 }
 
@@ -38,12 +37,17 @@ void main() {
     vec3 ray = normalize(world_from_eye * vec3(tangent, -1.0));
     float down = (level_m - eye.y) / (abs(ray.y) > 1e-5 ? ray.y : 1e-5);  // world metres along it
     vec3 point = eye + ray * clamp(down, 0.0, 1e4 * scale);
-    float line = finer * lines(point.xz, 0.1 * spacing_m);
-    line = max(line, mix(1.0, MAJOR, finer) * lines(point.xz, spacing_m));
-    line = max(line, MAJOR * lines(point.xz, 10.0 * spacing_m));
-    line *= down > 0.0 ? exp(-down / (scale * FAR_M)) : 0.0;
-    float glow = GLOW * exp(-abs(ray.y) / GLOW_RISE) + (ray.y < 0.0 ? GROUND : 0.0);
+    vec2 pixel_m = max(fwidth(point.xz), vec2(1e-7));
     float open = 1.0 - texture(coverage, top_first ? vec2(place.x, 1.0 - place.y) : place).a;
+    if (!(open > 1.0 / 512.0)) discard;
+    float line = 0.0;
+    if (down > 0.0) {
+        line = finer * lines(point.xz, pixel_m, 0.1 * spacing_m);
+        line = max(line, mix(1.0, MAJOR, finer) * lines(point.xz, pixel_m, spacing_m));
+        line = max(line, MAJOR * lines(point.xz, pixel_m, 10.0 * spacing_m));
+        line *= exp(-down / (scale * FAR_M));
+    }
+    float glow = GLOW * exp(-abs(ray.y) / GLOW_RISE) + (ray.y < 0.0 ? GROUND : 0.0);
     float value = open * max(LINE * clearness * line + glow + dither() / 255.0, 0.0);
     shown = vec4(vec3(value), 0.0);
 }
