@@ -34,6 +34,20 @@ LIBRARIES = {
     "libXinerama.so.1": "libxinerama1",
     "libgomp.so.1": "libgomp1",
 }
+# Answered without the environment, by whatever Python started this.
+ASKING = ("-h", "--help", "help", "--version")
+TEST_HELP = """usage: python3 launch.py test [file] [options of pytest]
+
+Runs the tests; the first time it installs what they need into .venv.
+
+  --slow                long trainings, large sweeps and sessions of a headset, too
+  -k WORDS              only tests whose names have these words
+  -x                    stop at the first that fails
+  -q, -v                say less, say more
+  --regenerate          make the golden pictures anew
+  tests/test_cli.py     only the tests of a file
+
+All others, once they are installed: .venv/bin/python -m pytest --help"""
 OPENCL_PACKAGE = "pocl-opencl-icd"
 OPENCL_WHEEL = "pocl-binary-distribution==3.0"  # Linux x86-64 only, half as fast as Debian's
 
@@ -151,12 +165,12 @@ def make_environment(testing: bool) -> None:
         stamp_file(level).write_text(digest(level))
 
 
-def hand_over(arguments: list[str]) -> int:
+def hand_over(arguments: list[str], python: Path = PYTHON) -> int:
     """Run in the environment; on POSIX this process becomes the program, so signals reach it."""
     os.environ["PYTHONPATH"] = os.pathsep.join(
         [str(ROOT)] + [p for p in [os.environ.get("PYTHONPATH")] if p]
     )
-    command = [str(PYTHON), *arguments]
+    command = [str(python), *arguments]
     if not WINDOWS:
         os.execv(command[0], command)
     child = subprocess.Popen(command)
@@ -172,6 +186,11 @@ def main(arguments: list[str]) -> int:
         found = ".".join(map(str, sys.version_info[:3]))
         stop(f"Shapeshift needs Python 3.11 or newer, this is {found}; start it with that.")
     testing = arguments[:1] == ["test"]
+    if testing and set(arguments[1:]) & {"-h", "--help"}:
+        print(TEST_HELP)
+        return 0
+    if arguments and arguments[0] in ASKING and len(arguments) == 1:
+        return hand_over(["-m", "app.cli", *arguments], Path(sys.executable))
     try:
         make_environment(testing)
     except KeyboardInterrupt:

@@ -1,5 +1,6 @@
 """Command line: one table of modes; only the mode that is asked for is imported."""
 
+import contextlib
 import importlib
 import os
 import sys
@@ -47,24 +48,37 @@ COMMANDS = {
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
+LAUNCHED = {"test": "run the tests"}  # commands that launch.py has itself
+OPEN_ENDED = ("view", "vr")  # they last as long as somebody looks
 BAD_INPUT = 2  # exit code
 FAULT = 3
 INTERRUPTED = 130
 
 
 def usage() -> str:
-    rows = [f"  {name:9} {text}" for name, (_, text) in COMMANDS.items()]
+    from app.program import program
+
+    name = program()
     return "\n".join(
         [
-            "usage: python3 launch.py [command] [options]     (command --help lists its options)",
+            f"usage: {name} [command] [options]",
+            f"       {name} command --help     lists its options",
+            f"       {name} --version",
             "",
             "With no command: the viewer on the bundled demo, or, without a display, its pictures.",
             "With a file or folder: the viewer on that scene.",
             "",
-            *rows,
-            "  test      run the tests",
+            *(f"  {command:9} {text}" for command, text in offered().items()),
         ]
     )
+
+
+def offered() -> dict[str, str]:
+    """Every command and what it does; an installed package has no tests to run."""
+    from app.program import is_installed
+
+    rows = {command: text for command, (_, text) in COMMANDS.items()}
+    return rows if is_installed() else rows | LAUNCHED
 
 
 def has_display() -> bool:
@@ -98,8 +112,14 @@ def known_failures() -> tuple[type[Exception], ...]:
 def refuse(sentence: str) -> int:
     """One line on stderr, whatever a path or a file put into it."""
     line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in sentence)
-    print(f"shapeshift {line}", file=sys.stderr)
+    warn(f"shapeshift {line}")
     return BAD_INPUT
+
+
+def warn(text: str) -> None:
+    """A line on stderr; the exit code stays what it is where nobody reads it."""
+    with contextlib.suppress(BrokenPipeError):
+        print(text, file=sys.stderr, flush=True)
 
 
 def report_fault(command: str, error: Exception) -> int:
@@ -112,49 +132,105 @@ def report_fault(command: str, error: Exception) -> int:
     with tempfile.NamedTemporaryFile("w", prefix="shapeshift-", suffix=".log", delete=False) as log:
         traceback.print_exception(error, file=log)
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
-    print(
+    warn(
         f"shapeshift {command}: a fault of the program, not of your input ({text}); "
-        f"the details are in {log.name}.",
-        file=sys.stderr,
+        f"the details are in {log.name}."
     )
     return FAULT
 
 
 def run_command(command: str, arguments: list[str]) -> int:
-    import tyro
+    from app.command_line import parse, wants_help
+    from app.program import program
+    from app.progress import lines
 
-    module = importlib.import_module(f"app.{COMMANDS[command][0]}")
-    options = tyro.cli(module.Options, args=arguments, prog=f"launch.py {command}")
-    return module.run(options)
+    module, prog = importlib.import_module(f"app.{COMMANDS[command][0]}"), f"{program()} {command}"
+    if wants_help(arguments):
+        from app.command_help import help_text
+
+        defaults = getattr(module, "defaults", dict)()
+        print(help_text(module.Options, prog, defaults))
+        return 0
+    options = parse(module.Options, arguments, prog)
+    if command in OPEN_ENDED:
+        return module.run(options)
+    with lines(command):
+        return module.run(options)
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """The exit code of what was asked for.
+
+    A reader of our output that goes away, as `| head` does, ends it quietly.
+    """
     arguments = sys.argv[1:] if arguments is None else arguments
+    code = 0
+    try:
+        code = run(arguments)
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:
+                stream.flush()  # now, where a closed pipe can be met, not while Python ends
+    except BrokenPipeError:
+        forget_output()
+    except SystemExit as ended:
+        if not isinstance(ended.__context__, BrokenPipeError):  # so a table of rich ends it
+            raise
+        forget_output()
+    return code
+
+
+def forget_output() -> None:
+    """What is still to be written goes nowhere: Python would complain at its end."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, OSError, ValueError):
+            os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def run(arguments: list[str]) -> int:
+    """The same; BrokenPipeError where output is not read to its end."""
     from app.paths import plain_path
 
     arguments = [plain_path(argument) for argument in arguments]
+    if arguments[:1] == ["help"] and len(arguments) == 2:
+        arguments = [arguments[1], "--help"]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
         print(usage())
         return 0
+    if arguments[:1] in (["--version"], ["-V"], ["version"]):
+        from app.program import version
+
+        print(f"shapeshift {version()}")
+        return 0
     command, rest = choose(arguments)
     if command == "view" and rest and not rest[0].startswith("-") and not Path(rest[0]).exists():
-        return refuse(f"'{rest[0]}' is neither a command nor a file; --help lists the commands.")
+        return refuse(no_command(rest[0]))
     try:
         return run_command(command, rest)
     except KeyboardInterrupt:
-        print("Interrupted.", file=sys.stderr)
+        warn("Interrupted.")
         return INTERRUPTED
     except BrokenPipeError:
-        return 0  # the reader of our output went away, as `| head` does
+        raise
     except known_failures() as error:
         if not arguments and command == "view" and type(error).__name__ == "NoContext":
             print(f"No window here ({error}) Drawing the demo without one.", file=sys.stderr)
-            return main(["headless"])
+            return run(["headless"])
         return refuse(f"{command}: {error}")
     except OSError as error:
         return refuse(f"{command}: {error.strerror or error}: {error.filename or 'no file named'}")
     except Exception as error:
         return report_fault(command, error)
+
+
+def no_command(word: str) -> str:
+    """What is said of a first word that is nothing."""
+    from app.command_line import nearest
+
+    meant = nearest(word, list(offered()))
+    hint = f"did you mean {meant}? " if meant else ""
+    return f"'{word}' is neither a command nor a file; {hint}--help lists the commands."
 
 
 if __name__ == "__main__":

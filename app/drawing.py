@@ -32,24 +32,17 @@ def parse_size(text: str, option: str = "--size") -> tuple[int, int]:
     return width, height
 
 
-def parse_controls(words: tuple[str, ...]) -> list[float]:
-    """Control values of words that are numbers in [0, 1] or sweep:N."""
-    values: list[float] = []
+def split_controls(words: tuple[str, ...]) -> list[float | str]:
+    """What --x lists: sweep:N as its numbers from 0 to 1, every other word as it is."""
+    values: list[float | str] = []
     for word in words:
-        if found := re.fullmatch(r"sweep:([0-9]{1,20})", word):
-            if not 2 <= int(found[1]) <= MOST_VALUES:
-                raise UsageError(f"--x is '{word}'; a sweep has 2 to {MOST_VALUES} values.")
-            values += np.linspace(0, 1, int(found[1])).tolist()
+        kind, _, count = word.strip().partition(":")
+        if kind != "sweep":
+            values.append(word)
             continue
-        try:
-            x = float(word)
-        except ValueError:
-            raise UsageError(f"--x is '{word}', expected a number in 0..1 or sweep:N.") from None
-        if not 0 <= x <= 1:
-            raise UsageError(f"--x is {word}, expected 0 to 1.")
-        values.append(x)
-    if not values:
-        raise UsageError("--x has no value, expected numbers in 0..1 or sweep:N.")
+        if not (re.fullmatch("[0-9]{1,20}", count) and 2 <= int(count) <= MOST_VALUES):
+            raise UsageError(f"--x is '{word}'; sweep:N has 2 to {MOST_VALUES} values.")
+        values += np.linspace(0, 1, int(count)).tolist()
     return values
 
 

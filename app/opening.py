@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
+from app.command_line import EXPERT
 from runtime_models.model import Finding, Model
 from runtime_models.plain_splats import Reading
 
@@ -18,19 +19,19 @@ PATIENCE_S = 1.0  # what takes longer shows a progress bar
 class ReadingOptions:
     """What a command that opens scenes takes beside its own options."""
 
-    mode: Literal["", "cumulative", "exclusive"] = ""
-    """How layers add up; without it as the files suggest: a thermal pair exclusive, other layers
-    cumulative."""
     up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = ""
-    """The file's axis that points up, where it is not the one its format has; write --up=-Z."""
+    """The axis of the file that points up.  Default: the one that its format says."""
     flip: bool = False
     """Turn the scene upside down."""
-    strict: bool = False
+    mode: Annotated[Literal["", "cumulative", "exclusive"], EXPERT] = ""
+    """How layers add up: each with those below it, or each alone.  Default: as the files suggest,
+    a thermal pair exclusive, other layers cumulative."""
+    strict: Annotated[bool, EXPERT] = False
     """Refuse a file that needs repair instead of repairing it."""
-    allow_huge: bool = False
+    allow_huge: Annotated[bool, EXPERT] = False
     """Open a file even where thousands of its splats would lie over every pixel."""
-    max_splats: int = 0
-    """Show no more splats than this, those that show most; 0: all."""
+    max_splats: Annotated[int, EXPERT] = 0
+    """Show at most so many splats, the most visible ones; 0: all."""
 
     def reading(self) -> Reading:
         """The same for readers.  Raises UsageError."""
@@ -85,12 +86,13 @@ def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
     from rich.markup import escape
 
-    from app.progress import progress_bar
+    from app.progress import Words, listed, progress_bar
 
-    began, bar, task = time.monotonic(), None, None
+    began, bar, task, words = time.monotonic(), None, None, Words()
 
     def told(what: str, part: float) -> None:
         nonlocal bar, task
+        words.text = f"{what}, {part:.0%}"
         if bar is None:
             if time.monotonic() - began < seconds:
                 return
@@ -100,7 +102,8 @@ def progress_after(seconds: float) -> Iterator:
         bar.update(task, description=escape(what), completed=part)
 
     try:
-        yield told
+        with listed(words):
+            yield told
     finally:
         if bar is not None:
             bar.stop()

@@ -32,6 +32,11 @@ def plain(path: Path | str) -> Path:
     return Path(plain_path(str(path)))
 
 
+def full(path: Path | str) -> str:
+    """A path as it is told to people: from the root, so that it is found from everywhere."""
+    return os.path.abspath(plain(path))
+
+
 def file_name(text: str) -> str:
     """A name that is a file's on every system, of one that people or files have given a thing."""
     plain = "".join(c if c.isalnum() or c in " -_.,()+" else "_" for c in text)

@@ -1,13 +1,18 @@
 """What a command draws and measures: one model, or the objects of a scene file."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from app.command_line import nearest
+from app.errors import UsageError
 from app.opening import ReadingOptions, open_model
-from runtime_models.model import Model
+from runtime_models.model import Model, Stop
+from runtime_models.stop_weights import Control, Pace, StopWeights, parse_control
 from scene.framing import default_background, default_view, frame_points, scene_points
 from scene.pose import Pose, View
 from scene.scene import IDENTITY, Scene, SceneObject
@@ -41,10 +46,11 @@ class Subject:
         """Every x at which an object rests, rising."""
         xs = {stop.x for model in self.models for stop in model.stops}
         items = self.file.all_items if self.file else ()
-        return tuple(sorted(xs | {state.x for item in items for state in item.states}))
+        states = {s.x for i in items for s in i.states if not isinstance(s.x, StopWeights)}
+        return tuple(sorted(xs | states))
 
     @property
-    def x(self) -> float | None:
+    def x(self) -> Control | None:
         """The control value of all that shows; None where objects have several."""
         found = {thing.x for thing in self.scene.objects if thing.visible}
         return found.pop() if len(found) == 1 else None
@@ -61,7 +67,7 @@ class Subject:
         black = (0.0, 0.0, 0.0)
         return black if self.file else default_background(self.scene.objects[0].model, black)
 
-    def at(self, x: float | None, pose: Pose = IDENTITY) -> Scene:
+    def at(self, x: Control | None, pose: Pose = IDENTITY) -> Scene:
         """All objects at x (None: each at its own), the world moved by a pose."""
         things = self.scene.objects
         if x is not None:
@@ -69,6 +75,14 @@ class Subject:
         if pose is not IDENTITY:
             things = tuple(moved_object(thing, pose) for thing in things)
         return Scene(things)
+
+    def placed(self, text: str, said: str = "--x") -> "Subject":
+        """The same with all objects where `control_of_text` has their sliders; of a scene file,
+        objects that have no such stop or state stay.  Raises UsageError.
+        """
+        items = self.file.all_items if self.file else ()
+        states = {item.name: item.states for item in items}
+        return replace(self, scene=Scene(placed(self.scene.objects, text, said, states)))
 
     def points(self) -> tuple[np.ndarray, np.ndarray]:
         """World points (N, 3) and opacity (N,) that stand for what shows."""
@@ -89,6 +103,65 @@ class Subject:
         from scene.camera_list import moved
 
         return replace(cameras, views=tuple(moved(cameras.views, -self.origin)))
+
+
+def placed(
+    things: Sequence[SceneObject], text: str, said: str = "--x",
+    states: Mapping[str, Sequence] = MappingProxyType({}),
+) -> tuple[SceneObject, ...]:  # fmt: skip
+    """Objects with their sliders where a text says, those that have the stop that it names.
+
+    states: of a scene file, by object.  Raises UsageError where no object has it.
+    """
+    stops = [
+        [*thing.model.stops, *(Stop(s.name, s.x) for s in states.get(thing.name, ()))]
+        for thing in things
+    ]
+    known = {stop.name: stop for each in reversed(stops) for stop in reversed(each)}
+    control_of_text(text, list(known.values())[::-1], said)  # one sentence for all of them
+    out = []
+    for thing, mine in zip(things, stops, strict=True):
+        try:
+            out.append(replace(thing, x=control_of_text(text, mine, said, pace_of(thing.model))))
+        except UsageError:  # a stop that others have
+            out.append(thing)
+    return tuple(out)
+
+
+def pace_of(model: Model) -> tuple[Pace, ...]:
+    """How fast the model's stops are mixed into each other, where it says so."""
+    return getattr(model, "pace", ())
+
+
+def control_of_text(
+    text: str, stops: Sequence[Stop], said: str = "--x", pace: tuple[Pace, ...] = ()
+) -> Control:
+    """What `parse_control` reads; of stops whose names differ in case alone, the one spelt so.
+
+    Raises UsageError that begins with `said`.
+    """
+    word = text.strip()
+    alike = {s.name: s for s in reversed(stops) if s.name.casefold() == word.casefold()}
+    if len(alike) > 1 and word not in alike:
+        raise UsageError(f"{said}: '{word}' may be {' or '.join(alike)}; spell it as it is.")
+    if alike:
+        return alike[word if word in alike else next(iter(alike))].x
+    ends = [stop for stop in stops if not isinstance(stop.x, StopWeights)]  # of ways and blends
+    try:
+        return parse_control(word, ends, pace)
+    except ValueError:
+        raise UsageError(f"{said}: {no_control(word, stops)}") from None
+
+
+def no_control(word: str, stops: Sequence[Stop]) -> str:
+    """What is said of a text that `parse_control` does not read."""
+    names = [stop.name for stop in stops]
+    meant = nearest(word, names)
+    way = f" or a way such as {names[0]}..{names[-1]}:0.5" if len(names) > 1 else ""
+    return (
+        f"'{word[:60]}' is no x of this scene; expected a number from 0 to 1, a stop "
+        f"({', '.join(names) or 'it has none'}){way}{f'; did you mean {meant}?' if meant else '.'}"
+    )
 
 
 def moved_object(thing: SceneObject, world_from_before: Pose) -> SceneObject:

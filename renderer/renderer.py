@@ -347,6 +347,13 @@ class Renderer:
                 unit = 1.0 if self._debug else self._drawing.unit_of(i)
                 self._resolve.draw(image, framebuffer, background, palette, heat, unit)
 
+    def coverage(self, i: int = 0) -> moderngl.Texture | np.ndarray:
+        """How much splats hide of what is behind them in view i, as drawn: the alpha of a GL
+        texture, row 0 at the bottom, or without GL (H, W) float32, row 0 on top.
+        """
+        image = self._drawing.presentable(i)
+        return image[..., 3] if isinstance(image, np.ndarray) else image
+
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
         self._decode_colors([view])

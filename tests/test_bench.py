@@ -185,8 +185,6 @@ def test_a_name_with_brackets_is_no_markup(capsys, model, clock):
 
 
 REFUSED = {
-    ("--x", "-0.5"): "--x is -0.5",
-    ("--x", "nan"): "--x is nan",
     ("--frames", "1"): "--frames is 1, expected 2 to",
     ("--sweep", "0"): "--sweep is 0, expected 2 to",
     ("--size", "16384x16384"): "134,217,728 pixels",

@@ -184,9 +184,12 @@ def test_plain_splats_become_no_package(scenes, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--x", "1.5"), "0 to 1 or one of the stops of random.shift: RGB (0), Thermal (1)"),
-        (("--x", "nan"), "0 to 1 or one of the stops"),
-        (("--x", "layer9"), "0 to 1 or one of the stops"),
+        (
+            ("--x", "1.5"),
+            "'1.5' is no x of this scene; expected a number from 0 to 1",
+        ),
+        (("--x", "nan"), "'nan' is no x of this scene"),
+        (("--x", "layer9"), "a stop (RGB, Thermal) or a way such as RGB..Thermal:0.5"),
         (("--sh-degree", "4"), "--sh-degree is 4"),
         (("--sh-degree", "-1"), "--sh-degree is -1"),
         (("--object", "2"), "there are 1 random.shift"),

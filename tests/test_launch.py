@@ -107,3 +107,30 @@ def test_a_second_start_adds_under_a_second():
     inside = [ROOT / ".venv/bin/python", "-m", "app.cli", "--help"]
     seconds(door)  # the set-up, if something changed
     assert min(seconds(door) for _ in range(3)) - min(seconds(inside) for _ in range(3)) < 1.0
+
+
+@pytest.mark.parametrize("words", [["--help"], ["-h"], ["help"], ["--version"]])
+def test_what_is_only_asked_installs_nothing(launch, calls, monkeypatch, words):
+    """The Python that started it answers; its standard library is enough."""
+    handed = []
+    monkeypatch.setattr(launch, "hand_over", lambda *given: handed.append(given) or 0)
+    assert launch.main(words) == 0
+    ((arguments, python),) = handed
+    assert calls.all == [] and str(python) == sys.executable and arguments[-1] == words[0]
+
+
+@pytest.mark.parametrize("words", [["--help"], ["-h"], ["help"], ["--version"]])
+def test_what_is_only_asked_needs_the_standard_library_alone(words):
+    answer = subprocess.run(
+        [sys.executable, "-I", "-S", ROOT / "app" / "cli.py", *words],
+        capture_output=True, text=True, cwd=ROOT, check=True,
+    )  # fmt: skip
+    assert answer.stdout.startswith(("usage: ", "shapeshift ")) and answer.stderr == ""
+
+
+@pytest.mark.parametrize("words", [["--help"], ["-h"], ["-q", "--help"]])
+def test_help_of_the_tests_installs_nothing(launch, calls, capsys, words):
+    assert launch.main(["test", *words]) == 0
+    told = capsys.readouterr()
+    assert calls.all == [] and told.err == ""
+    assert told.out.startswith("usage: python3 launch.py test") and "--slow" in told.out

@@ -103,10 +103,11 @@ def test_headless_writes_pictures_and_says_where(scene, tmp_path):
 
 
 REFUSED = {
-    ("--x", "1.5"): "--x is 1.5, expected 0 to 1",
-    ("--x", "nan"): "--x is nan",
-    ("--x", "left"): "--x is 'left'",
-    ("--x", "sweep:1"): "a sweep has 2",
+    ("--x", "1.5"): "--x: '1.5' is no x of this scene; expected a number from 0 to 1, a stop",
+    ("--x", "nan"): "--x: 'nan' is no x",
+    ("--x", "left"): "a stop (RGB, Thermal) or a way such as RGB..Thermal:0.5.",
+    ("--x", "thrmal"): "did you mean Thermal?",
+    ("--x", "sweep:1"): "sweep:N has 2 to 100000 values",
     ("--size", "0x10"): "each side must be 1 to 16384",
     ("--size", "99999x10"): "each side must be 1 to 16384",
     ("--size", "big"): "expected WIDTHxHEIGHT",

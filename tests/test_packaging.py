@@ -39,6 +39,18 @@ def test_every_dependency_is_pinned_and_explained():
     assert not unexplained
 
 
+def test_an_index_can_show_what_it_is():
+    """What people see of a package before they have it."""
+    project = PROJECT["project"]
+    assert (ROOT / project["readme"]).is_file() and len(project["description"]) > 40
+    assert project["authors"][0]["name"] and project["keywords"]
+    told = {c.split(" :: ")[0] for c in project["classifiers"]}
+    assert {"Development Status", "Intended Audience", "Operating System", "Topic"} <= told
+    # A licence is named as soon as the repository has one, and none before.
+    has_licence = any(ROOT.glob("LICEN[CS]E*"))
+    assert ("license" in project) == has_licence
+
+
 def test_top_level_of_the_readme_tree_is_the_top_level():
     tree = (ROOT / "README.md").read_text().split("```")
     block = next(b for b in tree if "launch.py " in b and "renderer/" in b)

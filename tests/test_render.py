@@ -11,9 +11,9 @@ from app import cli
 from app.drawing import (
     is_our_png,
     open_renderer,
-    parse_controls,
     parse_size,
     save_png,
+    split_controls,
 )
 from app.errors import UsageError
 from renderer.palette import palette_colors
@@ -152,7 +152,7 @@ def test_pictures_that_exist_are_found_before_the_scene_is_opened(
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
     out.mkdir()
-    x = parse_controls(words[-1:])[-1] if "--x" in words else 0
+    x = split_controls(words[-1:])[-1] if "--x" in words else 0
     (out / f"{last:04}_x{x:.3f}.png").write_text("mine")
     (out / f"{last + 1:04}_x{x:.3f}.png").write_text("mine, in nobody's way")
     assert render(broken, "--out", out, *words, *TINY) == 2
@@ -199,16 +199,13 @@ def test_sizes():
 
 
 def test_controls():
-    assert parse_controls(("0", "1", "0.25")) == [0.0, 1.0, 0.25]
-    assert parse_controls(("sweep:3", "0.1")) == [0.0, 0.5, 1.0, 0.1]
-    assert parse_controls(("-0.0", "1e-3")) == [0.0, 0.001]
-    bad = ("nan", "inf", "-0.001", "1.0001", "", "x", "sweep:", "sweep:1", "sweep:-3", "sweep:1e9",
-           "sweep:100001", "sweep:" + "9" * 50)  # fmt: skip
+    assert split_controls(()) == []
+    assert split_controls(("0", "Thermal", "0.25")) == ["0", "Thermal", "0.25"]
+    assert split_controls(("sweep:3", "0.1")) == [0.0, 0.5, 1.0, "0.1"]
+    bad = ("sweep:", "sweep:1", "sweep:-3", "sweep:1e9", "sweep:100001", "sweep:" + "9" * 50)
     for text in bad:
         with pytest.raises(UsageError, match="--x is"):
-            parse_controls((text,))
-    with pytest.raises(UsageError, match="no value"):
-        parse_controls(())
+            split_controls((text,))
 
 
 REFUSED = {

@@ -80,7 +80,10 @@ def test_the_same_run_gives_the_same_bytes(example, tmp_path):
 
 
 def test_pictures_show_what_moves(tmp_path):
-    options = Options(SCENE, tmp_path, SCRIPT, 1.2, 54, "160x90", "tiles", "none")
+    options = Options(
+        SCENE, tmp_path, SCRIPT, seconds=1.2, pictures=54, size="160x90", drawing="tiles",
+        context="none",
+    )  # fmt: skip
     assert run(options) == 0
     names = sorted(p.name for p in tmp_path.iterdir())
     assert names == ["00000.png", "00054.png", "00108.png", "run.jsonl"]
@@ -108,6 +111,15 @@ def test_nothing_is_replaced_unasked_and_an_input_never(example, tmp_path):
 def test_wrong_options_are_one_sentence(tmp_path, changes, said):
     with pytest.raises(UsageError, match=said):
         run(replace(Options(SCENE, tmp_path / "out"), **changes))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["workshop.shift", "a.ply", "folder"])
+def test_what_is_no_scene_file_is_told_what_is(tmp_path, name):
+    path = tmp_path / name
+    path.mkdir() if name == "folder" else path.write_bytes(b"PK")
+    with pytest.raises(UsageError, match=rf"{name} is no scene file: .* NAME\.scene\.json"):
+        run(Options(path, tmp_path / "out"))
     assert not (tmp_path / "out").exists()
 
 

@@ -24,6 +24,7 @@ from vr.touching import (
     REACH_M,
     TAKEN,
     TOUCHED,
+    Offer,
     Touching,
     at_rest,
     feel,
@@ -78,6 +79,33 @@ def test_a_squeeze_takes_the_nearest_within_reach_at_every_scale(scale):
         assert told[-1].held == {"left": None, "right": taken}
         assert touching.busy == (frozenset({"right"}) if taken else frozenset())
         assert at_rest(SQUEEZE, touching).hands["right"].squeeze == (0.0 if taken else 1.0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.3, 3.0])
+def test_what_a_squeeze_would_take_is_offered_first(scale):
+    level = Standing(Pose(ROOM.world_from_play.position, at(0, 0, 0).wxyz), scale)
+    for gap, offered in ((REACH_M - 0.01, True), (REACH_M + 0.01, False)):
+        place = np.array(HERE) - [0, 0, gap + 0.05 / scale]
+        world = world_with(place, standing=level)
+        touching, told = run(world, [OPEN], standing=level)
+        assert told[-1].offers == ((Offer("right", "a", "hand"),) if offered else ())
+        _, told = run(world, [SQUEEZE], touching, level)
+        assert (told[-1].held["right"] == "a") == offered, "what is offered is what is taken"
+        assert told[-1].offers == (), "a hand that is at work is offered nothing"
+
+
+def test_a_ray_is_offered_what_answers_to_it():
+    far = (HERE[0], HERE[1], HERE[2] - 2.0)
+    world = world_with(far, reactions=(reaction("ray", "fire"),))
+    _, told = run(world, [OPEN])
+    assert told[-1].offers == (Offer("right", "a", "ray"),)
+    _, told = run(world, [frame(right=hand("right", wxyz=tilted(0.5)))])
+    assert told[-1].offers == (), "it points elsewhere"
+    _, told = run(world, [frame(right=LOST)])
+    assert told[-1].offers == ()
+    silent = world_with(far, reactions=(reaction("grab", "fire"),))
+    _, told = run(silent, [OPEN])
+    assert told[-1].offers == (), "nothing would come of it"
 
 
 def test_reach_is_a_hand_s():

@@ -185,10 +185,9 @@ def test_packages_have_one_way_up(reading):
 
 @pytest.mark.parametrize("words", [["--up", "-Z"], ["--up=-Z"], ["--up", "+Z"], ["--up=+Z"]])
 def test_the_option_takes_an_axis_with_its_sign(words):
-    import tyro
-
+    from app.command_line import parse
     from app.commands.info import Options
 
-    options = tyro.cli(Options, args=["scene.ply", *words])
+    options = parse(Options, ["scene.ply", *words], "info")
     assert options.reading().up == words[-1][-2:]
-    assert tyro.cli(Options, args=[*words, "--flip", "scene.ply"]).reading().flip
+    assert parse(Options, [*words, "--flip", "scene.ply"], "info").reading().flip

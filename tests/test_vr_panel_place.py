@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from vr_hands import HEAD, a_frame, hand_at, moved
+from vr_hands import HEAD, OPEN, a_frame, hand_at, moved
 
 from runtime_models.model import Stop
 from scene.pose import Pose
@@ -12,17 +12,17 @@ from vr.carried import Carried, carry, panel_row
 from vr.frame import LOST, Hand, Pulse
 from vr.glove import fingertip, glove
 from vr.panel_layout import knob_place, lay_out
-from vr.panel_place import ABOVE_HAND, NEAR_M, RAY_M, hang, play_point
+from vr.panel_place import ABOVE_M, ASIDE, NEAR_M, RAY_M, hang, play_point
 from vr.panel_state import Facts, Recentre, SetX, Slider
 
 STOPS = (Stop("normal", 0.0), Stop("ice", 0.25), Stop("fire", 1.0))
 FACTS = Facts((Slider("cube", STOPS, 0.25),))
 LEFT = hand_at((-0.15, 1.15, -0.45))
-SIZE_M = (0.37, 0.27)
+SIZE_M = (0.25, 0.2)
 
 
 def settled(facts: Facts = FACTS, left: Hand = LEFT) -> Carried:
-    carried = Carried()
+    carried = OPEN
     for _ in range(3):
         carried, _, _ = carry(carried, facts, a_frame(left), 1.0)
     return carried
@@ -50,11 +50,16 @@ def step(carried: Carried, right: Hand, left: Hand = LEFT, facts: Facts = FACTS,
     return carry(carried, facts, a_frame(left, right, **state), 1 / 72)
 
 
-def test_it_hangs_over_the_hand_upright_and_faces_the_head():
-    pose = hang(None, LEFT, HEAD, SIZE_M, 0.0)
+@pytest.mark.parametrize(("side", "outwards"), [("left", -1), ("right", 1)])
+def test_it_hangs_outwards_of_the_hand_upright_and_faces_the_head(side, outwards):
+    """Not over what one looks at between the hands."""
+    hand = LEFT if side == "left" else moved(LEFT, (0.3, 0, 0))
+    pose = hang(None, hand, HEAD, SIZE_M, 0.0, side)
     right, up, normal = pose.matrix()[:3, :3].T
-    over = pose.position - LEFT.grip.position
-    np.testing.assert_allclose(over, (0, ABOVE_HAND + SIZE_M[1] / 2, 0), atol=1e-12)
+    away = pose.position - hand.grip.position
+    assert away[1] == pytest.approx(ABOVE_M + SIZE_M[1] / 2)
+    assert np.hypot(away[0], away[2]) == pytest.approx(ASIDE * SIZE_M[0])
+    assert away[0] * outwards > 0.06
     to_head = HEAD.position - pose.position
     np.testing.assert_allclose(normal, to_head / np.linalg.norm(to_head), atol=1e-12)
     assert right[1] == pytest.approx(0) and up[1] > 0.5
@@ -62,14 +67,19 @@ def test_it_hangs_over_the_hand_upright_and_faces_the_head():
 
 def test_it_follows_a_trembling_hand_calmly_and_a_jump_at_once():
     pose = hang(None, LEFT, HEAD, SIZE_M, 0.0)
-    for by, least, most in ((0.002, 0.0001, 0.0005), (0.7, 0.699, 0.701)):
-        now = hang(pose, moved(LEFT, (by, 0, 0)), HEAD, SIZE_M, 1 / 90)
-        assert least < (now.position - pose.position)[0] < most
+    trembles = hang(pose, moved(LEFT, (0.002, 0, 0)), HEAD, SIZE_M, 1 / 90)
+    assert 0.0001 < (trembles.position - pose.position)[0] < 0.0005
+    jumped = moved(LEFT, (0.7, 0, 0))
+    there = hang(None, jumped, HEAD, SIZE_M, 0.0)
+    now = hang(pose, jumped, HEAD, SIZE_M, 1 / 90)
+    np.testing.assert_array_equal(now.position, there.position)
 
 
-def test_without_a_hand_it_stays_and_at_first_is_before_the_head():
+def test_without_a_hand_it_stays_and_at_first_is_at_the_lower_edge():
     pose = hang(None, LOST, HEAD, SIZE_M, 0.0)
-    assert pose.position[2] == pytest.approx(-0.55) and 1.3 < pose.position[1] < 1.6
+    np.testing.assert_allclose(pose.position, np.add(HEAD.position, (-0.24, -0.24, -0.5)))
+    other = hang(None, LOST, HEAD, SIZE_M, 0.0, "right")
+    np.testing.assert_allclose(other.position, np.add(HEAD.position, (0.24, -0.24, -0.5)))
     assert hang(pose, LOST, HEAD, SIZE_M, 1.0) is pose
     for wxyz in ((0.7071068, -0.7071068, 0, 0), (0.7071068, 0.7071068, 0, 0)):  # up, down
         head = Pose(HEAD.position, np.array(wxyz))
@@ -91,11 +101,73 @@ def test_a_menu_button_of_either_hand_closes_and_opens_it():
     carried, _, _ = step(carried, LOST)
     carried, _, _ = step(carried, LOST, replace(LEFT, menu=True))
     assert carried.panel.side == "left"
+    for _ in range(100):  # a second and more: the palm is not up, and it stays all the same
+        carried, _, _ = step(carried, LOST)
+    assert carried.panel.open
     carried, _, _ = step(carried, hand_at((0.2, 1.2, -0.4), menu=True))
     assert not carried.panel.open
     other = Carried(replace(carried.panel), home="right")
     other, _, _ = step(other, hand_at((0.2, 1.2, -0.4), menu=True))
     assert other.panel.side == "right"
+
+
+def palm(up: float, side: str = "left", **state) -> Hand:
+    """A hand whose palm's normal is turned up by radians from level."""
+    sign = 1.0 if side == "left" else -1.0  # the grip's X comes out of the left palm alone
+    half = sign * up / 2
+    pose = Pose(LEFT.grip.position, np.array([np.cos(half), 0, 0, np.sin(half)]))
+    return Hand(True, pose, pose, **state)
+
+
+def turned(carried: Carried, hand: Hand, seconds: float) -> Carried:
+    for _ in range(round(seconds * 90)):
+        hands = (hand, LOST) if carried.home == "left" else (LOST, hand)
+        carried, _, _ = carry(carried, FACTS, a_frame(*hands), 1 / 90)
+    return carried
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_palm_that_is_turned_up_opens_it_for_as_long(side):
+    carried = turned(Carried(home=side), palm(0.0, side), 1.0)
+    assert not carried.panel.open, "closed at first: the scene is what one sees"
+    level = turned(carried, palm(0.8, side), 1.0)  # sin 0.72: not yet
+    assert not level.panel.open
+    carried = turned(carried, palm(1.4, side), 0.15)
+    assert not carried.panel.open, "a hand that passes by"
+    carried = turned(carried, palm(1.4, side), 0.1)
+    assert carried.panel.side == side and not carried.pinned
+    carried = turned(carried, palm(0.8, side), 3.0)  # no trembling between yes and no
+    assert carried.panel.open
+    carried = turned(carried, palm(0.2, side), 0.3)
+    assert carried.panel.open
+    assert not turned(carried, palm(0.2, side), 0.2).panel.open
+    assert not turned(turned(carried, palm(1.4, side), 1.0), LOST, 0.5).panel.open
+
+
+def test_the_back_of_a_hand_and_a_hand_that_holds_something_open_nothing():
+    for hand in (palm(-1.4), palm(1.4, squeeze=0.9), palm(1.4, "right")):
+        assert not turned(Carried(), hand, 1.0).panel.open
+
+
+def test_a_menu_button_puts_away_what_the_palm_opened_until_it_turns_again():
+    carried = turned(Carried(), palm(1.4), 1.0)
+    carried = turned(carried, palm(1.4, menu=True), 0.1)
+    assert not carried.panel.open and not carried.pinned
+    carried = turned(carried, palm(1.4), 2.0)
+    assert not carried.panel.open
+    carried = turned(turned(carried, palm(0.0), 1.0), palm(1.4), 0.5)
+    assert carried.panel.open
+
+
+def test_a_panel_in_use_does_not_close_under_the_hand():
+    carried = turned(Carried(), palm(1.4), 1.0)
+    carried, _, _ = step(carried, ray_at(carried, "knob"), palm(1.4))
+    for _ in range(90):
+        carried, _, _ = step(carried, ray_at(carried, "knob", trigger=1.0), palm(0.0))
+    assert carried.panel.held == {"right": "track"}
+    for _ in range(90):
+        carried, _, _ = step(carried, LOST, palm(0.0))
+    assert not carried.panel.open
 
 
 def test_a_ray_drags_the_knob_and_the_world_gets_nothing_of_it():
@@ -192,8 +264,8 @@ def test_a_room_with_a_new_origin_has_it_on_the_hand_at_once():
     carried = settled()
     shifted = moved(LEFT, (0.3, 0.0, 0.1))
     carried, _, _ = step(carried, LOST, shifted, recentred=True)
-    over = carried.play_from_panel.position - shifted.grip.position
-    np.testing.assert_allclose(over[[0, 2]], 0, atol=1e-12)
+    there = hang(None, shifted, HEAD, lay_out(carried.panel).size_m, 0.0)
+    np.testing.assert_array_equal(carried.play_from_panel.position, there.position)
 
 
 def test_places_and_pixels_are_inverse():
@@ -209,7 +281,7 @@ def test_places_and_pixels_are_inverse():
 
 
 def test_a_closed_panel_leaves_the_hands_alone():
-    carried = replace(settled(), panel=replace(settled().panel, side=""))
+    carried = Carried()
     right = hand_at((0.2, 1.2, -0.3), trigger=1.0, squeeze=1.0)
     carried, wishes, hands = step(carried, right)
     assert wishes == [] and hands == {"left": LEFT, "right": right}

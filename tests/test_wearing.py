@@ -14,6 +14,7 @@ from app.headset.worn_scene import open_worn
 from renderer.settings import FrameStats, RenderSettings
 from scene.pose import Pose, View
 from scene.scene import IDENTITY
+from vr.floor import REST
 from vr.frame import LOST, SIDES, Frame
 from vr.life import Life
 from vr.pace import Pace
@@ -37,6 +38,8 @@ class Played:
         self.queue, self.closing, self.left = frames, False, 0
         self.settings = RenderSettings()
         self.overlay = SimpleNamespace(draw=lambda *given: self.asked.append("overlay"))
+        self.floor = SimpleNamespace(draw=self.draw_floor)
+        self.grids, self.profiles = [], {}
         self.framebuffers, self.textures = ["left", "right"], ["left", "right"]
         self.ctx, self.scenes, self.views = None, [], []
 
@@ -76,6 +79,13 @@ class Played:
     def present(self, framebuffer, i) -> None:
         self.asked.append(f"present {framebuffer}")
 
+    def coverage(self, i) -> str:
+        return f"coverage {i}"
+
+    def draw_floor(self, framebuffer, view, standing, coverage, grid, background) -> None:
+        self.asked.append(f"floor by {coverage}")
+        self.grids.append(grid)
+
 
 @pytest.fixture(scope="module")
 def scene():
@@ -99,12 +109,44 @@ def head_in_world(wearing: Wearing, frame: Frame) -> np.ndarray:
 def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
     wearing, played = wear([frame_at(0.0), frame_at(PERIOD)])
     wearing.loop()
-    once = ["draw", "present left", "overlay", "present right", "overlay", "submit", "mirror"]
-    assert played.asked == once * 2
+    eyes = ["present left", "floor by coverage 0", "overlay",
+            "present right", "floor by coverage 1", "overlay"]  # fmt: skip
+    assert played.asked == ["draw", *eyes, "submit", "mirror"] * 2
     assert [len(views) for views in played.views] == [2, 2]
     assert played.settings.background == wearing.scene.background
     left = played.views[0][0].world_from_eye
     np.testing.assert_allclose(left.matrix(), head_in_world(wearing, frame_at(0.0)), atol=1e-9)
+
+
+def test_the_floor_is_that_of_the_scene_and_clearer_while_one_moves(wear):
+    wearing, played = wear([frame_at(i * PERIOD) for i in range(3)])
+    wearing.loop()
+    assert {grid.level_m for grid in played.grids} == {wearing.scene.floor_y}
+    resting = played.grids[-1].clearness
+    stick = replace(LOST, active=True, grip=HEAD, aim=HEAD, stick=(0.0, 1.0))
+    hands = {"left": stick, "right": LOST}
+    for i in range(3, 40):
+        wearing.frame(frame_at(i * PERIOD, hands=hands))
+    assert played.grids[-1].clearness > 0.95 > 2 * resting
+    for i in range(40, 400):
+        wearing.frame(frame_at(i * PERIOD))
+    assert played.grids[-1].clearness == pytest.approx(REST, abs=0.02)
+    wearing.floor_shown, count = False, len(played.grids)
+    wearing.frame(frame_at(400 * PERIOD))
+    assert len(played.grids) == count
+
+
+def test_a_scene_without_a_floor_has_it_where_one_stood_first(wear):
+    wearing, played = wear([frame_at(0.0)])
+    wearing.person.floor_y = None
+    wearing.loop()
+    feet = wearing.standing.point(HEAD.position * (1, 0, 1))[1]
+    assert played.grids[-1].level_m == pytest.approx(feet)
+    up = replace(LOST, active=True, grip=HEAD, aim=HEAD, stick=(0.0, 1.0))
+    for i in range(1, 60):  # flies
+        wearing.frame(frame_at(i * PERIOD, hands={"left": LOST, "right": up}))
+    assert wearing.standing.point(HEAD.position * (1, 0, 1))[1] > feet + 0.3
+    assert played.grids[-1].level_m == pytest.approx(feet)
 
 
 def test_what_is_not_shown_is_not_drawn_and_the_world_goes_on(wear):

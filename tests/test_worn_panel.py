@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from splat_scenes import random_layers
-from vr_hands import a_frame, hand_at
+from vr_hands import HEAD, OPEN, a_frame, hand_at
 
+from app.headset.notices import BELOW, QUIET_S, SHOWN_S, Late, late_card
 from app.headset.pacing import Pacing
 from app.headset.person import Person
-from app.headset.worn_panel import HINT, WornPanel, grant, sliders_of
+from app.headset.worn_panel import HINT, WornPanel, facts_of, grant, sliders_of
 from runtime_models.model import Stop
 from scene.reactions import State
 from scene.scene_file import SceneFile, SceneItem, named_stops
@@ -21,6 +22,7 @@ from vr.panel_state import (
     Pulse,
     PutBack,
     Recentre,
+    SetFloor,
     SetQuality,
     SetScale,
     SetX,
@@ -58,6 +60,7 @@ class Wearing(SimpleNamespace):
         super().__init__(
             world=world, pacing=Pacing((0, 0, 0)), standing=Standing(), done=[],
             person=Person(world, SimpleNamespace(), None), session=SimpleNamespace(pace=pace),
+            floor_shown=True,
         )  # fmt: skip
 
     def recentre(self, frame) -> None:
@@ -81,9 +84,8 @@ def test_sliders_are_of_what_is_seen_and_goes_somewhere():
 
 def test_a_ring_ends_where_it_begins():
     states = (State("normal", 0.0), State("fire", 0.5))
-    ring = item("leg", states=states, ring=True)
-    leg = a_world().things["leg"].drawn.model
-    assert [(stop.name, stop.x) for stop in named_stops(ring, leg)] == [
+    ring = replace(a_world().things["leg"], item=item("leg", states=states, ring=True))
+    assert [(stop.name, stop.x) for stop in named_stops(ring.item, ring.drawn.model)] == [
         ("normal", 0.0), ("fire", 0.5), ("normal", 1.0)
     ]  # fmt: skip
 
@@ -100,13 +102,28 @@ def test_wishes_are_granted():
     grant(SetScale(4.0), wearing, frame)
     assert wearing.standing.scale == 4.0
     np.testing.assert_allclose(wearing.standing.point(frame.head.position * (1, 0, 1)), under)
+    grant(SetFloor(False), wearing, frame)
+    assert not wearing.floor_shown and not facts_of(wearing).floor
     for wish in (Recentre(), Pulse("left", 0.5, 0.1), Exit()):
         grant(wish, wearing, frame)
     assert wearing.done == ["recentre", ("left", 0.5, 0.1), "from the panel"]
 
 
+def an_open_panel() -> WornPanel:
+    panel = WornPanel()
+    panel.carried = OPEN
+    return panel
+
+
+def test_it_is_closed_at_first_and_tells_how_to_open_it():
+    wearing, panel = Wearing(), WornPanel("right")
+    panel.act(wearing, a_frame(LEFT), 0.0)
+    assert not panel.carried.panel.open and panel.carried.home == "right"
+    assert panel.carried.panel.facts.note == HINT and "palm up" in HINT
+
+
 def test_a_frame_shows_the_world_and_moves_it():
-    wearing, panel = Wearing(), WornPanel()
+    wearing, panel = Wearing(), an_open_panel()
     panel.act(wearing, a_frame(LEFT), 0.0)
     row = panel_row(panel.carried)
     assert (row["object"], row["shown"], row["hand"]) == ("lamp", "layer 0", "left")
@@ -122,7 +139,7 @@ def test_a_frame_shows_the_world_and_moves_it():
 
 
 def test_what_is_taken_in_a_hand_is_what_the_slider_is_of():
-    wearing, panel = Wearing(), WornPanel()
+    wearing, panel = Wearing(), an_open_panel()
     wearing.person.touched = Touched(held={"left": None, "right": "leg"})
     panel.act(wearing, a_frame(LEFT), 0.0)
     assert panel.carried.panel.slider.name == "leg"
@@ -134,16 +151,23 @@ def test_what_is_taken_in_a_hand_is_what_the_slider_is_of():
     assert panel.carried.panel.slider.name == "lamp"  # a table has none
 
 
+def test_late_frames_are_told_for_a_moment_and_not_again_at_once():
+    late = Late()
+    rows = ((0.0, 0), (0.5, 1), (1.0, 7), (1.5, 7), (4.9, 7), (5.1, 7), (6.0, 20), (30.0, 20))
+    said = [late.watch(second, dropped) for second, dropped in rows]
+    assert said == [False, False, True, True, True, False, False, False]
+    assert SHOWN_S == 4.0
+    assert not late.watch(1.0 + QUIET_S, 40) and late.watch(1.1 + QUIET_S, 60)
+    assert not Late().watch(0.0, 1000), "what was dropped before is nobody's business"
+
+
 @pytest.mark.parametrize(
-    ("quality", "told"),
-    [("auto", "frames are late"), ("best", "frames are late: try Auto")],
+    ("quality", "line"),
+    [("auto", "Frames are late"), ("best", "Frames are late: try Auto")],
 )
-def test_late_frames_are_told_and_forgotten(quality, told):
-    wearing, panel = Wearing(), WornPanel()
-    wearing.pacing.quality = quality
-    notes = []
-    for second, dropped in ((0.0, 0), (0.5, 1), (1.0, 7), (1.5, 7), (3.1, 7), (4.0, 8)):
-        wearing.session.pace.dropped = dropped
-        panel.act(wearing, a_frame(LEFT, seen_s=second), 0.0)
-        notes.append(panel.carried.panel.facts.note)
-    assert notes == [HINT, HINT, told, told, HINT, HINT]
+def test_the_word_on_late_frames_is_below_what_one_looks_at(quality, line):
+    card = late_card(HEAD, quality)
+    assert card.lines == (line,)
+    np.testing.assert_allclose(card.play_from_card.position, HEAD.position + BELOW)
+    ahead = -card.play_from_card.matrix()[:3, 2]
+    assert ahead @ BELOW / np.linalg.norm(BELOW) > 0.999, "it faces the head"

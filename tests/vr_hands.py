@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from scene.pose import Pose, View, look_at
+from vr.carried import Carried
 from vr.frame import LOST, Frame, Hand
+from vr.panel_state import Panel
 
+OPEN = Carried(Panel(side="left"), pinned=True)  # a panel that a menu button has opened
 HEAD = Pose(np.array([0.0, 1.6, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))
 GRIP_TURN = np.array([0.8660254, 0.5, 0.0, 0.0])  # 60 degrees up, as a fist holds a controller
 

@@ -126,7 +126,7 @@ class Fit:
             if not trainer.settled:
                 raise BadFile(
                     f"A trial of {trainer.iteration} steps ends while new anchors still settle; "
-                    "give more --iterations, or --grow False."
+                    "give more --iterations, or --no-grow."
                 )
             models.append(trainer.model())
             seconds.append(trainer.elapsed)

@@ -1,4 +1,8 @@
-"""The panel from frame to frame: the menu button, where it hangs, what hands do to it."""
+"""The panel from frame to frame: when it is open, where it hangs, what hands do to it.
+
+A menu button opens it, and so does the palm of the hand that carries it, turned up as one looks at
+a watch, for as long as it is.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -9,13 +13,28 @@ from vr.panel_layout import TRACK, knob_place, lay_out
 from vr.panel_place import NOBODY, Pointing, hang, play_point, point_at
 from vr.panel_state import Facts, Panel, Place, Wish, shown_stop
 
+PALM_UP, PALM_AWAY = 0.8, 0.55  # of a palm's normal, up: it opens the panel; it closes it again
+OPENS_S, CLOSES_S = 0.2, 0.4  # so long
+LOOSE = 0.3  # of a squeeze: a hand that holds something turns as it must
+
+
+@dataclass(frozen=True)
+class Palm:
+    """Of the hand that carries the panel."""
+
+    up: bool = False
+    doubt_s: float = 0.0  # so long it has been the other way
+    done: bool = False  # the panel was put away while it is up: it has to turn away first
+
 
 @dataclass(frozen=True)
 class Carried:
-    """A panel and where it is; open at first, so that everybody finds it."""
+    """A panel and where it is; closed at first, so that the scene is what one sees."""
 
-    panel: Panel = field(default_factory=lambda: Panel(side="left"))
+    panel: Panel = field(default_factory=Panel)
     home: str = "left"  # the hand that carries it
+    pinned: bool = False  # open by a menu button, until that closes it
+    palm: Palm = Palm()
     play_from_panel: Pose | None = None
     pointing: Pointing = NOBODY
     places: dict[str, Place] = field(default_factory=dict)  # side -> where it points, pixels
@@ -29,16 +48,17 @@ def carry(
 
     Those are for the world: a trigger that presses a button here fires nothing there.
     """
-    panel = replace(_toggled(carried, frame.hands), facts=facts)
-    menus = frozenset(side for side in SIDES if frame.hands[side].menu)
-    carried = replace(carried, panel=panel, menus=menus)
+    carried = _opened(carried, frame.hands, seconds)
+    panel = replace(carried.panel, facts=facts)
+    carried = replace(carried, panel=panel)
     if not panel.open:
         panel, _ = press(panel, [])
         carried = replace(carried, play_from_panel=None, pointing=NOBODY, places={})
         return replace(carried, panel=panel), [], dict(frame.hands)
     layout = lay_out(panel)
     before = None if frame.recentred else carried.play_from_panel
-    pose = hang(before, frame.hands[panel.side], frame.head, layout.size_m, seconds)
+    hand = frame.hands[panel.side]
+    pose = hang(before, hand, frame.head, layout.size_m, seconds, panel.side)
     pointing, pointers = point_at(carried.pointing, pose, layout, frame.hands, panel.side)
     panel, wishes = press(panel, pointers, seconds)
     panel, more = push(panel, frame.hands[panel.side].stick, seconds)
@@ -59,13 +79,39 @@ def left_over(carried: Carried, hands: dict[str, Hand]) -> dict[str, Hand]:
     return left
 
 
-def _toggled(carried: Carried, hands: dict[str, Hand]) -> Panel:
-    """A menu button, of whichever hand has one, closes it and opens it on its hand."""
-    panel = carried.panel
-    if any(hands[side].menu and side not in carried.menus for side in SIDES):
-        side = "" if panel.open else carried.home
+def _opened(carried: Carried, hands: dict[str, Hand], seconds: float) -> Carried:
+    """Open or closed, by a menu button of whichever hand has one, or by the palm.
+
+    While a hand holds something of the panel, or points at it, it stays.
+    """
+    panel, palm = carried.panel, turned(carried.palm, carried.home, hands[carried.home], seconds)
+    pinned = carried.pinned
+    menus = frozenset(side for side in SIDES if hands[side].menu)
+    if menus - carried.menus:
+        pinned, palm = not panel.open, replace(palm, done=panel.open and palm.up)
+        wanted = pinned
+    else:
+        in_use = panel.open and bool(panel.held or panel.hovers)
+        wanted = pinned or (palm.up and not palm.done) or in_use
+    if wanted != panel.open:
+        side = carried.home if wanted else ""
         panel = replace(panel, side=side, hovers={}, held={}, stick="", exit_s=0.0)
-    return panel
+    return replace(carried, panel=panel, pinned=pinned, palm=palm, menus=menus)
+
+
+def turned(palm: Palm, side: str, hand: Hand, seconds: float) -> Palm:
+    """Whether an open hand's palm is turned up, without trembling between yes and no."""
+    up = False
+    if hand.grip is not None and hand.squeeze < LOOSE:
+        # OpenXR's grip: +X comes out of the left palm and goes into the right one.
+        normal = hand.grip.matrix()[1, 0] * (1.0 if side == SIDES[0] else -1.0)
+        up = bool(normal >= (PALM_AWAY if palm.up else PALM_UP))
+    if up == palm.up:
+        return replace(palm, doubt_s=0.0, done=palm.done and up)
+    doubt_s = palm.doubt_s + seconds
+    if doubt_s < (OPENS_S if up else CLOSES_S):
+        return replace(palm, doubt_s=doubt_s)
+    return Palm(up, 0.0, palm.done and up)
 
 
 def panel_row(carried: Carried) -> dict:

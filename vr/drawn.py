@@ -3,13 +3,14 @@
 All of it in metres of the room, so that it is as large as hands are at any scale of the world.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from scene.pose import Pose
+from vr.card import Card
 from vr.carried import Carried
 from vr.frame import SIDES, Hand
 from vr.glove import Capsule, glove
@@ -36,6 +37,7 @@ class Drawn:
     lines: tuple[Capsule, ...] = ()  # they shine, and may fade out
     panel: Panel | None = None
     play_from_panel: Pose | None = None
+    cards: tuple[Card, ...] = ()
     vignette: float = 0.0  # 0..1
     blink: float = 0.0  # 0..1
 
@@ -45,9 +47,11 @@ def drawn_of(
     carried: Carried,
     comfort: Comfort = CALM,
     touched: Touched = NOTHING,
+    outlines: Sequence[Capsule] = (),
+    cards: tuple[Card, ...] = (),
 ) -> Drawn:
     """What a frame shows; `hands` as the runtime has them, before the panel takes its part."""
-    lines: list[Capsule] = []
+    lines: list[Capsule] = list(outlines)
     beams = {beam.side: beam for beam in touched.beams}
     holds = {side for side, name in touched.held.items() if name is not None}
     for side in SIDES:
@@ -58,7 +62,7 @@ def drawn_of(
         lines += arc(comfort.arc.points, comfort.arc.landing, comfort.arc.fine)
     solid = [part for side in SIDES for part in glove(side, hands[side], side in holds)]
     panel = carried.panel if carried.play_from_panel is not None else None
-    return Drawn(tuple(solid), tuple(lines), panel, carried.play_from_panel,
+    return Drawn(tuple(solid), tuple(lines), panel, carried.play_from_panel, cards,
                  comfort.vignette, comfort.blink)  # fmt: skip
 
 

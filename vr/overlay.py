@@ -1,6 +1,7 @@
-"""Draws hands, lines, the panel and the vignette over the splats' picture of an eye."""
+"""Draws hands, lines, the panel, cards and the vignette over the splats' picture of an eye."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import moderngl
 import numpy as np
@@ -8,12 +9,12 @@ import numpy as np
 from renderer.context import is_software
 from renderer.shader import compile_program
 from scene.pose import View
+from vr.card import card_picture
 from vr.drawn import Drawn
+from vr.flat import Flats
 from vr.glove import Capsule
 from vr.panel_layout import lay_out
 from vr.panel_picture import panel_picture, picture_key
-from vr.panel_place import play_point
-from vr.panel_state import Panel
 from vr.shown import SHADERS
 
 
@@ -32,6 +33,7 @@ PLAIN = Detail(0, 1, 8, 2)  # software GL: under half of the time, and no headse
 INSTANCE = "3f 3f 2f 4f 4f/i"
 NAMES = ("a", "b", "radii", "color_a", "color_b")
 ROOM = 256  # capsules that the buffer has room for at first
+CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])  # of a flat picture, halves of its sides
 SPARE = 3  # pixels around what is drawn: lines are widened to nearly one
 OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
 
@@ -39,7 +41,7 @@ PixelBox = tuple[int, int, int, int]  # left, bottom, width, height
 
 
 class Overlay:
-    """Programs, the capsule's mesh, the panel's texture; use it in a `with`.
+    """Programs, the capsule's mesh, pictures of the panel and cards; use it in a `with`.
 
     The context may be anybody's: nothing is enabled afterwards, and bound is what was bound.
     """
@@ -48,18 +50,13 @@ class Overlay:
         self._ctx = ctx
         self.detail = detail or (PLAIN if is_software(ctx) else FINE)
         self._capsule = compile_program(ctx, "capsule.vert", "capsule.frag", SHADERS)
-        self._panel = compile_program(
-            ctx, "panel.vert", "panel.frag", SHADERS, TAPS=self.detail.taps
-        )
+        self._flats = Flats(ctx, self.detail.taps)
         self._over = compile_program(ctx, "full.vert", "over.frag", SHADERS)
         mesh, faces = capsule_mesh(self.detail.around, self.detail.below)
         self._mesh, self._faces = ctx.buffer(mesh), ctx.buffer(faces)
         self._instances = ctx.buffer(reserve=ROOM * 16 * 4)
         self._capsules = self._vertices()
-        self._corners = ctx.vertex_array(self._panel, [])
         self._triangle = ctx.vertex_array(self._over, [])
-        self._picture: moderngl.Texture | None = None
-        self._picture_key: tuple | None = None
         self._target: moderngl.Framebuffer | None = None  # several samples a pixel
         self._resolved: moderngl.Framebuffer | None = None  # one
 
@@ -89,9 +86,9 @@ class Overlay:
         clip_from_play = view.clip_from_eye() @ view.eye_from_world()
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._draw_capsules(drawn.hands, view, clip_from_play, True)
-        if drawn.panel is not None:
+        if drawn.panel is not None or drawn.cards:
             ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
-            self._draw_panel(drawn.panel, clip_from_play @ drawn.play_from_panel.matrix())
+            self._draw_flats(drawn, clip_from_play)
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE | moderngl.BLEND)
         target.depth_mask = False
         self._draw_capsules(drawn.lines, view, clip_from_play, False)
@@ -118,28 +115,18 @@ class Overlay:
         program["lit"].value = lit
         self._capsules.render(moderngl.TRIANGLES, instances=len(rows))
 
-    def _draw_panel(self, panel: Panel, clip_from_panel: np.ndarray) -> None:
-        key = picture_key(panel)
-        if key != self._picture_key:
-            self._upload(panel_picture(panel))
-            self._picture_key = key
-        self._picture.use(0)
-        self._panel["picture"].value = 0
-        self._panel["clip_from_panel"].write(columns(clip_from_panel))
-        self._panel["half_size"].value = tuple(side / 2 for side in lay_out(panel).size_m)
-        self._corners.render(moderngl.TRIANGLE_STRIP, vertices=4)
-
-    def _upload(self, picture: np.ndarray) -> None:
-        """(H, W, 4) uint8 as a texture with its smaller levels."""
-        size = (picture.shape[1], picture.shape[0])
-        if self._picture is None or self._picture.size != size:
-            if self._picture is not None:
-                self._picture.release()
-            self._picture = self._ctx.texture(size, 4)
-            self._picture.repeat_x = self._picture.repeat_y = False
-        self._picture.write(np.ascontiguousarray(picture))
-        self._picture.build_mipmaps()
-        self._picture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    def _draw_flats(self, drawn: Drawn, clip_from_play: np.ndarray) -> None:
+        """The panel, then the cards, over what lies behind them."""
+        panel = drawn.panel
+        if panel is not None:
+            clip = clip_from_play @ drawn.play_from_panel.matrix()
+            key, picture = picture_key(panel), partial(panel_picture, panel)
+            self._flats.draw("panel", key, picture, clip, lay_out(panel).size_m)
+        for number, card in enumerate(drawn.cards):
+            clip = clip_from_play @ card.play_from_card.matrix()
+            picture = partial(card_picture, card.lines)
+            slot = f"card {number}"
+            self._flats.draw(slot, card.lines, picture, clip, card.size_m, card.opacity)
 
     def _lay_over(
         self, framebuffer: moderngl.Framebuffer, view: View, drawn: Drawn, box: PixelBox | None
@@ -195,11 +182,9 @@ class Overlay:
     def release(self) -> None:
         """Gives all of it back; the context stays."""
         self._release_targets()
-        if self._picture is not None:
-            self._picture.release()
         for part in (
-            self._capsules, self._corners, self._triangle, self._instances, self._mesh,
-            self._faces, self._capsule, self._panel, self._over,
+            self._capsules, self._triangle, self._instances, self._mesh, self._faces,
+            self._capsule, self._flats, self._over,
         ):  # fmt: skip
             part.release()
 
@@ -212,11 +197,13 @@ def box_of(drawn: Drawn, view: View, size: tuple[int, int]) -> PixelBox | None:
     capsules = drawn.hands + drawn.lines
     places = [capsule.a for capsule in capsules] + [capsule.b for capsule in capsules]
     radii = [c.radii[0] for c in capsules] + [c.radii[1] for c in capsules]
+    flats = [(card.play_from_card, card.size_m) for card in drawn.cards]
     if drawn.panel is not None:
-        layout = lay_out(drawn.panel)
-        corners = [(x, y) for x in (0, layout.size[0]) for y in (0, layout.size[1])]
-        places += [play_point(drawn.play_from_panel, layout, corner) for corner in corners]
-        radii += [0.0] * 4
+        flats.append((drawn.play_from_panel, lay_out(drawn.panel).size_m))
+    for pose, (width_m, height_m) in flats:
+        axes = pose.matrix()[:3, :2] * (width_m / 2, height_m / 2)
+        places += [pose.position + axes @ corner for corner in CORNERS]
+        radii += [0.0] * len(CORNERS)
     if not places:
         return None
     eye_from_play = view.eye_from_world()

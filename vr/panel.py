@@ -17,6 +17,7 @@ from vr.panel_state import (
     Pulse,
     PutBack,
     Recentre,
+    SetFloor,
     SetQuality,
     SetScale,
     SetX,
@@ -135,7 +136,10 @@ def _pressed(panel: Panel, pointer: Pointer, item: str) -> tuple[Panel, list[Wis
         return replace(panel, chosen=names[place]), [click]
     if item.startswith("quality:"):
         return panel, [click, SetQuality(item.removeprefix("quality:"))]
-    wish = {"recentre": Recentre(), "put back": PutBack(), "true": SetScale(1.0)}.get(item)
+    wish = {
+        "recentre": Recentre(), "put back": PutBack(), "true": SetScale(1.0),
+        "floor": SetFloor(not panel.facts.floor),
+    }.get(item)  # fmt: skip
     return panel, [click, wish or SetScale(_next_scale(panel.facts.scale, item == "larger"))]
 
 

@@ -7,7 +7,7 @@ from runtime_models.model import Stop
 from vr.panel_state import QUALITIES, Panel, Place
 
 WIDTH = 1000  # pixels
-WIDTH_M = 0.37  # metres: in a hand at 0.4 m 400 pixels of an eye with 1,000
+WIDTH_M = 0.25  # metres, as a tablet on the wrist: at 0.35 m 310 pixels of an eye with 1,000
 METRES_PER_PIXEL = WIDTH_M / WIDTH
 MARGIN = 52
 TRACK = (92, WIDTH - 92)  # left and right end of the slider's line
@@ -73,8 +73,8 @@ def lay_out(panel: Panel) -> Layout:
     items += _row(y, ["smaller", "size", "larger", "true"], ["\u2212", "", "+", "1 : 1"],
                   (0.8, 1.5, 0.8, 1.2))  # fmt: skip
     y += ROW + GAP
-    items += _row(y, ["recentre", "put back", "exit"], ["Recentre", "Put back", "Exit"],
-                  (1, 1, 1), MARGIN)  # fmt: skip
+    texts = ["Recentre", "Put back", "Floor", "Exit"]
+    items += _row(y, [text.lower() for text in texts], texts, (1.25, 1.25, 0.9, 0.9), MARGIN)
     y += ROW
     if panel.facts.note:
         foot = y + FOOT / 2 + 4

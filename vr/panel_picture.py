@@ -78,6 +78,7 @@ class _Lit:
     held: frozenset[str]
     hovered: frozenset[str]
     asks: bool  # Exit asks "really?"
+    floor: bool = False  # the floor's grid is shown
 
     @property
     def true(self) -> bool:
@@ -91,7 +92,8 @@ def _lit(panel: Panel) -> _Lit:
     held, hovered = (
         frozenset(names.values()) - {"track", "plate"} for names in (panel.held, panel.hovers)
     )
-    return _Lit(panel.facts.quality, panel.facts.scale, held, hovered, panel.exit_s > 0)
+    facts = panel.facts
+    return _Lit(facts.quality, facts.scale, held, hovered, panel.exit_s > 0, facts.floor)
 
 
 def _knob_state(panel: Panel) -> str:
@@ -108,6 +110,7 @@ def _is_lit(item: Item, lit: _Lit) -> bool:
         or name in lit.held | lit.hovered
         or (name == "exit" and lit.asks)
         or (name == "true" and lit.true)
+        or (name == "floor" and lit.floor)
     )
 
 
@@ -240,7 +243,7 @@ def _legend(
 
 def _button(image: "Image.Image", draw: "ImageDraw.ImageDraw", lit: _Lit, item: Item) -> None:
     """A flat button; lit when it is the choice, pointed at, or pressed."""
-    chosen = item.name == f"quality:{lit.quality}"
+    chosen = item.name == f"quality:{lit.quality}" or (item.name == "floor" and lit.floor)
     held = item.name in lit.held
     hovered = item.name in lit.hovered
     fill, ink, text = RAISED, TEXT, item.text

@@ -15,8 +15,8 @@ from vr.panel import Pointer
 from vr.panel_layout import METRES_PER_PIXEL, Layout
 from vr.panel_state import Place
 
-ABOVE_HAND = 0.09  # metres from the grip to the lower edge: knuckles and thumb stay free
-BEFORE_HEAD = np.array([0.0, -0.12, -0.55])  # without a hand to hang on, metres in a level head
+ASIDE, ABOVE_M = 0.35, 0.03  # from the grip: outwards, of the width; up, metres to the lower edge
+BESIDE_HEAD = np.array([0.24, -0.24, -0.5])  # without a hand, metres outwards, up, back of a head
 CALM_S = 0.06  # time constant at which it follows: hands tremble
 JUMP_M = 0.5  # farther than this it is there at once
 RAY_M = 3.0  # as far one can point at it
@@ -52,16 +52,24 @@ NOBODY = Pointing(unsure=frozenset(SIDES))
 
 
 def hang(
-    before: Pose | None, hand: Hand, head: Pose, size_m: tuple[float, float], seconds: float
-) -> Pose:
-    """play_from_panel: over the hand and turned to the head; where it was once the hand is lost."""
+    before: Pose | None, hand: Hand, head: Pose, size_m: tuple[float, float], seconds: float,
+    side: str = SIDES[0],
+) -> Pose:  # fmt: skip
+    """play_from_panel: beside the hand of a side, outwards, turned to the head; where it was once
+    the hand is lost.
+
+    A left hand has it at the lower left: not over what one looks at, and down with the hand.
+    """
+    outwards = -1.0 if side == SIDES[0] else 1.0
     if hand.grip is None:
-        return before or _facing(_before(head), head)
-    place = hand.grip.position + np.array([0.0, ABOVE_HAND + size_m[1] / 2, 0.0])
+        return before or facing(_beside(head, outwards), head)
+    right = facing(hand.grip.position, head).matrix()[:3, 0]
+    aside = right * outwards * ASIDE * size_m[0]
+    place = hand.grip.position + aside + np.array([0.0, ABOVE_M + size_m[1] / 2, 0.0])
     if before is not None and np.linalg.norm(place - before.position) < JUMP_M:
         part = -math.expm1(-max(seconds, 0.0) / CALM_S)
         place = before.position + (place - before.position) * part
-    return _facing(place, head)
+    return facing(place, head)
 
 
 def point_at(
@@ -136,18 +144,18 @@ def _with(sides: frozenset[str], side: str, belongs: bool) -> frozenset[str]:
     return sides | {side} if belongs else sides - {side}
 
 
-def _before(head: Pose) -> np.ndarray:
-    """(3,) a place before the head, which may look up or down."""
+def _beside(head: Pose, outwards: float) -> np.ndarray:
+    """(3,) a place before the head, below and aside, -1 left, 1 right; it may look up or down."""
     back = head.matrix()[:3, 2] * (1, 0, 1)
     length = np.linalg.norm(back)
     back = back / length if length > 1e-6 else np.array([0.0, 0.0, 1.0])
     right = np.array([back[2], 0.0, -back[0]])
-    x, y, z = BEFORE_HEAD
-    return head.position + right * x + np.array([0.0, y, 0.0]) + back * z
+    x, y, z = BESIDE_HEAD
+    return head.position + right * (x * outwards) + np.array([0.0, y, 0.0]) + back * z
 
 
-def _facing(place: np.ndarray, head: Pose) -> Pose:
-    """Upright and turned to the head's place."""
+def facing(place: np.ndarray, head: Pose) -> Pose:
+    """A pose at a place (3,), upright, its +Z to where the head is."""
     normal = head.position - place
     length = np.linalg.norm(normal)
     normal = normal / length if length > 1e-6 else head.matrix()[:3, 2]

@@ -32,6 +32,7 @@ class Facts:
     quality: str = QUALITIES[0]
     scale: float = 1.0  # metres of the world a metre of the room (vr/standing.py)
     note: str = ""  # one short line at the lower edge
+    floor: bool = True  # the grid on the floor is shown
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,18 @@ class PutBack:
 
 
 @dataclass(frozen=True)
+class SetFloor:
+    """The grid on the floor is to be shown, or not."""
+
+    shown: bool
+
+
+@dataclass(frozen=True)
 class Exit:
     """VR is to end."""
 
 
-Wish = SetX | SetQuality | SetScale | Recentre | PutBack | Exit | Pulse
+Wish = SetX | SetQuality | SetScale | Recentre | PutBack | SetFloor | Exit | Pulse
 
 
 def shown_stop(slider: Slider) -> str:

@@ -36,6 +36,15 @@ class Beam:
 
 
 @dataclass(frozen=True)
+class Offer:
+    """What a hand that presses now would take, or its ray act on."""
+
+    side: str
+    object: str
+    by: str  # hand or ray
+
+
+@dataclass(frozen=True)
 class Touching:
     """Between two frames."""
 
@@ -53,6 +62,7 @@ class Touched:
     pulses: tuple[Pulse, ...] = ()
     beams: tuple[Beam, ...] = ()
     held: Mapping[str, str | None] = field(default_factory=dict)  # side -> object
+    offers: tuple[Offer, ...] = ()
 
 
 def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[Touching, Touched]:
@@ -90,7 +100,10 @@ def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[
     busy |= hits & squeezes
     held = {side: world.held(side) for side in SIDES}
     now = replace(now, busy=busy, near=near)
-    return now, Touched(strongest(pulses), tuple(beams), held)
+    free = [side for side in SIDES if held[side] is None and side not in now.squeezing]
+    found = (offered(world, side, frame.hands[side], palms[side], standing) for side in free)
+    offers = tuple(offer for offer in found if offer is not None)
+    return now, Touched(strongest(pulses), tuple(beams), held, offers)
 
 
 def pressed(
@@ -133,6 +146,22 @@ def touched(world, palm: Pose | None, standing: Standing) -> str | None:
     """The object at a palm."""
     found = world.nearest(palm.position, SKIN_M * standing.scale) if palm is not None else None
     return found[0] if found else None
+
+
+def offered(world, side: str, hand: Hand, palm: Pose | None, standing: Standing) -> Offer | None:
+    """What a squeeze would take; else what a pull of the trigger would reach that answers to it."""
+    if palm is None:
+        return None
+    near = world.nearest(palm.position, REACH_M * standing.scale)
+    if near is not None:
+        return Offer(side, near[0], "hand")
+    if hand.aim is None:
+        return None
+    aim = standing.pose(hand.aim)
+    hit = world.aim(aim.position, -aim.matrix()[:3, 2])
+    if hit is None or hit.object not in world.things or not answers(world, hit.object):
+        return None
+    return Offer(side, hit.object, "ray")
 
 
 def shows(hand: Hand) -> bool:

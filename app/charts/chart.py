@@ -1,13 +1,14 @@
 """launch.py chart: what every named setting saves in time and costs in the picture."""
 
+import shlex
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from app.opening import ReadingOptions
+from app.paths import full
 
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
@@ -20,28 +21,30 @@ class Options(ReadingOptions):
     Writes rows.csv, chart.svg and chart.png.  Rows that are there are kept: Ctrl-C loses nothing.
     """
 
-    scenes: Annotated[tuple[Path, ...], tyro.conf.Positional] = ()
-    """Packages, .ply, .splat, folders of PLY layers or scene files; several stand side by side."""
-    out: Annotated[Path, tyro.conf.arg(name="out")] = Path("out/chart")
+    scenes: Annotated[tuple[Path, ...], POSITIONAL] = ()
+    """Packages, splats of any known format, folders of layers or scene files; several stand side by
+    side."""
+    out: Path = Path("out/chart")
     """Folder for rows.csv and the chart."""
     cameras: Path | None = None
-    """Views to measure from, any file that render's --camera takes; default: an arc about the
+    """Views to measure from, any file that render's --camera takes.  Default: an arc about the
     scene, 0.75 degrees a frame."""
-    size: str = "1280x720"
+    size: Annotated[str, SIZE] = "1280x720"
     """WIDTHxHEIGHT in pixels."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
     frames: int = 0
-    """Views on the arc; default 32, with --quick 8."""
-    x: float | None = None
-    """Control value on the path, 0 to 1, of all objects; default: the first stop of the first
-    scene, and with a scene file what it says for each object."""
+    """Views on the arc; 0: 32, with --quick 8."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
+    stop of the first scene, and in a scene file what it says for each object."""
     quick: bool = False
     """About ten settings, fewer frames, no SSIM."""
-    decode: bool = False
-    """Instead: decode time against anchors, all five networks and colour alone (no scene)."""
+    decode: Annotated[bool, EXPERT] = False
+    """Measure something else, without a scene: decode time against the number of anchors, of all
+    five networks and of the colours alone."""
 
 
 def run(options: Options) -> int:
@@ -60,8 +63,6 @@ def run(options: Options) -> int:
         raise UsageError("name a scene to chart, or add --decode.")
     if not 0 <= options.frames <= MOST_FRAMES or options.frames == 1:
         raise UsageError(f"--frames is {options.frames}, expected 2 to {MOST_FRAMES}.")
-    if options.x is not None and not 0 <= options.x <= 1:
-        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
     subjects = read_subjects(options)
     cameras = read_views(options, subjects[0], size)
     make_folder(options.out)
@@ -73,6 +74,8 @@ def read_subjects(options: Options) -> list:
     from app.subject import open_subject
 
     known = {path: open_subject(path, options) for path in dict.fromkeys(options.scenes)}
+    if options.x:
+        known = {path: subject.placed(options.x) for path, subject in known.items()}
     return [known[path] for path in options.scenes]
 
 
@@ -96,8 +99,8 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     from app.charts.chart_settings import settings_of
     from app.charts.chart_stage import QUICK, Walk, digest, make_stage
 
-    x = options.x
-    if x is None and not any(subject.file for subject in subjects):
+    x = None
+    if not (options.x or any(subject.file for subject in subjects)):
         x = subjects[0].x  # scenes side by side show one stop
     walk = QUICK if options.quick else Walk()
     walk = replace(walk, frames=options.frames or walk.frames)
@@ -153,7 +156,8 @@ def command_line(options: Options) -> str:
     for name in ("cameras", "size", "drawing", "context", "frames", "x", "mode"):
         value = getattr(options, name)
         if value != getattr(plain, name):
-            words.append(f"--{name} {value.name if isinstance(value, Path) else value}")
+            word = value.name if isinstance(value, Path) else str(value)
+            words.append(f"--{name} {shlex.quote(word)}")
     words += [f"--{name}" for name in ("quick", "decode") if getattr(options, name)]
     return " ".join([*words, "--out DIR"])
 
@@ -194,5 +198,5 @@ def print_front(front: list, count: int, out: Path) -> None:
         ssim = f"{row.ssim:.4f}" if row.ssim == row.ssim else "-"
         table.add_row(row.name, f"{row.ms:.2f}", f"{row.ratio:.3f}", f"{row.db:.1f}", ssim)
     Console(stderr=True, highlight=False).print(table)
-    print(f"{count} settings in {out / 'rows.csv'}; {out / 'chart.png'} shows them.",
+    print(f"{count} settings in {full(out / 'rows.csv')}; {full(out / 'chart.png')} shows them.",
           file=sys.stderr)  # fmt: skip

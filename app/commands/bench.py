@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
+from app.paths import full
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -19,35 +19,36 @@ LARGEST_RESULT = 1_000_000  # bytes
 class Options(ReadingOptions):
     """Time frames on an orbit and an x sweep, and measure the image error beside them."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
+    scene: Annotated[Path, POSITIONAL]
+    """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
     json: Path | None = None
-    """Write the result here; - writes it to standard output."""
+    """File for the result; - writes it to standard output.  Default: only the table."""
     frames: int = 60
-    """Frames of the orbit, mono and stereo each (after 3 that do not count)."""
+    """Frames of the orbit, mono and stereo each, after 3 that do not count."""
     sweep: int = 200
-    """Values of x in the sweep from 0 to 1 (after 3 that do not count)."""
-    size: str = "640x360"
+    """Values of x in the sweep from 0 to 1, after 3 that do not count."""
+    size: Annotated[str, SIZE] = "640x360"
     """WIDTHxHEIGHT in pixels."""
-    x: float | None = None
-    """Control value of the orbit, 0 to 1, of all objects; default: the first stop, and in a scene
-    file what it says for each."""
-    quality_size: str = "256x144"
-    """Size of the images that are compared with the float64 reference."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
-    settings: str = ""
-    """A setting by its name in the chart, such as "sort every 4"; wrong names list them all."""
-    target: Literal["", "auto", "rgba8", "rgba16", "rgba16f", "rgba32f"] = ""
-    """What quads blend into; default auto (rgba16 where the scene's colours fit, else rgba16f), or
-    what --settings says."""
-    target_ms: float | None = None
-    """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
-    machine; measured once, in seconds, and kept."""
-    floor_db: float | None = None
-    """Never below this PSNR against the exact picture, whatever the budget; default 35."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the slider stands on the orbit: a stop by its name, or a number from 0 to 1.  Default:
+    the first stop, and in a scene file what it says for each object."""
+    quality_size: Annotated[str, Opt(expert=True, metavar="SIZE")] = "256x144"
+    """WIDTHxHEIGHT of the images that are compared with the float64 reference."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
+    settings: Annotated[str, EXPERT] = ""
+    """A setting by its name in the chart, such as "sort every 4"; a wrong name lists them all.
+    Default: the exact picture."""
+    target: Annotated[Literal["", "auto", "rgba8", "rgba16", "rgba16f", "rgba32f"], EXPERT] = ""
+    """Pixel format that quads blend into.  Default: auto (rgba16 where the scene's colours fit,
+    else rgba16f), or what --settings says."""
+    target_ms: Annotated[float | None, EXPERT] = None
+    """Milliseconds that a frame may take: the setting is chosen by a chart of this scene on this
+    machine, which is measured once, in seconds, and kept.  Default: no limit, the exact picture."""
+    floor_db: Annotated[float | None, EXPERT] = None
+    """PSNR in dB against the exact picture below which --target-ms never goes.  Default: 35."""
 
 
 def run(options: Options) -> int:
@@ -60,28 +61,28 @@ def run(options: Options) -> int:
     size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
     quality_size = parse_size(options.quality_size, "--quality-size")
     check_counts(options)
-    if options.x is not None and not 0 <= options.x <= 1:
-        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
     if budget and (options.settings or options.target):
         raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
     if options.json not in (None, STANDARD_OUTPUT):
         check_result_path(options.json)
     subject = open_subject(options.scene, options)
+    if options.x:
+        subject = subject.placed(options.x)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         if budget:
             from app.charts.budget_chart import Drawn, settings_for
 
-            renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, options.x, size))
+            renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, None, size))
         elif options.settings or options.target:
             renderer.settings = asked_settings(options, renderer, subject, size)
-        work = Measure(renderer, ctx, subject, options.x, size)
+        work = Measure(renderer, ctx, subject, None, size)
         result = measure(work, options, quality_size)
     print_table(result)
     if options.json == STANDARD_OUTPUT:
         print(json.dumps(result, indent=1, allow_nan=False))
     elif options.json is not None:
         write_json(options.json, result)
-        print(f"written to {options.json}", file=sys.stderr)
+        print(f"written to {full(options.json)}", file=sys.stderr)
     return 0
 
 
@@ -107,10 +108,10 @@ def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
 
 def measure(work, options, quality_size: tuple[int, int]) -> dict:
     """All rows of a Measure, with what was asked; says on stderr what it is at."""
-    from rich.console import Console
+    from app.progress import working
 
-    with Console(stderr=True).status("starting") as status:
-        result = work.all(options.frames, options.sweep, quality_size, status.update)
+    with working("starting") as tell:
+        result = work.all(options.frames, options.sweep, quality_size, tell)
     return result | {"command": command_line(), "scene": options.scene.name}
 
 

@@ -7,25 +7,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from app.command_line import POSITIONAL
+from app.paths import full
 
 
 @dataclass(frozen=True)
 class Options:
     """List the cameras of a file or folder, or write them in another form."""
 
-    cameras: Annotated[Path, tyro.conf.Positional]
+    cameras: Annotated[Path, POSITIONAL]
     """JSON of our own, 3DGS's cameras.json, transforms.json, nerfstudio's camera_path.json,
     splatapult's _vr.json, a COLMAP model, or a folder with one of them."""
     out: Path | None = None
-    """File to write, or for COLMAP the folder that gets sparse/0."""
+    """File to write, or for COLMAP the folder that gets sparse/0.  Default: the list is printed."""
     to: Literal["", "ours", "inria", "transforms", "nerfstudio", "vr", "colmap-bin",
                 "colmap-txt"] = ""  # fmt: skip
-    """Form to write; without it our own, or COLMAP's where --out has no ending."""
+    """Form to write.  Default: our own, or COLMAP's where --out has no ending."""
     fov_y: float = 0.0
-    """Degrees from top to bottom, for a file that says nothing about the lens."""
+    """Degrees from top to bottom, for a file that says nothing about the lens; 0: not known."""
     up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = ""
-    """Axis of the file's world that points up, where it is not its format's; write --up=-Z."""
+    """The axis of the file that points up.  Default: the one that its format says."""
     flip: bool = False
     """Turn the cameras upside down, as --flip does with a scene."""
     json: bool = False
@@ -69,7 +70,7 @@ def write(options: Options, cameras) -> None:
     if form == "vr" and count > 1:
         print(f"A floor has one view: the first of {count} is taken.", file=sys.stderr)
         count = 1
-    names = f"{written[0]}" if len(written) == 1 else f"{written[0].parent}"
+    names = full(written[0] if len(written) == 1 else written[0].parent)
     print(f"{count} camera{'s' * (count > 1)} in {names}", file=sys.stderr)
 
 

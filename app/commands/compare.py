@@ -9,35 +9,38 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import tyro
 
+from app.command_line import EXPERT, POSITIONAL, SIZE
 from app.opening import ReadingOptions
+from app.paths import full
 
 VIEWS = 8  # of the orbit where no cameras are given
-SIZE = (640, 360)
+DEFAULT_SIZE = (640, 360)
 
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
     """Compare two scenes, stops of a scene, or folders of pictures: PSNR, SSIM, differences."""
 
-    a: Annotated[str, tyro.conf.Positional]
+    a: Annotated[str, POSITIONAL]
     """A scene, a scene at a stop or x (scene.shift@Thermal, scene.shift@0.5; of a scene file all
     objects that have the stop), or a folder of pictures."""
-    b: Annotated[str, tyro.conf.Positional]
+    b: Annotated[str, POSITIONAL]
     """The same, to compare with it; pictures are matched by name, else in order."""
     cameras: Path | None = None
-    """Views of both: a file or folder of cameras; without it 8 views on an orbit about A."""
+    """Views of both: a file or folder of cameras.  Default: 8 views on an orbit about A."""
     out: Path | None = None
-    """Folder for a sheet of each view (A, B and their difference) and for the difference alone."""
-    size: str = ""
-    """WIDTHxHEIGHT in pixels; default 640x360, or what the camera file says."""
+    """Folder for a sheet of each view (A, B and their difference) and for the difference alone.
+    Default: no pictures."""
+    size: Annotated[str, SIZE] = ""
+    """WIDTHxHEIGHT in pixels.  Default: 640x360, or what the camera file says."""
     background: tuple[float, float, float] | None = None
-    """Display sRGB, 0 to 1, behind both; default: what A was trained on, else black."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
+    """Red, green and blue behind both, 0 to 1 as displayed.  Default: what A was trained on, else
+    black."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
     json: bool = False
     """JSON on standard output instead of a table."""
     view: bool = False
@@ -95,9 +98,8 @@ def run(options: Options) -> int:
 
 def run_viewer(options: Options) -> int:
     """The same two in a window."""
-    from app.commands.compare_sides import split_stop, x_of
+    from app.commands.compare_sides import split_stop
     from app.errors import UsageError
-    from app.opening import open_model
     from app.viewer import desktop
     from scene.scene_file import is_scene_file
 
@@ -105,9 +107,7 @@ def run_viewer(options: Options) -> int:
     path, at = split_stop(options.a)
     if at and is_scene_file(path):
         raise UsageError(f"--view shows {path.name} as it says itself; leave @{at} out.")
-    stops = () if not at else open_model(path, options).stops
-    x = x_of(at, stops, options.a) if at else None
-    return desktop.run(desktop.Options(scenes=(path,), x=x, compare=options.b, **shared))
+    return desktop.run(desktop.Options(scenes=(path,), x=at, compare=options.b, **shared))
 
 
 def picture_pairs(a, b) -> Iterator[Compared]:
@@ -139,7 +139,7 @@ def choose_views(options: Options, a) -> list:
     if options.cameras is not None:
         cameras = read_camera_list(options.cameras, camera_reading(options, size))
         return moved(cameras.views, -a.subject.origin)
-    return orbit_path(VIEWS, *a.subject.bounds(), size or SIZE)
+    return orbit_path(VIEWS, *a.subject.bounds(), size or DEFAULT_SIZE)
 
 
 def drawn_pairs(options: Options, a, b) -> Iterator[Compared]:
@@ -189,11 +189,15 @@ def artist(renderer, side, background: tuple[float, float, float]):
 
 def score(compared: Iterator[Compared], names: tuple[str, str], options: Options) -> dict:
     """What is printed; the sheets are written on the way."""
+    from app.progress import working
+
     rows, kept = [], []
-    for pair in compared:
-        rows.append(pair.scores())
-        if options.out is not None:
-            kept.append(pair)
+    with working("comparing") as tell:
+        for pair in compared:
+            rows.append(pair.scores())
+            tell(f"comparing: {len(rows)} views done")
+            if options.out is not None:
+                kept.append(pair)
     decibels = [row["psnr_db"] for row in rows]
     numbers = [db for db in decibels if db != "equal"]
     mean = {
@@ -234,7 +238,7 @@ def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options
         save_png(sheet(pair.a, pair.b, names, amplify), both)
         difference = difference_picture(pair.a, pair.b, amplify)
         save_png(written(difference, scale_text(amplify)), alone)
-    print(f"{len(pairs)} sheets in {options.out}", file=sys.stderr)
+    print(f"{len(pairs)} sheets in {full(options.out)}", file=sys.stderr)
     return amplify
 
 

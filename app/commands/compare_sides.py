@@ -1,16 +1,13 @@
 """What is compared: a scene at one x, or a folder of pictures."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from app.errors import UsageError
 from app.opening import ReadingOptions
 from app.subject import Subject, open_subject
-from runtime_models.model import BadFile, Stop
-from scene.scene import Scene
+from runtime_models.model import BadFile
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 SCENE_MARKS = ("scene.json", "meta.json", "lod-meta.json")  # folders of these hold no photographs
@@ -40,29 +37,10 @@ def open_side(text: str, options: ReadingOptions) -> SceneSide | PictureSide:
         return PictureSide(path.name, files)
     subject, name = open_subject(path, options), path.resolve().name
     if at:
-        return SceneSide(f"{name} @ {at}", subject_at(subject, at, text))
+        return SceneSide(f"{name} @ {at}", subject.placed(at, f"'{text}'"))
     if subject.file:
         return SceneSide(name, subject)
     return SceneSide(name, Subject(subject.at(min(subject.stops, default=0.0))), False)
-
-
-def subject_at(subject: Subject, at: str, text: str) -> Subject:
-    """All objects at the x of a number; of a name, those that have such a stop or state at it."""
-    x = number_of(at, text)
-    if x is not None:
-        return replace(subject, scene=subject.at(x))
-    things, known = [], []
-    items = {item.name: item for item in subject.file.all_items} if subject.file else {}
-    for thing in subject.scene.objects:
-        states = items[thing.name].states if items else ()
-        stops = {stop.name.casefold(): stop for stop in (*thing.model.stops, *states)}
-        found = stops.get(at.casefold())
-        things.append(replace(thing, x=found.x) if found else thing)
-        known += [stop.name for stop in stops.values()]
-    if at.casefold() not in map(str.casefold, known):
-        names = ", ".join(dict.fromkeys(known))
-        raise UsageError(f"'{text}': there is no stop '{at}'; the stops are {names}.")
-    return replace(subject, scene=Scene(tuple(things)))
 
 
 def split_stop(text: str) -> tuple[Path, str]:
@@ -71,29 +49,6 @@ def split_stop(text: str) -> tuple[Path, str]:
     if not sign or not before or not at or Path(text).exists():
         return Path(text), ""
     return Path(before), at
-
-
-def x_of(at: str, stops: Sequence[Stop], text: str) -> float:
-    """The control value that a stop's name, in any case, or a number in 0..1 says."""
-    for stop in stops:
-        if stop.name.casefold() == at.casefold():
-            return stop.x
-    x = number_of(at, text)
-    if x is None:
-        names = ", ".join(stop.name for stop in stops)
-        raise UsageError(f"'{text}': there is no stop '{at}'; the stops are {names}.")
-    return x
-
-
-def number_of(at: str, text: str) -> float | None:
-    """The control value of a number; None for what is a name."""
-    try:
-        x = float(at)
-    except ValueError:
-        return None
-    if not 0 <= x <= 1:
-        raise UsageError(f"'{text}': x is {at}, expected 0 to 1.")
-    return x
 
 
 def pictures_in(path: Path) -> tuple[Path, ...]:

@@ -3,11 +3,12 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
+from app.paths import full
+from app.program import program
 
 PACKAGE = ".shift"
 
@@ -16,41 +17,41 @@ PACKAGE = ".shift"
 class Options(ReadingOptions):
     """Write a scene as it is shown at one x: plain splats that every viewer opens, or a package."""
 
-    scenes: tyro.conf.Positional[tuple[Path, ...]]
+    scenes: Annotated[tuple[Path, ...], POSITIONAL]
     """What to export; several become one file, where they stand when opened together, and the
     objects of a scene file where that puts them."""
     out: Path
     """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, or
     our package, .shift or a folder (a name without an ending)."""
-    x: str = ""
-    """Control value in 0..1 or the name of a stop, of all objects; default: the first stop, and in
-    a scene file what it says for each."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
+    stop, and in a scene file what it says for each object."""
     sh_degree: int = 3
-    """Spherical harmonics of the colours, at most; 0: one colour from all sides."""
+    """Degree of the colours' spherical harmonics, at most; 0: one colour from all sides."""
     palette: bool = True
-    """Thermal stops in their false colours, as they are shown; --no-palette: as the networks give
-    them."""
-    select: tuple[str, ...] = ()
-    """Parts with a control value X of their own (a number or a stop's name), in each object's
-    frame: sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border]
-    half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border]."""
-    only: tuple[str, ...] = ()
-    """Nothing but what lies in one of these: sphere:x,y,z:radius box:x,y,z:hx,hy,hz
-    half:x,y,z:nx,ny,nz lens:degrees; anchors count with all their splats."""
+    """Write thermal stops in their false colours, as they are shown; --no-palette: as the networks
+    give them."""
+    select: Annotated[tuple[str, ...], REGIONS] = ()
+    """Regions with an X of their own (a stop's name or a number), in each object's frame:
+    sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border]
+    lens:degrees:X[:border].  Default: none."""
+    only: Annotated[tuple[str, ...], REGIONS] = ()
+    """Write only what lies in one of these: sphere:x,y,z:radius box:x,y,z:hx,hy,hz
+    half:x,y,z:nx,ny,nz lens:degrees.  An anchor goes with all its splats.  Default: everything."""
     object: str = ""
-    """Nothing but the scene of that number, counted from 1, or file name; of a scene file, nothing
-    but the object of that name or label."""
-    label: int | None = None
-    """Nothing but the object of that label (files with labels: Gaussian Grouping)."""
-    eye: str = ""
-    """x,y,z in metres: where a scene is seen from whose shape depends on that (Scaffold-GS);
-    default: the first view."""
+    """Write only the scene of this number, counted from 1, or file name; of a scene file only the
+    object of this name or label.  Default: all."""
     overwrite: bool = False
     """Replace an earlier file; never what is read."""
-    encoding: Literal["kept", "stops"] = "kept"
+    label: Annotated[int | None, EXPERT] = None
+    """Write only the object of this label (files with labels: Gaussian Grouping).  Default: all."""
+    eye: Annotated[str, Opt(expert=True, metavar="X,Y,Z")] = ""
+    """Metres: from where a scene is seen whose shape depends on that (Scaffold-GS).  Default: the
+    first view."""
+    encoding: Annotated[Literal["kept", "stops"], EXPERT] = "kept"
     """Of a package; stops: the control encoding is written anew, a unit for each stop, so that
     programs which know of no blends of stops meet no jump between them either."""
-    pace: bool = True
+    pace: Annotated[bool, EXPERT] = True
     """Of a package that has none: measures how fast the picture changes between any two stops, so
     that equal ways of the slider are equal changes; --no-pace: leaves it as it is."""
 
@@ -94,7 +95,7 @@ def run(options: Options) -> int:
         print(sentence(finding), file=sys.stderr)
     degree = round(splats.sh.shape[1] ** 0.5) - 1
     print(
-        f"{options.out}: {len(splats.means):,} splats, SH degree {degree}, "
+        f"{full(options.out)}: {len(splats.means):,} splats, SH degree {degree}, "
         f"{options.out.stat().st_size:,} bytes, {told_x(parts)}.",
         file=sys.stderr,
     )
@@ -162,9 +163,7 @@ def parts_of(path: Path, subject, position, options: Options) -> list:
     if not subject.file:
         return [make_part(path, subject.scene.objects[0].model, position, options)]
     if options.x:
-        from app.commands.compare_sides import subject_at
-
-        subject = subject_at(subject, options.x, f"--x {options.x}")
+        subject = subject.placed(options.x)
     parts = []
     for thing in subject.scene.objects:
         part = make_part(path, thing.model, position, options, thing)
@@ -202,7 +201,7 @@ def make_part(path: Path, model, position, options: Options, known=None):
     from scene.read_selector import read_selector
     from scene.scene import IDENTITY, SceneObject
 
-    x = known.x if known else choose_x(options.x, model, path.name)
+    x = known.x if known else choose_x(options.x, model)
     eye = default_view(model, (640, 360)).world_from_eye
     try:
         selectors = tuple(read_selector(text, model.stops, eye) for text in options.select)
@@ -217,25 +216,13 @@ def make_part(path: Path, model, position, options: Options, known=None):
     return Part(thing, inside or None, options.label)
 
 
-def choose_x(text: str, model, name: str) -> float:
-    """The control value of a number or a stop's name.  Raises UsageError."""
-    from app.errors import UsageError
+def choose_x(text: str, model):
+    """The Control of one model.  Raises UsageError."""
+    from app.subject import control_of_text, pace_of
 
     if not text:
         return min((stop.x for stop in model.stops), default=0.0)
-    for stop in model.stops:
-        if stop.name.lower() == text.lower():
-            return stop.x
-    try:
-        x = float(text)
-    except ValueError:
-        x = float("nan")
-    if not 0 <= x <= 1:
-        names = ", ".join(f"{stop.name} ({stop.x:g})" for stop in model.stops) or "none"
-        raise UsageError(
-            f"--x is '{text}', expected 0 to 1 or one of the stops of {name}: {names}."
-        )
-    return x
+    return control_of_text(text, model.stops, pace=pace_of(model))
 
 
 def with_x(text: str) -> str:
@@ -285,8 +272,8 @@ def export_package(options: Options, opened: list) -> int:
         what = "several scenes" if len(models) != 1 else "plain splats"
         what = "objects of a scene file, which have places," if opened[0].file else what
         raise UsageError(
-            f"{what} cannot become a package: it is anchors and five networks, which `launch.py "
-            "train` makes of photos; write .ply, .spz or .glb."
+            f"{what} cannot become a package: it is anchors and five networks, which "
+            f"`{program()} train` makes of photos; write .ply, .spz or .glb."
         )
     from app.pace import with_pace
     from runtime_models.refit_encoding import refit_encoding
@@ -296,5 +283,5 @@ def export_package(options: Options, opened: list) -> int:
     features = model.features
     halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
     size = write_package(model, options.out, "float16" if halves else "float32")
-    print(f"{options.out}: {size:,} bytes, every x.", file=sys.stderr)
+    print(f"{full(options.out)}: {size:,} bytes, every x.", file=sys.stderr)
     return 0

@@ -5,6 +5,10 @@ import sys
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Annotated
+
+from app.command_line import SIZE
+from app.program import program
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
 TOUCH = "touch.png"
@@ -19,15 +23,15 @@ class Options:
     and the touch scene while the hands of its script are at work."""
 
     scene: Path = DEMO
-    """What to draw, a scene file as it says; the bundled demo and touch scene unless given."""
+    """What to draw.  Default: the bundled demo and touch scene."""
     out: Path = Path("out/demo")
     """Folder for the pictures and bench.json; those of an earlier run are replaced."""
-    size: str = "480x320"
+    size: Annotated[str, SIZE] = "480x320"
     """WIDTHxHEIGHT of one picture."""
     frames: int = 30
-    """Frames that are timed, mono and stereo each (after 3 that do not count)."""
+    """Frames that are timed, mono and stereo each, after 3 that do not count."""
     sweep: int = 30
-    """Values of x that are timed from 0 to 1 (after 3 that do not count)."""
+    """Values of x that are timed from 0 to 1, after 3 that do not count."""
 
 
 def run(options: Options) -> int:
@@ -41,7 +45,7 @@ def run(options: Options) -> int:
     size = parse_size(options.size)
     check_counts(options)
     if options.scene == DEMO and not DEMO.exists():
-        raise UsageError(f"the bundled demo {DEMO} is missing; `launch.py demo` makes one.")
+        raise UsageError(f"the bundled demo {DEMO} is missing; `{program()} demo` makes one.")
     subject = open_subject(options.scene, ReadingOptions())
     result_path = options.out / "bench.json"
     make_folder(options.out)

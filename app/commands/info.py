@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import tyro
-
+from app.command_line import POSITIONAL
 from app.opening import ReadingOptions, open_model
 
 
@@ -14,8 +13,8 @@ from app.opening import ReadingOptions, open_model
 class Options(ReadingOptions):
     """Say what is in a scene."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat, a folder of PLY layers or a scene file, see docs/scene.md."""
+    scene: Annotated[Path, POSITIONAL]
+    """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
     json: bool = False
     """JSON on standard output instead of a table."""
 

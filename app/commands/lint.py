@@ -5,8 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-import tyro
-
+from app.command_line import POSITIONAL
 from app.opening import PATIENCE_S, ReadingOptions, progress_after
 from app.scene_files import open_scene_file
 from runtime_models.model import BadFile
@@ -16,7 +15,7 @@ from runtime_models.model import BadFile
 class Options(ReadingOptions):
     """Say what is wrong with a scene; nothing is drawn, nothing is written."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
+    scene: Annotated[Path, POSITIONAL]
     """Anything that opens: a file of splats, a folder, a package, a scene file."""
     json: bool = False
     """JSON on standard output instead of a table."""

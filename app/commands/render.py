@@ -7,9 +7,9 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
 from app.opening import ReadingOptions, open_model
+from app.paths import full
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LEGEND = "legend.json"  # of --output
@@ -20,58 +20,62 @@ LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 class Options(ReadingOptions):
     """Draw a scene into PNG files."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat, a folder of PLY layers or a scene file, see docs/scene.md."""
+    scene: Annotated[Path, POSITIONAL]
+    """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
     out: Path
     """Folder for the pictures."""
-    x: tuple[str, ...] = ()
-    """Control values in 0..1, or sweep:N; default: 0, and in a scene file what it says for each
-    object."""
-    camera: str = "orbit"
-    """orbit, front, auto (cameras that lie with the scene), or a file or folder of cameras, see
-    docs/cameras.md: ours, cameras.json, transforms.json, camera_path.json, _vr.json, COLMAP."""
-    fov_y: float = 0.0
-    """Degrees from top to bottom, for a camera file that says nothing about the lens."""
+    x: Annotated[tuple[str, ...], CONTROL] = ()
+    """Where the slider stands, one or several: a stop by its name, a number from 0 to 1, or sweep:N
+    for N pictures from 0 to 1.  Default: 0, and in a scene file what it says for each object."""
+    camera: Annotated[str, Opt(metavar="CAMERA")] = "orbit"
+    """orbit, front, auto (cameras that lie with the scene), or a file or folder of cameras: ours,
+    cameras.json, transforms.json, camera_path.json, _vr.json, COLMAP (docs/cameras.md)."""
     frames: int = 1
-    """Pictures on the orbit (per control value); a camera file gives its own number."""
-    size: str = ""
-    """WIDTHxHEIGHT in pixels; default 640x360, or what the camera file says."""
+    """Pictures on the orbit, at each x; a camera file gives its own number."""
+    size: Annotated[str, SIZE] = ""
+    """WIDTHxHEIGHT in pixels.  Default: 640x360, or what the camera file says."""
     stereo: float = 0.0
-    """Distance of two eyes in metres; above 0 each picture holds both, side by side."""
-    stereo_colors: Literal["auto", "each", "shared"] = "auto"
+    """Distance of two eyes in metres; above 0 each picture holds both eyes, side by side."""
+    stereo_colors: Annotated[Literal["auto", "each", "shared"], EXPERT] = "auto"
     """Of two eyes: each its own, shared for the middle between them, or shared where nobody can
     tell."""
     background: tuple[float, float, float] | None = None
-    """Display sRGB, 0 to 1; default: what the scene was trained on, else black."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
-    debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
-    """Instead of the picture: which splats are left out and why, the same from above, how many
-    splats lie over each pixel, how far they are, which object they are of; with a legend."""
+    """Red, green and blue behind everything, 0 to 1 as displayed.  Default: what the scene was
+    trained on, else black."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
+    debug: Annotated[Literal["", "culls", "birdseye", "overdraw", "depth", "object"], EXPERT] = ""
+    """Draw with a legend, instead of the picture, which splats are left out and why, the same from
+    above, how many splats lie over each pixel, how far away they are, or which object they belong
+    to.  Default: the picture."""
     output: Literal["picture", "depth", "normal", "coverage"] = "picture"
-    """Instead of the colours: metres along the view, directions of the surface or how much of a
-    pixel is covered; each as a .npy and a 16-bit .png, and a legend.json that tells the numbers."""
-    depth_unit: float | None = None
-    """Metres a step of --output depth's .png; default: the finest power of ten that is enough."""
-    max_pixels: float = inf
-    """Leave out splats larger than this: one sigma of the longer axis, pixels."""
-    max_distance: float = inf
-    """Leave out splats farther from the eye than this, metres."""
-    min_pixels: float = 0.0
-    """Leave out splats smaller than this: from the centre to where they end, pixels."""
-    fade: float = 0.0
-    """Part of each of these limits over which splats fade, 0 to 1; 0: they end at once."""
-    select: tuple[str, ...] = ()
-    """Parts with a control value X of their own (a number or a stop's name), smooth over a border
-    in metres: sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border]
-    half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border]; a later one lies over an earlier one."""
-    target_ms: float | None = None
-    """Choose the setting by this budget, milliseconds a frame, from a chart of this scene on this
-    machine; measured once, in seconds, and kept."""
-    floor_db: float | None = None
-    """Never below this PSNR against the exact picture, whatever the budget; default 35."""
+    """What to write instead of colours: depth in metres along the view, surface normals, or how
+    much of each pixel is covered; each as a .npy and a 16-bit .png, with a legend.json."""
+    select: Annotated[tuple[str, ...], REGIONS] = ()
+    """Regions with an X of their own (a stop's name or a number) and a soft border in metres:
+    sphere:x,y,z:radius:X[:border] box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border]
+    lens:degrees:X[:border].  A later one lies over an earlier one.  Default: none."""
+    fov_y: Annotated[float, EXPERT] = 0.0
+    """Degrees from top to bottom, for a camera file that says nothing about the lens; 0: not
+    known."""
+    depth_unit: Annotated[float | None, EXPERT] = None
+    """Metres a step of the .png of --output depth.  Default: the finest power of ten that reaches
+    the far side."""
+    max_pixels: Annotated[float, EXPERT] = inf
+    """Leave out larger splats: one sigma of the longer axis, in pixels.  Default: no limit."""
+    max_distance: Annotated[float, EXPERT] = inf
+    """Leave out splats farther away, in metres.  Default: no limit."""
+    min_pixels: Annotated[float, EXPERT] = 0.0
+    """Leave out smaller splats: from the centre to where they end, in pixels."""
+    fade: Annotated[float, EXPERT] = 0.0
+    """Share of each of these limits over which splats fade, 0 to 1; 0: they end abruptly."""
+    target_ms: Annotated[float | None, EXPERT] = None
+    """Milliseconds that a frame may take: the setting is chosen by a chart of this scene on this
+    machine, which is measured once, in seconds, and kept.  Default: no limit, the exact picture."""
+    floor_db: Annotated[float | None, EXPERT] = None
+    """PSNR in dB against the exact picture below which --target-ms never goes.  Default: 35."""
     overwrite: bool = False
     """Replace pictures of the same name."""
 
@@ -84,13 +88,13 @@ def run(options: Options) -> int:
         MOST_VALUES,
         make_folder,
         open_renderer,
-        parse_controls,
         parse_size,
+        split_controls,
     )
     from app.errors import UsageError
     from scene.scene_file import is_scene_file
 
-    controls = parse_controls(options.x) if options.x else [None]
+    controls = split_controls(options.x) or [None]
     size = parse_size(options.size) if options.size else None
     if not 1 <= options.frames <= MOST_VALUES:
         raise UsageError(f"--frames is {options.frames}, expected 1 to {MOST_VALUES}.")
@@ -103,9 +107,12 @@ def run(options: Options) -> int:
     check_output(options)
     # What needs no scene comes before it: large ones take a while to open.
     cameras = choose_cameras(options, size)
-    pairs, paths = choose_paths(options, controls, len(cameras.views) if cameras else None)
+    count = len(cameras.views) if cameras else None
+    choose_paths(options, [label_of(control) for control in controls], count)
     opened = (open_objects if is_scene_file(options.scene) else open_one)(options, cameras, size)
-    views = opened.views
+    views, subjects = opened.views, [subject_at(opened.subject, each) for each in controls]
+    labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
+    rows, paths = choose_paths(options, labels, count)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
         background = options.background or opened.background
@@ -113,18 +120,17 @@ def run(options: Options) -> int:
             settings, target=renderer.settings.target, background=background
         )
         if budget:
-            x, eyes = controls[0], 1 + (options.stereo > 0)
-            drawn = Drawn(opened.subject, x, views[0].size, eyes)
+            drawn = Drawn(subjects[0], None, views[0].size, 1 + (options.stereo > 0))
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
             if options.stereo_colors != "auto":
                 renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)
-        scenes = [opened.scene_at(x, i) for x, i in pairs]
-        work = (renderer, scenes, [views[i] for _, i in pairs], paths, options.stereo)
+        scenes = [opened.scene_of(subjects[c], i) for c, i in rows]
+        work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
             draw_all(*work)
         else:
             draw_outputs(*work, options.output, unit_of(options, opened.subject, views))
-    print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {options.out}", file=sys.stderr)
+    print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}", file=sys.stderr)
     return 0
 
 
@@ -134,8 +140,8 @@ class Opened:
 
     views: list
     background: tuple[float, float, float]  # where the options give none
-    scene_at: Callable  # (x, row of the view) -> Scene
-    subject: object  # what a budget is measured with
+    scene_of: Callable  # (Subject at its x, row of the view) -> Scene
+    subject: object
 
 
 def open_one(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
@@ -148,11 +154,32 @@ def open_one(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     views = subject.sees(cameras).views if cameras else own_views(options, subject, size)
     selectors = [choose_selectors(options.select, model, view) for view in views]
 
-    def scene_at(x: float | None, row: int) -> Scene:
-        (thing,) = subject.at(x).objects
+    def scene_of(subject: Subject, row: int) -> Scene:
+        (thing,) = subject.scene.objects
         return Scene((replace(thing, selectors=selectors[row]),))
 
-    return Opened(views, subject.background, scene_at, subject)
+    return Opened(views, subject.background, scene_of, subject)
+
+
+def subject_at(subject, control: float | str | None):
+    """The Subject at a value of --x; None: as it is.  Raises UsageError."""
+    if isinstance(control, str):
+        return subject.placed(control)
+    return replace(subject, scene=subject.at(control))
+
+
+def label_of(control: float | str | None, x=None) -> str:
+    """A control in the name of a picture; x: the Control of all objects, where that is known."""
+    from app.paths import file_name
+
+    if isinstance(x, float | int):
+        return f"x{x:.3f}"
+    if not isinstance(control, str):
+        return f"x{control or 0:.3f}"
+    try:
+        return f"x{float(control):.3f}"
+    except ValueError:
+        return file_name(control)
 
 
 def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
@@ -164,7 +191,7 @@ def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Ope
         raise UsageError("--select is for one model; a scene file has selectors for each object.")
     subject = open_subject(options.scene, options)
     views = cameras.views if cameras else own_views(options, subject, size)
-    return Opened(views, subject.background, lambda x, row: subject.at(x), subject)
+    return Opened(views, subject.background, lambda subject, row: subject.scene, subject)
 
 
 def check_one_of(options: Options, budget) -> None:
@@ -223,24 +250,27 @@ def choose_cameras(options: Options, size: tuple[int, int] | None):
 
 
 def choose_paths(
-    options: Options, controls: list[float | None], views: int | None
-) -> tuple[list[tuple[float | None, int]], list[Path]]:
-    """(x, number of the view) of every picture, and its file.  UsageError where one is there."""
+    options: Options, labels: list[str], views: int | None
+) -> tuple[list[tuple[int, int]], list[Path]]:
+    """(number of the control, of the view) of every picture, and its file.
+
+    Raises UsageError where one is there.
+    """
     from app.drawing import MOST_VALUES
     from app.errors import UsageError
 
     views = views or (options.frames if options.camera == "orbit" else 1)
-    count = len(controls) * views
+    count = len(labels) * views
     if count > MOST_VALUES:
         raise UsageError(f"{count} pictures asked for, at most {MOST_VALUES} in one run.")
-    pairs = [(x, i) for x in controls for i in range(views)]
-    paths = [options.out / f"{i:04d}_x{x or 0:.3f}.png" for i, (x, _) in enumerate(pairs)]
+    rows = [(c, i) for c in range(len(labels)) for i in range(views)]
+    paths = [options.out / f"{n:04d}_{labels[c]}.png" for n, (c, _) in enumerate(rows)]
     beside = [p.with_suffix(".npy") for p in paths] + [options.out / LEGEND]
     files = paths if options.output == "picture" else paths + beside
     taken = [p for p in files if p.exists()]
     if taken and not options.overwrite:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
-    return pairs, paths
+    return rows, paths
 
 
 def own_views(options: Options, subject, size: tuple[int, int] | None) -> list:

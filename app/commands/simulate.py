@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
+from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
+from app.paths import full
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -19,22 +20,25 @@ LONGEST_S = 24 * 3600.0
 class Options:
     """Let hands and rays of a script act on a scene; poses, contacts, x and events come out."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
+    scene: Annotated[Path, POSITIONAL]
     """A scene file, see docs/scene.md."""
     out: Path
     """Folder for run.jsonl and the pictures."""
     script: Path | None = None
-    """JSON lines with times: hands, grabs, releases, rays; without it things only fall."""
+    """JSON lines with times: hands, grabs, releases, rays.  Default: none, things only fall."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the sliders of all objects stand at the start: a stop or state by its name, or a number
+    from 0 to 1.  Default: what the scene file says for each."""
     seconds: float | None = None
-    """How long; default: two seconds more than the script."""
+    """How long.  Default: two seconds more than the script."""
     pictures: int = 0
     """A picture every so many steps of 1/90 s; 0: none."""
-    size: str = "640x360"
+    size: Annotated[str, SIZE] = "640x360"
     """WIDTHxHEIGHT of a picture."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
     overwrite: bool = False
     """Replace what an earlier run has left in --out."""
 
@@ -48,6 +52,7 @@ def run(options: Options) -> int:
     size = parse_size(options.size)
     if options.pictures < 0:
         raise UsageError(f"--pictures is {options.pictures}; steps, 0 or more, are wanted.")
+    refuse_model(options.scene)
     file = read_scene_file(options.scene)
     acts = read_script(options.script, file.all_items) if options.script else ()
     seconds = options.seconds
@@ -56,29 +61,39 @@ def run(options: Options) -> int:
     if not 0 < seconds <= LONGEST_S:
         raise UsageError(f"--seconds is {seconds:g}; above 0 and at most a day is wanted.")
     steps = math.ceil(seconds * HZ - 1e-6)
-    simulation = make_simulation(file, acts)
+    simulation = make_simulation(file, acts, options.x)
     every = options.pictures
     paths = [options.out / f"{i:05d}.png" for i in range(0, steps + 1, every)] if every else []
     result = options.out / RESULT
     refuse_taken([result, *paths], options)
     make_folder(options.out)
-    told = tell(simulation, steps, result, options)
+    told = shown(tell(simulation, steps, result, options), steps)
     if every:
         draw_run(told, simulation, file, size, options)
     else:
         for _ in told:
             pass
     pictures = f" and {len(paths)} pictures" if paths else ""
-    print(
-        f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {options.out}", file=sys.stderr
-    )
+    summary = f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {full(options.out)}"
+    print(summary, file=sys.stderr)
     return 0
 
 
-def make_simulation(file, acts: tuple):
-    """The scene with its models, bodies and physics.  Raises BadFile."""
+def refuse_model(path: Path) -> None:
+    """Raises UsageError for a scene that is no file of objects, and would be read as none."""
+    from app.errors import UsageError
+
+    if path.exists() and path.suffix.lower() != ".json":
+        raise UsageError(
+            f"{path} is no scene file: simulate moves the objects of a NAME.scene.json (see "
+            "docs/scene.md), which the viewer writes of a scene by Ctrl+S."
+        )
+
+
+def make_simulation(file, acts: tuple, x: str = ""):
+    """The scene with its models, bodies and physics.  Raises BadFile, UsageError."""
     from app.opening import PATIENCE_S, progress_after, sentence
-    from app.scene_files import tell_findings
+    from app.scene_files import file_at, tell_findings
     from runtime_models.plain_splats import Reading
     from scene.collider_files import colliders_of
     from scene.scene_file import read_models
@@ -87,6 +102,7 @@ def make_simulation(file, acts: tuple):
 
     with progress_after(PATIENCE_S) as shown:
         models = read_models(file, Reading(told=shown))
+        file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown)
     world = World(file, models, colliders, hz=HZ)
     tell_findings(models)
@@ -123,6 +139,17 @@ def tell(simulation, steps: int, path: Path, options: Options):
                 out.write(line(record.row()))
             yield number
         out.write(line({"end": steps, "hash": world.physics.hash()}))
+
+
+def shown(told, steps: int):
+    """The same steps, with a bar of how many are done."""
+    from app.progress import progress_bar
+
+    with progress_bar() as bar:
+        task = bar.add_task("simulating", total=steps)
+        for number in told:
+            bar.update(task, completed=number)
+            yield number
 
 
 def line(row: dict) -> str:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
+from app.paths import full
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -24,24 +24,24 @@ class Options(ReadingOptions):
     docs/stability.md says what each case means.
     """
 
-    scene: Annotated[Path, tyro.conf.Positional]
-    """A package, a .ply, a .splat, a folder of PLY layers or a scene file."""
+    scene: Annotated[Path, POSITIONAL]
+    """A package, splats of any known format, a folder of layers or a scene file (docs/scene.md)."""
     out: Path
     """Folder for stability.csv and the pictures."""
-    cases: tuple[str, ...] = ()
-    """Names of cases; default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
+    cases: Annotated[tuple[str, ...], Opt(metavar="CASE")] = ()
+    """Names of cases.  Default: all of sweep, stale-orbit, stale-yaw, popping, disparity, canted,
     stereo, far-origin, depth-range, inside, lenses, random-eyes, needles, faint-layers, limits,
     counts, crowd, extrapolated-x, broken-heads, life."""
-    size: str = "640x360"
+    size: Annotated[str, SIZE] = "640x360"
     """WIDTHxHEIGHT in pixels."""
-    steps: int = 24
+    steps: Annotated[int, EXPERT] = 24
     """Frames between two stops of the x sweep, and of the 90-degree turn."""
-    rounds: int = 50
+    rounds: Annotated[int, EXPERT] = 50
     """Contexts made and closed by the case life."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Drawing back end: GL quads or OpenCL tiles."""
-    context: Literal["auto", "egl", "surfaceless", "osmesa", "none"] = "auto"
-    """Where GL comes from."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    context: Annotated[Literal["auto", "egl", "surfaceless", "osmesa", "none"], EXPERT] = "auto"
+    """Where the OpenGL context without a window comes from."""
     overwrite: bool = False
     """Start anew where the folder holds the table of another scene, size or drawing."""
 
@@ -72,7 +72,7 @@ def run(options: Options) -> int:
     failed = [name for name in names if table.failed(name)]
     told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
-    print(f"{count}, {told}; {table.path} and pictures beside it", file=sys.stderr)
+    print(f"{count}, {told}; {full(table.path)} and pictures beside it", file=sys.stderr)
     return FAILED if failed else 0
 
 
@@ -112,14 +112,15 @@ def perform(stage, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
     from rich.console import Console
 
+    from app.progress import working
     from app.stability_cases.table import CASES, save_panels
 
     console = Console(stderr=True, highlight=False)
-    with console.status("starting") as status:
+    with working("starting") as tell:
         for i, name in enumerate(names):
             if name in table.rows:
                 continue
-            status.update(f"{name} ({i + 1} of {len(names)})")
+            tell(f"{name} ({i + 1} of {len(names)})")
             result = CASES[name](stage)
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)

@@ -9,8 +9,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
-import tyro
-
+from app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from app.opening import ReadingOptions
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
@@ -21,44 +20,52 @@ NO_HEADSET = 4  # exit code
 class Options(ReadingOptions):
     """Walk into a scene and touch it, see docs/vr.md."""
 
-    scene: Annotated[Path | None, tyro.conf.Positional] = None
-    """A scene file, a package or splats; none: three things on a table."""
-    eye_part: float = 1.0
-    """Of the width and height that the runtime recommends for an eye."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
+    scene: Annotated[Path | None, POSITIONAL] = None
+    """A scene file, a package or splats.  Default: three things on a table."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the slider stands at the start: a stop by its name, or a number from 0 to 1.  Default:
+    the first stop, and in a scene file what it says for each object."""
     quality: Literal["auto", "best", "balanced", "fast"] = "auto"
     """auto: shortcuts only where the exact picture of both eyes takes longer than the headset's
     frames last, and fewer pixels while frames are late; best: exact, always."""
-    target_ms: float | None = None
-    """Milliseconds that a frame may take us with --quality auto; default: 85 % of the headset's."""
-    floor_db: float | None = None
-    """Never below this PSNR against the exact picture with --quality auto; default 35."""
-    stereo_colors: Literal["auto", "each", "shared"] = "auto"
-    """each: colours for each eye, always; shared: for the middle between the eyes; auto: as
-    --quality has it, which shares them where nobody can tell."""
     turning: Literal["snap", "smooth", "none"] = "snap"
-    """By the stick that does not walk: 30 degrees at a time, evenly, or by the body alone."""
+    """What the stick that does not walk does: turn by 30 degrees at a time, turn evenly, or
+    nothing, so that one turns with the body alone."""
     walking_hand: Literal["left", "right"] = "left"
     """The hand whose stick walks; the other turns and flies."""
     panel_hand: Literal["left", "right"] = "left"
     """The hand that carries the panel; the other points at it."""
     vignette: float = 0.8
-    """How dark the edge of the picture gets while a stick moves one; 0: not at all, 1: black."""
+    """How dark the edge of the picture gets while a stick moves you; 0: not at all, 1: black."""
+    floor: bool = True
+    """Show a faint grid on the floor and a horizon; the panel switches it, too."""
+    hints: bool = True
+    """Name the buttons beside the gloves for ten seconds, and say when frames are late."""
     mirror: bool = True
     """Show the left eye in a window too, where there is a display."""
-    frames: int = 0
+    target_ms: Annotated[float | None, EXPERT] = None
+    """Milliseconds that a frame may take with --quality auto.  Default: 85 % of the headset's."""
+    floor_db: Annotated[float | None, EXPERT] = None
+    """PSNR in dB against the exact picture below which --quality auto never goes.  Default: 35."""
+    stereo_colors: Annotated[Literal["auto", "each", "shared"], EXPERT] = "auto"
+    """each: colours for each eye, always; shared: for the middle between the eyes; auto: as
+    --quality has it, which shares them where nobody can tell."""
+    eye_part: Annotated[float, EXPERT] = 1.0
+    """Share of the width and height of an eye's picture that the runtime recommends."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    pixels: Annotated[str, Opt(expert=True, metavar="FORMAT")] = ""
+    """Format of the runtime's pictures, such as SRGB8_ALPHA8 or RGBA16F.  Default: the best."""
+    frames: Annotated[int, EXPERT] = 0
     """End after so many frames, for tests and benchmarks; 0: stay until it is ended."""
-    report: Path | None = None
-    """Write what the run was like here, as JSON, at its end."""
-    lines: Path | None = None
-    """Write one line of JSON a frame here, as it happens."""
-    pictures: Path | None = None
-    """Folder for the pictures of both eyes."""
-    every: int = 1
-    """Of --pictures: every so many frames."""
-    pixels: str = ""
-    """Format of the runtime's pictures, such as SRGB8_ALPHA8 or RGBA16F; default: the best."""
+    report: Annotated[Path | None, EXPERT] = None
+    """File for what the run was like, as JSON, written at its end.  Default: none."""
+    lines: Annotated[Path | None, EXPERT] = None
+    """File for one line of JSON a frame, written as it happens.  Default: none."""
+    pictures: Annotated[Path | None, EXPERT] = None
+    """Folder for the pictures of both eyes.  Default: none are written."""
+    every: Annotated[int, EXPERT] = 1
+    """Write --pictures of every so many frames."""
 
 
 def run(options: Options) -> int:
@@ -113,7 +120,7 @@ def wear(options: Options) -> int:
     from vr.session import Session
 
     with Instance() as instance:
-        scene = open_worn(options.scene or DEMO, options)
+        scene = open_worn(options.scene or DEMO, options, options.x)
         pacing = Pacing(
             scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms,
             options.stereo_colors,
@@ -131,8 +138,9 @@ def wear(options: Options) -> int:
             for profile in session.hands.refused:
                 print(f"{instance.runtime} does not know {profile}.", file=sys.stderr)
             wearing = Wearing(
-                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand
-            )
+                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand,
+                options.floor, options.hints,
+            )  # fmt: skip
             try:
                 with interrupting(wearing):
                     wearing.loop(options.frames)
@@ -193,4 +201,4 @@ def without_headset(reason: str, options: Options) -> int:
 
     print("Opening the scene in a window instead.", file=sys.stderr)
     reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}
-    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), **reading))
+    return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), x=options.x, **reading))

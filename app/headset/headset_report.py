@@ -1,12 +1,14 @@
 """What a run in the headset leaves behind for tests and benchmarks: a report, lines, pictures."""
 
 import json
+import sys
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
 from app.drawing import save_png
+from app.paths import full
 from runtime_models.whole_file import write_whole
 from scene.json_fields import control_row
 from scene.pose import Pose
@@ -48,10 +50,13 @@ class Report:
                 save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
 
     def write(self, told: dict) -> None:
-        """The report itself."""
+        """The report itself; and a word on what has been written."""
         if self._path is not None:
             text = json.dumps({**told, "ended": self.ended}, indent=1) + "\n"
             write_whole(self._path, text.encode())
+        written = [self._path, self._lines and self._lines.name, self._pictures]
+        if names := [full(path) for path in written if path]:
+            print(f"written to {', '.join(names)}", file=sys.stderr)
 
     def close(self) -> None:
         if self._lines is not None:
@@ -84,6 +89,10 @@ def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> d
         "hands": {side: hand_row(hand) for side, hand in frame.hands.items()},
         "standing": {**pose_row(standing.world_from_play), "scale": rounded(standing.scale)},
         "held": {side: world.held(side) for side in SIDES},
+        "offers": [
+            {"hand": offer.side, "object": offer.object, "by": offer.by}
+            for offer in wearing.person.touched.offers
+        ],
         "objects": {
             thing.name: {**pose_row(thing.world_from_object), "x": control_row(thing.x, DECIMALS)}
             for thing in world.drawn().objects

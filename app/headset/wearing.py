@@ -7,6 +7,7 @@ import moderngl
 
 from app.headset.headset_report import Report
 from app.headset.mirror import Mirror, NoMirror
+from app.headset.notices import Late, late_card
 from app.headset.pacing import Pacing, StereoChart
 from app.headset.person import Person
 from app.headset.worn_panel import WornPanel
@@ -14,11 +15,17 @@ from app.headset.worn_scene import WornScene
 from renderer.renderer import Renderer
 from renderer.settings import FrameStats
 from scene.pose import View
+from vr.card import Card
 from vr.drawn import Drawn, drawn_of
+from vr.floor import REST, Floor, Grid, clearness
 from vr.frame import Frame
+from vr.glove import Capsule
+from vr.hints import hints
 from vr.locomotion import RULES, Rules
+from vr.outline import BY_HAND, BY_RAY, Outlines, outline
 from vr.overlay import Overlay
 from vr.session import Session
+from vr.stance import underfoot
 from vr.standing import Standing
 from vr.touching import strongest
 
@@ -28,11 +35,11 @@ LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on
 class Eyes:
     """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`.
 
-    And what is drawn over it.
+    And what is drawn behind its splats and over them.
     """
 
     def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
-        self.overlay = Overlay(ctx)
+        self.floor, self.overlay = Floor(ctx), Overlay(ctx)
         self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
 
     @property
@@ -43,6 +50,7 @@ class Eyes:
         return self
 
     def __exit__(self, *failure) -> None:
+        self.floor.release()
         self.overlay.release()
         for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
             framebuffer.release()
@@ -63,6 +71,8 @@ class Wearing:
         report: Report,
         rules: Rules = RULES,
         panel_hand: str = "left",
+        floor: bool = True,
+        hints: bool = True,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.scene, self.world = scene, scene.world
@@ -70,6 +80,11 @@ class Wearing:
         self.person = Person(scene.world, scene.eye, scene.floor_y, rules)
         self.panel = WornPanel(panel_hand)
         self.standing = Standing()
+        self.floor_shown, self._hints = floor, hints
+        self._level_m = 0.0  # of the floor in the world
+        self._clearness = REST
+        self._outlines, self._late = Outlines(), Late()
+        self._worn_s = 0.0  # since the hands were there for the first time
         self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
         self.stats = FrameStats()
         self._seen_s: float | None = None  # when the frame before was to be seen
@@ -113,17 +128,19 @@ class Wearing:
             self.recentre(frame)
         self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
+        before = self.standing
         left_over = self.panel.act(self, frame, seconds)
         self.standing = self.person.act(left_over, self.standing, seconds)
+        self._clearness = clearness(self._clearness, before, self.standing, seconds)
+        if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
+            self._worn_s += seconds
         records = self.world.advance(seconds)
         for pulse in strongest(self.person.felt(records)):
             self.pulse(pulse.side, pulse.strength, pulse.seconds)
         if frame.drawn:
             views = [self.standing.view(view) for view in frame.views]
             self._choose_quality(views)
-            person = self.person
-            over = drawn_of(frame.hands, self.panel.carried, person.comfort, person.touched)
-            self.draw(views, frame.views, over)
+            self.draw(views, frame.views, self._over(frame))
             self.session.submit(self.eyes.textures)
             self.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
@@ -131,8 +148,36 @@ class Wearing:
             self.mirror.rest()
         self.report.note(self, frame, records)
 
+    def _over(self, frame: Frame) -> Drawn:
+        """What is in the room over the splats."""
+        person, carried = self.person, self.panel.carried
+        outlines, cards = self._outlined(frame), self._cards(frame)
+        return drawn_of(frame.hands, carried, person.comfort, person.touched, outlines, cards)
+
+    def _outlined(self, frame: Frame) -> list[Capsule]:
+        """Around what hands would take, or their rays act on, that do not point at the panel."""
+        lines: list[Capsule] = []
+        for offer in self.person.touched.offers:
+            thing = self.world.things[offer.object]
+            hull = self._outlines.hull(thing.collider)
+            if hull is None or offer.side in self.panel.carried.panel.hovers:
+                continue
+            pose, ink = thing.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
+            lines += outline(hull, pose, self.standing, frame.head.position, ink)
+        return lines
+
+    def _cards(self, frame: Frame) -> tuple[Card, ...]:
+        """What buttons do, at first; and that frames are late."""
+        if not self._hints:
+            return ()
+        side, rules = self.panel.carried.home, self.person.rules
+        cards = hints(frame, self._worn_s, self.session.profiles, rules, side)
+        if self._late.watch(frame.seen_s, self.session.pace.dropped):
+            cards += (late_card(frame.head, self.pacing.quality),)
+        return cards
+
     def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
-        """Splats with one sort for both eyes, and what is in the room over them."""
+        """Splats with one sort for both eyes, the floor behind them, the room over them."""
         self.renderer.settings = self.pacing.settings()
         start = time.perf_counter()
         self.renderer.update(self.world.drawn())
@@ -141,6 +186,11 @@ class Wearing:
         self.session.pace.drew(self._drawing_ms)
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
+            if self.floor_shown:
+                grid = Grid(self._level_m, self._clearness)
+                behind, hidden = self.scene.background, self.renderer.coverage(i)
+                floor = self.eyes.floor
+                floor.draw(framebuffer, play_views[i], self.standing, hidden, grid, behind)
             self.eyes.overlay.draw(framebuffer, play_views[i], over)
 
     def _choose_quality(self, views: list[View]) -> None:
@@ -159,6 +209,8 @@ class Wearing:
         """Back to where the scene is looked at first, at the size it has now."""
         self.standing = self.person.before_scene(frame, self.standing.scale)
         self.person.jumped()
+        floor_y, under = self.person.floor_y, self.standing.point(underfoot(frame.head))
+        self._level_m = float(under[1]) if floor_y is None else floor_y
 
     def pulse(self, side: str, strength: float, seconds: float) -> None:
         """Buzzes a hand."""

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
-from app.scene_files import open_scene_file
+from app.scene_files import file_at, open_scene_file
+from app.subject import control_of_text, pace_of
 from runtime_models.model import Model
 from scene.collider_files import colliders_of
 from scene.framing import default_background, default_view, frame_points, scene_points
@@ -36,11 +37,15 @@ class WornScene:
         return frame_points(*scene_points(self.world.drawn()))[0]
 
 
-def open_worn(path: Path, options: ReadingOptions) -> WornScene:
-    """Reads the scene with progress and findings on stderr.  Raises BadFile."""
+def open_worn(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
+    """Reads the scene with progress and findings on stderr.
+
+    x: where the sliders stand, in words; "": as the scene says.  Raises BadFile, UsageError.
+    """
     if not is_scene_file(path):
-        return open_alone(path, options)
+        return open_alone(path, options, x)
     file, models, scene = open_scene_file(path, options)
+    file = file_at(file, models, x) if x else file
     with progress_after(PATIENCE_S) as told:
         colliders = colliders_of(file, models, told)
     world = World(file, models, colliders, hz=HZ)
@@ -50,11 +55,12 @@ def open_worn(path: Path, options: ReadingOptions) -> WornScene:
     return WornScene(world, models, eye, file.floor_y, BACKGROUND)
 
 
-def open_alone(path: Path, options: ReadingOptions) -> WornScene:
+def open_alone(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
     """One model that nothing can touch, where its file has it."""
     model = open_model(path, options)
-    x = min((stop.x for stop in model.stops), default=0.0)
-    item = SceneItem(name=path.stem or path.name, model=str(path), x=x, static=True)
+    first = min((stop.x for stop in model.stops), default=0.0)
+    start = control_of_text(x, model.stops, pace=pace_of(model)) if x else first
+    item = SceneItem(name=path.stem or path.name, model=str(path), x=start, static=True)
     file = SceneFile(folder=Path(), items=(item,), gravity_m_s2=0.0)
     world = World(file, {item.name: model}, {}, hz=HZ)
     eye = default_view(model, ANY_SIZE).world_from_eye

@@ -4,6 +4,10 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from app.command_line import EXPERT, SIZE
+from app.paths import full
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 20 minutes of a core
@@ -19,19 +23,20 @@ class Options:
     out: Path = Path("out/workshop")
     """Folder for the capture, workshop.shift and its checkpoint."""
     package: Path | None = None
-    """Copy the package there too when it is done; the bundled one is assets/workshop.shift."""
+    """Copy the package to this file, too; the bundled one is assets/workshop.shift.  Default: no
+    copy."""
     seconds: float | None = None
-    """Train for so long instead of a fixed number of steps."""
+    """Train for this long instead of --iterations.  Default: no limit."""
     iterations: int = ITERATIONS
     """Steps of training; the same number gives the same bits."""
-    size: str = "384x288"
+    size: Annotated[str, SIZE] = "384x288"
     """WIDTHxHEIGHT of the photos."""
-    views: int = 72
-    """Photos to train on, a stop."""
-    test_views: int = 8
-    """Photos held out, a stop."""
-    processes: int = 0
-    """That trace rays at the same time; 0 = one a core, at most 8."""
+    views: Annotated[int, EXPERT] = 72
+    """Photos of each stop to train on."""
+    test_views: Annotated[int, EXPERT] = 8
+    """Photos of each stop that are held out."""
+    processes: Annotated[int, EXPERT] = 0
+    """Processes that trace rays at the same time; 0: one for each core, at most 8."""
 
 
 def run(options: Options) -> int:
@@ -42,7 +47,7 @@ def run(options: Options) -> int:
     folder = options.out / "capture"
     recipe = {"size": list(size), "views": options.views, "test_views": options.test_views}
     if made_before(folder, recipe):
-        say(f"Using the photos that are in {folder}; delete it to trace them again.")
+        say(f"Using the photos that are in {full(folder)}; delete it to trace them again.")
     else:
         photograph(folder, size, options)
     package = options.out / "workshop.shift"
@@ -77,7 +82,7 @@ def publish(package: Path, target: Path) -> None:
     beside = target.with_name(target.name + ".part")
     beside.write_bytes(data)
     os.replace(beside, target)
-    say(f"{target}: {len(data) / 1e6:.2f} MB")
+    say(f"{full(target)}: {len(data) / 1e6:.2f} MB")
 
 
 def made_before(folder: Path, recipe: dict) -> bool:

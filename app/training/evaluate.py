@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
+from app.command_line import EXPERT, MODALITY, POSITIONAL
 from app.opening import ReadingOptions, open_model
 
 if TYPE_CHECKING:
@@ -19,29 +18,33 @@ if TYPE_CHECKING:
 class Options(ReadingOptions):
     """Compare a scene with the held-out photos of a capture (every 8th, unless it says which)."""
 
-    scene: Annotated[Path, tyro.conf.Positional]
+    scene: Annotated[Path, POSITIONAL]
     """A package, or any other file of splats."""
-    capture: Annotated[Path, tyro.conf.Positional]
+    capture: Annotated[Path, POSITIONAL]
     """A folder of posed photos."""
-    modality: str | None = None
-    """Only this one of the capture: for a scene that was trained on it alone."""
+    modality: Annotated[str | None, MODALITY] = None
+    """Only this modality of the capture, for a scene that was trained on that alone.  Default:
+    all."""
     json: Path | None = None
-    """Write the result here; - writes it to standard output."""
+    """File for the result; - writes it to standard output.  Default: only the table."""
     downscale: int | None = None
-    """Divide the photos' sides by this.  Default: as in the training, if the scene knows it, else
-    until neither exceeds 640 pixels."""
+    """Divide the photos' sides by this number.  Default: as in the training, if the scene knows it,
+    else such that neither exceeds 640 pixels."""
     masks: Literal["object", "valid", "ignore"] = "object"
-    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
+    """What a mask means: object, nothing is outside it; valid, what is outside is unknown; ignore,
+    masks are not used."""
     background: Literal["auto", "black", "white", "gray"] = "auto"
-    """Colour behind everything.  auto: the capture's, else black."""
-    vgg: Path | None = None
-    """An ONNX file of VGG16's first layers: tells a distance of its features, too.  It is no LPIPS,
-    and compares only with figures of the same file."""
+    """Colour behind everything.  auto: the capture's own, else black."""
+    vgg: Annotated[Path | None, EXPERT] = None
+    """An ONNX file of VGG16's first layers: measures a distance of its features, too.  It is no
+    LPIPS, and compares only with figures of the same file.  Default: not measured."""
 
 
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
+    from app.paths import full
+    from app.progress import working
     from rasterizer.device import open_device
     from scene.read_capture import read_capture
     from scene.scene_file import is_scene_file
@@ -62,10 +65,11 @@ def run(options: Options) -> int:
     model = open_model(options.scene, options)
     capture = with_found(capture, rig_of(model.provenance))
     downscale = options.downscale or trained_downscale(model.provenance)
-    scores = evaluate_model(
-        open_device(), model, capture, downscale, options.masks, options.background,
-        distance,
-    )  # fmt: skip
+    with working("comparing with the photos"):
+        scores = evaluate_model(
+            open_device(), model, capture, downscale, options.masks, options.background,
+            distance,
+        )  # fmt: skip
     result = report(options.scene, scores, started)
     if distance is not None:
         result["vgg_file"] = distance.name
@@ -80,6 +84,7 @@ def run(options: Options) -> int:
         print(json.dumps(result, indent=1))
     elif options.json is not None:
         write_json(options.json, result)
+        print(f"written to {full(options.json)}", file=sys.stderr)
     return 0
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
+from app.command_line import EXPERT, MODALITY, POSITIONAL
 from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
@@ -19,32 +18,32 @@ if TYPE_CHECKING:
 class TrialOptions:
     """The trials: of what, into what, how long, and what they may lose."""
 
-    capture: Annotated[Path, tyro.conf.Positional]
+    capture: Annotated[Path, POSITIONAL]
     """A folder of posed photos, as of train."""
     out: Path
     """The package to write: NAME.shift or a folder."""
     tolerance_db: float = 0.1
-    """What any modality may lose in all against the largest model, with the error of that."""
+    """dB that each modality may lose in all against the largest model, its error included."""
     seeds: int = 2
     """Trainings of every trial.  Two seeds of one model differ by about 0.2 dB."""
     json: Path | None = None
-    """Write the need report here; - writes it to standard output."""
+    """File for the report; - writes it to standard output.  Default: only the table."""
     iterations: int | None = None
     """Steps of every training.  Default: 600."""
     seconds: float | None = None
-    """Train every trial for so long instead."""
+    """Train every trial for this long instead."""
     final_iterations: int | None = None
-    """Train the chosen model again, for so many steps.  Default: the trial's model is written."""
+    """Train the chosen model again for this many steps.  Default: the trial's model is written."""
     final_seconds: float | None = None
-    """The same, for so long."""
+    """Train the chosen model again for this long.  Default: the trial's model is written."""
     preset: Literal["fast", "paper"] = "fast"
-    """As of train: where nothing is said, the preset decides."""
-    seed: int | None = None
-    """The first seed."""
-    grow: bool | None = None
-    """Add and remove anchors between 10 % and 60 % of each training."""
+    """As of train: options that are left out take its numbers."""
     max_anchors: int | None = None
-    """Cap of growing."""
+    """Most anchors that growing may reach."""
+    seed: Annotated[int | None, EXPERT] = None
+    """Seed of the first training; the others count on from it."""
+    grow: Annotated[bool | None, EXPERT] = None
+    """Add and remove anchors between 10 % and 60 % of each training; --no-grow: keep the first."""
 
 
 @dataclass(frozen=True)
@@ -53,23 +52,27 @@ class Options(PhotoOptions, SizeOptions, ModelOptions, TrialOptions):
     the held-out photos.  The options say how large a model it starts from.
     """
 
-    fixed: str | None = None
+    calibrate: Annotated[str | None, MODALITY] = None
+    """A modality whose cameras' offset is found first, as of train.  Default: none."""
+    fixed: Annotated[str | None, EXPERT] = None
     """Networks that do not see x from the start, as offset,scale,rotation."""
-    calibrate: str | None = None
-    """A modality whose cameras' offset is found first, as of train."""
-    masks: Literal["object", "valid", "ignore"] | None = None
-    """What a mask means, as of train."""
-    background: Literal["auto", "random", "black", "white", "gray"] | None = None
-    """Colour behind everything, as of train."""
 
 
 TRIAL = 600  # steps
+
+
+def defaults() -> dict[str, str]:
+    """What --help says of options that are left to the preset."""
+    from app.training.train_options import preset_defaults
+
+    return preset_defaults() | {"seconds": "no limit, --iterations decides"}
 
 
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
     from app.pace import with_pace
+    from app.paths import full
     from app.progress import progress_bar
     from app.training.train import calibrated, say, settings_of
     from rasterizer.device import open_device
@@ -105,11 +108,13 @@ def run(options: Options) -> int:
     noted = with_pace(replace(model, provenance={**model.provenance, "need": result}))
     size = write_package(noted, options.out, need.fitted.storage)
     print_report(need)
-    say(f"{options.out}: {size:,} bytes, the fitted model of the first seed with this report in it")
+    what = "the fitted model of the first seed with this report in it"
+    say(f"{full(options.out)}: {size:,} bytes, {what}")
     if options.json == Path("-"):
         print(json.dumps(result, indent=1))
     elif options.json is not None:
         write_json(options.json, result)
+        say(f"written to {full(options.json)}")
     return 0
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.errors import UsageError
+from app.paths import full
 
 if TYPE_CHECKING:
     from training.train import Trainer
@@ -54,7 +55,7 @@ def kept_when_memory_ends(trainer: "Trainer", out: Path, checkpoint: Path) -> It
         save(trainer, out, checkpoint)
         raise UsageError(
             f"memory was full after {trainer.iteration} steps, with {trainer.anchors_count:,} "
-            f"anchors; the scene as it was then is in {out}.  To train on, {LESS}."
+            f"anchors; the scene as it was then is in {full(out)}.  To train on, {LESS}."
         ) from None
 
 

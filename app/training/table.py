@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
+from app.command_line import EXPERT, MODALITY, POSITIONAL
+from app.paths import full
 from app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
 from app.training.train import INTERRUPTED, say
 from app.training.train import Options as TrainOptions
@@ -26,35 +26,37 @@ PLACES = {
 class MethodOptions:
     """The methods: of what, into what, how long, and how large each may become."""
 
-    capture: Annotated[Path, tyro.conf.Positional]
+    capture: Annotated[Path, POSITIONAL]
     """A folder of posed photos; each modality needs held-out ones."""
     out: Path
     """A folder for the models, table.csv and table.md.  A method that is in it is not run again."""
     seconds: float | None = None
-    """Budget of every method; where it trains several models, they share it."""
+    """Budget of every method; its models share it.  Default: none, give this or --iterations."""
     iterations: int | None = None
-    """The same in steps: the same bits on every run."""
+    """The same in steps, with the same bits on every run.  Default: none."""
     methods: tuple[Literal["joint", "separate", "splats", "spz"], ...] = (
         "joint", "separate", "splats", "spz",
     )  # fmt: skip
     """joint: one shape-shifting model.  separate: one anchor model a modality.  splats: plain 3DGS
-    splats a modality, as PLY.  spz: those splats packed, without training again."""
-    vgg: Path | None = None
-    """An ONNX file of VGG16's first layers: adds a distance of its features, which is no LPIPS."""
-    seed: int | None = None
-    """Of everything random."""
+    splats, one set a modality, as PLY.  spz: those splats packed, without training again."""
+    vgg: Annotated[Path | None, EXPERT] = None
+    """An ONNX file of VGG16's first layers: adds a distance of its features, which is no LPIPS.
+    Default: not measured."""
+    seed: Annotated[int | None, EXPERT] = None
+    """Seed of all random numbers."""
     anchors: int | None = None
-    """How many anchors a model starts with at most."""
+    """Most anchors that a model starts with."""
     max_anchors: int | None = None
-    """Cap of growing, a model."""
-    splats: int | None = None
-    """How many plain splats a modality starts with at most."""
-    max_splats: int | None = None
-    """Cap of growing plain splats, a modality."""
-    sh_degree: int | None = None
-    """Of plain splats' colours: 0 to 3.  Default: 3."""
-    calibrate: str | None = None
-    """A modality whose cameras' offset is found first, for all methods alike; as of train."""
+    """Most anchors that growing may reach, for each model."""
+    splats: Annotated[int | None, EXPERT] = None
+    """Most plain splats that a modality starts with."""
+    max_splats: Annotated[int | None, EXPERT] = None
+    """Most plain splats that growing may reach, for each modality."""
+    sh_degree: Annotated[int | None, EXPERT] = None
+    """Degree of the spherical harmonics of plain splats, 0 to 3."""
+    calibrate: Annotated[str | None, MODALITY] = None
+    """A modality whose cameras' offset is found first, for all methods alike, as of train.
+    Default: none."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,13 @@ class Options(PhotoOptions, SizeOptions, MethodOptions):
 
     The form is that of the paper's Tables 1 and 2: method by modality.
     """
+
+
+def defaults() -> dict[str, str]:
+    """What --help says of options that are left to the preset."""
+    from app.training.train_options import preset_defaults
+
+    return preset_defaults()
 
 
 def run(options: Options) -> int:
@@ -92,7 +101,7 @@ def run(options: Options) -> int:
     capture = with_found(capture, rig)
     for method in sorted(set(options.methods), key=list(PLACES).index):
         if any(row.method == method and row.modality == MEAN for row in table.rows):
-            say(f"{NAMES[method]}: already in {table.path}")
+            say(f"{NAMES[method]}: already in {full(table.path)}")
             continue
         say(f"{NAMES[method]}:")
         if method == "spz":
@@ -105,6 +114,7 @@ def run(options: Options) -> int:
         for row in rows_of(method, device, capture, options, runs, distance):
             table.add(row)
     finish(table.rows, options.out, head)
+    say(f"written to {full(options.out)}: table.csv, table.md and the models")
     return 0
 
 

@@ -1,5 +1,6 @@
 """launch.py train: posed photos of one or several modalities to a scene."""
 
+import shlex
 import signal
 import sys
 import time
@@ -9,9 +10,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
-from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions, settings_of
+from app.command_line import EXPERT, MODALITY, POSITIONAL, Opt
+from app.paths import full
+from app.program import program
+from app.training.train_options import (
+    ModelOptions,
+    PhotoOptions,
+    SizeOptions,
+    preset_defaults,
+    settings_of,
+)
 
 if TYPE_CHECKING:
     from scene.capture import Capture
@@ -22,127 +30,146 @@ if TYPE_CHECKING:
 INTERRUPTED = 130  # exit code
 SAVE_EVERY = 60.0  # seconds between checkpoints
 LOOKS = 10  # at held-out photos in a run
+FEW_STEPS = 1000  # half of what is usual: scenes that are worth looking at need about so many
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """The run: of what, into what, how long, and how the anchors grow."""
 
-    capture: Annotated[Path, tyro.conf.Positional]
-    """A folder of posed photos: COLMAP, transforms.json or cameras.json."""
+    capture: Annotated[Path, POSITIONAL]
+    """A folder of posed photos: COLMAP, transforms.json or cameras.json (docs/capture.md)."""
     out: Path
-    """The package to write: NAME.shift or a folder.  NAME.checkpoint.npz comes to lie beside it."""
+    """The package to write: NAME.shift or a folder.  NAME.checkpoint.npz is written beside it."""
     seconds: float | None = None
-    """Train for so long; the learning rates follow the time."""
+    """Train for this long; the learning rates follow the time."""
     iterations: int | None = None
-    """Train so many steps: the same bits on every run.  fast: 2000, paper: 30000."""
-    model: Literal["anchors", "splats"] = "anchors"
-    """splats: plain 3DGS splats, a set a modality, to compare with; --out is a folder of PLY files.
-    The modalities share the budget."""
-    separate: bool = False
-    """One anchor model a modality, to compare with; --out is a folder of packages.  Each takes its
-    share of the budget."""
-    sh_degree: int | None = None
-    """Of plain splats' colours: 0 to 3.  Default: 3."""
-    splats: int | None = None
-    """How many plain splats a modality starts with at most."""
-    max_splats: int | None = None
-    """Cap of growing plain splats, a modality."""
+    """Train for this many steps; the same number gives the same bits."""
     preset: Literal["fast", "paper"] = "fast"
     """fast: minutes on a CPU.  paper: the numbers of the paper."""
     resume: bool = False
-    """Go on from the checkpoint and its settings; --iterations or --seconds may be longer."""
-    seed: int | None = None
-    """Of everything random."""
-    grow: bool | None = None
-    """Add and remove anchors between 10 % and 60 % of the run."""
+    """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""
     max_anchors: int | None = None
-    """Cap of growing."""
+    """Most anchors that growing may reach."""
     max_mb: float | None = None
-    """The same in megabytes of the package on disk; the start keeps within it, too."""
-    growth: Literal["gradient", "absgrad", "error"] | None = None
-    """What draws new anchors: the gradient by a splat's place on screen, that of every pixel
-    without its sign, or the splat's share of the picture's error."""
-    grow_threshold: float | None = None
-    """Of what draws them: smaller grows more.  gradient: 2e-4, absgrad: 6e-4, error: 1.2 times the
-    mean share."""
-    grow_grids: int | None = None
-    """Grids that new anchors fill: 1 a voxel, 2 also half a voxel, 3 also a quarter."""
-    grow_each: bool | None = None
-    """Grow at each modality by what its own photos say, not by the mean over all."""
-    grow_replace: float | None = None
-    """When the cap is reached, so many of all anchors at most make room: those that show least."""
-    prune_opacity: float | None = None
-    """An anchor whose splats have a smaller mean opacity goes."""
-    prune_weight: float | None = None
-    """An anchor that gives less to its pictures of every modality goes; pixels, for example 0.1."""
-    prune_views: float | None = None
-    """An anchor that is in a smaller share of all pictures goes, for example 0.01."""
-    points: str | None = None
+    """Most megabytes of the package on disk, from the start on."""
+    points: Annotated[str | None, Opt(metavar="WHERE")] = None
     """Where the first anchors stand: capture (COLMAP's points or the capture's own), depth (its
-    depth photos), hull (of masks or a known background), random, or a cloud: PLY, LAS, LAZ, NPZ in
-    the capture's world.  auto: the first of these that there is."""
+    depth photos), hull (of masks or a known background), random, or a point cloud in the capture's
+    world (PLY, LAS, LAZ, NPZ).  auto: the first of these that there is."""
+    model: Annotated[Literal["anchors", "splats"], EXPERT] = "anchors"
+    """splats: plain 3DGS splats, one set for each modality, to compare with; --out is a folder of
+    PLY files, and the modalities share the budget."""
+    separate: Annotated[bool, EXPERT] = False
+    """Train one anchor model for each modality, to compare with; --out is a folder of packages, and
+    the modalities share the budget."""
+    sh_degree: Annotated[int | None, EXPERT] = None
+    """Degree of the spherical harmonics of plain splats, 0 to 3."""
+    splats: Annotated[int | None, EXPERT] = None
+    """Most plain splats that a modality starts with."""
+    max_splats: Annotated[int | None, EXPERT] = None
+    """Most plain splats that growing may reach, for each modality."""
+    seed: Annotated[int | None, EXPERT] = None
+    """Seed of all random numbers."""
+    grow: Annotated[bool | None, EXPERT] = None
+    """Add and remove anchors between 10 % and 60 % of the run; --no-grow: keep the first ones."""
+    growth: Annotated[Literal["gradient", "absgrad", "error"] | None, EXPERT] = None
+    """What decides where anchors are added: gradient, the gradient by a splat's position on screen;
+    absgrad, the same of every pixel without its sign; error, the splat's share of the picture's
+    error."""
+    grow_threshold: Annotated[float | None, EXPERT] = None
+    """Threshold of --growth; smaller adds more anchors."""
+    grow_grids: Annotated[int | None, EXPERT] = None
+    """Voxel grids that new anchors fill: 1, the start's; 2, also one of half the width; 3, also one
+    of a quarter."""
+    grow_each: Annotated[bool | None, EXPERT] = None
+    """Decide where anchors are added for each modality by its own photos, not by the mean."""
+    grow_replace: Annotated[float | None, EXPERT] = None
+    """Share of all anchors, 0 to 1, that may be removed to make room once --max-anchors is reached:
+    those that contribute least."""
+    prune_opacity: Annotated[float | None, EXPERT] = None
+    """Remove anchors whose splats have a smaller mean opacity."""
+    prune_weight: Annotated[float | None, EXPERT] = None
+    """Remove anchors that contribute less than this to the pictures of every modality, in pixels;
+    0.1 is a useful value, 0 removes none."""
+    prune_views: Annotated[float | None, EXPERT] = None
+    """Remove anchors that are seen in a smaller share of all pictures; 0.01 is a useful value, 0
+    removes none."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LossOptions:
-    """What the training pulls at, how fast, and what it sees of the slider."""
+    """What the loss consists of, how fast is learned, and how x is encoded."""
 
-    ssim_share: float | None = None
-    """lambda: (1 - lambda) L1 + lambda D-SSIM.  Equation 8 read literally has 0.8."""
-    opacity_share: float | None = None
-    """lambda_alpha of equation 9."""
-    scale_share: float | None = None
-    """lambda_S of equation 9."""
-    depth_share: float | None = None
-    """Weight of the depth loss where photos have depth photos; 0: they are not used."""
-    rate_scale: float | None = None
-    """Times every learning rate."""
-    rise: int | None = None
-    """Steps over which the networks' rates rise, for scenes of which all would vanish at once."""
-    revive: float | None = None
-    """Weight of a pull on splats that are absent; 0: none. Default: 0.05."""
-    control: int | None = None
+    ssim_share: Annotated[float | None, EXPERT] = None
+    """Share of D-SSIM in the image loss: lambda in (1 - lambda) L1 + lambda D-SSIM.  Equation 8 of
+    the paper, read literally, has 0.8."""
+    opacity_share: Annotated[float | None, EXPERT] = None
+    """Weight of the opacity loss, lambda_alpha in equation 9."""
+    scale_share: Annotated[float | None, EXPERT] = None
+    """Weight of the scale loss, lambda_S in equation 9."""
+    depth_share: Annotated[float | None, EXPERT] = None
+    """Weight of the depth loss where photos have depth photos; 0: those are not used."""
+    rate_scale: Annotated[float | None, EXPERT] = None
+    """Factor on every learning rate."""
+    rise: Annotated[int | None, EXPERT] = None
+    """Steps of learning-rate warm-up for the networks, for scenes of which all splats would vanish
+    at once."""
+    revive: Annotated[float | None, EXPERT] = None
+    """Weight of a loss that keeps absent splats from staying absent; 0: none."""
+    control: Annotated[int | None, EXPERT] = None
     """Numbers of the control encoding; the last one stands for x = 1."""
-    sigma: float | None = None
-    """Width of each in x: wide ones let what lies between two stops learn from both."""
-    encoding: Literal["even", "stops"] | None = None
-    """stops: --control and --sigma by the capture: a number a stop, half as wide as stops lie
-    apart, so that what lies between two stops learns from both."""
-    between: Literal["none", "photos", "pictures", "shapes", "splats"] | None = None
-    """How x between two stops is learned: from blends of photos taken from one place, from blends
-    of the model's own pictures, from photos on shapes that are on their way to the next stop, or by
-    keeping splats on the straight way between the stops."""
-    between_share: float | None = None
-    """Of the steps, in which x lies between two stops."""
-    between_pull: float | None = None
-    """Weight of the pull of --between splats."""
-    thermal_smooth: float | None = None
-    """Weight of the roughness of thermal pictures, for example 0.6 (ThermalGaussian)."""
-    balance: str | None = None
-    """Steps of each modality beside the others', as RGB=3,Thermal=1.  Default: as many of each."""
+    sigma: Annotated[float | None, EXPERT] = None
+    """Width in x of each number of the control encoding; with wide ones, what lies between two
+    stops learns from both."""
+    encoding: Annotated[Literal["even", "stops"] | None, EXPERT] = None
+    """stops: --control and --sigma follow from the capture, one number for each stop, half as wide
+    as stops are apart.  even: as --control and --sigma say."""
+    between: Annotated[Literal["none", "photos", "pictures", "shapes", "splats"] | None, EXPERT] = (
+        None
+    )
+    """How x between two stops is learned: photos, from blends of photos taken from one place;
+    pictures, from blends of the model's own pictures; shapes, from photos on shapes that are on
+    their way to the next stop; splats, by keeping splats on the straight way between the stops."""
+    between_share: Annotated[float | None, EXPERT] = None
+    """Share of the steps, 0 to 1, in which x lies between two stops."""
+    between_pull: Annotated[float | None, EXPERT] = None
+    """Weight of the loss of --between splats."""
+    thermal_smooth: Annotated[float | None, EXPERT] = None
+    """Weight of the smoothness loss of thermal pictures; ThermalGaussian uses 0.6."""
+    balance: Annotated[str | None, EXPERT] = None
+    """Steps of each modality in proportion to the others', as RGB=3,Thermal=1."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PictureOptions:
     """Which photos, of what size and seen from where."""
 
-    coarse: int | None = None
-    """Start with photos of 1/2, 1/4 or 1/8 of the sides; the next size comes step by step."""
-    coarse_until: float | None = None
-    """Share of the run after which the photos have all their pixels, 0 to 1."""
-    calibrate: str | None = None
+    calibrate: Annotated[str | None, MODALITY] = None
     """A modality whose cameras all sit a little beside their stated poses, as on a rig: that turn
-    and shift is found first, from the photos.  `eval` knows it from the package."""
+    and shift is found first, from the photos.  `eval` reads it from the package.  Default: none."""
+    coarse: Annotated[int | None, EXPERT] = None
+    """Start with photos of 1/2, 1/4 or 1/8 of the sides; the larger sizes follow step by step."""
+    coarse_until: Annotated[float | None, EXPERT] = None
+    """Share of the run, 0 to 1, after which the photos have all their pixels."""
 
 
 @dataclass(frozen=True)
 class Options(PhotoOptions, PictureOptions, SizeOptions, LossOptions, ModelOptions, RunOptions):
-    """Train a shape-shifting scene.  Where nothing is said, the preset decides."""
+    """Train a shape-shifting scene.
+
+    A first run needs only --out; options that are left out take the numbers of --preset.
+    """
+
+
+def defaults() -> dict[str, str]:
+    """What --help says of options that are left to the preset."""
+    return preset_defaults()
 
 
 def run(options: Options) -> int:
     from app.pace import pace_package
+    from app.progress import working
     from app.training.keeping import kept_when_memory_ends, memory_for_training, refuse_place, save
     from rasterizer.device import open_device
     from runtime_models.write_package import refuse_foreign
@@ -163,12 +190,13 @@ def run(options: Options) -> int:
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options, resume[1]["settings"] if resume else None)
-    capture = read_capture(options.capture)
+    with working("reading the capture"):
+        capture = read_capture(options.capture)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-    with memory_for_training():
+    with memory_for_training(), working("reading photos, finding the first anchors"):
         trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
     say("\n".join([describe(trainer), *trainer.doubts]))
     options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -180,6 +208,8 @@ def run(options: Options) -> int:
     say(summary(trainer, options.out, interrupted))
     if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
         say(found)
+    for line in what_next(options, trainer.iteration, trainer.elapsed, interrupted):
+        say(line)
     return INTERRUPTED if interrupted else 0
 
 
@@ -308,6 +338,26 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
     return False
 
 
+def what_next(options: Options, steps: int, seconds: float, interrupted: bool) -> list[str]:
+    """The last lines: how to train on where that was little, and how to look at the scene."""
+    from training.settings import preset
+
+    again = [program(), "train", shlex.quote(full(options.capture))]
+    out = shlex.quote(full(options.out))
+    again += ["--out", out, "--resume"]
+    usual, lines = preset(options.preset).iterations, []
+    if interrupted:
+        lines = [f"go on: {' '.join(again)}"]
+    elif steps < FEW_STEPS:
+        more = seconds / max(steps, 1) * (usual - steps)
+        took = f"{more / 60:.0f} minutes" if more >= 90 else f"{more:.0f} seconds"
+        lines = [
+            f"{steps} steps are few: {usual:,} are usual, about {took} more on this machine. "
+            f"Go on: {' '.join(again)} --iterations {usual}"
+        ]
+    return [*lines, f"look: {program()} {out}"]
+
+
 def decibels(psnr: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.2f} dB" for name, value in psnr.items())
 
@@ -317,6 +367,6 @@ def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:
     quality = f"held-out photos: {psnr}" if psnr else "no photo was held out"
     state = "interrupted, --resume goes on" if interrupted else "done"
     return (
-        f"{out}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} s, "
+        f"{full(out)}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} s, "
         f"{trainer.anchors_count:,} anchors; {quality}"
     )

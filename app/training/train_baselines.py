@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.errors import UsageError
+from app.paths import full
 from app.training.train import (
     INTERRUPTED,
     Options,
@@ -188,6 +189,7 @@ def told(trainer, count: int) -> str:
 
 
 def word_on(outcome: Outcome, capture: "Capture", out: Path) -> str:
+    out = full(out)
     missing = [s.name for s in capture.stops if s.name not in outcome.runs]
     if outcome.interrupted:
         rest = f"; not trained: {', '.join(missing)}" if missing else ""

@@ -5,7 +5,9 @@ stand in the reverse order of --help.
 """
 
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from app.command_line import EXPERT
 
 if TYPE_CHECKING:
     from training.settings import TrainSettings
@@ -20,22 +22,22 @@ class ModelOptions:
     """How large an anchor model is and what its networks see."""
 
     anchors: int | None = None
-    """How many to start with at most, where --voxel is not given; where hulls are carved, for each
-    modality's own."""
-    voxel: float | None = None
+    """Most anchors to start with; where visual hulls are carved, for each modality's own hull."""
+    voxel: Annotated[float | None, EXPERT] = None
     """Metres between anchors at the start."""
-    splats_per_anchor: int | None = None
-    """k."""
-    features: int | None = None
-    """F, numbers an anchor."""
-    hidden: int | None = None
-    """Width of the five networks."""
-    layers: int | None = None
-    """Hidden layers of the five networks, 1 to 3."""
-    fixed: str | None = None
-    """Networks that do not see x, as offset,scale,rotation: all stops share what they give."""
-    view_dependent: bool | None = None
-    """Whether colour depends on where one looks from."""
+    splats_per_anchor: Annotated[int | None, EXPERT] = None
+    """Splats that the networks predict for each anchor: k in the paper."""
+    features: Annotated[int | None, EXPERT] = None
+    """Numbers that each anchor stores for the networks: the length of its feature vector."""
+    hidden: Annotated[int | None, EXPERT] = None
+    """Neurons in each hidden layer of the five networks."""
+    layers: Annotated[int | None, EXPERT] = None
+    """Hidden layers of each of the five networks, 1 to 3."""
+    fixed: Annotated[str | None, EXPERT] = None
+    """Networks that do not see x, as offset,scale,rotation: all stops share what they predict."""
+    view_dependent: Annotated[bool | None, EXPERT] = None
+    """Let colours depend on the direction from which one looks; --no-view-dependent: the same from
+    everywhere."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +45,7 @@ class SizeOptions:
     """How large the photos are."""
 
     downscale: int | None = None
-    """Divide the photos' sides by this.  Default: until neither exceeds 640 pixels."""
+    """Divide the photos' sides by this number.  Default: such that neither exceeds 640 pixels."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +53,47 @@ class PhotoOptions:
     """What else counts of the photos, and what computes."""
 
     masks: Literal["object", "valid", "ignore"] | None = None
-    """What a mask means: nothing lies outside it, what lies outside is unknown, or no matter."""
+    """What a mask means: object, nothing is outside it; valid, what is outside is unknown; ignore,
+    masks are not used."""
     background: Literal["auto", "random", "black", "white", "gray"] | None = None
-    """Colour behind everything.  auto: the capture's, else random where photos have masks."""
+    """Colour behind everything.  auto: the capture's own, else random where photos have masks."""
     device: Literal["cpu", "gpu"] | None = None
-    """Insist on one kind of OpenCL device."""
+    """Kind of OpenCL device that must be used.  Default: the fastest that there is."""
+
+
+# What --help says where the preset's number is None, or where the capture decides.
+DECIDED = {
+    "preset": "fast",
+    "seconds": "no limit, --iterations decides",
+    "max_mb": "no limit",
+    "voxel": "from the first points and --anchors",
+    "grow_threshold": "gradient 2e-4, absgrad 6e-4, error 1.2 times the mean",
+    "control": "one for each stop, as --encoding stops says; paper: 16",
+    "sigma": "half the distance of two stops; paper: 0.04",
+    "fixed": "none, all five see x",
+    "balance": "as many of each",
+}
+PLAIN = ("sh_degree", "splats", "max_splats")  # options of --model splats
+
+
+def preset_defaults() -> dict[str, str]:
+    """The numbers of the preset fast, with that of paper where it is another, by option."""
+    from training.plain_settings import PlainSettings
+    from training.settings import preset
+
+    fast, paper, plain = preset("fast").as_dict(), preset("paper").as_dict(), PlainSettings()
+    told = {name: in_words(value) for name, value in fast.items() if name not in DECIDED}
+    for name in told:
+        if fast[name] != paper[name]:
+            told[name] += f"; paper: {in_words(paper[name])}"
+    return told | DECIDED | {name: in_words(getattr(plain, name)) for name in PLAIN}
+
+
+def in_words(value: object) -> str:
+    """A setting as it would be typed."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import tyro
 
 from app.camera_files import camera_reading
+from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
 from app.drawing import parse_size
 from app.errors import UsageError
 from app.opening import ReadingOptions
@@ -26,54 +26,63 @@ from renderer.renderer import Renderer
 from scene.read_selector import read_selector
 from scene.selector import Selector
 
-SIZE = "1280x720"  # of the window, pixels at a text size of 1
+WINDOW_SIZE = "1280x720"  # of the window, pixels at a text size of 1
 
 
 @dataclass(frozen=True)
 class Options(ReadingOptions):
-    scenes: tyro.conf.Positional[tuple[Path, ...]] = ()
-    """Packages, splats of any known format, folders of layers, and files of cameras to step
-    through; none: the bundled demo."""
+    """Open a scene in a window."""
+
+    scenes: Annotated[tuple[Path, ...], POSITIONAL] = ()
+    """Packages, splats of any known format, folders of layers, scene files, and files of cameras to
+    step through.  Default: the bundled demo."""
+    x: Annotated[str, CONTROL] = ""
+    """Where the slider stands at the start: a stop by its name, or a number from 0 to 1.  Default:
+    the first stop."""
     camera: Path | None = None
-    """File or folder of cameras: starts at its first, N and P step; see docs/cameras.md."""
-    fov_y: float = 0.0
-    """Degrees from top to bottom, for a camera file that says nothing about the lens."""
-    x: float | None = None
-    """Control value to start at, 0..1; without it the first stop."""
-    size: str = ""
-    """Of the window, WxH in pixels; without it 1280x720, and as much larger as the text is."""
-    drawing: Literal["auto", "quads", "tiles"] = "auto"
-    """Back end that draws the splats: OpenGL quads, or OpenCL tiles where there is no GPU."""
-    target_ms: float | None = None
-    """Choose the setting by this budget, milliseconds a frame; measured once at the start."""
-    floor_db: float | None = None
-    """Never below this PSNR in dB against the exact picture, whatever the budget."""
-    debug: Literal["", "culls", "birdseye", "overdraw", "depth", "object"] = ""
-    """Debug view to start in; G goes through them."""
-    select: tuple[str, ...] = ()
-    """Regions with an x of their own, one after the other: sphere:x,y,z:radius:X[:border],
-    box:x,y,z:hx,hy,hz:X[:border], half:x,y,z:nx,ny,nz:X[:border], lens:degrees:X[:border]."""
+    """File or folder of cameras: starts at the first, N and P step through them (docs/cameras.md).
+    Default: the whole scene in view."""
+    size: Annotated[str, SIZE] = ""
+    """WIDTHxHEIGHT of the window in pixels.  Default: 1280x720, and as much larger as the text
+    is."""
+    select: Annotated[tuple[str, ...], REGIONS] = ()
+    """Regions with an X of their own (a stop's name or a number): sphere:x,y,z:radius:X[:border]
+    box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border].  Default:
+    none."""
+    compare: Annotated[str, Opt(metavar="SCENE")] = ""
+    """Another scene (or scene@Stop, scene@0.5) to compare with: a line parts the two pictures.
+    Default: none."""
+    touch: bool = False
+    """Open the bundled scene that can be touched, a table with three objects; without a scene."""
+    play: bool = False
+    """Let the objects of a scene file fall and be carried from the start; T switches it."""
     pictures: Path | None = None
     """Folder for the pictures that F12 saves and the views that K keeps; scenes and exports go
-    beside it.  Without it Shapeshift/pictures among your documents."""
-    screenshot: Path | None = None
-    """Write a picture of the whole window here after --frames frames, and end."""
-    frames: int = 3
+    beside it.  Default: Shapeshift/pictures among your documents."""
+    panel: bool = True
+    """Show the panel over the picture; H switches it."""
+    target_ms: Annotated[float | None, EXPERT] = None
+    """Milliseconds that a frame may take: the setting is chosen by a chart that is measured at the
+    start.  Default: no limit, the exact picture."""
+    floor_db: Annotated[float | None, EXPERT] = None
+    """PSNR in dB against the exact picture below which --target-ms never goes.  Default: 35."""
+    fov_y: Annotated[float, EXPERT] = 0.0
+    """Degrees from top to bottom, for a camera file that says nothing about the lens; 0: not
+    known."""
+    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
+    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
+    debug: Annotated[Literal["", "culls", "birdseye", "overdraw", "depth", "object"], EXPERT] = ""
+    """Debug view to start in; G goes through them.  Default: the picture."""
+    screenshot: Annotated[Path | None, EXPERT] = None
+    """Write a picture of the whole window to this file after --frames frames, and end.  Default:
+    the window stays."""
+    frames: Annotated[int, EXPERT] = 3
     """How many frames to draw before the --screenshot."""
-    compare: str = ""
-    """Another scene (or scene@stop, scene@x) to compare with: a line parts the two pictures."""
-    touch: bool = False
-    """Without a scene: the bundled one that can be touched, a table where things move."""
-    play: bool = False
-    """Let the things of a scene file fall and be carried from the start; T switches it."""
-    panel: Annotated[bool, tyro.conf.arg(help="Show the overlay; H switches it.")] = True
 
 
 def run(options: Options) -> int:
     """Opens the window and stays until it is closed; 0.  Errors for people say why not."""
-    size = parse_size(options.size or SIZE)
-    if options.x is not None and not 0 <= options.x <= 1:
-        raise UsageError(f"--x is {options.x}, expected 0 to 1.")
+    size = parse_size(options.size or WINDOW_SIZE)
     if options.frames < 1:
         raise UsageError(f"--frames is {options.frames}, expected 1 or more.")
     for name, value in (("--target-ms", options.target_ms), ("--floor-db", options.floor_db)):
@@ -86,8 +95,6 @@ def run(options: Options) -> int:
     found = named_cameras(options, read)
     if not found.sources and found.file is None:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
-    if found.file is not None and options.x is not None:
-        raise UsageError(f"--x is for one model; {found.path.name} is a scene of objects.")
     scene, document = opened_scene(found, options.x)
     stage.take(found.sources, scene, first_look(found), document)
     stage.settings = replace(stage.settings, debug=options.debug)

@@ -12,6 +12,8 @@ from app.panels.open_row import OpenRow
 from app.panels.path_box import PathBox
 from app.panels.theme import Box
 from app.paths import DEMO, TOUCH, config_folder
+from app.scene_files import file_at
+from app.subject import placed
 from app.viewer.controls import Camera
 from app.viewer.document import Document, document_from, document_of
 from app.viewer.first_look import FirstLook
@@ -209,20 +211,25 @@ def take_over(viewer: "Viewer", opener: Opener, take: Callable[[Found], None]) -
     return opener.busy
 
 
-def opened_scene(found: Found, x: float | None = None) -> tuple[Scene, Document]:
-    """What is drawn of what was opened, each at x or its first stop, and its file.
+def opened_scene(found: Found, x: str = "") -> tuple[Scene, Document]:
+    """What is drawn of what was opened, and its file: each at its own x, or where the text x says.
 
-    Raises BadFile for a scene file whose objects cannot be as it says.
+    Raises BadFile for a scene file whose objects cannot be as it says, UsageError for x.
     """
     if found.file is None:
-        scene = scene_of(found.sources, x)
+        scene = scene_of(found.sources)
+        scene = Scene(placed(scene.objects, x)) if x else scene
         return scene, document_from(scene, found.sources)
     file, inside = found.file, len(found.file.all_items)
     document = document_of(found.path, file, found.sources[:inside])
     for source in found.sources[inside:]:
         file = edits.add(file, document.item(source))
         document.history = document.history.take(file, f"add {file.items[-1].name}")
-    return scene_of_file(file, document.models_by_name()), document
+    models = document.models_by_name()
+    if x:
+        file = file_at(file, models, x)
+        document.history = edits.History.of(file)
+    return scene_of_file(file, models), document
 
 
 def told_of(found: Found) -> str:

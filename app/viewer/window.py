@@ -13,6 +13,7 @@ from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from app.panels import theme
 from app.paths import plain
+from app.program import program
 from app.viewer.monitor import grow_window, monitor_height
 from app.viewer.settings import default_text_size
 from renderer.context import NoContext
@@ -384,5 +385,5 @@ def _open(title: str, size: tuple[int, int]) -> GlfwWindow:
             reason = (reasons or [str(error)])[0].rstrip(".")
     raise NoContext(
         f"no window with OpenGL 4.3 could be opened ({reason}); "
-        "`launch.py headless` and `launch.py render` need none."
+        f"`{program()} headless` and `{program()} render` need none."
     )

@@ -12,6 +12,7 @@ from app.charts.comparison import MOST_DB, Comparison
 from app.commands.compare_sides import SceneSide, open_side
 from app.errors import UsageError
 from app.panels import theme
+from app.program import program
 from app.viewer.shown import Wish, picture_key
 from app.viewer.two_pictures import TwoPictures
 from app.viewer.window import Event, KeyDown
@@ -39,7 +40,7 @@ def comparing(viewer: "Viewer", options: "Options") -> Iterator["Wipe | None"]:
     if not isinstance(side, SceneSide):
         raise UsageError(
             f"--compare is {options.compare}, a folder of pictures; the viewer compares scenes, "
-            "`launch.py compare` also pictures."
+            f"`{program()} compare` also pictures."
         )
     drawing = viewer.renderer.backends["drawing"].split()[0]
     with Renderer(viewer.window.ctx, drawing) as renderer:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 import pytest
-from vr_hands import HEAD, a_frame, eyes, hand_at, pixel_of
+from vr_hands import HEAD, OPEN, a_frame, eyes, hand_at, pixel_of
 
 from runtime_models.model import Stop
 from scene.pose import Pose
@@ -59,7 +59,7 @@ def at(image: np.ndarray, eye: int, place) -> np.ndarray:
 
 
 def shown(left=LEFT, right=LOST, facts: Facts = FACTS) -> Carried:
-    carried = Carried()
+    carried = OPEN
     for _ in range(2):
         carried, _, _ = carry(carried, facts, a_frame(left, right), 1.0)
     return carried

@@ -7,7 +7,7 @@ from PIL import Image
 from test_headset_life import WHOLE_LIFE
 from test_headset_pictures import SIZE, pixel_of
 
-from scene.pose import View
+from scene.pose import Pose, View
 from vr.frame import SIDES
 
 BEFORE = 0.03  # metres from the panel, where a finger is close and does not press
@@ -20,10 +20,18 @@ def reader(person: Person) -> Person:
     """Somebody who has the panel before the eyes, in the left hand."""
     person.controller("left").position = CARRIES
     person.controller("right").position = FREE
+    line = person.frames(2)
+    assert not line["panel"]["open"], "at first the scene is what one sees"
+    open_panel(person)
     line = person.frames(8)  # it follows the hand
     assert line["panel"]["open"] and line["panel"]["hand"] == "left"
     assert (line["panel"]["object"], line["panel"]["shown"]) == ("cube", "normal")
     return person
+
+
+def open_panel(person: Person) -> None:
+    with person.pressing("left", "secondary"):  # an Index controller has no other for a menu
+        pass
 
 
 def on_slider(line: dict, x: float) -> np.ndarray:
@@ -50,7 +58,7 @@ def test_the_knob_is_grabbed_and_slides_the_modality(reader):
     line = reader.squeeze("right")
     assert line["held"]["right"] is None, "the knob is taken, not the world"
     started = len(reader.program.lines)
-    along = 0.006 * direction(line)  # metres a frame
+    along = 0.003 * direction(line)  # metres a frame
     while line["panel"]["shown"] != "fire" and line["objects"]["cube"]["x"] < 0.7:
         line = reader.move("right", np.add(reader.controller("right").position, along))
     line = reader.frames(3)
@@ -122,12 +130,72 @@ def test_exit_asks_once_more_and_ends_the_session(reader):
 
 @pytest.mark.slow
 def test_the_menu_button_puts_it_away_and_takes_it_out(reader):
-    with reader.pressing("left", "secondary"):  # an Index controller has no other for a menu
-        pass
+    open_panel(reader)
     assert not reader.line["panel"]["open"]
-    with reader.pressing("left", "secondary"):
-        pass
+    open_panel(reader)
     assert reader.line["panel"]["open"] and reader.line["panel"]["hand"] == "left"
+
+
+@pytest.mark.slow
+def test_a_palm_that_is_turned_up_shows_it(person):
+    """As one looks at a watch: fingers ahead, the palm to the sky."""
+    hand = person.controller("left")
+    hand.position, person.controller("right").position = CARRIES, FREE
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    hand.wxyz = tuple(Pose.from_matrix(matrix).wxyz)
+    line = person.until(lambda line: line["panel"]["open"], "open")
+    line = person.frames(8)
+    knob, grip = (
+        np.array(line["panel"]["knob"]),
+        np.array(line["hands"]["left"]["grip"]["position"]),
+    )
+    assert knob[0] < grip[0] - 0.05, "outwards of the hand"
+    eyes_at = line["head"]["position"][1]
+    assert knob[1] < eyes_at, "below what one looks at"
+    hand.wxyz = (1.0, 0.0, 0.0, 0.0)
+    person.until(lambda line: not line["panel"]["open"], "closed")
+
+
+@pytest.mark.slow
+def test_the_floor_is_seen_and_its_switch_takes_it_away(stand, start):
+    """Over the shoulder, where the scene has nothing at all."""
+    pictures = stand.folder / "pictures"
+    program = start(stand, "--quality", "best", "--pictures", str(pictures))
+    with program.headset(stand.port) as remote:
+        person = Person(program, remote)
+        remote.left.position, remote.right.position = CARRIES, FREE
+        person.until(lambda line: line["focused"], "focused")
+        open_panel(person)
+        person.frames(8)
+        before = person.line
+        press(person, "floor")
+        person.frames(4)
+        open_panel(person)
+        after = person.frames(2)
+        remote.head = Pose(np.array([0.0, 1.6, 0.0]), np.array([0.0, 0.0, 1.0, 0.0]))
+        behind = person.frames(3)
+        person.frame()
+        program.interrupt()
+
+    def spread(line: dict, side: str) -> int:
+        name = pictures / f"{side}-{line['frame']:05d}.png"
+        return int(np.ptp(np.asarray(Image.open(name)).astype(int)[:, :, :3], axis=(0, 1)).max())
+
+    assert not after["panel"]["open"]
+    for side in SIDES:
+        assert spread(behind, side) == 0, "switched off there is nothing behind the person"
+        assert floor_of(np.asarray(Image.open(pictures / f"{side}-{before['frame']:05d}.png"))) > 30
+
+
+def floor_of(picture: np.ndarray) -> int:
+    """Pixels of the lower right corner, where no panel is, that are a little lighter than the
+    background and grey.
+    """
+    rows, columns = picture.shape[:2]
+    part = picture[rows // 2 :, columns * 3 // 4 :].astype(int)
+    grey = np.ptp(part, axis=2) <= 4
+    return int((grey & (part.mean(axis=2) > 26) & (part.mean(axis=2) < 90)).sum())
 
 
 @pytest.mark.slow
@@ -138,6 +206,7 @@ def test_both_eyes_see_the_panel(stand, start):
         person = Person(program, remote)
         remote.left.position, remote.right.position = CARRIES, (0.0, 1.4, 1.5)
         person.until(lambda line: line["focused"], "focused")
+        open_panel(person)
         shown = person.frames(10)
         with person.pressing("left", "secondary"):
             pass

@@ -69,7 +69,8 @@ def pixel_of(view: View, world: np.ndarray) -> tuple[int, int]:
 def seen(stand, start) -> tuple[dict, list[np.ndarray]]:
     """A frame's line and the pictures of both eyes, (H, W, 3) 0..1, from near the cube."""
     pictures = stand.folder / "pictures"
-    program = start(stand, "--frames", "12", "--quality", "best", "--pictures", str(pictures))
+    asked = ("--frames", "12", "--quality", "best", "--no-floor", "--no-hints")
+    program = start(stand, *asked, "--pictures", str(pictures))
     with program.headset(stand.port) as remote:
         tilt = 0.35  # half of the angle, downwards
         remote.head = Pose(

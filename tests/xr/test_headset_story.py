@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from person import Person, place
-from test_headset_panel import CARRIES, FREE, direction, in_front
+from test_headset_panel import CARRIES, FREE, direction, in_front, open_panel
 from test_headset_touch import CUBE_TOP_M, events, heading_deg
 from xr_stand import Stand
 
@@ -46,11 +46,12 @@ def look_about(person: Person) -> None:
 
 def slide_to_ice(person: Person) -> None:
     person.controller("left").position, person.controller("right").position = CARRIES, FREE
+    open_panel(person)
     person.frames(8)
     person.touch("right", in_front(person.line, np.array(person.line["panel"]["knob"])))
     person.frames(2)
     person.squeeze("right")
-    along = 0.006 * direction(person.line)
+    along = 0.003 * direction(person.line)
     while person.line["panel"]["shown"] != "ice":
         assert person.line["objects"]["cube"]["x"] < 0.4
         person.move("right", np.add(person.controller("right").position, along))

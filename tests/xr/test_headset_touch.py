@@ -29,6 +29,9 @@ def test_reach_squeeze_carry_and_let_go(person):
     before = person.take("right", "ring", RING_TOP_M)
     felt = [pulse for line in person.program.lines[-6:] for pulse in line["pulses"]]
     assert any(side == "right" and strength > 0.3 for side, strength, _ in felt)
+    offer = {"hand": "right", "object": "ring", "by": "hand"}
+    offered = [line["frame"] for line in person.program.lines if offer in line["offers"]]
+    assert offered and max(offered) < before["frame"], "it lit up before it was taken, and no more"
     offset = place(before, "ring") - person.palm("right")
     for way in ((0, 0.25, 0), (-0.2, 0.25, -0.1), (-0.2, 0.3, 0.1)):
         person.reach("right", np.add(person.palm("right"), way))

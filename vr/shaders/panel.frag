@@ -2,6 +2,7 @@
 // small letters stay crisp and, with four, do not crawl when the head moves.
 in vec2 place;
 uniform sampler2D picture;  // display sRGB, premultiplied
+uniform float opacity;      // 0..1
 out vec4 shown;
 
 const float FINER = TAPS > 1 ? -1.0 : -0.5;  // levels
@@ -15,4 +16,5 @@ void main() {
         vec2 aside = TAPS > 1 ? GRID[i].x * right + GRID[i].y * up : vec2(0.0);
         shown += texture(picture, place + aside, FINER) / float(TAPS);
     }
+    shown *= opacity;
 }

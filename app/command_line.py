@@ -1,0 +1,287 @@
+"""Dataclasses as command lines: a field is an option, its docstring the help, its default too.
+
+    @dataclass(frozen=True)
+    class Options:
+        scene: Annotated[Path, POSITIONAL]
+        \"\"\"What to draw.\"\"\"
+        fade: Annotated[float, EXPERT] = 0.0
+        \"\"\"Part of each limit over which splats fade.\"\"\"
+
+`parse` makes one of the words that were typed; app/command_help.py says what may be typed.  Types
+are str, int, float, bool, Path and Literal, each also in `| None` and in tuples.
+"""
+
+import ast
+import difflib
+import inspect
+import re
+import textwrap
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from app.errors import UsageError
+
+Options = TypeVar("Options")
+LIKE = 0.6  # of difflib's ratio: as alike a word is taken for a slip of the hand
+SWITCHED = {"True": True, "False": False}  # a switch may be followed by either
+NUMBER = re.compile(r"-[\d.]")  # how a value begins that is no option
+
+
+@dataclass(frozen=True)
+class Opt:
+    """What an annotation says about an option beside its type."""
+
+    positional: bool = False
+    expert: bool = False  # in help's second group
+    metavar: str = ""  # how help calls its value; "": by the type
+
+
+POSITIONAL, EXPERT = Opt(positional=True), Opt(expert=True)
+SIZE, CONTROL, REGIONS, MODALITY = (Opt(metavar=m) for m in ("SIZE", "X", "REGION", "MODALITY"))
+
+
+@dataclass(frozen=True)
+class Argument:
+    """One field of a dataclass as a word or an option of a command line."""
+
+    field: Field
+    opt: Opt
+    kind: Any  # the type of one value: str, int, float, bool, Path or a Literal
+    count: int | None  # values: 1, or of a tuple so many, None: any number
+    is_tuple: bool
+    help: str
+
+    @property
+    def name(self) -> str:
+        """As it is typed, and as errors and help call it."""
+        name = self.field.name
+        return self.metavar if self.opt.positional else f"--{name.replace('_', '-')}"
+
+    @property
+    def metavar(self) -> str:
+        if self.opt.metavar or self.opt.positional:
+            return self.opt.metavar or self.field.name.upper().removesuffix("S" * self.many)
+        if typing.get_origin(self.kind) is Literal:
+            return "{" + ",".join(self.choices) + "}"
+        return {int: "N", float: "NUMBER", Path: "PATH"}.get(self.kind, "TEXT")
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The words of a Literal that somebody would type; "" stands for none of them."""
+        return tuple(word for word in typing.get_args(self.kind) if word)
+
+    @property
+    def many(self) -> bool:
+        return self.count is None
+
+    @property
+    def required(self) -> bool:
+        return self.field.default is MISSING
+
+    @property
+    def invocation(self) -> str:
+        """The option with what follows it."""
+        if self.kind is bool:
+            return self.name
+        if self.opt.positional:
+            word = f"{self.name} ..." if self.many else self.name
+            return word if self.required else f"[{word}]"
+        word = self.metavar
+        values = f"{word} [{word} ...]" if self.many else " ".join([word] * self.count)
+        return f"{self.name} {values}"
+
+
+def parse(kind: type[Options], words: Sequence[str], prog: str) -> Options:
+    """The dataclass that the words stand for.  Raises UsageError, one sentence.
+
+    Argparse would need as many lines around it: its complaints are of its own form, it takes
+    values with a dash for options, and words after options of many values for nothing.
+    """
+    arguments = arguments_of(kind)
+    known = {name: each for each in arguments for name in _spellings(each)}
+    values, loose = _values_of(words, known, prog)
+    values |= _place([each for each in arguments if each.opt.positional], loose, prog)
+    missing = [a for a in arguments if a.required and a.field.name not in values]
+    _refuse_missing(missing, values, prog)
+    return kind(**values)
+
+
+def wants_help(words: Sequence[str]) -> bool:
+    """Whether --help is among the words."""
+    options = list(words[: words.index("--")] if "--" in words else words)
+    return "-h" in options or "--help" in options
+
+
+@cache
+def arguments_of(kind: type) -> tuple[Argument, ...]:
+    """Those of a dataclass: its own fields in order, then those that it shares with others."""
+    hints, texts = typing.get_type_hints(kind, include_extras=True), _docs_of(kind)
+    inherited = {
+        name for base in kind.__mro__[1:] for name in vars(base).get("__annotations__", {})
+    }
+    rows = sorted(fields(kind), key=lambda f: (f.default is not MISSING, f.name in inherited))
+    made = []
+    for field in rows:
+        hint, opt = hints[field.name], Opt()
+        if typing.get_origin(hint) is Annotated:
+            hint, *notes = typing.get_args(hint)
+            opt = next((note for note in notes if isinstance(note, Opt)), opt)
+        made.append(Argument(field, opt, *_value_of(hint), texts.get(field.name, "")))
+    return tuple(made)
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """The known word that somebody meant who typed this one; "" where none is like it."""
+    folded = {name.casefold(): name for name in known}
+    found = difflib.get_close_matches(word.casefold(), folded, 1, LIKE)
+    found += [name for name in folded if len(word) > 2 and name.startswith(word.casefold())]
+    return folded[found[0]] if found else ""
+
+
+_EXPECTED = {int: "a whole number", float: "a number", Path: "a path"}
+
+
+def _values_of(
+    words: Sequence[str], known: Mapping[str, Argument], prog: str
+) -> tuple[dict[str, Any], list[str]]:
+    """Values by field of the options among the words, and the words that are none."""
+    rest, values, loose = list(words), {}, []
+    while rest:
+        word = rest.pop(0)
+        if word == "--":
+            return values, loose + rest
+        if not _is_option(word):
+            loose.append(word)
+            continue
+        name, sign, value = word.partition("=")
+        name = name.replace("_", "-")
+        if name not in known:
+            raise UsageError(_no_such(name, known, prog))
+        each = known[name]
+        if each.kind is bool:
+            said = value if sign else rest.pop(0) if rest and rest[0] in SWITCHED else "True"
+            if said not in SWITCHED:
+                raise UsageError(f"{name} is a switch and takes no value; leave '={value}' out.")
+            values[each.field.name] = (name == each.name) == SWITCHED[said]
+            continue
+        taken = [value] if sign else _following(each, rest)
+        found = _checked(each, taken)
+        if each.many:  # given twice it is both
+            values[each.field.name] = values.get(each.field.name, ()) + found
+        else:
+            values[each.field.name] = found if each.is_tuple else found[0]
+    return values, loose
+
+
+def _following(each: Argument, rest: list[str]) -> list[str]:
+    """Takes an option's values off the words that come after it."""
+    taken: list[str] = []
+    while rest and len(taken) != each.count:
+        if _is_option(rest[0]) and not (rest[0] in each.choices and not taken):
+            break
+        taken.append(rest.pop(0))
+    return taken
+
+
+def _checked(each: Argument, words: Sequence[str]) -> tuple:
+    """The values of an option's words.  Raises UsageError."""
+    if each.count == 1 and not words:
+        raise UsageError(f"{each.name} has no value, expected {_expected(each)}.")
+    if len(words) != each.count and not (each.many and words):
+        raise UsageError(f"{each.name} has {len(words)} values, expected {each.count or 'some'}.")
+    return tuple(_read(word, each) for word in words)
+
+
+def _is_option(word: str) -> bool:
+    """Whether a word is an option's name and no value: -1 and -.5,0,0 are values."""
+    return word.startswith("-") and word != "-" and not NUMBER.match(word)
+
+
+def _no_such(name: str, known: Mapping[str, Argument], prog: str) -> str:
+    meant = nearest("--" + name.lstrip("-"), list(known))
+    hint = f"did you mean {meant}?" if meant else f"`{prog} --help` lists them."
+    return f"there is no option '{name}'; {hint}"
+
+
+def _place(arguments: Sequence[Argument], words: Sequence[str], prog: str) -> dict[str, Any]:
+    """Values of the words that stand alone, in the order of the fields.  Raises UsageError."""
+    values, rest = {}, list(words)
+    for each in arguments:
+        taken, rest = rest[: each.count], rest[each.count :] if each.count else []
+        if taken:
+            found = _checked(each, taken)
+            values[each.field.name] = found if each.is_tuple else found[0]
+    if rest:
+        names = " and ".join(each.name for each in arguments) or "no word alone"
+        raise UsageError(f"'{rest[0]}' is one word too many: `{prog}` takes {names}.")
+    return values
+
+
+def _refuse_missing(missing: Sequence[Argument], values: Mapping[str, Any], prog: str) -> None:
+    """Raises UsageError that shows how it is written."""
+    if not missing:
+        return
+    names, wanted = " and ".join(a.name for a in missing), " ".join(a.invocation for a in missing)
+    hint = "--help says more."
+    greedy = any(isinstance(value, tuple) and len(value) > 1 for value in values.values())
+    if missing[0].opt.positional and greedy:
+        hint = "write it first, since options like --x take all words that follow."
+    be = "is" if len(missing) == 1 else "are"
+    raise UsageError(f"{names} {be} missing: `{prog} {wanted}`; {hint}")
+
+
+def _read(text: str, each: Argument) -> Any:
+    """The value of a word.  Raises UsageError."""
+    if typing.get_origin(each.kind) is Literal:
+        if text in typing.get_args(each.kind):
+            return text
+        meant = nearest(text, each.choices)
+        hint = f"; did you mean {meant}?" if meant else "."
+        raise UsageError(f"{each.name} is '{text}', expected {_expected(each)}{hint}")
+    try:
+        return each.kind(text)
+    except ValueError:
+        raise UsageError(f"{each.name} is '{text}', expected {_expected(each)}.") from None
+
+
+def _expected(each: Argument) -> str:
+    *most, last = each.choices or ("",)
+    if each.choices:
+        return f"{', '.join(most)} or {last}" if most else last
+    return _EXPECTED.get(each.kind, "a text")
+
+
+def _spellings(each: Argument) -> tuple[str, ...]:
+    """The options that set a field; a switch can be set both ways."""
+    if each.opt.positional:
+        return ()
+    return (each.name, f"--no-{each.name[2:]}") if each.kind is bool else (each.name,)
+
+
+def _value_of(hint: Any) -> tuple[Any, int | None, bool]:
+    """The type of one value, how many there are, and whether that is a tuple, of a field's type."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        (hint,) = (part for part in typing.get_args(hint) if part is not type(None))
+    if typing.get_origin(hint) is not tuple:
+        return hint, 1, False
+    parts = typing.get_args(hint)
+    return parts[0], None if parts[-1] is Ellipsis else len(parts), True
+
+
+def _docs_of(kind: type) -> dict[str, str]:
+    """The docstrings under the fields of a dataclass and its bases."""
+    found: dict[str, str] = {}
+    for base in kind.__mro__:
+        if "__annotations__" not in vars(base):
+            continue
+        (node,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+        for field, text in zip(node.body, node.body[1:], strict=False):
+            if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
+                said = " ".join(ast.literal_eval(text.value).split())
+                found.setdefault(field.target.id, said)
+    return found

@@ -1,0 +1,132 @@
+"""A faint grid on the floor and a horizon, behind the splats: nobody stands in a black void.
+
+The grid stays with the world, so that one sees that and how fast one moves: it is clearer while
+one does.  Drawn over an eye's picture where splats leave it uncovered.
+"""
+
+import math
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from renderer.shader import compile_program
+from scene.pose import View
+from vr.shown import SHADERS
+from vr.standing import Standing
+
+REST = 0.35  # of the clearness while one moves
+RISES_S, FALLS_S = 0.08, 0.7  # time constants of that
+BRIGHT = 0.5  # mean of a background from which on lines are darker than it
+UP = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The floor in a frame."""
+
+    level_m: float  # its height in the world
+    clearness: float = REST  # 0..1; 0: nothing is drawn
+
+
+def clearness(before: float, was: Standing, now: Standing, seconds: float) -> float:
+    """How clear the grid is after `seconds`: it comes as the room is moved, and goes slowly."""
+    moves = was.scale != now.scale or not (
+        np.array_equal(was.world_from_play.position, now.world_from_play.position)
+        and np.array_equal(was.world_from_play.wxyz, now.world_from_play.wxyz)
+    )
+    goal, lasts = (1.0, RISES_S) if moves else (REST, FALLS_S)
+    part = -math.expm1(-max(seconds, 0.0) / lasts)
+    return before + (goal - before) * part
+
+
+class Floor:
+    """The program for it; use it in a `with`."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._program = compile_program(ctx, "full.vert", "floor.frag", SHADERS)
+        self._triangle = ctx.vertex_array(self._program, [])
+        self._uploaded: moderngl.Texture | None = None  # a coverage that came as an array
+
+    def draw(
+        self,
+        framebuffer: moderngl.Framebuffer,
+        play_view: View,
+        standing: Standing,
+        coverage: moderngl.Texture | np.ndarray,
+        grid: Grid,
+        background: tuple[float, float, float],
+    ) -> None:
+        """Adds to the framebuffer, which shows the splats over `background`.
+
+        coverage: 0..1 in a texture's alpha, row 0 at the bottom, or (H, W), row 0 on top.
+        """
+        if not grid.clearness > 0:
+            return
+        ctx, program = self._ctx, self._program
+        spacing, finer = spacing_of(standing.scale)
+        eye = standing.point(play_view.world_from_eye.position)
+        whole = 10 * spacing  # a multiple of all lines: floats stay exact far from the origin
+        rotation = (standing.world_from_play.matrix() @ play_view.world_from_eye.matrix())[:3, :3]
+        program["eye"].value = tuple(eye - np.floor(eye / whole) * whole * (1 - UP))
+        program["world_from_eye"].write(rotation.T.astype(np.float32).tobytes())
+        program["tangents"].value = play_view.tangents
+        program["level_m"].value, program["scale"].value = grid.level_m, standing.scale
+        program["spacing_m"].value, program["finer"].value = spacing, finer
+        program["clearness"].value = grid.clearness
+        from_array = isinstance(coverage, np.ndarray)
+        texture = self._upload(coverage) if from_array else coverage
+        texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        texture.use(0)
+        program["coverage"].value, program["top_first"].value = 0, from_array
+        before = ctx.fbo or ctx.detect_framebuffer(0)
+        framebuffer.use()
+        ctx.enable_only(moderngl.BLEND)
+        ctx.blend_func = moderngl.ONE, moderngl.ONE
+        darker = np.mean(background) > BRIGHT
+        ctx.blend_equation = moderngl.FUNC_REVERSE_SUBTRACT if darker else moderngl.FUNC_ADD
+        try:
+            self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        finally:
+            ctx.blend_equation = moderngl.FUNC_ADD
+            ctx.enable_only(moderngl.NOTHING)
+            before.use()
+
+    def _upload(self, coverage: np.ndarray) -> moderngl.Texture:
+        size = (coverage.shape[1], coverage.shape[0])
+        if self._uploaded is None or self._uploaded.size != size:
+            self.release_upload()
+            self._uploaded = self._ctx.texture(size, 1, dtype="f4")
+            self._uploaded.swizzle = "000R"  # where a splatter's texture has it
+            self._uploaded.repeat_x = self._uploaded.repeat_y = False
+        self._uploaded.write(np.ascontiguousarray(coverage, np.float32))
+        return self._uploaded
+
+    def release_upload(self) -> None:
+        if self._uploaded is not None:
+            self._uploaded.release()
+            self._uploaded = None
+
+    def __enter__(self) -> "Floor":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Gives all of it back; the context stays."""
+        self.release_upload()
+        self._triangle.release()
+        self._program.release()
+
+
+def spacing_of(scale: float) -> tuple[float, float]:
+    """Metres of the world between lines, and how much those of a tenth of it are seen, 0..1.
+
+    A power of ten that is 1 to 10 m in the room; while the world is scaled finer lines fade in and
+    out, and lines become those of a tenth, so that none jumps.
+    """
+    exponent = math.log10(scale)
+    whole = math.floor(exponent)
+    return 10.0 ** (whole + 1), 1.0 - (exponent - whole)

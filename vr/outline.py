@@ -1,0 +1,81 @@
+"""The outline of what a hand would take or its ray would act on, as lines in the room.
+
+An object's convex hull seen from the head: edges between faces that are turned to it and away.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scene.pose import Pose
+from vr.glove import Capsule
+from vr.standing import Standing
+
+AWAY_M = 0.004  # of the room, from the hull: lines beside what they are around
+THICK_M = 0.0028  # radius
+BY_HAND, BY_RAY = (0.96, 0.66, 0.30, 0.95), (0.92, 0.93, 0.96, 0.8)  # display sRGB, opacity
+
+
+@dataclass(frozen=True)
+class Hull:
+    """A convex hull in its object's frame."""
+
+    points: np.ndarray  # (V, 3) metres
+    outward: np.ndarray  # (V, 3) of length 1, from the middle
+    edges: np.ndarray  # (E, 2) rows of points
+    faces: np.ndarray  # (E, 2) rows of planes, on both sides of each edge
+    planes: np.ndarray  # (F, 4) normal, offset: normal @ point + offset <= 0 inside
+
+
+class Outlines:
+    """Hulls by the collider that they are of; each is made once."""
+
+    def __init__(self) -> None:
+        self._hulls: dict[int, tuple[object, Hull | None]] = {}
+
+    def hull(self, collider) -> Hull | None:
+        """None where there is nothing to go around: no collider, or one that is flat."""
+        if collider is None:
+            return None
+        key = id(collider)
+        if key not in self._hulls:
+            self._hulls[key] = collider, hull_of(np.concatenate(collider.hulls))
+        return self._hulls[key][1]
+
+
+def hull_of(points: np.ndarray) -> Hull | None:
+    """The convex hull of points (N, 3); None where they have no volume."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        found = ConvexHull(np.asarray(points, np.float64))
+    except (QhullError, ValueError):
+        return None
+    corners, faces = found.simplices, np.arange(len(found.simplices))
+    sides = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    order = np.lexsort(np.sort(sides, axis=1).T)
+    sides, owners = np.sort(sides, axis=1)[order], np.tile(faces, 3)[order]
+    pairs = sides.reshape(-1, 2, 2)  # each edge is of two faces, which lie beside each other now
+    if not (pairs[:, 0] == pairs[:, 1]).all():
+        return None
+    used, edges = np.unique(pairs[:, 0], return_inverse=True)
+    kept = found.points[used]
+    away = kept - kept.mean(axis=0)
+    outward = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+    return Hull(kept, outward, edges.reshape(-1, 2), owners.reshape(-1, 2), found.equations)
+
+
+def outline(
+    hull: Hull, world_from_object: Pose, standing: Standing, eye: np.ndarray, color: tuple
+) -> list[Capsule]:
+    """Lines around a hull as an eye (3,) of the room sees it; metres of the room."""
+    to_world = world_from_object.matrix()
+    room = standing.world_from_play
+    to_room = room.matrix()[:3, :3].T / standing.scale
+    seen_from = to_world[:3, :3].T @ (standing.point(eye) - to_world[:3, 3])  # object frame
+    turned_to = hull.planes[:, :3] @ seen_from + hull.planes[:, 3] > 0
+    rim = turned_to[hull.faces[:, 0]] != turned_to[hull.faces[:, 1]]
+    points = hull.points + hull.outward * (AWAY_M * standing.scale)
+    world = points @ to_world[:3, :3].T + to_world[:3, 3]
+    places = (world - room.position) @ to_room.T
+    return [Capsule(places[a], places[b], (THICK_M, THICK_M), color) for a, b in hull.edges[rim]]
