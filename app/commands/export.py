@@ -19,8 +19,8 @@ class Options(ReadingOptions):
     """What to export; several become one file, where they stand when opened together, and the
     objects of a scene file where that puts them."""
     out: Path
-    """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, or
-    our package, .shift or a folder (a name without an ending)."""
+    """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat,
+    .usdz (.usd, .usda, .usdc), or our package, .shift or a folder (a name without an ending)."""
     x: str = ""
     """Control value in 0..1 or the name of a stop, of all objects; default: the first stop, and in
     a scene file what it says for each."""
