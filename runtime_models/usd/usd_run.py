@@ -44,21 +44,20 @@ def refuse_outside(root: Path) -> None:
             raise Unreadable("no USD that can be read" if name == str(root) else
                              f"its layer {short(name)} cannot be read")  # fmt: skip
         refuse_clips(layer)
-        for said in layer.GetCompositionAssetDependencies():
+        for said in filter(None, layer.GetCompositionAssetDependencies()):  # "": itself
             inside = layer.ComputeAbsolutePath(said)
             outer = inside.partition("[")[0]
             usual = "://" not in said and "SDF_FORMAT_ARGS" not in said
-            if not usual or not Path(outer).resolve().is_relative_to(folder):
+            inner = not os.path.isabs(outer) or Path(outer).resolve().is_relative_to(folder)
+            if not (usual and inner):
                 raise Unreadable(
                     f"it names {short(said)}, and only files in its own folder are opened; flatten "
                     "it (usdcat --flatten)"
                 )
             if not inside.partition("]")[0].lower().endswith(ENDINGS):
                 raise Unreadable(f"it names {short(said)}, which is no USD")
-            if not os.path.isfile(outer):
-                raise Unreadable(
-                    f"it names {short(said)}, which is not there; copy its whole folder"
-                )
+            if not (os.path.isabs(outer) and os.path.isfile(outer)):
+                raise Unreadable(f"it names {short(said)}, which is not there; copy all of it")
             waiting.append(inside)
 
 
