@@ -1,5 +1,6 @@
 """How every command opens its scene: the options of reading, progress, a word on what is wrong."""
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -32,6 +33,9 @@ class ReadingOptions:
     """Open a file even where thousands of its splats would lie over every pixel."""
     max_splats: Annotated[int, EXPERT] = 0
     """Show at most so many splats, the most visible ones; 0: all."""
+    memory: Annotated[float, EXPERT] = 0.0
+    """GB of memory that files may take while they are read, however few bytes they have; 0: 64
+    bytes for each byte of a file, and three quarters of this machine's in all."""
 
     def reading(self) -> Reading:
         """The same for readers.  Raises UsageError."""
@@ -39,6 +43,8 @@ class ReadingOptions:
 
         if self.max_splats < 0:
             raise UsageError(f"--max-splats is {self.max_splats}, expected 0 (all) or more.")
+        if not 0 <= self.memory < math.inf:
+            raise UsageError(f"--memory is {self.memory}, expected GB, or 0 for what is usual.")
         return Reading(
             self.mode,
             self.up,
@@ -46,6 +52,7 @@ class ReadingOptions:
             self.strict,
             allow_huge=self.allow_huge,
             most_splats=self.max_splats,
+            memory_gb=self.memory,
         )
 
 

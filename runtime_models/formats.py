@@ -16,6 +16,7 @@ class Format:
     endings: tuple[str, ...]  # lower case; of one without a mark they alone tell
     has_mark: Callable[[bytes, Path], bool] | None  # by the first HEAD bytes; None: no mark inside
     read: Callable[[Path, Reading], RawSplats]
+    is_whole: bool = True  # False: another file is packed in it
 
     def fits(self, head: bytes, path: Path) -> bool:
         if self.has_mark is None:
@@ -25,6 +26,7 @@ class Format:
 
 def formats() -> tuple[Format, ...]:
     """All of them, in the order in which they are tried."""
+    from runtime_models.checkpoint.read_checkpoint import is_checkpoint, read_raw_checkpoint
     from runtime_models.read_compressed_ply import has_chunks, read_raw_compressed_ply
     from runtime_models.read_gltf import is_gltf, read_raw_gltf
     from runtime_models.read_ksplat import read_raw_ksplat
@@ -33,6 +35,13 @@ def formats() -> tuple[Format, ...]:
     from runtime_models.read_sog import is_sog, read_raw_sog
     from runtime_models.read_splat import read_raw_splat
     from runtime_models.read_spz import has_spz_mark, read_raw_spz
+    from runtime_models.usd.read_usd import is_usd, read_raw_usd
+    from runtime_models.wrapped.read_wrapped import (
+        is_gzip,
+        is_zip_of_one,
+        read_raw_gzip,
+        read_raw_zip_of_one,
+    )
 
     return (
         Format("compressed PLY", (".ply",), has_chunks, read_raw_compressed_ply),
@@ -41,6 +50,10 @@ def formats() -> tuple[Format, ...]:
         Format("glTF", (".glb", ".gltf"), is_gltf, read_raw_gltf),
         Format("SOG", (".sog", "meta.json"), is_sog, read_raw_sog),
         Format("spz", (".spz",), has_spz_mark, read_raw_spz),
+        Format("USD", (".usd", ".usda", ".usdc", ".usdz"), is_usd, read_raw_usd),
+        Format("checkpoint", (".pt", ".ckpt", ".npz"), is_checkpoint, read_raw_checkpoint),
+        Format("zip of one file", (".zip",), is_zip_of_one, read_raw_zip_of_one, False),
+        Format("gzip", (".gz",), is_gzip, read_raw_gzip, False),
         Format(".ksplat", (".ksplat",), None, read_raw_ksplat),
         Format(".splat", (".splat",), None, read_raw_splat),
     )
@@ -48,21 +61,28 @@ def formats() -> tuple[Format, ...]:
 
 def format_of(path: Path) -> Format | None:
     """The format of a file of plain splats, or of a folder that stands for one; None: no format."""
-    head = b""
-    if not path.is_dir():
-        with path.open("rb") as file:
-            head = file.read(HEAD)
+    head = head_of(path)
     return next((form for form in formats() if form.fits(head, path)), None)
+
+
+def head_of(path: Path) -> bytes:
+    """The first bytes of a file; of a folder none."""
+    if path.is_dir():
+        return b""
+    with path.open("rb") as file:
+        return file.read(HEAD)
 
 
 def read_raw(path: Path, reading: Reading) -> RawSplats:
     """One file of plain splats as it is written, with its labels.  Raises BadFile."""
+    from runtime_models.foreign.foreign_files import refusal
     from runtime_models.read_labels import with_labels
+    from runtime_models.sog_files import META
 
+    reading = reading.within(path.parent if path.name == META else path)
     form = format_of(path)
     if form is None:
-        names = ", ".join(form.name for form in formats())
-        raise BadFile(f"{path} is of no known format of splats; known are {names}.")
+        raise BadFile(refusal(path, head_of(path), ", ".join(form.name for form in formats())))
     return with_labels(form.read(path, reading), path)
 
 

@@ -12,9 +12,11 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from runtime_models.memory import JSON_A_BYTE, Account
 from runtime_models.model import BadFile
 
 MAGIC = b"glTF"
+GENERATOR = "Shapeshift"  # of files up to 0.4, which were written in our axes: right, up, back
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MOST_MARKS = 200_000  # of { [ , : in the JSON: bounds the memory that its objects take
 TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -26,15 +28,21 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 class Asset:
     """One glTF file and what lies beside it; `read` gives an accessor's numbers."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, memory: Account) -> None:
+        self.path, self.memory = path, memory
         data = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
         text, self._binary = split_glb(data, path.name)
+        memory.charge(JSON_A_BYTE * len(text), "its JSON")
         self.json = parse_json(text, path.name)
         self._buffers: dict[int, np.ndarray] = {}
         version = str(self.item(self.json, "asset", dict, {}).get("version", ""))
         if not version.startswith("2."):
             raise BadFile(f"{path.name} is glTF {version or 'without a version'}; 2.0 is read.")
+
+    @property
+    def in_our_axes(self) -> bool:
+        """Whether it is right, up, back, as we once wrote it, instead of left, up, front."""
+        return self.item(self.json, "asset", dict, {}).get("generator") == GENERATOR
 
     def refuse(self, text: str) -> BadFile:
         return BadFile(f"{self.path.name}: {text}")
@@ -92,6 +100,7 @@ class Asset:
         kind, _, text = uri.partition(",")
         if not kind.endswith(";base64"):
             raise self.refuse("a buffer's data: URI is not in base64.")
+        self.memory.charge(2 * len(text), "a buffer's data: URI")
         try:
             return np.frombuffer(base64.b64decode(text, validate=True), np.uint8)
         except ValueError:  # binascii.Error, and letters that are not ASCII
@@ -110,16 +119,10 @@ class Asset:
             )
         if not target.is_file():
             raise self.refuse(f"its buffer {name[:60]!r} is not beside it; copy it there.")
-        if not os.stat(target).st_size:
+        if not (size := os.stat(target).st_size):
             return np.zeros(0, np.uint8)
+        self.memory.widen(size)
         return np.memmap(target, np.uint8, "r")
-
-    def size_beside(self) -> int:
-        """Bytes of all buffers that lie in other files."""
-        entries = self.item(self.json, "buffers", list, [])
-        count = len(entries)
-        outside = [i for i in range(count) if "uri" in self.entry("buffers", i)]
-        return sum(len(self.buffer(i)) for i in outside)
 
     def count(self, index: int) -> int:
         """How many elements an accessor promises."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from runtime_models.lint_rows import mend_rows
 from runtime_models.lint_whole import read_coding, refuse_boundless, refuse_filling, sample_of
 from runtime_models.model import BadFile, Finding
-from runtime_models.own_units import to_own_units
+from runtime_models.own_units import ODD, to_own_units
 from runtime_models.plain_splats import PlainSplats, RawSplats, Reading
 from runtime_models.recentre import about, place_of
 from runtime_models.turn import ours_from_file
@@ -18,10 +18,14 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     says is read as what it is; each is a finding.  The arrays of `raw` are changed and become the
     result's.
     """
-    count, ours = len(raw.means), ours_from_file(reading.up or raw.up, reading.flip)
+    count, ours = len(raw.means), ours_from_file(reading.up or raw.up, reading.flip, raw.front)
+    memory = raw.memory
     findings = [*raw.findings, *read_coding(raw)]
     odd, filed = to_own_units(raw, ours)
-    findings += mend_rows(raw, odd, filed)
+    dropping = 12 * raw.sh.shape[1] * count if len(odd) else 0  # one array at a time
+    with memory.lend(dropping, f"the check of {count:,} splats"):
+        findings += mend_rows(raw, odd, filed)
+    memory.release(len(odd) * (ODD + 2 * raw.bytes_a_splat))
     if not len(raw.means):
         raise BadFile(f"{raw.file}: not one of {count:,} splats can be drawn{because(findings)}.")
     sample = sample_of(raw.means, raw.scales, raw.opacity)
@@ -29,6 +33,8 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     if not reading.allow_huge:
         refuse_filling(raw.file, sample)
     origin, found = place_of(sample, raw.means.dtype, raw.file)
+    if any(origin):
+        memory.charge(36 * len(raw.means), f"moving {len(raw.means):,} splats")
     findings += found
     if reading.strict:
         refuse_repairs(raw.file, findings)
@@ -44,6 +50,7 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
         extra=raw.extra,
         findings=tuple(findings),
         format=raw.format,
+        memory=memory,
     )
 
 

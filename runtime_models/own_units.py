@@ -10,6 +10,7 @@ from runtime_models.plain_splats import RawSplats
 from runtime_models.rotation import normalize
 from runtime_models.turn import turner
 
+ODD = 140  # bytes of an odd splat's numbers in float64, beside two copies as they are filed
 ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")
 
 
@@ -32,6 +33,7 @@ def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawS
     def work(rows: slice, _: None) -> None:
         if is_odd(filed, rows):
             odd = rows.start + np.flatnonzero(odd_in(filed, rows))
+            raw.memory.charge(len(odd) * (ODD + 2 * raw.bytes_a_splat), f"{len(odd):,} odd splats")
             found.append((odd, [getattr(filed, name)[odd] for name in ARRAYS]))
         if filed.log_scales:
             np.exp(raw.scales[rows], out=raw.scales[rows])

@@ -7,7 +7,7 @@ import numpy as np
 
 from runtime_models.blocks import each_block
 from runtime_models.model import BadFile
-from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.plain_splats import RawSplats, Reading, empty_splats
 from runtime_models.ply_file import PlyHeader, read_header
 from runtime_models.read_ply import teller
 from runtime_models.spherical_harmonics import C0
@@ -35,17 +35,14 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
     header = read_header(path)
     ranges, packed = chunks_and_splats(path, header)
     rest = harmonics_of(path, header, len(packed))  # (N, 3, M - 1) bytes
-    count = len(packed)
+    memory = reading.within(path).memory
     raw = RawSplats(
-        means=np.empty((count, 3), np.float32),
-        scales=np.empty((count, 3), np.float32),
-        wxyz=np.empty((count, 4), np.float32),
-        opacity=np.empty(count, np.float32),
-        sh=np.empty((count, 1 + rest.shape[2], 3), np.float32),
+        **empty_splats(len(packed), 1 + rest.shape[2], memory),
         file=path.name,
         format="compressed PLY",
         logits=False,
         antialiased="splatrendermode: mip" in [comment.lower() for comment in header.comments],
+        memory=memory,
     )
     colored = set(COLORS) <= set(ranges.dtype.names)
 
@@ -66,7 +63,7 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
         raw.sh[rows, 1:] = harmonics(rest[rows])
 
     with np.errstate(invalid="ignore", over="ignore"):  # ranges of NaN or Inf are for the judge
-        each_block(count, decode, teller(path, reading))
+        each_block(len(packed), decode, teller(path, reading))
     return raw
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.gltf_files import Asset
-from runtime_models.gltf_nodes import moved, placed_meshes
+from runtime_models.gltf_nodes import placed_meshes
 from runtime_models.model import Finding
+from runtime_models.placed_splats import joined, moved
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.spherical_harmonics import C0
-from runtime_models.turn import ours_from_file
+from runtime_models.turn import HALF_TURN_Y, ours_from_file
 
-HALF_TURN_Y = np.diag([-1.0, 1, -1])
 SPLATS = "KHR_gaussian_splatting"
 SPZ = "KHR_gaussian_splatting_compression_spz_2"
 PREFIX = f"{SPLATS}:"
@@ -24,10 +24,7 @@ FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
 NAME = "glTF"
 # Required extensions that do not touch what is read here: materials are ignored by the extension.
 HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
-MOST_REPEATED = 4  # times the file's bytes that its splats may take, where nodes share a mesh
-MOST_UNPACKED = 64  # times the file's bytes that splats out of spz may take, all together
-ALWAYS_ALLOWED = 48 << 20  # bytes, whatever the file's size
-ROW = 11  # floats of a splat beside its harmonics
+ROW = 44  # bytes of a splat beside its harmonics
 
 
 def is_gltf(head: bytes, path: Path) -> bool:
@@ -38,7 +35,8 @@ def is_gltf(head: bytes, path: Path) -> bool:
 
 def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
     """The splats of all nodes of the scene, where these stand.  Raises BadFile."""
-    asset = Asset(path)
+    reading = reading.within(path)
+    asset = Asset(path, reading.memory)
     for name in asset.item(asset.json, "extensionsRequired", list, []):
         if not str(name).startswith(HARMLESS):
             raise asset.refuse(f"it needs the extension {str(name)[:60]}, which is not read here.")
@@ -53,16 +51,12 @@ def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
             f"its scene has no Gaussian splats ({meshes} mesh{'es' * (meshes != 1)}, none shown "
             f"with {SPLATS}); export them with that extension."
         )
-    refuse_repeats(asset, [primitive for primitive, _ in placed])
-    parts, room = [], MOST_UNPACKED * path.stat().st_size + ALWAYS_ALLOWED
+    parts = []
     for number, (primitive, matrix) in enumerate(placed):
         reading.tell(f"reading {path.name}", number / len(placed))
-        parts.append(moved(read_primitive(asset, primitive, reading), matrix, asset))
-        if compressed_view(asset, primitive) is not None:
-            room -= 4 * len(parts[-1].means) * (ROW + 3 * parts[-1].sh.shape[1])
-        if room < 0:
-            raise asset.refuse("its few bytes of spz unpack to far more than scenes do.")
-    return joined(parts, path)
+        parts.append(moved(read_primitive(asset, primitive, reading), matrix))
+    raw = joined(parts, path.name)
+    return replace(raw, front=not asset.in_our_axes)
 
 
 def splat_primitives(asset: Asset, mesh: object) -> list[dict]:
@@ -71,22 +65,6 @@ def splat_primitives(asset: Asset, mesh: object) -> list[dict]:
     if not all(isinstance(row, dict) for row in rows):
         raise asset.refuse(f"mesh {mesh} has a primitive that is no object.")
     return [row for row in rows if SPLATS in asset.item(row, "extensions", dict, {})]
-
-
-def refuse_repeats(asset: Asset, primitives: list[dict]) -> None:
-    """Few bytes that many nodes or attributes share must not become many gigabytes."""
-    wanted = 0
-    for primitive in primitives:
-        attributes = asset.item(primitive, "attributes", dict, {})
-        if "POSITION" in attributes and compressed_view(asset, primitive) is None:
-            floats = ROW + 3 * sum("SH_DEGREE_" in name for name in attributes)
-            wanted += 4 * floats * asset.count(attributes["POSITION"])
-    size = asset.path.stat().st_size + asset.size_beside()
-    if wanted > MOST_REPEATED * size + ALWAYS_ALLOWED:
-        raise asset.refuse(
-            f"its {size:,} bytes stand for {wanted:,} of splats; the same ones are used over and "
-            "over, or a count in it is wrong."
-        )
 
 
 def compressed_view(asset: Asset, primitive: dict) -> int | None:
@@ -106,7 +84,8 @@ def read_primitive(asset: Asset, primitive: dict, reading: Reading) -> RawSplats
     else:
         raw = read_attributes(asset, asset.item(primitive, "attributes", dict, {}))
     if asset.item(splats, "colorSpace", str, "") == "lin_rec709_display":
-        raw.sh = display_from_linear(raw.sh)
+        with asset.memory.lend(5 * raw.sh.nbytes, f"colours of {len(raw.means):,} splats"):
+            raw.sh = display_from_linear(raw.sh)
         what = f"colours of {len(raw.means):,} splats are linear"
         done = "turned into display colours one by one; where they overlap they blend otherwise"
         findings.append(Finding(what, len(raw.means), done, file=asset.path.name, repaired=False))
@@ -145,6 +124,8 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
     if "POSITION" not in attributes:
         raise asset.refuse("a splat primitive has no POSITION; export it again.")
     count, draft = asset.count(attributes["POSITION"]), is_draft(attributes)
+    row = ROW + 12 * max(sum("SH_DEGREE_" in name for name in attributes), 1)  # bytes
+    asset.memory.charge(count * row, f"{count:,} splats")
     means, xyzw, scales = read("POSITION", 3), read(ROTATION, 4), read(SCALE, 3)
     opacity = read(COLOR, 4)[:, 3:] if draft else read(OPACITY, 1)
     names = harmonic_names(asset, attributes, draft)
@@ -162,6 +143,7 @@ def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
         log_scales=False,
         logits=False,
         up="+Y",
+        memory=asset.memory,
     )
 
 
@@ -193,17 +175,17 @@ def read_spz_view(asset: Asset, view: int, turned: bool, reading: Reading) -> Ra
     """Splats of an spz file within a buffer view.
 
     turned: by the extension's text it is stored half a turn about +Y from the scene (spz is right,
-    up, back; glTF names its axes left, up, front).  Drafts, which name no colour space, are as
-    stored.
+    up, back; glTF is left, up, front).  Drafts, which name no colour space, are as stored.
     """
     from runtime_models.read_spz import read_spz_bytes
 
     data, _ = asset.view(view)
-    raw = read_spz_bytes(data.tobytes(), asset.path.name, reading)
+    with asset.memory.lend(len(data), "its bytes of spz"):
+        raw = read_spz_bytes(data.tobytes(), asset.path.name, reading)
     matrix = np.eye(4)
     matrix[:3, :3] = (HALF_TURN_Y if turned else np.eye(3)) @ ours_from_file(raw.up)
     metres = replace(raw, scales=np.exp(raw.scales), log_scales=False, up="+Y")
-    return replace(moved(metres, matrix, asset), format=f"{NAME} with {raw.format}")
+    return replace(moved(metres, matrix), format=f"{NAME} with {raw.format}")
 
 
 def display_from_linear(sh: np.ndarray) -> np.ndarray:
@@ -220,25 +202,3 @@ def display_from_linear(sh: np.ndarray) -> np.ndarray:
         out = sh * slope
         out[:, :1] = (shown - 0.5) / C0
     return out.astype(np.float32)
-
-
-def joined(parts: list[RawSplats], path: Path) -> RawSplats:
-    """One set of splats; those of fewer harmonics get zeros."""
-    if len(parts) == 1:
-        return parts[0]
-    width = max(part.sh.shape[1] for part in parts)
-    sh = [np.pad(p.sh, ((0, 0), (0, width - p.sh.shape[1]), (0, 0))) for p in parts]
-    return RawSplats(
-        means=np.concatenate([part.means for part in parts]),
-        scales=np.concatenate([part.scales for part in parts]),
-        wxyz=np.concatenate([part.wxyz for part in parts]),
-        opacity=np.concatenate([part.opacity for part in parts]),
-        sh=np.concatenate(sh),
-        file=path.name,
-        format=" + ".join(sorted({part.format for part in parts})),
-        log_scales=False,
-        logits=False,
-        up="+Y",
-        antialiased=any(part.antialiased for part in parts),
-        findings=tuple(finding for part in parts for finding in part.findings),
-    )

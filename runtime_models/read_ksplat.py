@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import BadFile
-from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.plain_splats import RawSplats, Reading, empty_splats
 from runtime_models.spherical_harmonics import C0
 
 VERSION = b"\0\1"  # the first bytes: 0.1
@@ -24,6 +24,7 @@ BUCKETS = struct.Struct("<IIH")  # full, partly filled; SH degree
 BUCKETS_AT = 32
 HARMONICS = (0, 9, 24, 45)  # numbers a splat beyond the first three, by SH degree; 3 is written
 #                              by other converters, GaussianSplats3D itself stops at 2
+UNPACKED = 64  # bytes a splat of what is needed on the way, beside its harmonics
 RANGE = 32767  # codes on either side of a bucket's centre, where a section does not say
 BYTE_HARMONIC = 1.5  # largest 8-bit harmonic, where the header does not say
 
@@ -58,34 +59,49 @@ def read_raw_ksplat(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3; as in COLMAP, y down.  Raises BadFile."""
     with path.open("rb") as file:  # what is none is not read as a whole to say so
         head = file.read(HEADER_SIZE)
+    memory = reading.within(path).memory
+    if head[:2] == VERSION:
+        memory.charge(path.stat().st_size, "its bytes")
     data = path.read_bytes() if head[:2] == VERSION else head
     header = read_header(data, path.name)
     sections = read_sections(data, header)
     degree = max((section.degree for section in sections), default=0)
-    means = np.empty((header.count, 3), np.float32)
-    scales, opacity = np.empty((header.count, 3), np.float32), np.empty(header.count, np.float32)
-    wxyz = np.empty((header.count, 4), np.float32)
-    sh = np.zeros((header.count, (degree + 1) ** 2, 3), np.float32)
+    raw = RawSplats(
+        **empty_splats(header.count, (degree + 1) ** 2, memory),
+        file=path.name,
+        format="ksplat",
+        log_scales=False,
+        logits=False,
+        memory=memory,
+    )
+    raw.sh[:, 1:] = 0
     first = 0
     for section in sections:
         rows = slice(first, first + section.count)
-        kind = row_of(header.level, section.degree)
-        table = np.frombuffer(data, kind, section.count, section.rows_at)
-        means[rows] = table["mean"]
-        if header.level:
-            means[rows] -= section.range
-            means[rows] *= section.block_m / 2 / section.range
-            means[rows] += centers_of(data, header, section)
-        scales[rows], wxyz[rows] = table["scale"], table["wxyz"]
-        rgba = table["rgba"] / np.float32(255)
-        opacity[rows] = rgba[:, 3]
-        sh[rows, 0] = (rgba[:, :3] - np.float32(0.5)) / np.float32(C0)
-        unpack_harmonics(table["sh"], header, sh[rows])
+        decoded = section.count * (UNPACKED + 4 * HARMONICS[section.degree])
+        with memory.lend(decoded, f"{section.count:,} splats"):
+            fill(raw, rows, data, header, section)
         first += section.count
         reading.tell(f"reading {path.name}", first / header.count)
-    return RawSplats(
-        means, scales, wxyz, opacity, sh, path.name, "ksplat", log_scales=False, logits=False
-    )  # fmt: skip
+    memory.release(len(data))
+    return raw
+
+
+def fill(raw: RawSplats, rows: slice, data: bytes, header: Header, section: Section) -> None:
+    """Puts the splats of a section into their rows."""
+    kind = row_of(header.level, section.degree)
+    table = np.frombuffer(data, kind, section.count, section.rows_at)
+    means = raw.means[rows]
+    means[:] = table["mean"]
+    if header.level:
+        means -= section.range
+        means *= section.block_m / 2 / section.range
+        means += centers_of(data, header, section)
+    raw.scales[rows], raw.wxyz[rows] = table["scale"], table["wxyz"]
+    rgba = table["rgba"] / np.float32(255)
+    raw.opacity[rows] = rgba[:, 3]
+    raw.sh[rows, 0] = (rgba[:, :3] - np.float32(0.5)) / np.float32(C0)
+    unpack_harmonics(table["sh"], header, raw.sh[rows])
 
 
 def read_header(data: bytes, file: str) -> Header:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Account
 from runtime_models.model import BadFile, Finding
 from runtime_models.plain_splats import RawSplats
 
@@ -31,7 +32,8 @@ def with_labels(raw: RawSplats, path: Path) -> RawSplats:
             f"shown without labels; copy {CLASSIFIER} of the run beside it", file=raw.file,
         )  # fmt: skip
         return replace(raw, findings=(*raw.findings, finding))
-    weight, bias = read_classifier(classifier)
+    raw.memory.widen(classifier.stat().st_size)
+    weight, bias = read_classifier(classifier, raw.memory)
     names = [f"{FEATURE}{i}" for i in range(weight.shape[1])]
     found = sum(name.startswith(FEATURE) for name in raw.extra)
     if found != len(names) or not set(names) <= raw.extra.keys():
@@ -39,6 +41,7 @@ def with_labels(raw: RawSplats, path: Path) -> RawSplats:
             f"{raw.file} has {found} columns {FEATURE}*, its {CLASSIFIER} takes {len(names)}; "
             "put the two of one run together."
         )
+    raw.memory.charge(4 * len(raw.means) * (len(names) + 1), f"labels of {len(raw.means):,} splats")
     with np.errstate(all="ignore"):
         features = np.stack([raw.extra[name] for name in names], 1).astype(np.float32)  # (N, F)
     return replace(raw, labels=most_likely(features, weight, bias))
@@ -62,11 +65,11 @@ def most_likely(features: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> n
     return labels
 
 
-def read_classifier(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def read_classifier(path: Path, memory: Account | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Weight (C, F) and bias (C,) of a 1x1 convolution saved by torch.  Raises BadFile."""
     from runtime_models.read_torch import read_tensors
 
-    tensors = read_tensors(path)
+    tensors = read_tensors(path, memory)
     weight, bias = tensors.get("weight"), tensors.get("bias")
     shapes = [None if t is None else t.shape for t in (weight, bias)]
     if None in shapes or weight.ndim != 4 or weight.shape[2:] != (1, 1):

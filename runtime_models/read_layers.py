@@ -76,6 +76,7 @@ def join_layers(
     width = max(used_coefficients(part.sh) for part in parts)  # files of a lower degree get zeros
     if width < filed:
         provenance["sh_degree"] = math.isqrt(filed) - 1  # of the files
+    charge_joining(parts, width)
     pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
     parts.clear()
     shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
@@ -99,6 +100,18 @@ def join_layers(
         },
         findings=findings,
     )
+
+
+def charge_joining(parts: list[PlainSplats], width: int) -> None:
+    """For what one scene of several files takes: zeros for harmonics, and an array at a time."""
+    total = sum(len(part.means) for part in parts)
+    parts[0].memory.charge(4 * total, f"{total:,} splats")
+    if len(parts) > 1:
+        for part in parts:
+            more = 12 * (width - part.sh.shape[1]) * len(part.means)
+            part.memory.charge(more, f"harmonics of {len(part.means):,} splats")
+        with parts[0].memory.lend(12 * width * total, f"{total:,} splats in one"):
+            pass  # given back before it is used: that it fits has been seen
 
 
 def moved(means: np.ndarray, shift: np.ndarray) -> np.ndarray:

@@ -1,7 +1,10 @@
 """An ONNX file to a network: layers of Gemm (or MatMul and Add) with Relu between, then a head."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from runtime_models.memory import Account, unlimited
 from runtime_models.model import BadFile, Mlp
 
 HEADS = {"Tanh": "tanh", "Sigmoid": "sigmoid", "Softplus": "softplus", "Exp": "exp"}
@@ -19,10 +22,21 @@ UNDERSTOOD = (
     "a network is Gemm (or MatMul and Add) with Relu between, then, where wanted, "
     "Clip, one of Tanh, Sigmoid, Softplus, Exp, and Mul by one number"
 )
+COPIES = 4  # of a layer's numbers while they are read
+MESSAGE = 160  # bytes of memory a byte that is no number: of the smallest messages
+MOST_FIELDS = 100_000  # that are looked at; a network has some hundred
+WORTH_A_LOOK = 64  # bytes of a message that may hold numbers
+INSIDE = {  # (message, number of a field of it): what is in there, by onnx.proto
+    ("model", 7): "graph", ("graph", 1): "node", ("graph", 5): "tensor", ("node", 5): "attribute",
+    ("attribute", 5): "tensor", ("attribute", 7): "numbers", ("tensor", 4): "numbers",
+    ("tensor", 9): "numbers",
+}  # fmt: skip
 LARGEST = float(np.finfo(np.float32).max)  # a bound that a Clip leaves out
 
 
-def read_onnx(data: bytes, name: str, inputs: tuple[str, ...]) -> Mlp:
+def read_onnx(
+    data: bytes, name: str, inputs: tuple[str, ...], memory: Account | None = None
+) -> Mlp:
     """The network in `data`; `name` is for messages, `inputs` the order of what is concatenated.
 
     Raises BadFile where the file is not ONNX or is not a plain chain of known nodes.
@@ -30,6 +44,9 @@ def read_onnx(data: bytes, name: str, inputs: tuple[str, ...]) -> Mlp:
     import onnx
     from google.protobuf.message import DecodeError
 
+    memory = memory or unlimited()
+    payload = payload_of(data)
+    memory.charge(COPIES * payload + MESSAGE * (len(data) - payload), f"the network {name}")
     try:
         graph = onnx.load_model_from_string(data).graph
     except DecodeError:
@@ -41,7 +58,7 @@ def read_onnx(data: bytes, name: str, inputs: tuple[str, ...]) -> Mlp:
             f"{name} has {len(given)} inputs and {len(graph.output)} outputs, expected one of "
             "each; export a network of the concatenated inputs."
         )
-    chain = _Chain(name, constants, given[0])
+    chain = _Chain(name, constants, given[0], memory)
     with np.errstate(over="ignore", invalid="ignore"):  # finish() refuses what is not finite
         for node in graph.node:
             chain.take(node)
@@ -61,11 +78,63 @@ def read_tensor(tensor, name: str) -> np.ndarray:
     return array.astype(np.float32) if array.dtype.kind == "f" else array
 
 
+def payload_of(data: bytes) -> int:
+    """Bytes of the numbers of a graph's tensors, which stay what they are in memory.
+
+    All else in a protobuf message, an empty node of two bytes, becomes an object.
+    """
+    payload, fields, waiting = 0, 0, [("model", 0, len(data))]
+    while waiting:
+        kind, at, end = waiting.pop()
+        for field, start, stop in fields_of(data, at, end):
+            fields += 1
+            if fields > MOST_FIELDS:
+                return payload  # what comes then counts as messages: no network is like that
+            inner = INSIDE.get((kind, field))
+            if inner == "numbers":
+                payload += stop - start
+            elif inner and stop - start >= WORTH_A_LOOK:
+                waiting.append((inner, start, stop))
+    return payload
+
+
+def fields_of(data: bytes, at: int, end: int) -> Iterator[tuple[int, int, int]]:
+    """(number, first byte, end) of the fields with a length in a message, up to what is broken."""
+    while at < end:
+        key, at = varint(data, at, end)
+        wire = key & 7
+        if wire == 0:
+            _, at = varint(data, at, end)
+        elif wire == 2:
+            length, at = varint(data, at, end)
+            if length > end - at:
+                return
+            yield key >> 3, at, at + length
+            at += length
+        elif wire in (1, 5):
+            at += 8 if wire == 1 else 4
+        else:
+            return
+
+
+def varint(data: bytes, at: int, end: int) -> tuple[int, int]:
+    """A number of protobuf and where it ends; `end` where it is broken."""
+    number, shift = 0, 0
+    while at < end and shift < 64:
+        number |= (data[at] & 127) << shift
+        at, shift = at + 1, shift + 7
+        if data[at - 1] < 128:
+            return number, at
+    return 0, end
+
+
 class _Chain:
     """Collects layers, then the head, along the one value that flows from input to output."""
 
-    def __init__(self, name: str, constants: dict[str, np.ndarray], value: str) -> None:
-        self.name, self.constants = name, constants
+    def __init__(
+        self, name: str, constants: dict[str, np.ndarray], value: str, memory: Account
+    ) -> None:
+        self.name, self.constants, self.memory = name, constants, memory
         self.value = value  # what the node before gives
         self.before = ""  # the kind of that node
         self.weights: list[np.ndarray] = []  # (out, in) each
@@ -127,6 +196,7 @@ class _Chain:
                 f"{label} takes {weight.shape[1]} values, the layer before gives "
                 f"{len(self.weights[-1])}; export it again."
             )
+        self.memory.charge(COPIES * weight.nbytes, f"a layer of {self.name}")
         self.weights.append(weight * np.float32(attributes.get("alpha", 1.0)))
         self.biases.append(np.zeros(len(weight), np.float32))
         if node.op_type == "Gemm" and len(node.input) > 2 and node.input[2]:

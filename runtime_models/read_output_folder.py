@@ -116,6 +116,7 @@ def thermal_twin(raw: RawSplats) -> RawSplats:
             f"{raw.file} has {len(names)} columns t_dc and t_rest; thermal harmonics are 3, 12, "
             "27 or 48 of them, numbered from 0 on."
         )
+    raw.memory.charge(len(raw.means) * raw.bytes_a_splat, f"{len(raw.means):,} splats once more")
     sh = np.empty((len(raw.means), count, 3), np.float32)
     for i, name in enumerate(wanted):  # t_rest is channel-major, as f_rest is
         row, channel = (0, i) if i < 3 else (1 + (i - 3) % (count - 1), (i - 3) // (count - 1))

@@ -8,16 +8,20 @@ from typing import BinaryIO
 import numpy as np
 
 from runtime_models.blocks import block_of, each_block
+from runtime_models.memory import Account
 from runtime_models.model import BadFile, Finding
-from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.plain_splats import RawSplats, Reading, empty_splats
 from runtime_models.ply_file import Element, PlyHeader, read_header
-from runtime_models.spherical_harmonics import COEFFICIENTS
+from runtime_models.spherical_harmonics import C0, COEFFICIENTS
+from runtime_models.still_frame import still
 
 PLACE = ("x", "y", "z")
 SCALES = ("scale_0", "scale_1", "scale_2")
 QUATERNION = ("rot_0", "rot_1", "rot_2", "rot_3")
 DIRECT = ("f_dc_0", "f_dc_1", "f_dc_2")
-GEOMETRY = (*PLACE, "opacity", *SCALES[:2], *QUATERNION, *DIRECT)  # without scale_2: discs
+RGB = ("red", "green", "blue")  # where there is no DIRECT
+SHAPES = (*PLACE, "opacity", *SCALES[:2], *QUATERNION)  # without scale_2: discs
+GEOMETRY = (*SHAPES, *DIRECT)
 NORMAL = ("nx", "ny", "nz")  # written by habit, all zero
 FLAT = 1e-3  # a disc's third scale, of the smaller of its two: thinner than any pixel shows
 TEXT = 1 << 20  # bytes of an ASCII file read at a time
@@ -27,14 +31,21 @@ def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
     """Splats of a 3DGS PLY of SH degree 0 to 3, binary or ASCII.  Raises BadFile."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    vertex.require(GEOMETRY, path.name)
+    shades = shades_in(vertex.row.names)
+    vertex.require(SHAPES if shades else GEOMETRY, path.name)
     said = {name.rstrip(":=").lower(): value.lower() for name, value in sayings(header)}
-    splats = Columns(vertex, harmonics_of(vertex.row.names, path.name), path.name, said)
+    memory = reading.within(path).memory
+    splats = Columns(vertex, harmonics_of(vertex.row.names, path.name), path.name, said, memory)
     if header.encoding == "ascii":
         read_text(path, begins, splats, reading)
     else:
         read_records(path, begins, splats, reading)
-    return splats.raw
+    return still(splats.raw, 0.0)
+
+
+def shades_in(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The columns of the colours where there are no harmonics."""
+    return () if set(DIRECT) & set(names) or not set(RGB) <= set(names) else RGB
 
 
 def sayings(header: PlyHeader) -> Iterator[tuple[str, str]]:
@@ -60,7 +71,9 @@ def harmonics_of(names: tuple[str, ...], file: str) -> list[str]:
 class Columns:
     """The arrays of a file's splats, filled by blocks of its records."""
 
-    def __init__(self, vertex: Element, harmonics: list[str], file: str, said: dict) -> None:
+    def __init__(
+        self, vertex: Element, harmonics: list[str], file: str, said: dict, memory: Account
+    ) -> None:
         names, kinds, n = vertex.row.names, vertex.row, vertex.count
         self.row = vertex.row
         self.count = n
@@ -73,19 +86,17 @@ class Columns:
             done = f"read as flat splats, {FLAT:g} as thick as wide"
             findings = (Finding("2D splats, with two scales each", n, done, (), file, False),)
         self.raw = RawSplats(
-            means=np.empty((n, 3), np.float64 if exact else np.float32),
-            scales=np.empty((n, 3), np.float32),
-            wxyz=np.empty((n, 4), np.float32),
-            opacity=np.empty(n, np.float32),
-            sh=np.empty((n, len(harmonics) // 3, 3), np.float32),
+            **empty_splats(n, len(harmonics) // 3, memory, exact),
             file=file,
             format="ply",
             antialiased=said.get("antialiased") == "1" or said.get("splatrendermode") == "mip",
             findings=findings,
+            memory=memory,
         )
         raw = self.raw
+        self.shades = shades_in(names)
         self.targets = [  # (the columns, the array with a row of them)
-            (harmonics, raw.sh.reshape(n, -1)),
+            *([] if self.shades else [(harmonics, raw.sh.reshape(n, -1))]),
             (PLACE, raw.means),
             (scales, raw.scales[:, : len(scales)]),
             (QUATERNION, raw.wxyz),
@@ -95,8 +106,9 @@ class Columns:
             np.array([kinds.fields[name][1] // 4 for name in columns])
             for columns, _ in self.targets
         ]
-        used = {name for columns, _ in self.targets for name in columns} | {SCALES[2]}
+        used = {n for columns, _ in self.targets for n in columns} | {SCALES[2], *self.shades}
         self.kept = [name for name in names if name not in used]
+        memory.charge(n * sum(kinds[name].itemsize for name in self.kept), "its other columns")
 
     def fill(self, rows: slice, table: np.ndarray) -> None:
         """Puts records of the file into some rows."""
@@ -112,6 +124,10 @@ class Columns:
         if self.flat:
             scales = self.raw.scales[rows]
             scales[:, 2] = scales[:, :2].min(axis=1) + np.float32(np.log(FLAT))
+        for channel, name in enumerate(self.shades):
+            kind = table.dtype[name]
+            most = np.iinfo(kind).max if kind.kind in "iu" else 1.0
+            self.raw.sh[rows, 0, channel] = (table[name] / np.float32(most) - 0.5) / C0
         for name in self.kept:
             self.keep(name, rows, table[name])
 
@@ -137,7 +153,8 @@ def read_records(path: Path, begins: int, splats: Columns, reading: Reading) -> 
     def work(rows: slice, own: tuple[BinaryIO, np.ndarray]) -> None:
         file, table = own[0], own[1][: rows.stop - rows.start]
         file.seek(begins + rows.start * size)
-        if read_fully(file, memoryview(table).cast("B")) < table.nbytes:
+        # Not a memoryview of the records: those may have names that it does not know how to read.
+        if read_fully(file, memoryview(table.view(np.uint8))) < table.nbytes:
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         splats.fill(rows, table)
 
@@ -161,6 +178,8 @@ def read_text(path: Path, begins: int, splats: Columns, reading: Reading) -> Non
         for values in numbers(file, path.name):
             pending = np.concatenate([pending, values])
             count = min(len(pending) // width, splats.count - first)
+            if not count:
+                continue
             table = np.empty(count, splats.row)
             part = pending[: count * width].reshape(count, width)
             with np.errstate(over="ignore", invalid="ignore"):

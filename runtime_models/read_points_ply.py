@@ -1,5 +1,6 @@
 """A PLY of points, with or without colours: shown as round splats that reach their neighbours."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ COLORS = (  # names that programs give to red, green and blue
     ("r", "g", "b"),
 )
 GRAY = 0.7  # of points without a colour
+SHOWN = 80  # bytes a point of the arrays that it is shown by
+MEASURED = 320  # bytes a point while neighbours are looked for
 SIGMA = 0.25  # of the distance to the neighbours: they touch, strays do not hide the rest
 
 
@@ -38,28 +41,48 @@ def read_raw_points_ply(path: Path, reading: Reading) -> RawSplats:
     vertex, begins = header.find("vertex")
     lacking = [name for name in GEOMETRY if name not in vertex.row.names]
     what = f"a point cloud, no splats: it has no {', '.join(lacking)}"
-    if reading.strict:
-        raise BadFile(f"{path.name}: {what}; --strict shows splats only, open it without.")
+    reading = reading.within(path)
+    memory = reading.memory
+    memory.charge(vertex.count * (vertex.row.itemsize + 12), f"{vertex.count:,} points")
     table = read_records(path, header, vertex, begins)
     places = np.stack([table[axis] for axis in PLACE], 1)  # (N, 3)
+    raw = splats_of_points(places, None, path.name, reading, what)
+    return replace(raw, sh=colors_of(table), extra=others_of(table), format="PLY of points")
+
+
+def splats_of_points(
+    places: np.ndarray, shades: np.ndarray | None, file: str, reading: Reading, what: str = ""
+) -> RawSplats:
+    """A round opaque splat for each place (N, 3), of the shades (N, 3) 0..1, else gray.
+
+    reading.memory is the file's Account; `what` is what its finding says.  Raises BadFile, always
+    if strict.
+    """
+    what = what or "a point cloud, no splats: it has no scales, rotations or opacities"
+    if reading.strict:
+        raise BadFile(f"{file}: {what}; --strict shows splats only, open it without.")
+    if places.ndim != 2 or places.shape[1] != 3 or not len(places):
+        raise BadFile(f"{file} has points of shape {places.shape!s:.40}, expected (N, 3).")
     if places.dtype not in (np.float32, np.float64):
         places = places.astype(np.float64)
-    reading.tell(f"measuring {path.name}", 0.5)
-    size = (SIGMA * spacing(places)).astype(np.float32)
-    count = len(table)
+    count, memory = len(places), reading.memory
+    memory.charge(count * SHOWN, f"{count:,} points")
+    reading.tell(f"measuring {file}", 0.5)
+    with memory.lend(count * MEASURED, f"measuring {count:,} points"):
+        size = (SIGMA * spacing(places)).astype(np.float32)
     done = f"shown as {count:,} points, each as wide as the way to its neighbours"
     return RawSplats(
         means=places,
         scales=np.repeat(size[:, None], 3, axis=1),
         wxyz=np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
         opacity=np.ones(count, np.float32),
-        sh=colors_of(table),
-        file=path.name,
-        format="PLY of points",
+        sh=harmonics_of(shades, count),
+        file=file,
+        format="points",
         log_scales=False,
         logits=False,
-        extra=others_of(table),
-        findings=(Finding(what, 0, done, file=path.name),),
+        findings=(Finding(what, 0, done, file=file),),
+        memory=memory,
     )
 
 
@@ -92,8 +115,13 @@ def colors_of(table: np.ndarray) -> np.ndarray:
     shades = shades_of(table)
     if shades is None and set(DIRECT) <= set(table.dtype.names):
         return np.stack([table[name] for name in DIRECT], 1, dtype=np.float32)[:, None]
+    return harmonics_of(shades, len(table))
+
+
+def harmonics_of(shades: np.ndarray | None, count: int) -> np.ndarray:
+    """(N, 1, 3) float32 of shades (N, 3) 0..1, or gray."""
     if shades is None:
-        return np.full((len(table), 1, 3), (GRAY - 0.5) / C0, np.float32)
+        return np.full((count, 1, 3), (GRAY - 0.5) / C0, np.float32)
     return ((shades - 0.5) / np.float32(C0))[:, None]
 
 

@@ -24,6 +24,7 @@ SETTING = re.compile(r"(\w+)\s*[:=]\s*'?([\w.+-]+)")
 NETWORK_ENDINGS = (".pt", ".pth", ".onnx")
 FEW = 10  # rows that a finding names
 MOST_LEVELS = 64
+SHOWN = 60  # bytes of a splat that is decoded
 
 
 def cloud_of(path: Path) -> Path:
@@ -49,6 +50,8 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
     Raises BadFile.
     """
     file = cloud_of(path)
+    reading = reading.within(file.parent)
+    memory = reading.memory
     settings = read_settings(file.parent)
     cloud = read_cloud(file, reading)
     findings = judge_rows(cloud.good, reading, file.name)
@@ -56,7 +59,7 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
     _, k, _ = cloud.offsets.shape
     features = cloud.features.shape[1]
     shape = Shape(features, k, octree is not None, boolean(settings.get("add_level")))
-    networks = read_networks(file.parent, shape)
+    networks = read_networks(file.parent, shape, memory)
     anchors, features_of, offsets, scales, _ = cloud.kept()
     sample = sample_of(anchors, scales, np.ones(len(anchors)))
     place, far = place_of(sample, anchors.dtype, file.name)
@@ -79,6 +82,7 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
         tuple(map(float, rotation @ origin)),
         (*networks.findings, *findings, *far),
     )
+    memory.charge(SHOWN * model.splat_count, f"{model.splat_count:,} splats")
     if not reading.allow_huge:
         refuse_filling(model, file.name)
     return within_budget(model, reading.most_splats)

@@ -1,12 +1,14 @@
 """Opens whatever this program can show, recognised by content where the format allows."""
 
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from runtime_models.formats import format_of
+from runtime_models.foreign.foreign_files import is_address, refusal
+from runtime_models.formats import format_of, head_of
+from runtime_models.lcc.read_lcc import is_lcc, read_lcc
+from runtime_models.lcc.read_lcc2 import is_lcc2, read_lcc2
 from runtime_models.lint_package import refuse_filling
 from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
@@ -27,16 +29,19 @@ from runtime_models.read_streamed import TREE, is_streamed, read_sog_folder, rea
 from runtime_models.refit_encoding import encoding_findings
 from runtime_models.sog_files import META
 from runtime_models.thin import left_whole, thin
+from runtime_models.zip_files import member_names
 
+THINNING = 160  # bytes a splat on the way, beside what is kept
 KNOWN = (
     "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
-    ".gltf), a folder of .ply layers, or the folder of a 3DGS or Scaffold-GS run"
+    ".gltf, .usd, .lcc, .pt, .ckpt), a folder of .ply layers, or the folder of a 3DGS or "
+    "Scaffold-GS run"
 )
 
 
 def read_model(path: str | Path, reading: Reading | None = None) -> Model:
     """The model in a file or folder, read as `reading` says.  Raises BadFile."""
-    reading = reading or Reading()
+    reading = (reading or Reading()).begun()
     try:
         model = read_whole(Path(path), reading)
     except MemoryError as error:
@@ -46,12 +51,18 @@ def read_model(path: str | Path, reading: Reading | None = None) -> Model:
         ) from error
     if isinstance(model, AnchorModel):
         return left_whole(model, reading.most_splats, Path(path).name)
-    return thin(model, reading.most_splats) if isinstance(model, SplatLayers) else model
+    if not (isinstance(model, SplatLayers) and 0 < reading.most_splats < model.splat_count):
+        return model
+    memory = reading.within(Path(path)).memory
+    with memory.lend(THINNING * model.splat_count, f"thinning {model.splat_count:,} splats"):
+        return thin(model, reading.most_splats)
 
 
 def read_whole(path: Path, reading: Reading) -> Model:
     """The model with all its splats."""
     if not path.exists():
+        if is_address(path):
+            raise BadFile(f"{path} is an address of the web; download the file, then open that.")
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if not (path.is_file() or path.is_dir()):  # reading a pipe would wait for ever
         raise BadFile(f"{path} is neither a file nor a folder; wanted is {KNOWN}.")
@@ -59,6 +70,10 @@ def read_whole(path: Path, reading: Reading) -> Model:
         path = path.parent
     if is_streamed(path):
         return read_streamed(path, reading)
+    if is_lcc(path):
+        return read_lcc(path, reading)
+    if is_lcc2(path):
+        return read_lcc2(path, reading)
     if path.name == META and format_of(path):
         path = path.parent
     if path.is_dir():
@@ -84,7 +99,7 @@ def read_whole(path: Path, reading: Reading) -> Model:
         return read_upright(path, reading)
     if format_of(path):
         return read_file(path, reading)
-    raise BadFile(f"{path} is of no known format; wanted is {KNOWN}.")
+    raise BadFile(refusal(path, head_of(path), KNOWN))
 
 
 def read_upright(path: Path, reading: Reading) -> AnchorModel:
@@ -93,17 +108,18 @@ def read_upright(path: Path, reading: Reading) -> AnchorModel:
         raise BadFile(
             f"{path.name} is a package, and +Y is up in all of them; leave out --up and --flip."
         )
-    model = read_package(path)
+    model = read_package(path, reading)
     if not reading.allow_huge:
         refuse_filling(model, path.name)
     return replace(model, findings=(*model.findings, *encoding_findings(model, path.name)))
 
 
 def is_package(path: Path) -> bool:
-    """A zip that is no SOG, by content; whether it is whole is for the reader to say."""
-    with path.open("rb") as file:
-        head = file.read(2)
-    return (head == b"PK" or zipfile.is_zipfile(path)) and not is_sog(head, path)
+    """A zip with parts of one; whether it has them all is for the reader to say."""
+    names = [name.rpartition("/")[2] for name in member_names(path)]
+    if not names:  # cut off: only its name can tell
+        return path.name.lower().endswith(".shift") and head_of(path)[:2] == b"PK"
+    return any(name in (MANIFEST, ANCHORS) or name.endswith(".onnx") for name in names)
 
 
 def describe(model: Model, path: str | Path) -> dict:
@@ -177,7 +193,8 @@ def describe_head(mlp: Mlp) -> dict:
 
 def files_of(model: Model, path: Path) -> list[Path]:
     """What of `path` belongs to the model: a folder may hold other things, too."""
-    if path.name in (MANIFEST, META, TREE, LIST):
+    in_folder = path.name in (MANIFEST, META, TREE, LIST) or is_lcc(path) or is_lcc2(path)
+    if in_folder and not path.is_dir():
         path = path.parent
     if isinstance(model, ScaffoldModel) and not path.is_dir():
         path = path.parent

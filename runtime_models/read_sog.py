@@ -1,23 +1,25 @@
 """PlayCanvas's SOG, versions 1 and 2: splats as pixels of WebP pictures beside a meta.json."""
 
-import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.blocks import each_block
+from runtime_models.memory import Account
 from runtime_models.model import BadFile, Finding
 from runtime_models.package_files import MANIFEST
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.read_compressed_ply import from_smallest_three
 from runtime_models.sog_files import META, SogFiles, is_meta
+from runtime_models.zip_files import member_names
 
 PICTURES = {"means": 2, "scales": 1, "quats": 1, "sh0": 1, "shN": 2}  # of each part
 COEFFICIENTS = (0, 3, 8, 15)  # beyond degree 0, by bands
 PALETTE_ROW = 64  # sets of harmonics in a row of their picture
 LARGEST_PALETTE = 1 << 16  # sets; labels have 16 bits
-FREE_SPLATS = 1 << 16  # each beyond these takes a byte of the files at least; of real ones 8
+GEOMETRY, DECODING = 44, 72  # bytes a splat of the arrays but for harmonics, and on the way there
+ROOM = 1 << 16  # pixels that a picture may have beyond four times its splats
 FIRST_MODE = 252  # the alpha of a quaternion says which entry is the largest: 252 is w
 LARGEST_NUMBER = 1e38  # of float32
 HEAD = 1 << 16  # bytes of a meta.json that tell what it is
@@ -33,13 +35,7 @@ def is_sog(head: bytes, path: Path) -> bool:
             return is_sog(file.read(HEAD), meta)
     if path.name == META:
         return b'"means"' in head[:HEAD]
-    if head[:2] != b"PK" or not zipfile.is_zipfile(path):
-        return False
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = [entry.filename for entry in archive.infolist()]
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        return False  # whoever reads packages says what is wrong with it
+    names = member_names(path) if head[:2] == b"PK" else []
     packaged = any(name.rpartition("/")[2] == MANIFEST for name in names)
     return any(is_meta(name) for name in names) and not packaged
 
@@ -49,14 +45,19 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
 
     Raises BadFile.
     """
-    sog = open_sog(path)
-    reading.tell(f"reading {path.name}", 0.0)
-    means = read_means(sog)
-    reading.tell(f"reading {path.name}", 0.3)
-    scales = decode(sog, "scales", sog.pixels("scales")[:, :3])
-    wxyz = read_quaternions(sog)
-    reading.tell(f"reading {path.name}", 0.5)
-    sh, opacity = read_colors(sog)
+    memory = reading.within(path).memory
+    sog = open_sog(path, memory)
+    what = f"{sog.count:,} splats"
+    memory.charge(GEOMETRY * sog.count, what)
+    with memory.lend(DECODING * sog.count, what):
+        reading.tell(f"reading {path.name}", 0.0)
+        means = read_means(sog)
+        reading.tell(f"reading {path.name}", 0.3)
+        scales = decode(sog, "scales", sog.pixels("scales")[:, :3])
+        wxyz = read_quaternions(sog)
+        reading.tell(f"reading {path.name}", 0.5)
+        sh, opacity = read_colors(sog)
+    memory.release(sog.files.held)
     return RawSplats(
         means=means,
         scales=scales,
@@ -68,12 +69,13 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
         logits=sog.version == 1,
         antialiased=sog.meta.get("model") == "antialiased" or sog.meta.get("antialias") is True,
         findings=tuple(sog.findings),
+        memory=memory,
     )
 
 
 @dataclass
 class Sog:
-    """A meta.json whose count is bounded by its files; what is odd in them gathers as findings."""
+    """What a meta.json says; what is odd in its pictures gathers as findings."""
 
     files: SogFiles
     meta: dict
@@ -118,7 +120,7 @@ class Sog:
 
     def pixels(self, part: str, number: int = 0) -> np.ndarray:
         """(N, 4) uint8: of each splat the pixel of one of a part's pictures."""
-        most = 4 * self.count + FREE_SPLATS
+        most = 4 * self.count + ROOM
         picture = self.files.image(self.names(part)[number], self.count, most)
         return picture.reshape(-1, 4)[: self.count]
 
@@ -134,9 +136,9 @@ def extrapolated(codebook: list) -> float | None:
     return first + (first - last) / 255
 
 
-def open_sog(path: Path) -> Sog:
+def open_sog(path: Path, memory: Account) -> Sog:
     """The meta.json of a SOG; no picture is read yet.  Raises BadFile."""
-    files = SogFiles(path)
+    files = SogFiles(path, memory)
     meta = files.meta()
     version = meta.get("version", 1)
     if type(version) is not int or version not in (1, 2):
@@ -147,12 +149,7 @@ def open_sog(path: Path) -> Sog:
     if type(count) is not int or count < 1:
         raise BadFile(f"{files.name} does not say how many splats there are; export it again.")
     sog = Sog(files, meta, version, count)
-    size = files.bytes_of(sog.file_names())
-    if count > size + FREE_SPLATS:
-        raise BadFile(
-            f"{files.name} states {count:,} splats, its {size:,} bytes cannot hold them; it is cut "
-            "off or its header is wrong."
-        )
+    sog.file_names()  # all named as they should be
     return sog
 
 
@@ -208,6 +205,7 @@ def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
     """(N, M, 3) harmonics and (N,) opacity: 0..1, of version 1 logits."""
     pixels = sog.pixels("sh0")
     palette = read_palette(sog) if "shN" in sog.meta else np.zeros((1, 0, 3), np.float32)
+    sog.files.memory.charge(12 * sog.count * (1 + palette.shape[1]), f"{sog.count:,} splats")
     sh = np.empty((sog.count, 1 + palette.shape[1], 3), np.float32)
     if sog.version == 1:
         decoded = decode(sog, "sh0", pixels)
@@ -251,7 +249,8 @@ def read_palette(sog: Sog) -> np.ndarray:
     if coefficients not in COEFFICIENTS[1:] or width % PALETTE_ROW:
         raise sog.bad(f"the harmonics' picture is {width} pixels wide, expected 192, 512 or 960")
     codes = picture[:, :, :3].reshape(-1, coefficients, 3)[:count]
-    return decode(sog, "shN", codes)
+    with sog.files.memory.lend(16 * codes.size, f"{count:,} sets of harmonics"):
+        return decode(sog, "shN", codes)
 
 
 def odd(what: str, rows: np.ndarray, done: str, sog: Sog) -> Finding:

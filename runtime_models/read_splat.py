@@ -4,18 +4,27 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Account
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.spherical_harmonics import C0
 
+KEPT, CODED = 60, 48  # bytes a splat: of the arrays, of their colours and turns on the way
 ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("wxyz", "u1", 4)])
 
 
 def read_raw_splat(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0.  Raises BadFile."""
-    size = path.stat().st_size
+    size, memory = path.stat().st_size, reading.within(path).memory
     if size == 0 or size % ROW.itemsize:
         raise BadFile(f"{path.name} has {size} bytes, expected a multiple of 32: it is cut off.")
+    count = size // ROW.itemsize
+    memory.charge(count * KEPT, f"{count:,} splats")
+    with memory.lend(count * CODED, f"{count:,} splats"):
+        return read_rows(path, memory)
+
+
+def read_rows(path: Path, memory: Account) -> RawSplats:
     table = np.fromfile(path, ROW)
     rgba = table["rgba"].astype(np.float32) / 255
     return RawSplats(
@@ -28,4 +37,5 @@ def read_raw_splat(path: Path, reading: Reading) -> RawSplats:
         format="splat",
         log_scales=False,
         logits=False,
+        memory=memory,
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from runtime_models.blocks import BLOCK
 from runtime_models.model import BadFile, Finding
-from runtime_models.plain_splats import RawSplats, Reading
+from runtime_models.plain_splats import RawSplats, Reading, empty_splats
 from runtime_models.read_compressed_ply import from_smallest_three
 from runtime_models.spz_file import ANTIALIASED, REST, SpzHeader, is_spz, unpack_spz
 
@@ -27,25 +27,25 @@ def has_spz_mark(head: bytes, path: Path) -> bool:
 
 def read_raw_spz(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3.  Raises BadFile."""
-    return read_spz_bytes(path.read_bytes(), path.name, reading)
+    reading = reading.within(path)
+    with reading.memory.lend(path.stat().st_size, "its bytes"):
+        return read_spz_bytes(path.read_bytes(), path.name, reading)
 
 
 def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
     """The same of a file in memory; x right, y up, z back, if no extension says otherwise."""
-    spz = unpack_spz(data, file)
+    memory = reading.within(Path(file), len(data)).memory
+    spz = unpack_spz(data, file, memory)
     header = spz.header
     count, there = header.count, REST[header.degree]
     kept = min(there, REST[3])
     raw = RawSplats(
-        means=np.empty((count, 3), np.float32),
-        scales=np.empty((count, 3), np.float32),
-        wxyz=np.empty((count, 4), np.float32),
-        opacity=np.empty(count, np.float32),
-        sh=np.empty((count, 1 + kept, 3), np.float32),
+        **empty_splats(count, 1 + kept, memory),
         file=file,
         format=f"spz v{header.version}",
         logits=False,
         antialiased=bool(header.flags & ANTIALIASED),
+        memory=memory,
     )
     streams = zip(header.widths, decoders(raw, header), strict=True)
     for done, (width, decode) in enumerate(streams):

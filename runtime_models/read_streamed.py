@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.lint import judge
+from runtime_models.memory import JSON_A_BYTE, Account, Memory
 from runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.read_layers import check_mode, join_layers
@@ -49,17 +50,23 @@ def is_streamed(path: Path) -> bool:
     return path.name == TREE or (path / TREE).is_file()
 
 
+def folder_of(path: Path) -> Path:
+    return path.parent if path.name == TREE else path
+
+
 def read_streamed(path: Path, reading: Reading) -> SplatLayers:
     """The finest level within reading.most_splats, else the coarsest.  Raises BadFile."""
-    streamed = read_tree(path)
+    reading = reading.within(folder_of(path))
+    streamed = read_tree(path, reading.memory)
     return read_level(streamed, finest_within(streamed.counts, reading.most_splats), reading)
 
 
 def read_sog_folder(path: Path, reading: Reading) -> SplatLayers:
     """A folder that holds one SOG, of one level.  Raises BadFile."""
     check_mode(reading.mode)
+    reading = reading.within(path)
     plain = judge(read_raw_sog(path, reading), reading)
-    names = [META, *open_sog(path).file_names()]
+    names = [META, *open_sog(path, reading.memory).file_names()]
     return join_layers([plain], (Stop(path.resolve().name, 0.0, "layer"),), reading.mode, names)
 
 
@@ -69,7 +76,8 @@ def levels(path: Path, reading: Reading) -> Iterator[SplatLayers]:
     Some between are left out: each has at least GROWTH times the splats of the one before, or is
     the last.  Raises BadFile.
     """
-    streamed = read_tree(path)
+    reading = replace(reading, memory=None)  # of each level anew: the one before goes
+    streamed = read_tree(path, reading.within(folder_of(path)).memory)
     origin = None
     for number in steps(streamed.counts, reading.most_splats):
         level = thin(read_level(streamed, number, reading), reading.most_splats)
@@ -98,12 +106,14 @@ def steps(counts: tuple[int, ...], most: int) -> list[int]:
     return [*out, last]
 
 
-def read_tree(path: Path) -> Streamed:
+def read_tree(path: Path, memory: Account | None = None) -> Streamed:
     """What a lod-meta.json says, checked, no splat read yet.  Raises BadFile."""
     file = path if path.name == TREE else path / TREE
     if file.stat().st_size > LARGEST_META:
         raise BadFile(f"{file.name} has over {LARGEST_META:,} bytes; it is no {TREE} of a scene.")
-    said = parse_json(file.read_bytes(), file.name)
+    memory = memory or Memory().of(path)
+    with memory.lend(JSON_A_BYTE * file.stat().st_size, f"its {file.name}"):
+        said = parse_json(file.read_bytes(), file.name)
     if said.get("version", 1) != 1:
         raise BadFile(f"{file.name} is of version {str(said['version'])[:20]}, known is 1.")
     names, count, environment = (said.get(k) for k in ("filenames", "lodLevels", "environment"))
@@ -153,6 +163,7 @@ def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[Run
 def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers:
     """One level as a scene of one stop.  Raises BadFile."""
     check_mode(reading.mode)
+    reading = reading.within(streamed.folder)
     runs_of_file: dict[int, list[Run]] = {}
     for run in streamed.levels[number]:
         if run.count:
@@ -162,10 +173,10 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
     for i, (file, runs) in enumerate(sorted(runs_of_file.items())):
         reading.tell(f"reading level {number} of {streamed.folder.name}", i / len(runs_of_file))
         parts.append(picked(read_raw_sog(streamed.files[file], within), runs))
-        used += files_of_sog(streamed.files[file])
+        used += files_of_sog(streamed.files[file], reading)
     if streamed.environment is not None:
         parts.append(read_raw_sog(streamed.environment, reading))
-        used += files_of_sog(streamed.environment)
+        used += files_of_sog(streamed.environment, reading)
     name = streamed.folder.resolve().name
     plain = judge(joined(parts, name), reading)
     kept = [file.relative_to(streamed.folder).as_posix() for file in used]
@@ -188,11 +199,11 @@ def told_of(streamed: Streamed, number: int) -> tuple[Finding, ...]:
     return (Finding(what, 0, done, file=streamed.folder.resolve().name, repaired=False),)
 
 
-def files_of_sog(path: Path) -> list[Path]:
+def files_of_sog(path: Path, reading: Reading) -> list[Path]:
     """A .sog, or a meta.json with the pictures that it names."""
     if path.name != META:
         return [path]
-    sog = open_sog(path)
+    sog = open_sog(path, reading.memory)
     return [path, *(path.parent / name for name in sog.file_names())]
 
 
@@ -207,7 +218,9 @@ def picked(raw: RawSplats, runs: list[Run]) -> RawSplats:
     rows = np.concatenate([np.arange(r.first, r.first + r.count) for r in runs])
     if len(rows) == count and (np.diff(rows) == 1).all():
         return raw
-    arrays = {name: getattr(raw, name)[rows] for name in ARRAYS}
+    with raw.memory.lend(len(rows) * raw.bytes_a_splat, f"{len(rows):,} splats"):
+        arrays = {name: getattr(raw, name)[rows] for name in ARRAYS}
+    raw.memory.release((count - len(rows)) * raw.bytes_a_splat)
     return replace(raw, **arrays)
 
 
@@ -221,13 +234,17 @@ def joined(parts: list[RawSplats], name: str) -> RawSplats:
     if len({part.format for part in parts}) > 1:
         raise BadFile(f"{name} mixes versions of SOG; export it again.")
     most = max(part.sh.shape[1] for part in parts)
+    count = sum(len(part.means) for part in parts)
+    memory = parts[0].memory
+    memory.charge(sum(12 * (most - p.sh.shape[1]) * len(p.means) for p in parts), "harmonics")
     for part in parts:
         part.sh = np.pad(part.sh, ((0, 0), (0, most - part.sh.shape[1]), (0, 0)))
     arrays = {}
-    for key in ARRAYS:
-        arrays[key] = np.concatenate([getattr(part, key) for part in parts])
-        for part in parts:
-            setattr(part, key, None)  # each goes once it is copied
+    with memory.lend(12 * most * count, f"{count:,} splats in one"):
+        for key in ARRAYS:
+            arrays[key] = np.concatenate([getattr(part, key) for part in parts])
+            for part in parts:
+                setattr(part, key, None)  # each goes once it is copied
     findings = tuple(found for part in parts for found in part.findings)
     mip = any(part.antialiased for part in parts)
     return replace(parts[0], **arrays, file=name, findings=findings, antialiased=mip)

@@ -5,16 +5,19 @@ Layout: a zip that stores TOP/data.pkl, whose tensors point into TOP/data/KEY, o
 
 import math
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Account, Memory
 from runtime_models.model import BadFile
-from runtime_models.package_files import DAMAGED
-from runtime_models.tensor_pickle import Storage, Tensor, index_of
+from runtime_models.tensor_pickle import MOST_OPCODES, Storage, Tensor, index_of
+from runtime_models.zip_files import DAMAGED, member_names, opened_zip
 
 INDEX = "data.pkl"
 LARGEST_INDEX = 16 << 20  # bytes
+INDEX_A_BYTE = 256  # bytes of memory: an opcode of one byte may become a dictionary
 MOST_DIMENSIONS = 8
 LONGEST = 1 << 31  # of a tensor that holds nothing
 OLD_MAGIC = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # torch.save before 1.6
@@ -22,43 +25,42 @@ OLD_MAGIC = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # torch.save before 1.6
 
 def is_torch_archive(path: Path) -> bool:
     """A zip with an index of tensors, by content."""
-    if not zipfile.is_zipfile(path):
-        return False
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return any(n == INDEX or n.endswith(f"/{INDEX}") for n in archive.namelist())
-    except DAMAGED:
-        return False
+    return any(name == INDEX or name.endswith(f"/{INDEX}") for name in member_names(path))
 
 
-def read_tensors(path: Path) -> dict[str, np.ndarray]:
+def read_tensors(
+    path: Path, memory: Account | None = None, wanted: Callable[[str], bool] | None = None
+) -> dict[str, np.ndarray]:
     """Every tensor of a file by torch.jit.save or torch.save by its dotted name ("0.weight").
 
-    As read_script, without the modules.  Raises BadFile.
+    As read_script, without the modules; `wanted` says by name which ones are read.  Raises BadFile.
     """
-    return read_script(path)[0]
+    return read_script(path, memory, wanted)[0]
 
 
-def read_script(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def read_script(
+    path: Path, memory: Account | None = None, wanted: Callable[[str], bool] | None = None
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Tensors and modules ("1": "ReLU"; a state dict names none) of a file, by dotted names.
 
     Read-only arrays, float32 where the file holds bfloat16, else of the file's own type.  Whatever
     else the file names is refused, and nothing in it is ever called.  Raises BadFile.
     """
-    try:
-        archive = zipfile.ZipFile(path)
-    except DAMAGED:
-        raise BadFile(_no_archive(path)) from None
-    with archive:
-        members = _Members(archive, path)
-        index = index_of(members.read(INDEX, LARGEST_INDEX), path.name)
-        tensors = index.tensors
+    memory = memory or Memory().of(path)
+    if not zipfile.is_zipfile(path):
+        raise BadFile(_no_archive(path))
+    with opened_zip(path, path.name, memory) as archive:
+        members = _Members(archive, path, memory)
+        data = members.read(INDEX, LARGEST_INDEX)
+        with memory.lend(INDEX_A_BYTE * min(len(data), MOST_OPCODES), "its index of tensors"):
+            index = index_of(data, path.name)
+        tensors = {n: t for n, t in index.tensors.items() if wanted is None or wanted(n)}
         order = members.read("byteorder", 64) if members.has("byteorder") else b"little"
         if order != b"little":
             raise BadFile(f"{path.name} has its numbers in {order!r} order; save it on a PC.")
         storages = {t.storage.key: t.storage for t in tensors.values()}
         kept = {key: members.numbers(storage) for key, storage in storages.items()}
-    if not tensors:
+    if not index.tensors:
         raise BadFile(f"{path.name} holds no tensor; wanted are networks saved by torch.")
     for name, tensor in tensors.items():
         if tensor.storage != storages[tensor.storage.key]:
@@ -81,8 +83,8 @@ def _no_archive(path: Path) -> str:
 class _Members:
     """The members of an archive by name, below its one top folder.  Names are never paths."""
 
-    def __init__(self, archive: zipfile.ZipFile, path: Path) -> None:
-        self._archive, self._path = archive, path
+    def __init__(self, archive: zipfile.ZipFile, path: Path, memory: Account) -> None:
+        self._archive, self._path, self._memory = archive, path, memory
         entries = archive.infolist()
         tops = [e.filename[: -len(INDEX)] for e in entries if e.filename.endswith(INDEX)]
         tops = [top for top in tops if top == "" or (top.endswith("/") and top.count("/") == 1)]
@@ -112,6 +114,7 @@ class _Members:
                 f"{file}: {name[:80]!r} is said to have {size:,} bytes, which is more than it may "
                 "or than the file has; save it again."
             )
+        self._memory.charge(size, f"{name[:80]!r}")
         try:
             return self._archive.read(entry)
         except DAMAGED:
@@ -129,6 +132,7 @@ class _Members:
                 "it is cut off, save it again."
             )
         found = np.frombuffer(data, dtype)
+        self._memory.charge(4 * wanted if brain_float else 0, "numbers of two bytes")
         return (found.astype("<u4") << 16).view("<f4") if brain_float else found
 
 

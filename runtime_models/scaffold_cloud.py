@@ -56,6 +56,8 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
     vertex.require((*PLACE, *SCALES), path.name)
     k, width = count_columns(vertex.row.names, path.name)
     count, row = vertex.count, vertex.row
+    floats = 3 + width + 3 * k + 3 + 3  # of an anchor
+    reading.within(path).memory.charge(2 * 4 * count * floats, f"{count:,} anchors")
     cloud = Cloud(
         header,
         np.empty((count, 3), np.float32),
@@ -74,7 +76,7 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
     def work(rows: slice, own: tuple[BinaryIO, np.ndarray]) -> None:
         file, table = own[0], own[1][: rows.stop - rows.start]
         file.seek(begins + rows.start * row.itemsize)
-        if read_fully(file, memoryview(table).cast("B")) < table.nbytes:
+        if read_fully(file, memoryview(table.view(np.uint8))) < table.nbytes:
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         fill(cloud, rows, table)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Account, unlimited
 from runtime_models.model import SCAFFOLD_HEADS, BadFile, Finding, Mlp
 from runtime_models.package_files import LARGEST_NETWORK
 from runtime_models.read_onnx import read_onnx
@@ -50,9 +51,9 @@ class Networks:
     findings: tuple[Finding, ...]
 
 
-def read_networks(folder: Path, shape: Shape) -> Networks:
+def read_networks(folder: Path, shape: Shape, memory: Account) -> Networks:
     """All networks of a folder, in the file's axes.  Raises BadFile, naming what is missing."""
-    found, files = gather(folder)
+    found, files = gather(folder, memory)
     missing = [STEMS[role] for role in SCAFFOLD_HEADS if STEMS[role] not in found]
     if missing:
         raise BadFile(
@@ -70,39 +71,39 @@ def read_networks(folder: Path, shape: Shape) -> Networks:
     return Networks(mlps, files, told, findings)
 
 
-def gather(folder: Path) -> tuple[dict[str, Callable], tuple[str, ...]]:
+def gather(folder: Path, memory: Account) -> tuple[dict[str, Callable], tuple[str, ...]]:
     """stem -> a function that reads it (networks: given the activation); and the files' names."""
     found, files = {}, []
     for stem in (*STEMS.values(), APPEARANCE):
         script, graph = folder / f"{stem}.pt", folder / f"{stem}.onnx"
         if script.is_file():
-            found[stem] = from_tensors(*read_torch_file(script), script.name, stem)
+            found[stem] = from_tensors(*read_torch_file(script, memory), script.name, stem, memory)
             files.append(script.name)
         elif graph.is_file() and stem != APPEARANCE:
-            found[stem] = from_graph(graph)
+            found[stem] = from_graph(graph, memory)
             files.append(graph.name)
     united = folder / UNITED
     if any(STEMS[role] not in found for role in SCAFFOLD_HEADS) and united.is_file():
-        tensors, _ = read_torch_file(united)
+        tensors, _ = read_torch_file(united, memory)
         files.append(UNITED)
         for stem, key in IN_UNITED.items():
             mine = {name: t for name, t in tensors.items() if name.startswith(f"{key}.")}
             if mine and stem not in found:
-                found[stem] = from_tensors(mine, {}, f"{UNITED} ({key})", stem)
+                found[stem] = from_tensors(mine, {}, f"{UNITED} ({key})", stem, memory)
     return found, tuple(files)
 
 
-def read_torch_file(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def read_torch_file(path: Path, memory: Account) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     if path.stat().st_size > LARGEST_NETWORK:
         raise BadFile(
             f"{path.name} has {path.stat().st_size:,} bytes; a network of at most "
             f"{LARGEST_NETWORK:,} is read."
         )
-    return read_script(path)
+    return read_script(path, memory)
 
 
 def from_tensors(
-    tensors: dict[str, np.ndarray], modules: dict[str, str], name: str, stem: str
+    tensors: dict[str, np.ndarray], modules: dict[str, str], name: str, stem: str, memory: Account
 ) -> Callable:
     if stem == APPEARANCE:
         return lambda _: embedding_of(tensors, name)
@@ -115,14 +116,15 @@ def from_tensors(
             f"{name} is {', '.join(kinds[:9])}; a network of Scaffold-GS is Linear, ReLU, Linear"
             f"{'' if wanted == 'Linear' else ', ' + wanted}."
         )
-    return lambda activation: mlp_of(tensors, name, activation)
+    return lambda activation: mlp_of(tensors, name, activation, memory)
 
 
-def from_graph(path: Path) -> Callable:
+def from_graph(path: Path, memory: Account) -> Callable:
     """An ONNX graph says itself how it ends."""
     if path.stat().st_size > LARGEST_NETWORK:
         raise BadFile(f"{path.name} has {path.stat().st_size:,} bytes, no network of this kind.")
-    return lambda _: read_onnx(path.read_bytes(), path.name, ())
+    memory.charge(path.stat().st_size, path.name)
+    return lambda _: read_onnx(path.read_bytes(), path.name, (), memory)
 
 
 def embedding_of(tensors: dict[str, np.ndarray], name: str) -> np.ndarray:
@@ -133,8 +135,11 @@ def embedding_of(tensors: dict[str, np.ndarray], name: str) -> np.ndarray:
     return tables[0].astype(np.float32)
 
 
-def mlp_of(tensors: dict[str, np.ndarray], name: str, activation: str) -> Mlp:
+def mlp_of(
+    tensors: dict[str, np.ndarray], name: str, activation: str, memory: Account | None = None
+) -> Mlp:
     """A torch.nn.Sequential of Linear and ReLU by its parameters "0.weight", "0.bias", ..."""
+    memory = memory or unlimited()
     layers: dict[int, dict[str, np.ndarray]] = {}
     for label, tensor in tensors.items():
         if not (match := LAYER.fullmatch(label)):
@@ -147,6 +152,7 @@ def mlp_of(tensors: dict[str, np.ndarray], name: str, activation: str) -> Mlp:
         fits = fits and bias.shape == weight.shape[:1]
         if not fits or (weights and weight.shape[1] != len(weights[-1])):
             raise BadFile(f"{name}: layer {number} does not fit the one before; save it again.")
+        memory.charge(3 * 4 * weight.size, f"layer {number} of {name}")
         with np.errstate(over="ignore"):
             weights.append(weight.astype(np.float32))
             biases.append(bias.astype(np.float32))

@@ -9,13 +9,15 @@ from typing import IO
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from runtime_models.memory import JSON_A_BYTE, Account
 from runtime_models.model import BadFile
-from runtime_models.package_files import DAMAGED
+from runtime_models.zip_files import DAMAGED, KNOWN, opened_zip
 
 META = "meta.json"
 LARGEST_META = 4 << 20  # bytes; real ones have some kilobytes
 LONGEST_NAME = 255  # bytes, of a file or a folder on disks
 SMALL = 1 << 16  # bytes that any file may have
+DECODED = 12  # bytes a pixel that a decoder and its copies take beside the pixels that come out
 # Pillow on a damaged or hostile picture; DecompressionBombError is no ValueError.
 UNREADABLE = (
     UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError, SyntaxError,
@@ -26,18 +28,21 @@ UNREADABLE = (
 class SogFiles:
     """A SOG's folder (or its meta.json) or zip; names that would leave it are refused."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, memory: Account) -> None:
         self.path, self.name = path, path.name  # the name is for messages
+        self.memory, self.held = memory, 0  # bytes of pictures that are charged
         self.folder = path if path.is_dir() else path.parent if path.name == META else None
         if path.name == META:
             self.name = f"{path.parent.name}/{META}"
 
     def meta(self) -> dict:
         """What meta.json says.  Raises BadFile."""
-        return parse_json(self.read(META, LARGEST_META), f"{self.name}: its {META}")
+        data = self.read(META, LARGEST_META)
+        self.memory.charge(JSON_A_BYTE * len(data), f"its {META}")
+        return parse_json(data, f"{self.name}: its {META}")
 
     def image(self, name: str, least: int, most: int) -> np.ndarray:
-        """(H, W, 4) uint8 of a WebP with `least` to `most` pixels.  Raises BadFile."""
+        """(H, W, 4) uint8 of a WebP with `least` to `most` pixels, charged.  Raises BadFile."""
         data = self.read(name, 5 * most + SMALL)  # more than uncoded pixels take
         width, height = webp_size(data)
         if not least <= width * height <= most:
@@ -45,19 +50,17 @@ class SogFiles:
                 f"{self.name}: {name[:60]!r} has {width} x {height} pixels, expected {least:,} to "
                 f"{most:,}; it is no WebP or not of this scene, export it again."
             )
-        try:
-            with Image.open(io.BytesIO(data), formats=("WEBP",)) as picture:
-                if picture.size == (width, height):
-                    return np.asarray(picture.convert("RGBA"))
-        except UNREADABLE:
-            pass
+        pixels = width * height
+        self.memory.charge(4 * pixels, f"the picture {name[:60]!r}")
+        self.held += 4 * pixels
+        with self.memory.lend(DECODED * pixels + len(data), f"decoding {name[:60]!r}"):
+            try:
+                with Image.open(io.BytesIO(data), formats=("WEBP",)) as picture:
+                    if picture.size == (width, height):
+                        return np.asarray(picture.convert("RGBA"))
+            except UNREADABLE:
+                pass
         raise BadFile(f"{self.name}: {name[:60]!r} is no WebP that can be read; copy it again.")
-
-    def bytes_of(self, names: list[str]) -> int:
-        """How many bytes the named files take on the disk; of a zip, all of it."""
-        if self.folder is None:
-            return self.path.stat().st_size
-        return sum(self._file(name).stat().st_size for name in names)
 
     def read(self, name: str, limit: int) -> bytes:
         """One file.  Raises BadFile: a name outside, no such file, more than `limit` bytes."""
@@ -66,24 +69,26 @@ class SogFiles:
             with file.open("rb") as stream:
                 return self._bounded(stream, name, limit, file.stat().st_size)
         check_name(name, self.name)
-        try:
-            with zipfile.ZipFile(self.path) as archive:
-                entry = find_entry(archive, name)
-                if entry is None or entry.compress_size > self.path.stat().st_size:
-                    raise BadFile(f"{self.name} does not hold {name[:60]!r} just once; copy it.")
+        with opened_zip(self.path, self.name, self.memory) as archive:
+            entry = find_entry(archive, name)
+            if entry is None or entry.compress_type not in KNOWN:
+                raise BadFile(f"{self.name} does not hold {name[:60]!r} just once; copy it.")
+            try:
                 with archive.open(entry) as stream:
                     return self._bounded(stream, name, limit, entry.file_size)
-        except BadFile:
-            raise
-        except DAMAGED:
-            raise BadFile(f"{self.name}: {name[:60]!r} cannot be unpacked; copy it.") from None
+            except BadFile:
+                raise
+            except DAMAGED:
+                raise BadFile(f"{self.name}: {name[:60]!r} cannot be unpacked; copy it.") from None
 
     def _file(self, name: str) -> Path:
         return file_inside(self.folder, name, self.name)
 
     def _bounded(self, stream: IO[bytes], name: str, limit: int, stated: int) -> bytes:
-        if stated <= limit and len(data := stream.read(stated + 1)) <= stated:
-            return data
+        if stated <= limit:
+            with self.memory.lend(stated, f"{name[:60]!r}"):
+                if len(data := stream.read(stated + 1)) <= stated:
+                    return data
         raise BadFile(
             f"{self.name}: {name[:60]!r} has more than the {limit:,} bytes that its splats need."
         )

@@ -37,8 +37,3 @@ def shade(sh: np.ndarray, direction: np.ndarray) -> np.ndarray:
     out = (basis(direction, sh.shape[1])[:, None] @ sh)[:, 0]
     out += 0.5
     return np.maximum(out, 0, out=out)
-
-
-# Turning the world by half a turn about x takes y, z to -y, -z: a function changes its sign
-# where y and z together stand in it an odd number of times.
-HALF_TURN_SIGNS = np.array([1, -1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], np.float32)

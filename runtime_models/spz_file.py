@@ -8,6 +8,7 @@ import struct
 import zlib
 from dataclasses import dataclass
 
+from runtime_models.memory import Account
 from runtime_models.model import BadFile
 
 MAGIC = b"NGSP"
@@ -20,9 +21,6 @@ ANTIALIASED, EXTENSIONS = 1, 2  # flags
 REST = (0, 3, 8, 15, 24)  # coefficients beyond the first, by SH degree
 MOST_FRACTIONAL_BITS = 30
 
-# A header may claim no more than this: real scenes pack 2 to 8 times, flat test data up to 30.
-MOST_RATIO = 32  # decompressed bytes a byte of the file
-ALWAYS_FREE = 1 << 24  # decompressed bytes that any file may have
 MOST_EXTENSION_BYTES = 1 << 16
 PIECE = 1 << 16  # bytes of a gzip stream that are given to zlib at a time
 
@@ -77,6 +75,15 @@ class Spz:
         return read_extensions(data) if self.header.flags & EXTENSIONS else {}
 
 
+def count_in(head: bytes, file: str) -> int:
+    """The splats that a file of these first bytes says that it has.  Raises BadFile."""
+    if head[:2] == GZIP:
+        head = Inflate(head, file).take(LEGACY_HEADER.size)
+    if len(head) < LEGACY_HEADER.size or head[:4] != MAGIC:
+        raise BadFile(f"{file} does not begin with NGSP, as an .spz does.")
+    return LEGACY_HEADER.unpack_from(head)[2]
+
+
 def is_spz(head: bytes) -> bool:
     """Whether a file begins as one: plainly, or with a gzip stream of one."""
     if head[:2] == GZIP:
@@ -87,17 +94,20 @@ def is_spz(head: bytes) -> bool:
     return head[:4] == MAGIC
 
 
-def unpack_spz(data: bytes, file: str) -> Spz:
-    """The container of a whole file in memory, nothing of it decompressed yet.  Raises BadFile."""
+def unpack_spz(data: bytes, file: str, memory: Account) -> Spz:
+    """The container of a whole file in memory, nothing of it decompressed yet.  Raises BadFile.
+
+    What decompressing takes by itself is charged; the splats are for whoever takes them.
+    """
     if data[:4] != MAGIC and data[:2] != GZIP:
         raise BadFile(f"{file} begins neither with NGSP nor as gzip, as an .spz does.")
     if data[:4] == MAGIC and int.from_bytes(data[4:8], "little") >= 4:
-        return unpack_zstd(data, file)
+        return unpack_zstd(data, file, memory)
     return unpack_legacy(data, file)
 
 
-def checked(header: SpzHeader, size: int) -> SpzHeader:
-    """The header, believable for a file of `size` bytes.  Raises BadFile."""
+def checked(header: SpzHeader) -> SpzHeader:
+    """The header, believable.  Raises BadFile."""
     file = header.file
     if not 1 <= header.version <= 4:
         raise BadFile(f"{file} is .spz version {header.version}; 1 to 4 are known.")
@@ -110,12 +120,6 @@ def checked(header: SpzHeader, size: int) -> SpzHeader:
         )
     if header.count == 0:
         raise BadFile(f"{file} has no splats.")
-    needed = sum(header.sizes)
-    if needed > max(MOST_RATIO * size, ALWAYS_FREE):
-        raise BadFile(
-            f"{file} says that it has {header.count:,} splats, {needed:,} bytes, out of {size:,}: "
-            f"more than {MOST_RATIO} times as many; its header is wrong."
-        )
     return header
 
 
@@ -128,7 +132,7 @@ def unpack_legacy(data: bytes, file: str) -> Spz:
     _, version, count, degree, bits, flags, _ = LEGACY_HEADER.unpack(head)
     if version >= 4:
         raise BadFile(f"{file} is .spz version {version} inside gzip; 1 to 3 are there.")
-    header = checked(SpzHeader(version, count, degree, bits, flags, file), len(data))
+    header = checked(SpzHeader(version, count, degree, bits, flags, file))
     return Spz(header, inflate, None)
 
 
@@ -170,12 +174,12 @@ class Inflate:
         return b"".join(parts)
 
 
-def unpack_zstd(data: bytes, file: str) -> Spz:
+def unpack_zstd(data: bytes, file: str, memory: Account) -> Spz:
     """Version 4."""
     if len(data) < HEADER.size:
         raise BadFile(f"{file} is cut off in its header, {len(data)} bytes.")
     _, version, count, degree, bits, flags, streams, table = HEADER.unpack_from(data)
-    header = checked(SpzHeader(version, count, degree, bits, flags, file), len(data))
+    header = checked(SpzHeader(version, count, degree, bits, flags, file))
     sizes = [size for size in header.sizes if size]
     at = table + streams * TABLE_ROW.size
     if streams != len(sizes) or table < HEADER.size or at > len(data):
@@ -194,14 +198,15 @@ def unpack_zstd(data: bytes, file: str) -> Spz:
         packed_streams.append((memoryview(data)[at : at + packed], size))
         at += packed
     extensions = data[HEADER.size : table] if flags & EXTENSIONS else b""
-    return Spz(header, Zstd(packed_streams, file), extensions)
+    return Spz(header, Zstd(packed_streams, file, memory), extensions)
 
 
 class Zstd:
     """Streams of zstd one after the other, taken piece by piece; a piece lies within one."""
 
-    def __init__(self, packed: list[tuple[memoryview, int]], file: str) -> None:
+    def __init__(self, packed: list[tuple[memoryview, int]], file: str, memory: Account) -> None:
         self._packed, self._file, self._opened = packed, file, 0
+        self._memory, self._window = memory, 0  # bytes that the open stream looks back on
         self._at = self._size = 0  # decompressed bytes, of the stream that is open
 
     def take(self, size: int) -> bytearray:
@@ -210,6 +215,7 @@ class Zstd:
 
         if self._at == self._size:
             data, self._size = self._packed[self._opened]
+            self._charge(data)
             self._stream = zstandard.ZstdDecompressor().stream_reader(data)
             self._opened, self._at = self._opened + 1, 0
         out, had = bytearray(size), 0
@@ -226,6 +232,19 @@ class Zstd:
             became = "more" if more else f"{self._at:,}"
             raise BadFile(f"{what} becomes {became} bytes, expected {self._size:,}.")
         return out
+
+    def _charge(self, data: memoryview) -> None:
+        """For the window of the next stream: a frame of some bytes may ask for 128 MB."""
+        import zstandard
+
+        try:
+            frame = zstandard.get_frame_parameters(data)
+        except zstandard.ZstdError as error:
+            what = f"{self._file}: stream {self._opened}"
+            raise BadFile(f"{what} is broken ({error}).") from error
+        self._memory.release(self._window)
+        self._window = frame.window_size
+        self._memory.charge(self._window, "unpacking it")
 
 
 def read_extensions(data: bytes) -> dict[int, bytes]:

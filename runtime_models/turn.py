@@ -8,13 +8,10 @@ import numpy as np
 from runtime_models.blocks import BLOCK, each_block
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import AXES, PlainSplats
-from runtime_models.spherical_harmonics import HALF_TURN_SIGNS, basis
+from runtime_models.spherical_harmonics import basis
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
-PLACE_SIGNS = np.array([1, -1, -1], np.float32)  # of that half turn
-TILED_SIGNS = np.tile(PLACE_SIGNS, 4 * BLOCK)  # of the longest block
-QUATERNION_SIGNS = np.array([-1, 1, -1, 1], np.float32)  # of x w z y
-HARMONIC_SIGNS = np.repeat(HALF_TURN_SIGNS, 3)  # of every channel
+HALF_TURN_Y = np.diag([-1.0, 1.0, -1.0])  # between glTF's axes (left, up, front) and ours
 UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0])  # about z
 OURS_FROM_UP = {
     "+Y": np.eye(3),
@@ -26,11 +23,15 @@ OURS_FROM_UP = {
 }  # rotations that bring the named axis to +Y
 
 
-def ours_from_file(up: str, flip: bool = False) -> np.ndarray:
-    """(3, 3) the turn that brings the file's axis `up` to our +Y.  Raises BadFile."""
+def ours_from_file(up: str, flip: bool = False, front: bool = False) -> np.ndarray:
+    """(3, 3) the turn that brings the file's axis `up` to our +Y.  Raises BadFile.
+
+    front: half a turn about +Y after that; flip: half a turn about z at last.
+    """
     if up not in AXES:
         raise BadFile(f"the axis that points up is {up!r}; {', '.join(AXES)} are known.")
-    return UPSIDE_DOWN @ OURS_FROM_UP[up] if flip else OURS_FROM_UP[up]
+    turned = HALF_TURN_Y @ OURS_FROM_UP[up] if front else OURS_FROM_UP[up]
+    return UPSIDE_DOWN @ turned if flip else turned
 
 
 def turn(splats: PlainSplats, rotation: np.ndarray) -> PlainSplats:
@@ -53,8 +54,8 @@ def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
     """A function that turns, in place, rows of means (n, 3), wxyz (n, 4) and sh (n, count, 3)."""
     if np.array_equal(rotation, np.eye(3)):
         return lambda means, wxyz, sh: None
-    if np.array_equal(rotation, HALF_TURN):
-        return turn_rows_half
+    if np.array_equal(np.abs(rotation), np.eye(3)):
+        return half_turner(rotation.diagonal(), count)
     harmonics = turn_harmonics(rotation, count)
 
     def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
@@ -65,22 +66,48 @@ def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
     return turn_rows
 
 
-def turn_rows_half(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
-    """Half a turn about x, in place: nothing but signs, and quaternions (0, 1, 0, 0) * wxyz."""
-    if means.flags.c_contiguous and 3 * len(means) <= len(TILED_SIGNS):
-        flat = means.reshape(-1)  # one long loop, not one of three for each
-        flat *= TILED_SIGNS[: flat.size]
-    else:
-        means *= PLACE_SIGNS
-    wxyz[:] = wxyz.take((1, 0, 3, 2), axis=1)
-    wxyz *= QUATERNION_SIGNS
-    if sh.shape[1] == 1:
-        return
-    if sh.flags.c_contiguous:
-        flat = sh.reshape(len(sh), -1)  # one long loop a splat, not many of three
-        flat *= HARMONIC_SIGNS[: flat.shape[1]]
-    else:
-        sh *= HALF_TURN_SIGNS[: sh.shape[1], None]
+def half_turner(signs: np.ndarray, count: int) -> Callable[..., None]:
+    """turner() of half a turn about the axis whose sign (3,) is +1: nothing but signs.
+
+    A quaternion times that of the half turn is itself in another order, with signs.
+    """
+    axis = 1 + int(signs.argmax())
+    other = [i for i in (1, 2, 3) if i != axis]
+    order = np.array([axis, *(0 if i == axis else 6 - axis - i for i in (1, 2, 3))])
+    quaternion_signs = np.ones(4, np.float32)
+    quaternion_signs[[0, other[0], other[1]]] = -1, *((-1, 1) if axis != 2 else (1, -1))
+    tiled = np.tile(signs.astype(np.float32), 4 * BLOCK)  # of the longest block
+    harmonic_signs = signs_of_harmonics(signs, count)  # (count,)
+    every_channel = np.repeat(harmonic_signs, 3)
+
+    def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+        if means.flags.c_contiguous and 3 * len(means) <= len(tiled):
+            flat = means.reshape(-1)  # one long loop, not one of three for each
+            flat *= tiled[: flat.size]
+        else:
+            means *= tiled[:3]
+        wxyz[:] = wxyz.take(order, axis=1)
+        wxyz *= quaternion_signs
+        if sh.shape[1] == 1:
+            return
+        if sh.flags.c_contiguous:
+            flat = sh.reshape(len(sh), -1)  # one long loop a splat, not many of three
+            flat *= every_channel
+        else:
+            sh *= harmonic_signs[:, None]
+
+    return turn_rows
+
+
+def signs_of_harmonics(signs: np.ndarray, count: int) -> np.ndarray:
+    """(count,) float32: of each basis function after half a turn of the world, itself or minus it.
+
+    Told by its values at directions before and after the turn.
+    """
+    directions = np.random.default_rng(0).normal(size=(8, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    before, after = basis(directions * signs, count), basis(directions, count)
+    return np.sign((before * after).sum(axis=0)).astype(np.float32)
 
 
 def turn_quaternions(wxyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:

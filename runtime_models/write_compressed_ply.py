@@ -20,7 +20,7 @@ from runtime_models.read_compressed_ply import (
     SH_SPAN,
 )
 from runtime_models.spherical_harmonics import C0
-from runtime_models.turn import HALF_TURN, PLACE_SIGNS, turner
+from runtime_models.turn import HALF_TURN, turner
 from runtime_models.whole_file import write_whole
 
 LOG_SCALES = (-20.0, 20.0)  # 2e-9 m to 5e8 m, as the format's own writer cuts them
@@ -33,7 +33,7 @@ def write_compressed_ply(splats: PlainSplats, path: str | Path) -> None:
     scale, 1/510 in opacity and of a chunk's range in colour, 7e-4 in a quaternion's entries, 1/64
     in the other harmonics (1/32 at their ends, which are -4 and 4).
     """
-    order = morton_order(splats.means * PLACE_SIGNS)
+    order = morton_order(splats.means * np.diagonal(HALF_TURN).astype(np.float32))
     ranges, packed = chunks_and_splats(splats, order)
     rest = 3 * (splats.sh.shape[1] - 1)
     head = header(len(ranges), len(order), rest, splats.antialiased)

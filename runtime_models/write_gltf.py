@@ -1,4 +1,7 @@
-"""Plain splats to a .glb, glTF 2.0 with KHR_gaussian_splatting; its axes are ours."""
+"""Plain splats to a .glb, glTF 2.0 with KHR_gaussian_splatting.
+
+glTF's axes are left, up, front: half a turn about +Y from ours.
+"""
 
 import json
 import struct
@@ -7,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.gltf_files import BINARY_CHUNK, JSON_CHUNK, MAGIC
+from runtime_models.gltf_files import BINARY_CHUNK, GENERATOR, JSON_CHUNK, MAGIC
 from runtime_models.model import BadFile
 from runtime_models.plain_splats import PlainSplats
 from runtime_models.read_gltf import PREFIX, SPLATS
 from runtime_models.spherical_harmonics import C0
+from runtime_models.turn import HALF_TURN_Y, turn
 from runtime_models.whole_file import write_whole
 
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
@@ -26,6 +30,7 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
     COLOR_0 is for programs that know no splats and show points.  Raises BadFile over 4 GB, which
     the format's lengths cannot say.
     """
+    splats = turn(splats, HALF_TURN_Y)
     arrays = attributes_of(splats)
     views, accessors, place = [], [], 0
     for name, array in arrays.items():
@@ -61,7 +66,7 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
     if any(splats.origin):
         node["translation"] = list(splats.origin)
     asset = {
-        "asset": {"version": "2.0", "generator": "Shapeshift"},
+        "asset": {"version": "2.0", "generator": f"{GENERATOR} 0.5"},
         "extensionsUsed": [SPLATS],
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -82,7 +87,8 @@ def attributes_of(splats: PlainSplats) -> dict[str, np.ndarray]:
     arrays = {
         "POSITION": splats.means,
         "COLOR_0": np.round(points * 255).astype(np.uint8),
-        f"{PREFIX}ROTATION": splats.wxyz[:, [1, 2, 3, 0]],
+        # Two half turns of a quaternion are its minus: like this it comes back as it was.
+        f"{PREFIX}ROTATION": -splats.wxyz[:, [1, 2, 3, 0]],
         f"{PREFIX}SCALE": splats.scales,
         f"{PREFIX}OPACITY": splats.opacity.clip(0, 1)[:, None],
     }

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.feature_codes import encode_features
+from runtime_models.memory import Memory
 from runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST, open_package
 from runtime_models.read_package import read_files
@@ -118,7 +119,7 @@ def refuse_foreign(path: Path) -> None:
     if path.is_dir() == (path.suffix == ".shift"):
         raise BadFile(f"{path} exists and is no package of that kind; choose another name.")
     try:
-        manifest = json.loads(open_package(path)(MANIFEST))
+        manifest = json.loads(open_package(path, Memory().of(path))(MANIFEST))
         ours = str(manifest["format"]).startswith(FORMAT.split()[0])
     except (ValueError, KeyError, TypeError, RecursionError):
         ours = False

@@ -12,6 +12,7 @@ from runtime_models.read_layers import joined, moved, widened
 from runtime_models.recentre import FINE
 from runtime_models.spherical_harmonics import COEFFICIENTS
 from runtime_models.turn import turn
+from runtime_models.usd.read_usd import refuse_without
 
 FEW = 4  # columns that are named
 
@@ -21,15 +22,16 @@ class Writer:
     name: str
     ending: str
     sh_degree: int  # the highest that it holds
-    function: str  # of the module of the same name
+    function: str  # of the module of the same name, with the folder that it is in
     antialiased: bool = True  # has a place for the flag
     columns: bool = False  # has a place for labels and other columns
     far: bool = True  # keeps places far from zero, or refuses them
+    also: tuple[str, ...] = ()  # further endings
 
     def write(self, splats: PlainSplats, path: Path) -> None:
         """Atomic; what the format cannot hold is lost."""
         module = importlib.import_module(f"runtime_models.{self.function}")
-        getattr(module, self.function)(splats, path)
+        getattr(module, self.function.rpartition(".")[2])(splats, path)
 
 
 WRITERS = (  # of two endings that fit a name, the longer one stands first
@@ -38,15 +40,18 @@ WRITERS = (  # of two endings that fit a name, the longer one stands first
     Writer("spz", ".spz", 3, "write_spz"),
     Writer("glTF", ".glb", 3, "write_gltf", antialiased=False),
     Writer(".splat", ".splat", 0, "write_splat", antialiased=False, far=False),
+    Writer("USD", ".usdz", 3, "usd.write_usd", False, also=(".usd", ".usda", ".usdc")),
 )
 
 
 def writer_of(path: Path) -> Writer:
     """Who writes a file of that name.  Raises BadFile."""
     for writer in WRITERS:
-        if path.name.lower().endswith(writer.ending):
+        if path.name.lower().endswith((writer.ending, *writer.also)):
+            if writer.name == "USD":
+                refuse_without(path)
             return writer
-    endings = ", ".join(writer.ending for writer in WRITERS)
+    endings = ", ".join(ending for writer in WRITERS for ending in (writer.ending, *writer.also))
     raise BadFile(f"{path} has no ending that can be written; known are {endings}.")
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import read_text_file
 from runtime_models.model import BadFile
 
 MODELS = ("sparse/0", "sparse", "colmap/sparse/0", ".")  # where a folder may hold its model
@@ -188,8 +189,9 @@ def images_of_text(path: Path) -> list[Posed]:
 
 
 def text_lines(path: Path) -> list[str]:
+    text = read_text_file(path, "its lines")
     try:
-        return path.read_text(encoding="utf-8").split("\n")
+        return text.decode("utf-8").split("\n")
     except UnicodeDecodeError:
         raise BadFile(f"{path} is not text, whatever its name says; {AGAIN}.") from None
 

@@ -1,15 +1,17 @@
 """Depth photos: what a frame says of them, and their metres in the size that is asked for."""
 
+import math
 import os
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Memory
 from runtime_models.model import BadFile
-from runtime_models.read_package import BAD_HEADER
+from runtime_models.npy import BAD_HEADER
 from scene.capture import Capture, Photo
 from scene.json_values import is_number, shortened, shown, text_in
-from scene.photo import BROKEN, GREY_16, MOST_PIXELS, open_image, quiet
+from scene.photo import BROKEN, GREY_16, MOST_PIXELS, charge_pixels, open_image, quiet
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
 UNITS = ("depth_unit", "integer_depth_scale")  # ours; instant-ngp's
@@ -17,6 +19,7 @@ MILLIMETRES = 0.001  # metres a step where nothing is said
 ASPECT = 0.02  # by how much a depth photo may be wider or narrower than its photo
 LOOKED_AT, FEW_POINTS = 3, 30  # photos, points: to tell whether a unit can be right
 OTHER_UNIT = 8  # times: more than this the points of a scene do not lie behind what is seen
+DEPTH = 12  # bytes of memory a number of a .npy
 FARTHEST = 1e6  # metres: beyond that nothing was measured
 
 
@@ -68,8 +71,8 @@ def load_depth(photo: Photo, size: tuple[int, int] | None = None) -> np.ndarray:
             photo.depth_unit if values.dtype.kind != "f" else 1
         )
     else:
-        values = _integers(path) * np.float32(photo.depth_unit)
-    values = values.astype(np.float32)
+        values = _integers(path, math.prod(photo.view.size))
+        values *= np.float32(photo.depth_unit)
     known = (values > 0) & (values <= FARTHEST)  # NaN is not
     values[~known] = 0
     return values if size is None else at_centres(values, size)
@@ -126,11 +129,13 @@ def _over_points(photo: Photo, points: np.ndarray) -> np.ndarray:
     return (seen / z[inside])[seen > 0]
 
 
-def _integers(path: Path) -> np.ndarray:
-    """(H, W) float32 steps of a 16-bit image; 65535 stands for all that is too far."""
+def _integers(path: Path, most: int) -> np.ndarray:
+    """(H, W) float32 steps of a 16-bit image; 65535 stands for all that is too far.
+
+    most: pixels of the photo that it goes with.
+    """
     with open_image(path) as image:
-        if image.width * image.height > MOST_PIXELS:
-            raise BadFile(f"{shortened(path)}: over {MOST_PIXELS:,} pixels; scale it down")
+        charge_pixels(path, image.size, most)
         try:
             with quiet():
                 image.load()
@@ -153,4 +158,5 @@ def _array(path: Path) -> np.ndarray:
             f"{where}: a depth photo is (H, W) numbers, this is {values.shape!s:.40} of "
             f"{values.dtype}"
         )
+    Memory().of(path).charge(DEPTH * values.size, f"{values.size:,} numbers")
     return values

@@ -1,7 +1,7 @@
 """Points out of LAS and LAZ files, and a process of its own for the latter: see read_las.py.
 
-`python -P las_run.py IN.laz OUT.npz MOST`: laszip's decoder ends the process, panics, or decodes
-for minutes on some damaged files; none of this may happen to the program.
+`python -P las_run.py IN.laz OUT.npz MOST BYTES`: laszip's decoder ends the process, panics, or
+decodes for minutes on some damaged files; none of this may happen to the program.
 """
 
 import os
@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-CHUNK = 500_000  # points in memory at a time
+CHUNK = 200_000  # points in memory at a time
+CHUNK_BYTES = 8 << 20  # of records in memory at a time: some are 64 kB long
 UNPACKED = 100  # times its size that a LAZ may unpack to; scanners' are 4 to 15 times
+UNKNOWN = 2 << 30  # bytes that a process has taken, where the system does not tell
 REFUSED = 2  # exit code where the last line of standard error says what is wrong
-# What the process may take: seconds of processor time and bytes, and both for each byte of the file
-SECONDS, BYTES = 5, 2 << 30
-SECONDS_A_BYTE, BYTES_A_BYTE = 1e-6, 200
+# Seconds of processor time that the process may take, and more for each byte of the file
+SECONDS, SECONDS_A_BYTE = 5, 1e-6
 
 
 class Unreadable(ValueError):
@@ -43,7 +44,8 @@ def las_points(path: Path, most: int, chunk_points: int = CHUNK) -> tuple[np.nda
             if count * size > there * (UNPACKED if file.header.are_points_compressed else 1):
                 raise Unreadable(f"states {count:,} points of {size} bytes in {there:,} bytes")
             parts, step, at = [], max(-(-count // most), 1), 0
-            for chunk in file.chunk_iterator(chunk_points):
+            at_once = max(min(chunk_points, CHUNK_BYTES // max(size, 1)), 1)
+            for chunk in file.chunk_iterator(at_once):
                 rows = slice(-at % step, None, step)
                 parts.append(np.stack([np.asarray(chunk[c])[rows] for c in "xyz"], axis=1))
                 at += len(chunk)
@@ -57,26 +59,32 @@ def las_points(path: Path, most: int, chunk_points: int = CHUNK) -> tuple[np.nda
     return np.concatenate(parts).astype(np.float64), count
 
 
-def limit(size: int) -> None:
+def limit(size: int, memory: int) -> None:
     """Where the system can do so: not more time and memory than a file of so many bytes needs."""
+    import lazrs  # noqa: F401
+
     try:
         import resource
     except ImportError:
         return
+    try:
+        taken = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        taken = UNKNOWN
     seconds = round(SECONDS + SECONDS_A_BYTE * size)
     for what, most in (
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_CPU, seconds),
-        (resource.RLIMIT_AS, BYTES + BYTES_A_BYTE * size),
+        (resource.RLIMIT_AS, taken + memory),
     ):
         hard = resource.getrlimit(what)[1]
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(what, (most, hard))
 
 
-def main(given: str, wanted: str, most: str) -> None:
+def main(given: str, wanted: str, most: str, memory: str) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # each thread would reserve memory
-    limit(os.path.getsize(given))
+    limit(os.path.getsize(given), int(memory))
     try:
         points, count = las_points(Path(given), int(most))
     except Unreadable as error:

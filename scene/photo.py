@@ -1,5 +1,6 @@
 """The pixels of a photo and of its mask, in the size that is asked for."""
 
+import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,12 +9,16 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from runtime_models.memory import GB, VARIABLE, Memory
 from runtime_models.model import BadFile
 from scene.capture import Photo
 
 MOST_PIXELS = 1 << 27
-# Of one colour a picture packs 1000 pixels into a byte; 4K may pack better still.
-FREE_PIXELS, PIXELS_A_BYTE = 1 << 23, 1024
+# Photos pack 2 to 16 pixels into a byte, a rendering before one colour 40, a mask a thousand: that
+# may have as many as the photo that it is for.  What is small may pack as it likes, 4K is.
+FREE_PIXELS, PIXELS_A_BYTE = 1 << 23, 32
+PIXEL = 28  # bytes of memory: decoded, converted, as floats
+ROWS = 256  # that become floats at a time
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, RuntimeError)  # of Pillow, in broken files
 FLOATS = "F"  # how PIL names floating-point greyscale
 GREY_16 = ("I;16", "I;16B", "I;16L", "I")  # how PIL names 16-bit greyscale
@@ -50,7 +55,9 @@ def load_photo(
     reached by the mean over each new pixel's area.
     """
     rgb, alpha = read_pixels(photo.path, photo.counts)
-    mask = alpha if photo.mask is None else read_pixels(photo.mask)[0].mean(axis=2)
+    mask, pixels = alpha, rgb.shape[0] * rgb.shape[1]
+    if photo.mask is not None:
+        mask = read_pixels(photo.mask, most=pixels)[0].mean(axis=2)
     if mask is not None and mask.shape != rgb.shape[:2]:
         raise BadFile(
             f"{photo.mask}: the mask has {mask.shape[1]}x{mask.shape[0]} pixels, its photo "
@@ -62,17 +69,14 @@ def load_photo(
 
 
 def read_pixels(
-    path: Path, counts: tuple[float, float] | None = None
+    path: Path, counts: tuple[float, float] | None = None, most: int = 0
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """rgb and alpha or None, as load_photo gives them; counts: what stands for 0 and 1."""
+    """rgb and alpha or None, as load_photo gives them; counts: what stands for 0 and 1.
+
+    most: pixels that it may have however few its bytes, where a photo of as many goes with it.
+    """
     with open_image(path) as image:
-        size = path.stat().st_size
-        most = min(MOST_PIXELS, max(FREE_PIXELS, PIXELS_A_BYTE * size))
-        if image.width * image.height > most:
-            raise BadFile(
-                f"{path}: {image.width}x{image.height} pixels, at most {most:,} are read out of "
-                f"{size:,} bytes; scale it down or save it again"
-            )
+        charge_pixels(path, image.size, most)
         try:
             with quiet():
                 image.load()
@@ -82,9 +86,36 @@ def read_pixels(
             grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return np.repeat(grey[..., None], 3, axis=2), None
         if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
-            rgba = np.asarray(image.convert("RGBA"), np.float32) / 255
-            return rgba[..., :3] * rgba[..., 3:], rgba[..., 3].copy()
-        return np.asarray(image.convert("RGB"), np.float32) / 255, None
+            rgba = floats(image, "RGBA")
+            alpha = rgba[..., 3].copy()
+            rgba[..., :3] *= rgba[..., 3:]
+            return np.ascontiguousarray(rgba[..., :3]), alpha
+        return floats(image, "RGB"), None
+
+
+def charge_pixels(path: Path, size: tuple[int, int], most: int = 0) -> None:
+    """BadFile where a picture has more pixels than its bytes can mean, or than there is memory."""
+    bytes_there, pixels, whole = path.stat().st_size, size[0] * size[1], Memory()
+    usual = min(MOST_PIXELS, max(FREE_PIXELS, PIXELS_A_BYTE * bytes_there, most))
+    if pixels > (MOST_PIXELS if whole.asked else usual):
+        allow = math.ceil(PIXEL * pixels / GB)
+        more = f", or set {VARIABLE}={allow} (GB)" if pixels <= MOST_PIXELS else ""
+        raise BadFile(
+            f"{path}: {size[0]}x{size[1]} pixels, at most {usual:,} are read out of "
+            f"{bytes_there:,} bytes; scale it down, save it again{more}"
+        )
+    # What it may have is told in pixels: of the account only the machine's bound counts.
+    whole.of(path, PIXEL * MOST_PIXELS).charge(PIXEL * pixels, f"{pixels:,} pixels")
+
+
+def floats(image: Image.Image, mode: str) -> np.ndarray:
+    """(H, W, C) float32 0..1 of a picture in a mode of bytes, some rows at a time."""
+    out = np.empty((image.height, image.width, len(mode)), np.float32)
+    for start in range(0, image.height, ROWS):
+        end = min(start + ROWS, image.height)
+        out[start:end] = image.crop((0, start, image.width, end)).convert(mode)
+    out /= 255
+    return out
 
 
 def shares(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Memory
 from runtime_models.model import BadFile
 from scene.json_values import shortened
 from scene.las_run import REFUSED, SECONDS, SECONDS_A_BYTE, Unreadable, las_points
@@ -41,6 +42,7 @@ def unpacked(path: Path, most: int) -> tuple[np.ndarray, int]:
     with tempfile.TemporaryDirectory() as folder:
         wanted, said = Path(folder, "points.npz"), Path(folder, "said")
         command = [sys.executable, "-P", script, str(path.absolute()), str(wanted), str(most)]
+        command.append(str(Memory().of(path).left))
         with open(said, "wb") as errors:
             try:
                 done = subprocess.run(

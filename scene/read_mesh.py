@@ -5,6 +5,7 @@ but the file itself is opened (no materials, no textures).
 """
 
 import io
+import re
 import struct
 from pathlib import Path
 
@@ -12,7 +13,9 @@ import numpy as np
 
 from runtime_models.gltf_files import Asset
 from runtime_models.gltf_nodes import placed_meshes
+from runtime_models.memory import Account, Memory
 from runtime_models.model import BadFile
+from runtime_models.turn import HALF_TURN_Y
 from scene.triangle_mesh import TriangleMesh
 
 ENDINGS = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -22,16 +25,20 @@ MOST_HEADER = 65536  # bytes of a PLY's header
 PLY_SIZES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2,
              "uint16": 2, "int": 4, "uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4,
              "double": 8, "float64": 8}  # fmt: skip
+GLTF_VERTEX, GLTF_FACE = 120, 240  # bytes of memory with all copies
 TRIANGLES = 4  # glTF's mode of separate triangles
-# What the package that reads meshes raises on damaged bytes.
-DAMAGED = (
-    ValueError, KeyError, IndexError, TypeError, AttributeError, RuntimeError, OverflowError,
-    struct.error, EOFError, ZeroDivisionError, AssertionError,
-)  # fmt: skip
+STL_HEAD = struct.Struct("<80sI")  # any text, triangles
+STL_TRIANGLE = 50  # bytes
+OBJ_LINES = re.compile(rb"^[ \t]*([vf][ \t].*)$", re.MULTILINE)  # corners and faces alone
+# Bytes of memory: a byte of an .obj or .stl, a corner and a face of a .ply, with all copies.
+OBJ_A_BYTE, STL_A_BYTE, PLY_VERTEX, PLY_FACE = 32, 20, 160, 640
 
 
 def read_mesh(path: Path) -> TriangleMesh:
-    """The triangles of a file, metres, in its own axes, equal vertices joined.  Raises BadFile."""
+    """The triangles of a file, metres, equal vertices joined.  Raises BadFile.
+
+    In the file's own axes, but of glTF (left, up, front) in ours (right, up, back).
+    """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise BadFile(f"{path.name} is no mesh that is read here; {', '.join(ENDINGS)} are.")
@@ -41,10 +48,11 @@ def read_mesh(path: Path) -> TriangleMesh:
         raise BadFile(f"{path.name} cannot be read: {error.strerror}.") from None
     if not 0 < size <= MOST_BYTES:
         raise BadFile(f"{path.name} has {size:,} bytes; 1 to {MOST_BYTES:,} are read, simplify it.")
+    memory = Memory().of(path)
     if ending in (".glb", ".gltf"):
-        vertices, faces = read_gltf_triangles(path)
+        vertices, faces = read_gltf_triangles(path, memory)
     else:
-        vertices, faces = read_by_trimesh(path, ending[1:])
+        vertices, faces = read_by_trimesh(path, ending[1:], memory)
     return clean(vertices, faces, path.name)
 
 
@@ -72,34 +80,70 @@ def clean(vertices: np.ndarray, faces: np.ndarray, name: str) -> TriangleMesh:
     return TriangleMesh(vertices, faces)
 
 
-def read_by_trimesh(path: Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def read_by_trimesh(path: Path, kind: str, memory: Account) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (V, 3) and faces (F, 3) of an .obj, .ply or .stl.  Raises BadFile."""
     import trimesh
 
-    data = path.read_bytes()
-    if kind == "ply":
-        check_ply(data, path.name)
-    more = {"skip_materials": True} if kind == "obj" else {}
+    data = prepared(path, kind, memory)
     try:
         with np.errstate(all="ignore"):
             mesh = trimesh.load_mesh(
-                io.BytesIO(data), file_type=kind, process=False, maintain_order=True, **more
-            )
+                io.BytesIO(data), file_type=kind, process=False, maintain_order=True,
+                **({"skip_materials": True} if kind == "obj" else {}),
+            )  # fmt: skip
             if isinstance(mesh, trimesh.Scene):
                 mesh = mesh.to_mesh()
-            return np.asarray(mesh.vertices), np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-    except DAMAGED as error:
-        reason = str(error)[:100] or type(error).__name__
+            vertices = np.asarray(mesh.vertices)
+            faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+    except Exception as error:  # on damaged bytes its parsers raise whatever comes up
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise BadFile(f"{path.name} cannot be read as a mesh ({reason}); it is damaged.") from None
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise BadFile(f"{path.name} has vertices of {vertices.shape[-1:]} numbers; 3 are wanted.")
+    return vertices, faces
 
 
-def check_ply(data: bytes, name: str) -> None:
-    """Refuses a PLY whose elements cannot fit into the file.  Raises BadFile."""
+def prepared(path: Path, kind: str, memory: Account) -> bytes:
+    """The bytes that trimesh is given, charged with what it makes of them.  Raises BadFile."""
+    size = path.stat().st_size
+    memory.charge({"obj": OBJ_A_BYTE, "stl": STL_A_BYTE, "ply": 2}[kind] * size, "its triangles")
+    data = path.read_bytes()
+    if kind == "ply":
+        vertices, faces = check_ply(data, path.name)
+        memory.charge(PLY_VERTEX * vertices + PLY_FACE * faces, f"{faces:,} faces")
+    elif kind == "obj":
+        # Names of groups and materials say nothing here; of thousands trimesh takes minutes.
+        whole = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+        data = b"\n".join(OBJ_LINES.findall(whole.replace(b"\r", b"\n"))) + b"\n"
+        data = data.decode("ascii", "replace").encode()
+        if not data.strip():
+            raise BadFile(f"{path.name} has no line of an .obj that begins with v or f.")
+    elif kind == "stl":
+        data = check_stl(data, path.name)
+    return data
+
+
+def check_stl(data: bytes, name: str) -> bytes:
+    """The bytes of an STL, as ASCII where it is text; one that is cut off is refused."""
+    count = STL_HEAD.unpack_from(data)[1] if len(data) >= STL_HEAD.size else 0
+    if count and len(data) == STL_HEAD.size + count * STL_TRIANGLE:
+        return data
+    if data.lstrip()[:5].lower() == b"solid" and b"vertex" in data:
+        return data.decode("latin-1").encode("ascii", "replace")
+    there = max(len(data) - STL_HEAD.size, 0) // STL_TRIANGLE
+    raise BadFile(
+        f"{name} promises {count:,} triangles and holds {there:,}; it is cut off or no STL, copy "
+        "or export it again."
+    )
+
+
+def check_ply(data: bytes, name: str) -> tuple[int, int]:
+    """(vertices, faces) that a PLY promises, which fit into the file.  Raises BadFile."""
     end = data.find(b"end_header", 0, MOST_HEADER)
     if not data.startswith(b"ply") or end < 0:
         raise BadFile(f"{name} has no PLY header; it is damaged.")
     text = b"format ascii" in data[:end]
-    count, least, name_of = 0, 0, ""
+    count, least, name_of, counts = 0, 0, "", {"vertex": 0, "face": 0}
     for line in [*data[:end].decode("latin-1").splitlines(), "element end 0"]:
         words = line.split()
         if words[:1] == ["element"] and len(words) == 3:
@@ -107,9 +151,11 @@ def check_ply(data: bytes, name: str) -> None:
             if not (words[2].isascii() and words[2].isdigit() and len(words[2]) < 12):
                 raise BadFile(f"{name} has {words[2][:20]!r} elements '{words[1][:20]}'.")
             name_of, count, least = words[1], int(words[2]), 0
+            counts[name_of] = count
         elif words[:1] == ["property"] and len(words) >= 3:
             kind = words[2] if words[1] == "list" else words[1]  # a list has its length at least
             least += 2 if text else PLY_SIZES.get(kind, 1)
+    return counts["vertex"], counts["face"]
 
 
 def refuse_ply(count: int, least: int, there: int, name: str, element: str) -> None:
@@ -120,18 +166,23 @@ def refuse_ply(count: int, least: int, there: int, name: str, element: str) -> N
         )
 
 
-def read_gltf_triangles(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def read_gltf_triangles(path: Path, memory: Account) -> tuple[np.ndarray, np.ndarray]:
     """All triangles of the shown scene where its nodes stand.  Raises BadFile."""
-    asset = Asset(path)
+    asset = Asset(path, memory)
     for needed in asset.item(asset.json, "extensionsRequired", list, []):
         if not str(needed).startswith(("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_")):
             raise asset.refuse(f"it needs {str(needed)[:60]}, which is not read here.")
     vertices, faces, count, start = [], [], 0, 0
-    for mesh, matrix in placed_meshes(asset):
+    ours_from_file = np.eye(4)
+    if not asset.in_our_axes:  # as splats of that format are turned
+        ours_from_file[:3, :3] = HALF_TURN_Y
+    for mesh, world_from_mesh in placed_meshes(asset):
+        matrix = ours_from_file @ world_from_mesh
         for primitive in asset.item(asset.entry("meshes", mesh), "primitives", list, []):
             if not isinstance(primitive, dict) or primitive.get("mode", TRIANGLES) != TRIANGLES:
                 continue
             places, rows = read_primitive(asset, primitive)
+            memory.charge(GLTF_VERTEX * len(places) + GLTF_FACE * len(rows), f"{len(rows):,} faces")
             count += len(rows)
             if count > MOST_FACES or start + len(places) > 3 * MOST_FACES:
                 raise asset.refuse(f"it has more than {MOST_FACES:,} faces; simplify it.")

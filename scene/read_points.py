@@ -1,26 +1,20 @@
 """Coloured points that come with a capture: points.npz, or a PLY cloud as nerfstudio writes it."""
 
-import io
-import math
 import os
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import Account, Memory
 from runtime_models.model import BadFile
-from runtime_models.package_files import DAMAGED, refuse_bomb
+from runtime_models.npy import read_array
 from runtime_models.ply_file import read_header
-from runtime_models.read_package import BAD_HEADER
 from runtime_models.read_points_ply import read_records, shades_of
+from runtime_models.zip_files import opened_zip
 from scene.capture_rules import FARTHEST
 from scene.json_values import shortened
 
-LIMITED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # unpacking the others stops at no limit
-HEADERS = {
-    (1, 0): np.lib.format.read_array_header_1_0,
-    (2, 0): np.lib.format.read_array_header_2_0,
-}
+POINT = 96  # bytes of a point on the way: two copies of its place, its colour
 
 
 def read_points(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
@@ -28,7 +22,8 @@ def read_points(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     where = shortened(path)
     if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
         raise BadFile(f"{where}: the file of points is missing; put it there or drop its entry")
-    xyz, rgb = read_ply(path, where) if path.suffix.lower() == ".ply" else read_npz(path, where)
+    read = read_ply if path.suffix.lower() == ".ply" else read_npz
+    xyz, rgb = read(path, where, Memory().of(path))
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{where}: points have shape {xyz.shape!s:.40}; (P, 3) is wanted")
     wrong = ~(np.abs(xyz) <= FARTHEST)
@@ -46,54 +41,25 @@ def read_points(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     return xyz.astype(np.float64), rgb
 
 
-def read_npz(path: Path, where: str) -> tuple[np.ndarray, np.ndarray | None]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-            if "xyz.npy" not in names:
-                held = shortened(", ".join(names))
-                raise BadFile(f"{where}: lacks the array 'xyz' (P, 3), holds {held or 'nothing'}")
-            xyz = read_array(archive, "xyz.npy", where)
-            return xyz, read_array(archive, "rgb.npy", where) if "rgb.npy" in names else None
-    except BadFile:
-        raise
-    except (*DAMAGED, *BAD_HEADER) as error:
-        raise BadFile(f"{where}: the npz cannot be read ({error!s:.80}); copy it again") from None
+def read_npz(path: Path, where: str, memory: Account) -> tuple[np.ndarray, np.ndarray | None]:
+    with opened_zip(path, where, memory) as archive:
+        names = archive.namelist()
+        xyz = read_array(archive, "xyz", where, memory)
+        if xyz is None:
+            held = shortened(", ".join(names[:20]))
+            raise BadFile(f"{where}: lacks the array 'xyz' (P, 3), holds {held or 'nothing'}")
+        memory.charge(POINT * len(xyz) if xyz.ndim else 0, "its points")
+        return xyz, read_array(archive, "rgb", where, memory)
 
 
-def read_array(archive: zipfile.ZipFile, name: str, where: str) -> np.ndarray:
-    """An array of plain numbers, as many as its header states.  Nothing is unpickled."""
-    entry = archive.getinfo(name)
-    packed = min(entry.compress_size, os.path.getsize(archive.filename))
-    refuse_bomb(f"{where}: {name}", entry.file_size, packed)
-    if entry.compress_type not in LIMITED:
-        raise BadFile(f"{where}: {name} is packed in an unusual way; write it with numpy.savez")
-    with archive.open(entry) as stream:  # archive.read would unpack 2 GB, then cut
-        data = stream.read(entry.file_size + 1)
-    file = io.BytesIO(data)
-    read_header_of = HEADERS.get(np.lib.format.read_magic(file))
-    if read_header_of is None:
-        raise BadFile(f"{where}: {name} is of an unknown version; write it with numpy.savez")
-    shape, by_columns, kind = read_header_of(file)
-    if kind.kind not in "fiu":
-        raise BadFile(f"{where}: {name} holds {kind!s:.40}; plain numbers are wanted")
-    there = len(data) - file.tell()
-    if min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != there:
-        raise BadFile(
-            f"{where}: {name} states the shape {shape!s:.40}, but {there:,} bytes follow; copy it "
-            "again"
-        )
-    numbers = np.frombuffer(data, kind, offset=file.tell())
-    return numbers.reshape(shape, order="F" if by_columns else "C")
-
-
-def read_ply(path: Path, where: str) -> tuple[np.ndarray, np.ndarray | None]:
+def read_ply(path: Path, where: str, memory: Account) -> tuple[np.ndarray, np.ndarray | None]:
     """The vertices of a PLY, binary or ASCII; all that its header promises is there."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
     lacking = [axis for axis in "xyz" if axis not in vertex.row.names]
     if lacking:
         raise BadFile(f"{where}: its vertices have no {lacking[0]}; x, y and z are wanted")
+    memory.charge((POINT + vertex.row.itemsize) * vertex.count, f"{vertex.count:,} points")
     table = read_records(path, header, vertex, begins)
     with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused by the caller
         return np.stack([table[axis].astype(np.float64) for axis in "xyz"], 1), shades_of(table)

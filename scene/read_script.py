@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import read_text_file
 from runtime_models.model import BadFile
 from scene.json_fields import MOST_BYTES, Fields, read_object
 from scene.pose import UNIT_SLACK, Pose
@@ -48,7 +49,7 @@ def read_script(path: Path, items: Sequence[SceneItem] = ()) -> tuple[Act, ...]:
         raise BadFile(f"{path} is no file; a script of JSON lines is wanted.")
     if (size := path.stat().st_size) > MOST_BYTES:
         raise BadFile(f"{path} has {size:,} bytes; at most {MOST_BYTES:,} are read.")
-    lines = path.read_bytes().split(b"\n")
+    lines = read_text_file(path).split(b"\n")
     if len(lines) > MOST_LINES:
         raise BadFile(f"{path.name} has {len(lines):,} lines; at most {MOST_LINES:,} are read.")
     acts: list[Act] = []

@@ -3,11 +3,14 @@
 import json
 import math
 import os
+from collections import ChainMap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.memory import read_text_file
 from runtime_models.model import BadFile, Stop
 from scene.capture import Capture, Photo
 from scene.capture_rules import (
@@ -81,7 +84,7 @@ def read_transforms(*files: Path) -> Capture:
     return capture
 
 
-def gather(files: tuple[Path, ...]) -> tuple[dict, list[dict]]:
+def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
     """What the files say for all frames, and every frame with that filled in."""
     everything, entries = {}, []
     for file in files:
@@ -92,14 +95,16 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[dict]]:
         if not frames:
             raise BadFile(f"{file}: 'frames' is empty; a capture needs at least one photo")
         split = {"split": file.stem.rpartition("_")[2]} if len(files) > 1 else {}
-        entries += [data | split | frame for frame in frames]
+        # One after the other, not one of them: each frame would hold all that is said for all.
+        entries += [ChainMap(frame, split, data) for frame in frames]
         everything |= data
     return everything, entries
 
 
 def read_json(file: Path) -> dict:
+    text = read_text_file(file)
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
+        data = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise BadFile(f"{file}: not JSON ({error}); write it again") from None
     if not isinstance(data, dict):

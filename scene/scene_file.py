@@ -98,7 +98,7 @@ def is_scene_file(path: Path) -> bool:
 
 def read_models(file: SceneFile, reading: Reading | None = None) -> dict[str, Model]:
     """The model of each object by its name; one that several have is read once.  Raises BadFile."""
-    reading, models, opened = reading or Reading(), {}, {}
+    reading, models, opened = (reading or Reading()).begun(), {}, {}
     for item in file.all_items:
         key = (item.model, item.mode, item.up, item.flip)
         if key not in opened:

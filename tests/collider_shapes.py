@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from runtime_models.gltf_nodes import quaternions_of
+from runtime_models.placed_splats import quaternions_of
 
 
 @dataclass(frozen=True)

@@ -203,5 +203,5 @@ def test_refused_points(tmp_path):
         with pytest.raises(BadFile, match=sentence):
             read_points(path)
     path.write_bytes(path.read_bytes()[:50])
-    with pytest.raises(BadFile, match="cannot be read"):
+    with pytest.raises(BadFile, match="cut off"):
         read_points(path)

@@ -130,14 +130,17 @@ HOSTILE = {
     "fewer than none": (zipped(npy("(-1, -3)", data=bytes(12))), "12 bytes follow"),
     "a shape of more than 64 bits": (zipped(npy(f"({2**70}, 3)")), "0 bytes follow"),
     "pickled": (zipped(npy("(1,)", "|O", b"cos\nsystem\n(S'touch harmed'\ntR.")), "holds object"),
-    "a program for a header": (zipped(npy("__import__('os').system('touch harmed')")), "cannot be"),
+    "a program for a header": (zipped(npy("__import__('os').system('touch harmed')")), "no array"),
     "texts": (zipped(npy("(1, 3)", "<U1", bytes(12))), "plain numbers"),
     "of no width": (zipped(npy("(5, 3)", "|V0")), "plain numbers"),
-    "a bomb": (zipped(npy("(87381333, 3)", data=bytes(87381333 * 12 // 16))), "times as many"),
-    "packed without a limit": (zipped(npy("(1, 3)", data=bytes(12)), zipfile.ZIP_BZIP2), "unusual"),
-    "of a later version": (zipped(b"\x93NUMPY\7\0" + bytes(20)), "cannot be read|unknown version"),
-    "no npy": (zipped(b"xyz"), "cannot be read"),
-    "no zip": (b"xyz", "cannot be read"),
+    "a bomb": (zipped(npy("(17476266, 3)", data=bytes(17476266 * 12))), "of memory"),
+    "packed without a limit": (
+        zipped(npy("(1, 3)", data=bytes(12)), zipfile.ZIP_BZIP2),
+        "not read",
+    ),
+    "of a later version": (zipped(b"\x93NUMPY\7\0" + bytes(20)), "unknown version"),
+    "no npy": (zipped(b"xyz"), "no array"),
+    "no zip": (b"xyz", "no zip"),
 }
 
 
@@ -160,7 +163,7 @@ def test_a_size_that_lies_in_the_zip_bounds_what_is_read(tmp_path):
     assert data.count(stated) == 2
     path = tmp_path / "points.npz"
     path.write_bytes(data.replace(stated, struct.pack("<I", 140)))
-    with watched(0), pytest.raises(BadFile, match="cannot be read"):  # its checksum fails
+    with watched(0), pytest.raises(BadFile, match="cannot be unpacked"):  # its checksum fails
         read_points(path)
 
 

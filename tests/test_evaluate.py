@@ -10,8 +10,9 @@ from runtime_models.evaluate import BATCH, Evaluator, directions, evaluate
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, SplatLayers, Stop
 from runtime_models.read_package import read_package
 from runtime_models.rotation import covariance, normalize, rotation_matrices
-from runtime_models.spherical_harmonics import C0, HALF_TURN_SIGNS, basis, shade
+from runtime_models.spherical_harmonics import C0, basis, shade
 from runtime_models.stop_weights import StopWeights
+from runtime_models.turn import signs_of_harmonics
 from runtime_models.write_package import write_package
 from tests.models import make_random_model, psi_of, run_in_numpy
 
@@ -191,10 +192,13 @@ def test_harmonics_are_orthonormal_up_to_degree_3():
     np.testing.assert_allclose(y.T @ y / len(y) * 4 * np.pi, np.eye(16), atol=0.02)
 
 
-def test_half_turn_signs_equal_turned_directions():
+@pytest.mark.parametrize("signs", [(1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
+def test_half_turn_signs_equal_turned_directions(signs):
     d = np.random.default_rng(1).normal(size=(100, 3))
     d /= np.linalg.norm(d, axis=1, keepdims=True)
-    np.testing.assert_allclose(basis(d * [1, -1, -1], 16), basis(d, 16) * HALF_TURN_SIGNS)
+    found = signs_of_harmonics(np.array(signs, float), 16)
+    np.testing.assert_allclose(basis(d * signs, 16), basis(d, 16) * found)
+    assert set(found) == {-1, 1}
 
 
 def test_layers_fade_by_opacity_alone_and_shade_is_never_negative():

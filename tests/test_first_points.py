@@ -193,7 +193,7 @@ def test_cut_and_mangled_laser_clouds_are_one_sentence(tmp_path, ending):
 def test_a_decoder_that_ends_its_process_is_one_sentence(tmp_path, end, monkeypatch):
     path, script = tmp_path / "a.laz", tmp_path / "las_run.py"
     write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
-    text = Path(las_run.__file__).read_text().replace("SECONDS, BYTES = 5", "SECONDS, BYTES = 1")
+    text = Path(las_run.__file__).read_text().replace("A_BYTE = 5,", "A_BYTE = 1,")
     script.write_text(text.replace("    import laspy\n", f"    {end}\n", 1))
     monkeypatch.setattr("scene.read_las.__file__", str(tmp_path / "read_las.py"))
     with pytest.raises(BadFile, match="no LAZ that can be unpacked; copy it again"):

@@ -13,7 +13,7 @@ from runtime_models.plain_splats import PlainSplats, Reading
 from runtime_models.read_gltf import display_from_linear, read_raw_gltf
 from runtime_models.rotation import covariance
 from runtime_models.spherical_harmonics import C0, shade
-from runtime_models.turn import turn
+from runtime_models.turn import HALF_TURN_Y, turn
 from runtime_models.write_gltf import write_gltf
 from tests.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
 
@@ -238,7 +238,7 @@ def test_spz_within(tmp_path, draft):
     asset["extensionsRequired"] = ["KHR_gaussian_splatting_compression_spz_2"]
     asset["nodes"][0]["translation"] = [0, 5, 0]
     within = read_plain(write_glb(tmp_path / "a.glb", asset, data))
-    turned = alone if draft else turn(alone, np.diag([-1.0, 1, -1]))
+    turned = turn(alone, HALF_TURN_Y) if draft else alone  # drafts are taken as they are stored
     np.testing.assert_allclose(within.means, np.add(turned.means, (0, 5, 0)), atol=1e-6)
     np.testing.assert_allclose(within.scales, turned.scales, rtol=1e-6)
     np.testing.assert_allclose(within.opacity, turned.opacity)
@@ -298,14 +298,11 @@ def test_drafts_have_colour_and_opacity_in_color_0(tmp_path, prefix):
 # Third parties
 
 
-def test_a_third_party_finds_our_numbers(tmp_path):
-    """pygltflib: every accessor by its own reading of offsets and counts."""
+def attributes_in(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of the only primitive by pygltflib's reading of offsets and counts."""
     pygltflib = pytest.importorskip("pygltflib")
-    splats = replace(plain_splats(37), origin=(4e6, -1.5, 2.25e6))
-    write_gltf(splats, tmp_path / "a.glb")
-    found = pygltflib.GLTF2().load(tmp_path / "a.glb")
+    found = pygltflib.GLTF2().load(path)
     blob, (primitive,) = found.binary_blob(), found.meshes[0].primitives
-    assert found.nodes[0].translation == list(splats.origin)
     assert primitive.mode == pygltflib.POINTS
     names = {name: i for name, i in vars(primitive.attributes).items() if i is not None}
     arrays = {}
@@ -317,25 +314,60 @@ def test_a_third_party_finds_our_numbers(tmp_path):
         assert start % 4 == 0
         array = np.frombuffer(blob, kind, view.byteLength // np.dtype(kind).itemsize, start)
         arrays[name] = array.reshape(accessor.count, -1)
+    box = found.accessors[names["POSITION"]]
+    assert box.min == arrays["POSITION"].min(0).tolist()
+    assert box.max == arrays["POSITION"].max(0).tolist()
+    return arrays
+
+
+def test_a_third_party_finds_our_numbers(tmp_path):
+    pygltflib = pytest.importorskip("pygltflib")
+    splats = replace(plain_splats(37), origin=(4e6, -1.5, 2.25e6))
+    write_gltf(splats, tmp_path / "a.glb")
+    found = pygltflib.GLTF2().load(tmp_path / "a.glb")
+    assert found.nodes[0].translation == [-4e6, -1.5, -2.25e6]
+    arrays, turned = attributes_in(tmp_path / "a.glb"), turn(splats, HALF_TURN_Y)
     assert len(arrays) == 5 + 16
-    np.testing.assert_array_equal(arrays["POSITION"], splats.means)
-    np.testing.assert_array_equal(arrays[P + "ROTATION"], splats.wxyz[:, [1, 2, 3, 0]])
+    np.testing.assert_array_equal(arrays["POSITION"], splats.means * [-1, 1, -1])
+    np.testing.assert_array_equal(arrays[P + "ROTATION"], -turned.wxyz[:, [1, 2, 3, 0]])
     np.testing.assert_array_equal(arrays[P + "SCALE"], splats.scales)
     np.testing.assert_array_equal(arrays[P + "OPACITY"][:, 0], splats.opacity)
-    np.testing.assert_array_equal(arrays[P + "SH_DEGREE_3_COEF_6"], splats.sh[:, 15])
-    box = found.accessors[names["POSITION"]]
-    assert box.min == splats.means.min(0).tolist() and box.max == splats.means.max(0).tolist()
+    np.testing.assert_array_equal(arrays[P + "SH_DEGREE_3_COEF_6"], turned.sh[:, 15])
     display = np.clip(0.5 + C0 * splats.sh[:, 0], 0, 1)
     linear = np.where(display > 0.04045, ((display + 0.055) / 1.055) ** 2.4, display / 12.92)
     assert np.abs(arrays["COLOR_0"][:, :3] / 255 - linear).max() < 0.0021
     places = raw(tmp_path / "a.glb").means  # float64: a far place keeps its micrometres
-    np.testing.assert_allclose(places - splats.origin, splats.means, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        places - turned.origin, turned.means, rtol=0, atol=1e-6
+    )  # as they are filed
+
+
+def test_a_glb_has_gltfs_axes_and_one_of_ours_before_0_5_had_ours(tmp_path):
+    """glTF: +Y up, +Z forward, -X right (its 3.4); ours: +Y up, -Z forward, +X right."""
+    splats = replace(plain_splats(3), means=np.array([[1, 2, 3], [4, 5, 6], [7, 8, 9]], np.float32))
+    write_gltf(splats, tmp_path / "a.glb")
+    asset, data = gltf_of(tmp_path / "a.glb")
+    np.testing.assert_array_equal(
+        np.frombuffer(data, "<f4", 3), [-1, 2, -3]
+    )  # POSITION is the first attribute
+    np.testing.assert_allclose(read_plain(tmp_path / "a.glb").means, splats.means)
+    asset["asset"]["generator"] = "Shapeshift"
+    old = read_plain(write_glb(tmp_path / "old.glb", asset, data))
+    np.testing.assert_allclose(
+        old.means, turn(splats, HALF_TURN_Y).means
+    )  # its numbers as they are
+
+
+def gltf_of(path: Path) -> tuple[dict, bytes]:
+    data = path.read_bytes()
+    size = int.from_bytes(data[12:16], "little")
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
 
 
 def test_what_a_third_party_writes_is_read():
-    """The file is splat-transform 2.7.1's, of our PLY: turned half a turn about z, not about x."""
-    theirs = read_plain(Path(__file__).parent / "fixtures" / "splat_transform.glb")
-    ours, back = plain_splats(12, 1), turn(theirs, np.diag([-1.0, 1, -1]))
+    """The file is splat-transform 2.7.1's, of our PLY: the same scene, facing the same way."""
+    back = read_plain(Path(__file__).parent / "fixtures" / "splat_transform.glb")
+    ours = plain_splats(12, 1)
     np.testing.assert_allclose(back.means, ours.means, atol=1e-6)
     np.testing.assert_allclose(back.scales, ours.scales, rtol=1e-5)
     np.testing.assert_allclose(back.opacity, ours.opacity, atol=1e-6)

@@ -72,11 +72,11 @@ def test_a_missing_or_doubled_file(tmp_path):
 @pytest.mark.parametrize("count", [21 * 10**6, 2**31, 2**62, 10**30])
 def test_counts_that_the_files_cannot_hold(tmp_path, count):
     meta, pictures = random_sog(20)
-    refused(write_folder(tmp_path / "scene", meta | {"count": count}, pictures), "cannot hold")
-    refused(write_zip(tmp_path / "a.sog", meta | {"count": count}, pictures), "cannot hold")
+    refused(write_folder(tmp_path / "scene", meta | {"count": count}, pictures), "of memory")
+    refused(write_zip(tmp_path / "a.sog", meta | {"count": count}, pictures), "of memory")
     meta, pictures = random_sog(20, version=1)
     meta["means"]["shape"][0] = count
-    refused(write_folder(tmp_path / "first", meta, pictures), "cannot hold")
+    refused(write_folder(tmp_path / "first", meta, pictures), "of memory")
 
 
 def test_a_picture_smaller_or_larger_than_its_splats(tmp_path):

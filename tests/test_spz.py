@@ -127,7 +127,7 @@ WHOLE = modern(4, 0, random_streams(4, 4, 0))
         (header(version=5) + bytes(16), "version 5"),
         (gzip.compress(header(count=0)), "no splats"),
         (gzip.compress(header(count=5) + BODY), "cut off"),
-        (gzip.compress(header(count=1 << 31) + BODY), "32 times as many"),
+        (gzip.compress(header(count=1 << 31) + BODY), "of memory"),
         (gzip.compress(header(degree=5) + BODY), "SH degree 5"),
         (gzip.compress(header(bits=31) + BODY), "31 fractional bits"),
         (b"\x1f\x8b" + b"\xff" * 40, "gzip stream is broken"),
@@ -169,7 +169,7 @@ def test_a_bomb_is_not_unpacked():
         if count == 4:
             assert len(read(data).means) == 4
         else:
-            with pytest.raises(BadFile, match="32 times as many"):
+            with pytest.raises(BadFile, match="of memory"):
                 read(data)
         assert tracemalloc.get_traced_memory()[1] < 4e6
         tracemalloc.stop()

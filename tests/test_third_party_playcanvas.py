@@ -133,3 +133,40 @@ def test_we_read_what_splat_transform_writes(leg, tmp_path):
         near = near[np.abs(leg.opacity[near] - ours.opacity[row]) < 1 / 500]
         apart = np.abs(leg.sh[near, 1:].clip(-4, 4) - ours.sh[row, 1:]).max((1, 2))
         assert apart.min() <= 1 / 32 + 1e-6, row
+
+
+@pytest.mark.parametrize("number", [0, 3])
+def test_splat_transform_s_glb_and_spz_are_the_scene_of_their_ply(leg, tmp_path, number):
+    """Each format has axes of its own: whoever reads one as another turns the scene."""
+    path = tmp_path / "a.ply"
+    write_ply(degree(leg, number), path)
+    ours = read_plain(path)
+    theirs = read_plain(by_splat_transform(path, tmp_path / "theirs.glb"))
+    assert_same_numbers(theirs, ours)
+    packed = read_plain(by_splat_transform(path, tmp_path / "theirs.spz"))
+    assert np.abs(packed.means - ours.means).max() < 1e-3
+    back = read_plain(by_splat_transform(tmp_path / "theirs.spz", tmp_path / "back.ply"))
+    assert np.abs(packed.means - back.means).max() < 1e-6
+    assert np.abs(packed.sh - back.sh).max() < 1e-5
+
+
+def test_our_glb_holds_splat_transform_s_numbers(leg, tmp_path):
+    """It writes .glb and reads none: so ours is held beside its own, attribute by attribute."""
+    from test_gltf import attributes_in
+
+    from runtime_models.write_gltf import write_gltf
+
+    path = tmp_path / "a.ply"
+    write_ply(degree(leg, 3), path)
+    write_gltf(read_plain(path), tmp_path / "ours.glb")
+    theirs = attributes_in(by_splat_transform(path, tmp_path / "theirs.glb"))
+    ours = attributes_in(tmp_path / "ours.glb")
+    shared = [name for name in theirs if name != "COLOR_0"]
+    assert len(shared) == 20 and set(shared) <= ours.keys()
+    for name in shared:
+        if name.endswith("ROTATION"):  # of either sign
+            dots = (theirs[name] * ours[name]).sum(axis=1)
+            assert np.abs(np.abs(dots) - 1).max() < 1e-5
+        else:
+            scale = max(np.abs(theirs[name]).max(), 1)
+            assert np.abs(theirs[name] - ours[name]).max() < 3e-6 * scale, name

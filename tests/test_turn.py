@@ -20,6 +20,8 @@ from runtime_models.turn import (
     quaternion_of,
     turn,
     turn_harmonics,
+    turn_quaternions,
+    turner,
 )
 from runtime_models.write_ply import write_ply
 
@@ -35,7 +37,7 @@ def random_rotations(count: int) -> list[np.ndarray]:
     return list(rotation_matrices(q / np.linalg.norm(q, axis=1, keepdims=True)))
 
 
-TURNS = [ours_from_file(*which) for which in itertools.product(AXES, (False, True))]
+TURNS = [ours_from_file(*w) for w in itertools.product(AXES, (False, True), (False, True))]
 ALL = [*TURNS, *QUARTERS, *random_rotations(4)]
 
 
@@ -53,6 +55,29 @@ def test_the_axis_that_is_named_becomes_up(up):
     rotation = ours_from_file(up)
     np.testing.assert_array_equal(rotation @ axis_of(up), [0, 1, 0])
     np.testing.assert_array_equal(ours_from_file(up, flip=True) @ axis_of(up), [0, -1, 0])
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("count", COEFFICIENTS)
+def test_a_half_turn_by_signs_is_the_turn_of_any_rotation(axis, count):
+    """The short way through a diagonal matrix beside the long one through any."""
+    signs = np.where(np.arange(3) == axis, 1.0, -1.0)
+    rng = np.random.default_rng(axis)
+    means, wxyz = rng.normal(size=(7, 3)).astype("f4"), rng.normal(size=(7, 4)).astype("f4")
+    sh = rng.normal(size=(7, count, 3)).astype("f4")
+    short = [means.copy(), wxyz.copy(), sh.copy()]
+    turner(np.diag(signs), count)(*short)
+    np.testing.assert_allclose(short[0], means @ np.diag(signs), atol=1e-7)
+    np.testing.assert_allclose(
+        np.abs((short[1] * turn_quaternions(wxyz, np.diag(signs))).sum(1)),
+        (wxyz * wxyz).sum(1), rtol=1e-5,
+    )  # fmt: skip
+    wanted = np.einsum("ij,njc->nic", turn_harmonics(np.diag(signs), count), sh)
+    np.testing.assert_allclose(short[2], wanted, atol=1e-5)
+    strided = [np.repeat(array, 2, axis=0)[::2] for array in (means, wxyz, sh)]
+    turner(np.diag(signs), count)(*strided)
+    for one, other in zip(short, strided, strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("rotation", ALL)

@@ -21,8 +21,8 @@ class Options(ReadingOptions):
     """What to export; several become one file, where they stand when opened together, and the
     objects of a scene file where that puts them."""
     out: Path
-    """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, or
-    our package, .shift or a folder (a name without an ending)."""
+    """The file to write; its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat,
+    .usdz (.usd, .usda, .usdc), or our package, .shift or a folder (a name without an ending)."""
     x: Annotated[str, CONTROL] = ""
     """Where the slider stands: a stop by its name, or a number from 0 to 1.  Default: the first
     stop, and in a scene file what it says for each object."""

@@ -27,6 +27,7 @@ FORMAT_TIPS = {
     ".spz": "The smallest; Niantic's viewers, Spark, glTF tools.",
     ".glb": "glTF 2.0 with KHR_gaussian_splatting; not everywhere yet.",
     ".splat": "One colour from all sides; web viewers.",
+    ".usdz": "USD with ParticleField3DGaussianSplat; Omniverse, Houdini. Needs usd-core.",
 }
 
 

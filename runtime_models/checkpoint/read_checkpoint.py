@@ -1,0 +1,169 @@
+"""Splats as trainers keep them: gsplat's ckpt_N_rank0.pt, nerfstudio's step-N.ckpt, arrays in .npz.
+
+gsplat (examples/simple_trainer.py): splats.means, .scales, .quats, .opacities, .sh0, .shN, or
+.colors where a network adds to them.  nerfstudio (models/splatfacto.py):
+pipeline._model.gauss_params.means, .scales, .quats, .opacities, .features_dc, .features_rest.
+Scales are logarithms, opacities logits, quaternions w x y z.  Nothing of torch is needed, and
+nothing in a file is ever run.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from runtime_models.memory import Account
+from runtime_models.model import BadFile, Finding
+from runtime_models.npy import read_array
+from runtime_models.plain_splats import RawSplats, Reading, empty_splats
+from runtime_models.read_points_ply import splats_of_points
+from runtime_models.read_torch import INDEX, read_tensors
+from runtime_models.spherical_harmonics import C0, COEFFICIENTS
+from runtime_models.zip_files import member_names, opened_zip
+
+PARTS = {  # what each array is called, by gsplat, by nerfstudio, by others
+    "means": ("means", "means3d", "xyz"),
+    "scales": ("scales",),
+    "quats": ("quats", "quaternions"),
+    "opacities": ("opacities", "opacity"),
+    "first": ("sh0", "features_dc"),  # of the harmonics
+    "rest": ("shN", "features_rest"),
+    "colors": ("colors",),
+}
+ROLES = {name: role for role, names in PARTS.items() for name in names}
+GEOMETRY = ("means", "scales", "quats", "opacities")
+UP = "+Z"  # both trainers turn their world so that the cameras' up is +Z
+FLAT = -80.0  # logarithm of a sigma that 2D splats leave out
+WANTED = (
+    "wanted are the splats of gsplat (ckpt_*.pt), nerfstudio (step-*.ckpt) or arrays called means, "
+    "scales, quats, opacities and sh0"
+)
+Take = Callable[[str], np.ndarray]
+
+
+def is_checkpoint(head: bytes, path: Path) -> bool:
+    """A zip of torch's (an index of tensors in it) or of numpy's (nothing but arrays)."""
+    return head[:2] == b"PK" and path.is_file() and holds_arrays(member_names(path))
+
+
+def holds_arrays(names: list[str]) -> bool:
+    """Whether the members of a zip are torch's or numpy's."""
+    by_torch = any(name == INDEX or name.endswith(f"/{INDEX}") for name in names)
+    return by_torch or (bool(names) and all(name.endswith(".npy") for name in names))
+
+
+def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
+    """Splats of SH degree 0 to 3, or the coloured points that an .npz holds.  Raises BadFile."""
+    reading = reading.within(path)
+    memory = reading.memory
+    reading.tell(f"reading {path.name}", 0.0)
+    arrays = arrays_of(path, memory)
+    arrays = {role: array for role, array in arrays.items() if array is not None}
+    lacking = [name for name in GEOMETRY if name not in arrays]
+    if set(lacking) == {"scales", "quats", "opacities"}:
+        points = splats_of_points(arrays["means"], shades(arrays, path), path.name, reading)
+        return replace(points, up=UP)
+    if lacking:
+        held = ", ".join(arrays) or "none of them"
+        raise BadFile(f"{path.name} has no {lacking[0]} (it has {held}); {WANTED}.")
+    count = len(arrays["means"])
+    coefficients, fill_colors, findings = colors_of(arrays, count, path)
+    raw = RawSplats(
+        **empty_splats(count, coefficients, memory),
+        file=path.name,
+        format=f"checkpoint{path.suffix.lower()}",
+        up=UP,
+        findings=findings,
+        memory=memory,
+    )
+    with np.errstate(over="ignore", invalid="ignore"):  # what is beyond float32 is for the judge
+        raw.means[:] = shaped(arrays["means"], (count, 3), "means", path)
+        raw.wxyz[:] = shaped(arrays["quats"], (count, 4), "quats", path)
+        raw.opacity[:] = shaped(arrays["opacities"], (count,), "opacities", path)
+        scales = arrays["scales"]
+        if scales.shape == (count, 2):  # of 2DGS
+            raw.scales[:, :2], raw.scales[:, 2] = scales, FLAT
+        else:
+            raw.scales[:] = shaped(scales, (count, 3), "scales", path)
+        fill_colors(raw.sh)
+    return raw
+
+
+def arrays_of(path: Path, memory: Account) -> dict[str, np.ndarray | None]:
+    """role -> array, as stored.  Raises BadFile where there are two sets of splats, or none."""
+    if all(name.endswith(".npy") for name in member_names(path)):
+        with opened_zip(path, path.name, memory) as archive:
+            names = {n[:-4]: ROLES[n[:-4]] for n in archive.namelist() if n[:-4] in ROLES}
+            return {role: read_array(archive, n, path.name, memory) for n, role in names.items()}
+    found: dict[str, dict[str, np.ndarray]] = {}
+    tensors = read_tensors(path, memory, lambda name: name.rpartition(".")[2] in ROLES)
+    for name, tensor in tensors.items():
+        place, _, last = name.rpartition(".")
+        found.setdefault(place, {})[ROLES[last]] = tensor
+    whole = {place: arrays for place, arrays in found.items() if arrays.keys() >= set(GEOMETRY)}
+    if len(whole) != 1:
+        what = f"{len(whole)} sets of splats" if whole else "no splats"
+        raise BadFile(f"{path.name} is a file of torch with {what}; {WANTED}.")
+    return next(iter(whole.values()))
+
+
+def shaped(array: np.ndarray, shape: tuple[int, ...], name: str, path: Path) -> np.ndarray:
+    """The array as numbers of that shape, a last side of 1 left out.  Raises BadFile."""
+    if array.shape == (*shape, 1):
+        array = array[..., 0]
+    if array.shape != shape or array.dtype.kind not in "fiu":
+        raise BadFile(
+            f"{path.name}: {name} is {array.dtype} of shape {array.shape!s:.40}, expected {shape}; "
+            "save it again."
+        )
+    return array
+
+
+def colors_of(
+    arrays: dict[str, np.ndarray], count: int, path: Path
+) -> tuple[int, Callable[[np.ndarray], None], tuple[Finding, ...]]:
+    """(coefficients, what fills them in, findings)."""
+    first, rest, colors = (arrays.get(role) for role in ("first", "rest", "colors"))
+    if first is not None:
+        first = first[:, 0] if first.ndim == 3 else first
+        first = shaped(first, (count, 3), "the first harmonics", path)
+        more = 0 if rest is None or rest.ndim != 3 else rest.shape[1]
+        kept = min(more, COEFFICIENTS[-1] - 1)
+        if 1 + kept not in COEFFICIENTS:
+            raise BadFile(f"{path.name} has {more} further harmonics; 0, 3, 8 or 15 are known.")
+        if rest is not None and more:
+            rest = shaped(rest, (count, more, 3), "further harmonics", path)
+        # nerfstudio without harmonics keeps logits of colours
+        by_logits = more == 0 and rest is not None
+
+        def fill(sh: np.ndarray) -> None:
+            sh[:, 0] = (sigmoid(first) - 0.5) / C0 if by_logits else first
+            if kept:
+                sh[:, 1:] = rest[:, :kept]
+
+        return 1 + kept, fill, ()
+    if colors is None:
+        raise BadFile(f"{path.name} has splats without colours; {WANTED}.")
+    colors = shaped(colors, (count, 3), "colors", path)
+    what = "colours of which a network makes others, for each photo"
+    found = Finding(what, 0, "shown without it", file=path.name, repaired=False)
+
+    def fill(sh: np.ndarray) -> None:
+        sh[:, 0] = (sigmoid(colors) - 0.5) / C0
+
+    return 1, fill, (found,)
+
+
+def sigmoid(logits: np.ndarray) -> np.ndarray:
+    return 1 / (1 + np.exp(-logits.astype(np.float32)))
+
+
+def shades(arrays: dict[str, np.ndarray], path: Path) -> np.ndarray | None:
+    """(N, 3) float32 0..1 of points' colours, in bytes or numbers; None without."""
+    colors = arrays.get("colors")
+    if colors is None:
+        return None
+    colors = shaped(colors, (len(arrays["means"]), 3), "colors", path)
+    most = np.iinfo(colors.dtype).max if colors.dtype.kind in "iu" else 1
+    return colors.astype(np.float32) / np.float32(most)
