@@ -147,10 +147,10 @@ def test_debug_pictures_hold_floats(ctx):
 def test_a_driver_that_refuses_gets_half_floats_and_is_named(ctx, monkeypatch, caplog):
     real = Gpu.target
 
-    def refusing(self, size, dtype):
+    def refusing(self, size, dtype, *images):
         if dtype == "nu2":
             raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
-        return real(self, size, dtype)
+        return real(self, size, dtype, *images)
 
     monkeypatch.setattr(Gpu, "target", refusing)
     target_module.tell_once.cache_clear()
