@@ -39,8 +39,10 @@ class Saving:
     @property
     def in_place(self) -> bool:
         """Whether saving writes at once: over a file that this person has saved before."""
-        path = self._viewer.stage.document.path
-        return path is not None and self._own.has(path, self._viewer.stage.document.stamp)
+        document = self._viewer.stage.document
+        if document.path is None or is_bundled(document.path):
+            return False
+        return self._own.has(document.path, document.stamp)
 
     def save(self) -> bool:
         """Writes over what was saved before, else asks for a name; True when it did."""
@@ -200,9 +202,8 @@ def free_path(path: Path) -> Path:
 
 
 def unsaved(stage: "Stage") -> bool:
-    """Whether something would be lost; a scene that is no file yet has no regions to lose."""
-    changed = stage.regions.kept != stage.document.saved_regions
-    return stage.document.unsaved or (changed and stage.document.path is not None)
+    """Whether something would be lost: edits, regions, paint; not a lens, nor where x stands."""
+    return stage.document.unsaved or stage.regions.kept != stage.document.saved_regions
 
 
 def filed(file: SceneFile, stage: "Stage", path: Path) -> SceneFile:

@@ -70,6 +70,7 @@ class Stage:
         self._picker = Picker()
         self._shown: tuple = (None, None)  # what `shown` was made of, and what it was
         self._movable: tuple[Scene | None, list[int]] = (None, [])
+        self._legend: tuple[Scene | None, bool] = (None, False)
 
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
         """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
@@ -388,6 +389,9 @@ class Stage:
     @property
     def has_legend(self) -> bool:
         """Whether any thermal stop that may be seen has values to tell."""
-        seen = [thing for thing in self.scene.objects if thing.visible]
-        stops = [stop for thing in seen for stop in thing.model.stops]
-        return any(stop.palette and stop.value_range is not None for stop in stops)
+        if self._legend[0] is not self.scene:  # asked several times a frame, of many objects
+            seen = [thing for thing in self.scene.objects if thing.visible]
+            stops = [stop for thing in seen for stop in thing.model.stops]
+            found = any(stop.palette and stop.value_range is not None for stop in stops)
+            self._legend = (self.scene, found)
+        return self._legend[1]

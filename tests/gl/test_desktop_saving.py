@@ -230,3 +230,15 @@ def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
     key(viewer, glfw.KEY_Z, CTRL)
     key(viewer, glfw.KEY_Z, CTRL)
     assert stage.document.file.floor_y == -0.7 and objects.unsaved
+
+
+def test_paint_on_what_is_no_file_yet_is_asked_about_and_a_lens_is_not(plain):
+    plain.stage.toggle_lens()
+    run_frames(plain, 1)
+    assert not plain.objects.unsaved and plain._may_close()
+    plain.stage.add_region("sphere")
+    run_frames(plain, 1)
+    assert plain.objects.unsaved and not plain._may_close()
+    plain.objects.saving.answer("Cancel")
+    plain.objects.undo()
+    assert not plain.objects.unsaved and plain._may_close()
