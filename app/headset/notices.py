@@ -10,6 +10,7 @@ from vr.panel_place import facing
 
 WITHIN_S, LATE = 2.0, 3  # so many frames late in that time; fewer are nobody's business
 SHOWN_S, QUIET_S = 4.0, 30.0  # so long it is said, and then not for so long
+BEGINS_S = 5.0  # of a session, in which programs are compiled and files are read
 BELOW = np.array([0.0, -0.22, -0.55])  # metres, of the head: below what one looks at
 ADVICE = {"best": ": try Auto", "balanced": ": try Auto or Fast"}  # by the quality that is chosen
 
@@ -20,9 +21,14 @@ class Late:
     def __init__(self) -> None:
         self._dropped: deque[tuple[float, int]] = deque()  # when, and how many until then
         self._since_s: float | None = None  # when it was said last
+        self._began_s: float | None = None
 
     def watch(self, now_s: float, dropped: int) -> bool:
         """Whether it is to be said now."""
+        if self._began_s is None:
+            self._began_s = now_s
+        if now_s < self._began_s + BEGINS_S:
+            return False
         seen = self._dropped
         seen.append((now_s, dropped))
         while seen[0][0] < now_s - WITHIN_S:

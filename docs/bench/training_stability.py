@@ -43,7 +43,13 @@ from training.synthetic.balls import make_balls  # noqa: E402
 HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
 ANCHORS = ("--anchors", "1000", "--max-anchors", "2000")
 MOST_SAID = 5  # sentences a row
-USUAL = (" held out; ", " done after ", "PoCL")  # in lines of every run
+USUAL = (
+    " held out; ",
+    " done after ",
+    "PoCL",
+    "look: ",
+    " steps are few: ",
+)  # in every run's lines
 
 
 def smaller(capture: Capture, folder: Path, side: int) -> Capture:
