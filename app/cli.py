@@ -137,7 +137,9 @@ def main(arguments: list[str] | None = None) -> int:
         print(usage())
         return 0
     command, rest = choose(arguments)
-    if command == "view" and rest and not rest[0].startswith("-") and not Path(rest[0]).exists():
+    named = rest[0] if rest else "-"  # an address is left to the readers, who say what to do
+    known = named.startswith("-") or "://" in named or Path(named).exists()
+    if command == "view" and not known:
         return refuse(f"'{rest[0]}' is neither a command nor a file; --help lists the commands.")
     try:
         return run_command(command, rest)
