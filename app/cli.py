@@ -204,7 +204,9 @@ def run(arguments: list[str]) -> int:
         print(f"shapeshift {version()}")
         return 0
     command, rest = choose(arguments)
-    if command == "view" and rest and not rest[0].startswith("-") and not Path(rest[0]).exists():
+    named = rest[0] if rest else "-"  # an address is left to the readers, who say what to do
+    known = named.startswith("-") or "://" in named or Path(named).exists()
+    if command == "view" and not known:
         return refuse(no_command(rest[0]))
     try:
         return run_command(command, rest)

@@ -118,8 +118,20 @@ class Account:
         )
 
 
-def read_text_file(path: Path, what: str = "its JSON") -> bytes:
-    """The bytes of a JSON or text file, charged with what its objects take.  Raises BadFile."""
+def read_json_file(path: Path) -> bytes:
+    """The bytes of a JSON file, charged with what its objects take.  Raises BadFile, also where
+    there are none."""
+    refuse_empty(path)
+    return read_text_file(path, "its JSON")
+
+
+def refuse_empty(path: Path) -> None:
+    if not path.stat().st_size:
+        raise BadFile(f"{path} is empty: it has 0 bytes; copy or export it again.")
+
+
+def read_text_file(path: Path, what: str = "its lines") -> bytes:
+    """The bytes of a text file, charged with what its objects take.  Raises BadFile."""
     Memory().of(path).charge(JSON_A_BYTE * path.stat().st_size, what)
     return path.read_bytes()
 

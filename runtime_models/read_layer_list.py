@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from reprlib import repr as short
 
-from runtime_models.memory import read_text_file
+from runtime_models.memory import read_json_file
 from runtime_models.model import BadFile, SplatLayers
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import MODES, read_layers
@@ -25,7 +25,7 @@ def read_layer_list(folder: Path, reading: Reading) -> SplatLayers:
     path = folder / LIST
     if path.stat().st_size > LARGEST_LIST:
         raise BadFile(f"{path} has {path.stat().st_size:,} bytes; no list of stops is so long.")
-    text = read_text_file(path)
+    text = read_json_file(path)
     try:
         entries = json.loads(text)
     except (ValueError, RecursionError):

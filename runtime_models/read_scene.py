@@ -10,6 +10,7 @@ from runtime_models.formats import format_of, head_of
 from runtime_models.lcc.read_lcc import is_lcc, read_lcc
 from runtime_models.lcc.read_lcc2 import is_lcc2, read_lcc2
 from runtime_models.lint_package import refuse_filling
+from runtime_models.memory import refuse_empty
 from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
 from runtime_models.plain_splats import Reading
@@ -66,6 +67,8 @@ def read_whole(path: Path, reading: Reading) -> Model:
         raise BadFile(f"{path} does not exist; wanted is {KNOWN}.")
     if not (path.is_file() or path.is_dir()):  # reading a pipe would wait for ever
         raise BadFile(f"{path} is neither a file nor a folder; wanted is {KNOWN}.")
+    if path.is_file():
+        refuse_empty(path)
     if path.name in (MANIFEST, LIST):
         path = path.parent
     if is_streamed(path):

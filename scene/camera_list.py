@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.memory import read_text_file
+from runtime_models.memory import read_json_file
 from runtime_models.model import BadFile
 from runtime_models.turn import UPSIDE_DOWN, ours_from_file
 from scene.capture_rules import rigid
@@ -51,7 +51,7 @@ def read_json(path: Path) -> object:
         raise BadFile(f"{path} is no file; --camera wants a file of cameras.")
     if path.stat().st_size > MOST_BYTES:
         raise BadFile(f"{path} has {path.stat().st_size:,} bytes; no file of cameras is so large.")
-    data = read_text_file(path)
+    data = read_json_file(path)
     try:
         return json.loads(data)
     except (ValueError, RecursionError):

@@ -189,7 +189,7 @@ def images_of_text(path: Path) -> list[Posed]:
 
 
 def text_lines(path: Path) -> list[str]:
-    text = read_text_file(path, "its lines")
+    text = read_text_file(path)
     try:
         return text.decode("utf-8").split("\n")
     except UnicodeDecodeError:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from runtime_models.memory import read_text_file
+from runtime_models.memory import read_json_file
 from runtime_models.model import BadFile
 from runtime_models.stop_weights import Control, StopWeights
 from scene.camera_list import is_number
@@ -49,7 +49,7 @@ def read_object_file(path: Path) -> "Fields":
         raise BadFile(f"{path} is no file.")
     if (size := path.stat().st_size) > MOST_BYTES:
         raise BadFile(f"{path} has {size:,} bytes; at most {MOST_BYTES:,} are read.")
-    return read_object(read_text_file(path), path.name)
+    return read_object(read_json_file(path), path.name)
 
 
 def control_row(control: Control, decimals: int | None = None) -> float | dict[str, float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from runtime_models.gltf_files import Asset
 from runtime_models.gltf_nodes import placed_meshes
-from runtime_models.memory import Account, Memory
+from runtime_models.memory import Account, Memory, refuse_empty
 from runtime_models.model import BadFile
 from runtime_models.turn import HALF_TURN_Y
 from scene.triangle_mesh import TriangleMesh
@@ -46,8 +46,9 @@ def read_mesh(path: Path) -> TriangleMesh:
         size = path.stat().st_size
     except OSError as error:
         raise BadFile(f"{path.name} cannot be read: {error.strerror}.") from None
-    if not 0 < size <= MOST_BYTES:
-        raise BadFile(f"{path.name} has {size:,} bytes; 1 to {MOST_BYTES:,} are read, simplify it.")
+    if size > MOST_BYTES:
+        raise BadFile(f"{path.name} has {size:,} bytes; at most {MOST_BYTES:,}, simplify it.")
+    refuse_empty(path)
     memory = Memory().of(path)
     if ending in (".glb", ".gltf"):
         vertices, faces = read_gltf_triangles(path, memory)
@@ -99,7 +100,7 @@ def read_by_trimesh(path: Path, kind: str, memory: Account) -> tuple[np.ndarray,
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise BadFile(f"{path.name} cannot be read as a mesh ({reason}); it is damaged.") from None
     if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise BadFile(f"{path.name} has vertices of {vertices.shape[-1:]} numbers; 3 are wanted.")
+        raise BadFile(f"{path.name} has vertices of {vertices.shape[-1]} numbers; 3 are wanted.")
     return vertices, faces
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.memory import read_text_file
+from runtime_models.memory import read_json_file
 from runtime_models.model import BadFile, Stop
 from scene.capture import Capture, Photo
 from scene.capture_rules import (
@@ -102,7 +102,7 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
 
 
 def read_json(file: Path) -> dict:
-    text = read_text_file(file)
+    text = read_json_file(file)
     try:
         data = json.loads(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:

@@ -3,7 +3,6 @@
 BOMBS: what it is -> (who writes it, who reads it).  bomb_run.py reads them and says what they took.
 """
 
-import gzip
 import io
 import json
 import struct
@@ -337,7 +336,3 @@ def points_ply_of_bytes(folder: Path) -> Path:
     head = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n"
     head += "".join(f"property uchar {axis}\n" for axis in "xyz") + "end_header\n"
     return put(folder / "a.ply", head.encode() + bytes(3 * count))
-
-
-def gzipped(data: bytes) -> bytes:
-    return gzip.compress(data, mtime=0)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from fuzz_format_seeds import format_seeds
 from fuzz_run import Seed
 from models import make_random_model
 
@@ -322,4 +323,5 @@ def all_seeds(folder: Path) -> list[Seed]:
     legacy = gzip.compress(b"NGSP" + bytes([1, 0, 0, 0, 2, 0, 0, 0, 0, 12, 0, 0]) + bytes(2 * 17))
     seeds.append(Seed("spz v1", {"v1.spz": legacy}, forgiving, {"v1.spz": "gzip"}))
     seeds += [*thermal_seeds(folder), *picture_seeds(), *capture_seeds(folder), recent_seed()]
-    return seeds + camera_seeds(folder) + text_seeds()
+    seeds += [*camera_seeds(folder), *text_seeds()]
+    return seeds + format_seeds(folder / "further", some_splats)

@@ -13,11 +13,12 @@ from runtime_models.formats import read_plain
 from runtime_models.plain_splats import Reading
 from runtime_models.read_gltf import read_raw_gltf
 from runtime_models.read_scene import read_model
+from runtime_models.turn import HALF_TURN_Y
 from runtime_models.write_package import write_package
-from runtime_models.write_plain import WRITERS
 from runtime_models.write_ply import write_ply
 from tests.models import make_random_model
 from tests.test_gltf import plain_splats
+from tests.writers import EACH_WRITER
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def refused(capsys, words: str, *arguments) -> None:
     assert said.startswith("shapeshift export: ") and words in said, said
 
 
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.ending)
+@EACH_WRITER
 def test_every_format(scenes, tmp_path, capsys, writer):
     out = tmp_path / "new folder" / f"größe{writer.ending}"
     assert export(scenes / "random.shift", "--out", out, "--x", "thermal") == 0
@@ -114,7 +115,8 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
         path.touch()
     assert export(*both, "--out", tmp_path / "both.glb") == 0
     assert export(*both, "--object", 2, "--out", tmp_path / "two.glb") == 0
-    found = [read_raw_gltf(tmp_path / name, Reading()).means for name in ("both.glb", "two.glb")]
+    raw = [read_raw_gltf(tmp_path / name, Reading()) for name in ("both.glb", "two.glb")]
+    found = [each.means @ HALF_TURN_Y for each in raw]  # its axes: left, up, forward
     wanted = [near.means + np.array(place) for place in places.values()]
     np.testing.assert_allclose(found[0], np.concatenate(wanted), rtol=0, atol=1e-6)
     np.testing.assert_allclose(found[1], wanted[1], rtol=0, atol=1e-6)
@@ -131,7 +133,7 @@ def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.ending)
+@EACH_WRITER
 def test_what_a_format_has_no_place_for_is_said(scenes, tmp_path, capsys, monkeypatch, writer):
     model = read_model(scenes / "plain.ply")
     more = {"labels": np.arange(40, dtype=np.int32) % 3, "extra": {"error": np.ones(40, "f4")}}

@@ -23,7 +23,7 @@ from fuzz_then import Then
 
 from renderer.renderer import Renderer
 
-EXAMPLES = 600  # over all seeds together
+EXAMPLES = 800  # over all seeds together
 
 
 def fuzz_all(folder, examples: int, word: str = "") -> tuple[int, Then]:
@@ -106,4 +106,4 @@ def test_mutations_do_the_same_every_time_and_reach_inside(tmp_path, kind):
 
 def test_wrong_files_become_a_model_or_one_sentence(tmp_path):
     count, then = fuzz_all(tmp_path, EXAMPLES)
-    assert count >= 500 and then.opened > 50 and then.drawn > 5
+    assert count >= 800 and then.opened > 50 and then.drawn > 5

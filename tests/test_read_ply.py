@@ -1,5 +1,6 @@
 """The PLY reader against reading value by value: block edges, types, orders, comments, memory."""
 
+import contextlib
 import tracemalloc
 from dataclasses import replace
 
@@ -125,6 +126,8 @@ def test_progress_rises_to_one(tmp_path):
 
 ASCII = {
     "a word": (lambda d: d.replace(b" 0.0 ", b" five ", 1), "words that are no numbers"),
+    "cut in a word": (lambda d: d[:-3], None),  # 0.1234 -> 0.1: nobody can know
+    "cut between words": (lambda d: d.rsplit(b" ", 1)[0], "promises 20 splats.*the file holds 19"),
     "cut off": (lambda d: d.rsplit(b"\n", 2)[0], "promises 20 splats.*the file holds 18"),
     "a long word": (lambda d: d + b"\n" + b"1" * 3_000_000, None),  # behind what is read
     "nothing": (lambda d: d[: d.index(b"end_header") + 11], "promises 20 splats"),
@@ -142,6 +145,24 @@ def test_broken_ascii_is_one_sentence(tmp_path, how):
     with pytest.raises(BadFile, match=words) as failure:
         read_raw_ply(path, Reading())
     assert "\n" not in str(failure.value)
+
+
+@pytest.mark.parametrize("cut", range(1, 60))
+def test_ascii_of_one_splat_opens_or_is_one_sentence(tmp_path, cut):
+    """Cut anywhere, also within a word, and with no last end of line."""
+    path = write_rows(tmp_path / "a.ply", random_rows(1, names_of(1)), encoding="ascii")
+    data = path.read_bytes()
+    assert not data.endswith(b"\n") and len(read_raw_ply(path, Reading()).means) == 1
+    path.write_bytes(data[:-cut])
+    with contextlib.suppress(BadFile):
+        assert len(read_raw_ply(path, Reading()).means) == 1
+
+
+def test_names_of_columns_are_any(tmp_path):
+    """A colon, which a record of numpy has but a buffer of Python may not."""
+    rows = [row | {"user:label": 7.0} for row in random_rows(9, names_of(1))]
+    raw = read_raw_ply(write_rows(tmp_path / "a.ply", rows), Reading())
+    np.testing.assert_array_equal(raw.extra["user:label"], np.full(9, 7, np.float32))
 
 
 def test_a_word_without_end_is_not_collected(tmp_path):

@@ -14,13 +14,21 @@ from renderer.renderer import Renderer
 from runtime_models.formats import read_plain
 from runtime_models.model import SplatLayers, Stop
 from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.write_plain import WRITERS, cut
+from runtime_models.write_plain import cut
 from scene.framing import frame_points, orbit_path
 from scene.metrics import psnr
 from scene.scene import Scene, SceneObject
+from tests.writers import EACH_WRITER
 
 ALIKE = 50.0  # dB between our picture and theirs of one file
-COST = {".compressed.ply": 50, ".ply": 140, ".spz": 50, ".glb": 140, ".splat": 44}  # dB at least
+COST = {  # dB at least
+    ".compressed.ply": 50,
+    ".ply": 140,
+    ".spz": 50,
+    ".glb": 140,
+    ".splat": 44,
+    ".usdz": 140,
+}
 THEIRS = {".compressed.ply": "compressed.ply", ".ply": "ply", ".spz": "spz", ".splat": "splat"}
 SIZE = (240, 160)
 
@@ -84,7 +92,7 @@ def read_by_them(path: Path, ending: str, folder: Path) -> PlainSplats:
 
 @pytest.mark.parametrize("degree", [0, 3])
 @pytest.mark.parametrize("scene", ["leg", "extremes"])
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda writer: writer.ending)
+@EACH_WRITER
 def test_ours_and_theirs_see_the_same(renderer, tmp_path, request, writer, scene, degree):
     splats = cut(request.getfixturevalue(scene), degree)
     path = tmp_path / f"file{writer.ending}"

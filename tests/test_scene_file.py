@@ -271,7 +271,7 @@ def test_what_must_be_there_is_missed_by_name(path, way):
 @pytest.mark.parametrize(
     "text,said",
     [
-        ("", "not JSON"), ("[]", "one object in braces"), ("{", "column 2"), ('{"a":\n', "line 2"),
+        ("", "is empty"), ("[]", "one object in braces"), ("{", "column 2"), ('{"a":\n', "line 2"),
         ('{"objects": [NaN]}', "a list of objects"), ("[" * 100_000, "not JSON"),
         ('{"floor_y": NaN}', "'floor_y'"), ('{"floor_y": 1e999}', "'floor_y'"),
         ('{"floor_y": ' + "9" * 5000 + "}", "not JSON"),

@@ -11,7 +11,7 @@ from runtime_models.model import Stop
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layers import join_layers
 from runtime_models.read_scene import read_model
-from runtime_models.thin import certain_ones, evenly, largest, left_whole, thin
+from runtime_models.thin import certain_ones, evenly, largest, left_whole, prominence, thin
 from runtime_models.write_ply import write_ply
 
 WEIGHTS = {
@@ -56,6 +56,21 @@ def test_chances_are_those_of_the_weights():
 def test_neighbours_along_the_order_are_thinned_alike():
     kept = evenly(np.ones(1000), np.arange(1000), 250)
     assert (np.diff(kept) == 4).all()
+
+
+def test_what_shows_is_opacity_times_the_two_larger_sides():
+    """A needle shows less than a disc of its length, whichever axis is which."""
+    sides = [(1.0, 1e-3, 1e-3), (1e-3, 1.0, 1.0), (0.1, 0.1, 1e-3), (1.0, 1.0, 1e-3)]
+    sides += [(1e-3, 0.1, 0.1), (1.0, 1.0, 1.0)]
+    opacity = np.array([1.0, 1.0, 1.0, 0.25, 1.0, -0.5], np.float32)
+    layers = join_layers(
+        [replace(some_splats(6), scales=np.array(sides, np.float32), opacity=opacity)],
+        (Stop("a", 0.0),), "", ["a.ply"],
+    )  # fmt: skip
+    area = np.array([1e-3, 1.0, 1e-2, 0.25, 1e-2, 0.0])  # opacity * middle * most
+    np.testing.assert_allclose(prominence(layers), area**0.25, rtol=1e-6)
+    kept = {tuple(row) for row in np.round(thin(layers, 4).scales, 4).tolist()}
+    assert (1.0, 0.001, 0.001) not in kept, "a needle stays for its length alone"
 
 
 def test_largest_rows_rise_and_of_equals_the_first_stay():

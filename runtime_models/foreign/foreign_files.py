@@ -89,8 +89,6 @@ def is_address(path: Path) -> bool:
 def refusal(path: Path, head: bytes, known: str) -> str:
     """One sentence about a file that is not read; `known` says what is."""
     name = path.name.lower()
-    if not head:
-        return f"{path} is empty: it has 0 bytes; copy or export it again."
     for foreign in FOREIGN:
         if foreign.fits(head, name):
             return f"{path} is {foreign.what}, which is not read here; {foreign.advice}."

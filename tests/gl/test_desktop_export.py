@@ -10,7 +10,7 @@ from desktop_stand import ball, run_frames
 
 from app.panels.export_panel import EVERYTHING, REGIONS, attach_export
 from runtime_models.formats import read_plain
-from runtime_models.write_plain import WRITERS
+from tests.writers import EACH_WRITER
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 
@@ -32,7 +32,7 @@ def exported(viewer) -> list[Path]:
     return sorted(folder.iterdir()) if folder.exists() else []
 
 
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda writer: writer.ending)
+@EACH_WRITER
 def test_every_format_is_written_and_said(viewer, panel, writer):
     panel.ending = writer.ending
     panel.start()
