@@ -123,21 +123,25 @@ def report_fault(command: str, error: Exception) -> int:
 def run_command(command: str, arguments: list[str]) -> int:
     import tyro
 
+    from app.paths import begin_at_start
+
     module = importlib.import_module(f"app.{COMMANDS[command][0]}")
     options = tyro.cli(module.Options, args=arguments, prog=f"launch.py {command}")
-    return module.run(options)
+    return module.run(begin_at_start(options))
 
 
 def main(arguments: list[str] | None = None) -> int:
-    arguments = sys.argv[1:] if arguments is None else arguments
-    from app.paths import plain_path
+    from app.paths import leave_current_folder, plain, plain_path
 
+    if arguments is None:  # the program itself, not a part of another
+        arguments = sys.argv[1:]
+        leave_current_folder()
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
         print(usage())
         return 0
     command, rest = choose(arguments)
-    if command == "view" and rest and not rest[0].startswith("-") and not Path(rest[0]).exists():
+    if command == "view" and rest and not rest[0].startswith("-") and not plain(rest[0]).exists():
         return refuse(f"'{rest[0]}' is neither a command nor a file; --help lists the commands.")
     try:
         return run_command(command, rest)

@@ -8,6 +8,7 @@ import numpy as np
 
 from app.errors import UsageError
 from app.opening import ReadingOptions
+from app.paths import plain
 from app.subject import Subject, open_subject
 from runtime_models.model import BadFile, Stop
 from scene.scene import Scene
@@ -68,9 +69,9 @@ def subject_at(subject: Subject, at: str, text: str) -> Subject:
 def split_stop(text: str) -> tuple[Path, str]:
     """(path, stop or ""): a path that is there as it is written has no stop."""
     before, sign, at = text.rpartition("@")
-    if not sign or not before or not at or Path(text).exists():
-        return Path(text), ""
-    return Path(before), at
+    if not sign or not before or not at or plain(text).exists():
+        return plain(text), ""
+    return plain(before), at
 
 
 def x_of(at: str, stops: Sequence[Stop], text: str) -> float:
