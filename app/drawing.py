@@ -12,6 +12,7 @@ import numpy as np
 
 from app.errors import UsageError
 from renderer.renderer import Renderer
+from runtime_models.whole_file import whole_file
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
 MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer
@@ -87,12 +88,8 @@ def save_png(image: np.ndarray, path: Path) -> None:
     maker = PngInfo()
     maker.add_text("Software", SOFTWARE)
     pixels = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        Image.fromarray(pixels).save(temporary, format="PNG", pnginfo=maker)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)  # after Ctrl-C or on a full disk
+    with whole_file(path) as file:
+        Image.fromarray(pixels).save(file, format="PNG", pnginfo=maker)
 
 
 def is_our_png(path: Path) -> bool:

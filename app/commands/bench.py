@@ -150,12 +150,9 @@ def is_result(path: Path) -> bool:
 
 
 def write_json(path: Path, result: dict) -> None:
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    from runtime_models.whole_file import write_whole
+
+    write_whole(path, (json.dumps(result, indent=1, allow_nan=False) + "\n").encode())
 
 
 def print_table(result: dict) -> None:

@@ -112,8 +112,10 @@ def tell(simulation, steps: int, path: Path, options: Options):
 
     Lines are whole at every moment: who stops it keeps what was told until then.
     """
+    from runtime_models.whole_file import open_lines
+
     world = simulation.world
-    with path.open("w", encoding="utf-8", newline="\n") as out:
+    with open_lines(path) as out:
         head = {"scene": options.scene.name, "hz": world.hz, "steps": steps}
         out.write(line({**head, "objects": list(world.things)}))
         yield 0

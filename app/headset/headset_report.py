@@ -7,7 +7,7 @@ from typing import IO, TYPE_CHECKING
 import numpy as np
 
 from app.drawing import save_png
-from runtime_models.whole_file import write_whole
+from runtime_models.whole_file import open_lines, write_whole
 from scene.pose import Pose
 from vr.carried import panel_row
 from vr.frame import SIDES, Frame, Hand
@@ -33,7 +33,7 @@ class Report:
         self._path, self._pictures, self._every = path, pictures, every
         self._lines: IO[str] | None = None
         if lines is not None:
-            self._lines = lines.open("w", encoding="utf-8", newline="\n")
+            self._lines = open_lines(lines)
 
     def note(self, wearing: "Wearing", frame: Frame, records: list) -> None:
         """A frame that has been handed over."""

@@ -64,6 +64,7 @@ def run(options: Options) -> int:
 def publish(package: Path, target: Path) -> None:
     """The finished package to where it is wanted, whole or not at all."""
     from app.errors import UsageError
+    from runtime_models.whole_file import write_whole
 
     data = package.read_bytes()
     if len(data) > MOST_BYTES:
@@ -71,9 +72,7 @@ def publish(package: Path, target: Path) -> None:
             f"{package} has {len(data):,} bytes, more than the {MOST_BYTES:,} that a bundled "
             "package may have; lower MOST_ANCHORS"
         )
-    beside = target.with_name(target.name + ".part")
-    beside.write_bytes(data)
-    os.replace(beside, target)
+    write_whole(target, data)
     say(f"{target}: {len(data) / 1e6:.2f} MB")
 
 
