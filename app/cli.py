@@ -33,6 +33,10 @@ COMMANDS = {
         "commands.simulate",
         "a scene file in motion: hands and rays of a script, told as lines",
     ),
+    "colliders": (
+        "commands.colliders",
+        "make a scene file's colliders once, into files that travel with it",
+    ),
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
     "train": ("training.train", "posed photos of several modalities to a scene"),
     "fit": (
@@ -47,6 +51,7 @@ COMMANDS = {
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
+CACHELESS = ("info", "lint", "cameras", "export")  # commands that draw and keep nothing
 BAD_INPUT = 2  # exit code
 FAULT = 3
 INTERRUPTED = 130
@@ -133,7 +138,8 @@ def run_command(command: str, arguments: list[str]) -> int:
 def main(arguments: list[str] | None = None) -> int:
     from app.paths import leave_current_folder, plain, plain_path
 
-    if arguments is None:  # the program itself, not a part of another
+    alone = arguments is None  # the program itself, not a part of another
+    if alone:
         arguments = sys.argv[1:]
         leave_current_folder()
     arguments = [plain_path(argument) for argument in arguments]
@@ -144,6 +150,10 @@ def main(arguments: list[str] | None = None) -> int:
     if command == "view" and rest and not rest[0].startswith("-") and not plain(rest[0]).exists():
         return refuse(f"'{rest[0]}' is neither a command nor a file; --help lists the commands.")
     try:
+        if alone and command not in CACHELESS and "--help" not in rest:
+            from app.caches import settle_caches
+
+            settle_caches()
         return run_command(command, rest)
     except KeyboardInterrupt:
         print("Interrupted.", file=sys.stderr)

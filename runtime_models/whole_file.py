@@ -106,7 +106,7 @@ def open_lines(path: Path) -> IO[str]:
         return open(path, "w", encoding="utf-8", newline="\n")
 
 
-def make_folders(root: Path, below: Path | str) -> Path:
+def make_folders(root: Path, below: Path | str, rights: int = 0o777) -> Path:
     """`root`, which may be a link of the user's, and in it the folders of ours, which may not.
 
     Raises OSError that names the one that is.
@@ -119,7 +119,7 @@ def make_folders(root: Path, below: Path | str) -> Path:
             raise OSError(
                 errno.ELOOP, "it is a link, through which nothing is written", str(folder)
             )
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(rights, exist_ok=True)
     return folder
 
 

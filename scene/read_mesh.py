@@ -6,6 +6,7 @@ but the file itself is opened (no materials, no textures).
 
 import io
 import struct
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +31,11 @@ DAMAGED = (
 )  # fmt: skip
 
 
-def read_mesh(path: Path) -> TriangleMesh:
-    """The triangles of a file, metres, in its own axes, equal vertices joined.  Raises BadFile."""
+def read_mesh(path: Path, leave_out: Collection[int] = ()) -> TriangleMesh:
+    """The triangles of a file, metres, in its own axes, equal vertices joined.  Raises BadFile.
+
+    leave_out: meshes of a glTF file that do not count.
+    """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise BadFile(f"{path.name} is no mesh that is read here; {', '.join(ENDINGS)} are.")
@@ -42,7 +46,7 @@ def read_mesh(path: Path) -> TriangleMesh:
     if not 0 < size <= MOST_BYTES:
         raise BadFile(f"{path.name} has {size:,} bytes; 1 to {MOST_BYTES:,} are read, simplify it.")
     if ending in (".glb", ".gltf"):
-        vertices, faces = read_gltf_triangles(path)
+        vertices, faces = read_gltf_triangles(path, leave_out)
     else:
         vertices, faces = read_by_trimesh(path, ending[1:])
     return clean(vertices, faces, path.name)
@@ -120,14 +124,18 @@ def refuse_ply(count: int, least: int, there: int, name: str, element: str) -> N
         )
 
 
-def read_gltf_triangles(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """All triangles of the shown scene where its nodes stand.  Raises BadFile."""
+def read_gltf_triangles(
+    path: Path, leave_out: Collection[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """The triangles of the shown scene where its nodes stand.  Raises BadFile."""
     asset = Asset(path)
     for needed in asset.item(asset.json, "extensionsRequired", list, []):
         if not str(needed).startswith(("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_")):
             raise asset.refuse(f"it needs {str(needed)[:60]}, which is not read here.")
     vertices, faces, count, start = [], [], 0, 0
     for mesh, matrix in placed_meshes(asset):
+        if mesh in leave_out:
+            continue
         for primitive in asset.item(asset.entry("meshes", mesh), "primitives", list, []):
             if not isinstance(primitive, dict) or primitive.get("mode", TRIANGLES) != TRIANGLES:
                 continue
