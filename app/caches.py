@@ -13,6 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from app.terminal import say
 from runtime_models.user_cache import OURS, cache_base, cache_folder
 from runtime_models.whole_file import write_whole
 
@@ -29,10 +30,7 @@ def settle_caches() -> None:
             stand_in()
         )
         try_cache()
-        print(
-            f"The folder for caches, {base}, cannot be used ({why}); {cache_base()} is meanwhile.",
-            file=sys.stderr,
-        )
+        say(f"The folder for caches, {base}, cannot be used ({why}); {cache_base()} is meanwhile.")
     os.environ.setdefault("POCL_CACHE_DIR", str(cache_folder("pocl")))
     os.environ.setdefault("MPLCONFIGDIR", str(cache_folder("matplotlib")))
 

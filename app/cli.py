@@ -8,6 +8,8 @@ from pathlib import Path
 # Installed as shapeshift.app.cli, the folders' flat imports need the package's folder on the path.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from app.terminal import clean_streams, colors_allowed, drop_output, say, tell
+
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
     "view": ("viewer.desktop", "open a scene in a window"),
@@ -83,7 +85,7 @@ def choose(arguments: list[str]) -> tuple[str, list[str]]:
     if arguments and arguments[0] in COMMANDS:
         return arguments[0], arguments[1:]
     if not arguments and not has_display():
-        print("No display here: drawing the demo without a window.", file=sys.stderr)
+        say("No display here: drawing the demo without a window.")
         return "headless", []
     return "view", arguments
 
@@ -102,8 +104,7 @@ def known_failures() -> tuple[type[Exception], ...]:
 
 def refuse(sentence: str) -> int:
     """One line on stderr, whatever a path or a file put into it."""
-    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in sentence)
-    print(f"shapeshift {line}", file=sys.stderr)
+    say(f"shapeshift {sentence}")
     return BAD_INPUT
 
 
@@ -114,13 +115,13 @@ def report_fault(command: str, error: Exception) -> int:
 
     if os.environ.get("SHAPESHIFT_DEBUG"):
         raise error
-    with tempfile.NamedTemporaryFile("w", prefix="shapeshift-", suffix=".log", delete=False) as log:
+    kept = {"prefix": "shapeshift-", "suffix": ".log", "delete": False, "encoding": "utf-8"}
+    with tempfile.NamedTemporaryFile("w", **kept, errors="backslashreplace") as log:
         traceback.print_exception(error, file=log)
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
-    print(
+    say(
         f"shapeshift {command}: a fault of the program, not of your input ({text}); "
-        f"the details are in {log.name}.",
-        file=sys.stderr,
+        f"the details are in {log.name}."
     )
     return FAULT
 
@@ -131,11 +132,25 @@ def run_command(command: str, arguments: list[str]) -> int:
     from app.paths import begin_at_start
 
     module = importlib.import_module(f"app.{COMMANDS[command][0]}")
-    options = tyro.cli(module.Options, args=arguments, prog=f"launch.py {command}")
+    with colors_allowed():
+        options = tyro.cli(module.Options, args=arguments, prog=f"launch.py {command}")
     return module.run(begin_at_start(options))
 
 
 def main(arguments: list[str] | None = None) -> int:
+    """The program's exit code; without arguments, those of this process."""
+    try:
+        with clean_streams():
+            return answer(arguments)
+    except BrokenPipeError:
+        drop_output()
+        return 0  # the reader of our output went away, as `| head` does
+    except OSError as error:  # what was left of the output found no room
+        drop_output()
+        return refuse(f"{error.strerror}: {error.filename}")
+
+
+def answer(arguments: list[str] | None) -> int:
     from app.paths import leave_current_folder, plain, plain_path
 
     alone = arguments is None  # the program itself, not a part of another
@@ -144,7 +159,7 @@ def main(arguments: list[str] | None = None) -> int:
         leave_current_folder()
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
-        print(usage())
+        tell(usage())
         return 0
     command, rest = choose(arguments)
     if command == "view" and rest and not rest[0].startswith("-") and not plain(rest[0]).exists():
@@ -156,14 +171,14 @@ def main(arguments: list[str] | None = None) -> int:
             settle_caches()
         return run_command(command, rest)
     except KeyboardInterrupt:
-        print("Interrupted.", file=sys.stderr)
+        say("Interrupted.")
         return INTERRUPTED
     except BrokenPipeError:
-        return 0  # the reader of our output went away, as `| head` does
+        raise
     except known_failures() as error:
         if not arguments and command == "view" and type(error).__name__ == "NoContext":
-            print(f"No window here ({error}) Drawing the demo without one.", file=sys.stderr)
-            return main(["headless"])
+            say(f"No window here ({error}) Drawing the demo without one.")
+            return answer(["headless"])
         return refuse(f"{command}: {error}")
     except OSError as error:
         return refuse(f"{command}: {error.strerror or error}: {error.filename or 'no file named'}")

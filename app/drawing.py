@@ -2,7 +2,6 @@
 
 import os
 import re
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,7 @@ import moderngl
 import numpy as np
 
 from app.errors import UsageError
+from app.terminal import say
 from renderer.renderer import Renderer
 from runtime_models.whole_file import whole_file
 
@@ -71,7 +71,7 @@ def open_renderer(context: str, drawing: str) -> Iterator[tuple[Renderer, modern
         except NoContext as reason:
             if context != "auto" or drawing == "quads":
                 raise
-            print(f"Drawing with OpenCL alone: {reason}", file=sys.stderr)
+            say(f"Drawing with OpenCL alone: {reason}")
     try:
         with Renderer(ctx, drawing if ctx is not None else "tiles") as renderer:
             yield renderer, ctx

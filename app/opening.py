@@ -1,6 +1,5 @@
 """How every command opens its scene: the options of reading, progress, a word on what is wrong."""
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -8,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from app.terminal import say
 from runtime_models.model import Finding, Model
 from runtime_models.plain_splats import Reading
 
@@ -68,7 +68,7 @@ def open_model(
     with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
         model = read_model(path, replace(options.reading(), told=tell))
     for finding in model.findings:
-        print(sentence(finding), file=sys.stderr)
+        say(sentence(finding))
     return model
 
 
@@ -83,8 +83,6 @@ def sentence(finding: Finding) -> str:
 @contextmanager
 def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
-    from rich.markup import escape
-
     from app.progress import progress_bar
 
     began, bar, task = time.monotonic(), None, None
@@ -96,8 +94,8 @@ def progress_after(seconds: float) -> Iterator:
                 return
             bar = progress_bar()
             bar.start()
-            task = bar.add_task(escape(what), total=1.0)
-        bar.update(task, description=escape(what), completed=part)
+            task = bar.add_task(what, total=1.0)
+        bar.update(task, description=what, completed=part)
 
     try:
         yield told

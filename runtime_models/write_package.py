@@ -11,6 +11,7 @@ import numpy as np
 from runtime_models.feature_codes import encode_features
 from runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST, open_package
+from runtime_models.plain_text import json_text
 from runtime_models.read_package import read_files
 from runtime_models.whole_file import whole_folder, write_whole
 from runtime_models.write_onnx import write_onnx
@@ -45,7 +46,7 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
     np.savez_compressed(
         arrays, positions=model.anchors, **encode_features(model.features, features)
     )
-    manifest = json.dumps(describe_model(model), indent=1, ensure_ascii=False).encode()
+    manifest = json_text(describe_model(model)).encode()
     files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
     for name in HEADS:
         files[f"{name}.onnx"] = write_onnx(model.networks[name], name)

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 from app.charts.budget import Budget, Choice, choose
 from app.charts.chart_rows import write_text
 from app.subject import Subject
+from app.terminal import say
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
 from runtime_models.whole_file import make_folders
@@ -49,7 +49,7 @@ def settings_for(budget: Budget, renderer: Renderer, ctx, drawn: Drawn) -> Rende
     """
     rows = budget_rows(renderer, ctx, drawn)
     choice = choose(steady(rows), budget.target_ms, budget.floor_db)
-    print(choice.sentence, file=sys.stderr)
+    say(choice.sentence)
     return applied(choice, renderer.settings)
 
 
@@ -135,7 +135,7 @@ def store_rows(path: Path, rows: Sequence[BudgetRow]) -> None:
         make_folders(path.parent.parent, path.parent.name)
         write_text(path, json.dumps({"format": FORMAT, "rows": told}, indent=1) + "\n")
     except OSError as error:
-        print(f"The chart is not kept for the next time: {error}.", file=sys.stderr)
+        say(f"The chart is not kept for the next time: {error}.")
 
 
 def read_rows(path: Path) -> list[BudgetRow] | None:

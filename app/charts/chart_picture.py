@@ -9,6 +9,7 @@ import numpy as np
 
 from app.charts.chart_measure import ChartRow
 from app.charts.pareto import pareto_front
+from runtime_models.plain_text import one_line
 from runtime_models.whole_file import whole_file
 
 WIDTH, HEIGHTS, DPI = 8.3, (4.6, 3.4), 200  # inches: a README shows it 830 pixels wide
@@ -134,7 +135,7 @@ def _style(axis, places: list[tuple[float, float]], title: str, clock: str) -> N
     axis.set_axisbelow(True)
     for side in ("top", "right"):
         axis.spines[side].set_visible(False)
-    axis.set_title(title, fontsize=9, color=INK, loc="left")
+    axis.set_title(one_line(title), fontsize=9, color=INK, loc="left")
     axis.legend(fontsize=7.5, loc="upper right", frameon=True, framealpha=0.9, edgecolor=PALE)
 
 

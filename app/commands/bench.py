@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import tyro
 
 from app.opening import ReadingOptions
+from app.terminal import open_console, say, tell_json
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -77,10 +78,10 @@ def run(options: Options) -> int:
         result = measure(work, options, quality_size)
     print_table(result)
     if options.json == STANDARD_OUTPUT:
-        print(json.dumps(result, indent=1, allow_nan=False))
+        tell_json(result)
     elif options.json is not None:
         write_json(options.json, result)
-        print(f"written to {options.json}", file=sys.stderr)
+        say(f"written to {options.json}")
     return 0
 
 
@@ -106,9 +107,8 @@ def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
 
 def measure(work, options, quality_size: tuple[int, int]) -> dict:
     """All rows of a Measure, with what was asked; says on stderr what it is at."""
-    from rich.console import Console
 
-    with Console(stderr=True).status("starting") as status:
+    with open_console().status("starting") as status:
         result = work.all(options.frames, options.sweep, quality_size, status.update)
     return result | {"command": command_line(), "scene": options.scene.name}
 
@@ -156,7 +156,6 @@ def write_json(path: Path, result: dict) -> None:
 
 
 def print_table(result: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     backends = ", ".join(f"{what} {name}" for what, name in result["backends"].items())
@@ -183,7 +182,7 @@ def print_table(result: dict) -> None:
         f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms{frame_over_draw(result)}; "
         f"{result['frames']} frames after {result['warm_up']} that do not count"
     )
-    console = Console(stderr=True, highlight=False)
+    console = open_console()
     title = f"{result['scene']}, {result['size']}, {backends}, {result['gl_renderer']}"
     console.print(title, markup=False)  # a scene's name may hold brackets
     console.print(table)

@@ -4,12 +4,13 @@ python3 launch.py colliders room.scene.json --out room.made.scene.json
 """
 
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
+
+from app.terminal import say
 
 if TYPE_CHECKING:
     from scene.collider import Collider
@@ -47,10 +48,10 @@ def run(options: Options) -> int:
         if key not in made:
             made[key] = paths[item.name]
             told = write_one(make_one(file, item, models[item.name]), made[key])
-            print(f"{item.name}: {told} in {made[key]}", file=sys.stderr)
+            say(f"{item.name}: {told} in {made[key]}")
         file = naming(file, item.name, made[key])
     write_scene_file(file, options.out)
-    print(f"{options.out} names them.", file=sys.stderr)
+    say(f"{options.out} names them.")
     return 0
 
 

@@ -2,12 +2,13 @@
 
 import json
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+
+from app.terminal import say
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -69,9 +70,7 @@ def run(options: Options) -> int:
         for _ in told:
             pass
     pictures = f" and {len(paths)} pictures" if paths else ""
-    print(
-        f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {options.out}", file=sys.stderr
-    )
+    say(f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {options.out}")
     return 0
 
 
@@ -91,7 +90,7 @@ def make_simulation(file, acts: tuple):
     world = World(file, models, colliders, hz=HZ)
     tell_findings(models)
     for finding in world.findings:
-        print(sentence(finding), file=sys.stderr)
+        say(sentence(finding))
     return Simulation(world, acts)
 
 

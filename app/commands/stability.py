@@ -1,6 +1,5 @@
 """launch.py stability: a scene, and the renderer with it, in the cases where methods fail."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -8,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from app.opening import ReadingOptions
+from app.terminal import open_console, say
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -72,7 +72,7 @@ def run(options: Options) -> int:
     failed = [name for name in names if table.failed(name)]
     told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
-    print(f"{count}, {told}; {table.path} and pictures beside it", file=sys.stderr)
+    say(f"{count}, {told}; {table.path} and pictures beside it")
     return FAILED if failed else 0
 
 
@@ -110,11 +110,10 @@ def command_line() -> str:
 
 def perform(stage, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
-    from rich.console import Console
 
     from app.stability_cases.table import CASES, save_panels
 
-    console = Console(stderr=True, highlight=False)
+    console = open_console()
     with console.status("starting") as status:
         for i, name in enumerate(names):
             if name in table.rows:
@@ -128,7 +127,6 @@ def perform(stage, names: list[str], table) -> None:
 
 
 def print_table(table, names: list[str]) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -139,4 +137,4 @@ def print_table(table, names: list[str]) -> None:
             cells = (case if i == 0 else "", figure, measured, bound, verdict)
             shown.add_row(*(Text(cell, style) for cell in cells))  # figures may hold brackets
         shown.add_section()
-    Console(stderr=True, highlight=False).print(shown)
+    open_console().print(shown)

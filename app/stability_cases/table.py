@@ -11,6 +11,7 @@ from app.drawing import save_png
 from app.errors import UsageError
 from app.stability_cases import eyes, life, motion, networks, places, popping, shapes
 from app.stability_cases.finding import Finding, Panel
+from runtime_models.plain_text import one_line
 from runtime_models.whole_file import write_whole
 
 CASES = {
@@ -116,6 +117,6 @@ def captioned(panel: Panel, height: int) -> np.ndarray:
     canvas = np.zeros((height + CAPTION, image.shape[1], 3))
     canvas[CAPTION : CAPTION + len(image)] = image
     strip = Image.new("RGB", (image.shape[1], CAPTION), (40, 40, 40))
-    ImageDraw.Draw(strip).text((4, 3), panel.caption, fill=(235, 235, 235))
+    ImageDraw.Draw(strip).text((4, 3), one_line(panel.caption), fill=(235, 235, 235))
     canvas[:CAPTION] = np.asarray(strip) / 255
     return canvas

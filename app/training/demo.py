@@ -1,9 +1,10 @@
 """launch.py demo: the bundled demo again, from its ray-traced capture to its package."""
 
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+from app.terminal import say
 
 MOST_BYTES = 5_000_000  # the package lies in the repository
 ITERATIONS = 4000  # 3 to 5 minutes on two cores
@@ -97,7 +98,3 @@ def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
             progress.update(task, completed=done, total=all_of_them)
 
         make_workshop(folder, size, options.views, options.test_views, processes, tell)
-
-
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

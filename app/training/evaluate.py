@@ -1,7 +1,5 @@
 """launch.py eval: PSNR and SSIM of a scene on the held-out photos of a capture."""
 
-import json
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.opening import ReadingOptions, open_model
+from app.terminal import open_console, say, tell_json
 
 if TYPE_CHECKING:
     from scene.capture import Capture
@@ -71,13 +70,12 @@ def run(options: Options) -> int:
         result["vgg_file"] = distance.name
     print_table(result)
     if options.downscale is None and (downscale or 1) > 1:
-        print(
+        say(
             f"Photos made {downscale} times smaller, as in the training; --downscale 1 takes them "
-            "whole.",
-            file=sys.stderr,
+            "whole."
         )
     if options.json == Path("-"):
-        print(json.dumps(result, indent=1))
+        tell_json(result)
     elif options.json is not None:
         write_json(options.json, result)
     return 0
@@ -105,7 +103,6 @@ def only(capture: "Capture", name: str) -> "Capture":
 
 
 def print_table(result: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     vgg = ["VGG distance"] if "vgg_file" in result else []
@@ -121,7 +118,7 @@ def print_table(result: dict) -> None:
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")
         table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
-    console = Console(file=sys.stderr)
+    console = open_console()
     console.print(table)
     console.print(f"worst: {', '.join(worst.values())}", highlight=False, markup=False)
     console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")

@@ -1,7 +1,6 @@
 """launch.py train: posed photos of one or several modalities to a scene."""
 
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from app.terminal import say
 from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions, settings_of
 
 if TYPE_CHECKING:
@@ -168,7 +168,7 @@ def run(options: Options) -> int:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training():
         trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
-    say("\n".join([describe(trainer), *trainer.doubts]))
+    say(describe(trainer), *trainer.doubts)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with kept_when_memory_ends(trainer, options.out, checkpoint):
         interrupted = train(trainer, checkpoint)
@@ -226,10 +226,6 @@ def refuse_plain_options(options: Options) -> None:
         if getattr(options, name) is not None:
             option = f"--{name.replace('_', '-')}"
             raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
-
-
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def describe(trainer: "Trainer") -> str:
