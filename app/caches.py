@@ -13,11 +13,19 @@ import sys
 import tempfile
 from pathlib import Path
 
+from app.paths import has_left
 from app.terminal import say
 from runtime_models.user_cache import OURS, cache_base, cache_folder
 from runtime_models.whole_file import write_whole
 
+CACHELESS = ("info", "lint", "cameras", "export")  # commands that draw and keep nothing
 ROOM = 1 << 16  # bytes that have to fit: a cache on a full disk is none
+
+
+def settle_caches_for(command: str) -> None:
+    """The same for a command of the program itself; another program's environment is its own."""
+    if has_left() and command not in CACHELESS:
+        settle_caches()
 
 
 def settle_caches() -> None:
@@ -38,7 +46,7 @@ def settle_caches() -> None:
 def try_cache() -> None:
     """Raises OSError where our cache takes no file."""
     folder = cache_folder("pocl").parent
-    path = folder / f"room-{os.getpid()}"
+    path = folder / "room"
     try:
         write_whole(path, bytes(ROOM))
     finally:

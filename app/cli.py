@@ -8,6 +8,7 @@ from pathlib import Path
 # Installed as shapeshift.app.cli, the folders' flat imports need the package's folder on the path.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from app.paths import leave_current_folder
 from app.terminal import clean_streams, colors_allowed, drop_output, say, tell
 
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
@@ -53,7 +54,6 @@ COMMANDS = {
     "demo": ("training.demo", "make the bundled demo again: ray-trace its capture, train it"),
     "headless": ("commands.headless", "draw the bundled demo into pictures and time it"),
 }
-CACHELESS = ("info", "lint", "cameras", "export")  # commands that draw and keep nothing
 BAD_INPUT = 2  # exit code
 FAULT = 3
 INTERRUPTED = 130
@@ -129,16 +129,21 @@ def report_fault(command: str, error: Exception) -> int:
 def run_command(command: str, arguments: list[str]) -> int:
     import tyro
 
+    from app.caches import settle_caches_for
     from app.paths import begin_at_start
 
     module = importlib.import_module(f"app.{COMMANDS[command][0]}")
     with colors_allowed():
         options = tyro.cli(module.Options, args=arguments, prog=f"launch.py {command}")
+    settle_caches_for(command)
     return module.run(begin_at_start(options))
 
 
 def main(arguments: list[str] | None = None) -> int:
     """The program's exit code; without arguments, those of this process."""
+    if arguments is None:  # the program itself, not a part of another
+        arguments = sys.argv[1:]
+        leave_current_folder()
     try:
         with clean_streams():
             return answer(arguments)
@@ -150,13 +155,9 @@ def main(arguments: list[str] | None = None) -> int:
         return refuse(f"{error.strerror}: {error.filename}")
 
 
-def answer(arguments: list[str] | None) -> int:
-    from app.paths import leave_current_folder, plain, plain_path
+def answer(arguments: list[str]) -> int:
+    from app.paths import plain, plain_path
 
-    alone = arguments is None  # the program itself, not a part of another
-    if alone:
-        arguments = sys.argv[1:]
-        leave_current_folder()
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
         tell(usage())
@@ -165,10 +166,6 @@ def answer(arguments: list[str] | None) -> int:
     if command == "view" and rest and not rest[0].startswith("-") and not plain(rest[0]).exists():
         return refuse(f"'{rest[0]}' is neither a command nor a file; --help lists the commands.")
     try:
-        if alone and command not in CACHELESS and "--help" not in rest:
-            from app.caches import settle_caches
-
-            settle_caches()
         return run_command(command, rest)
     except KeyboardInterrupt:
         say("Interrupted.")

@@ -10,6 +10,8 @@ from urllib.parse import unquote
 SCHEME = "file:"
 LONGEST_NAME = 100  # letters, of a file that is named after a thing
 STANDARD_STREAM = "-"  # stands for one where a file is wanted
+# Settings of libraries that people give as paths.
+PATHS_IN_ENVIRONMENT = ("XR_RUNTIME_JSON", "OCL_ICD_VENDORS", "POCL_CACHE_DIR", "TMPDIR")
 
 _started_in: Path | None = None  # where relative paths begin; None: in the current folder
 
@@ -38,6 +40,11 @@ def plain(path: Path | str) -> Path:
     return path if _started_in is None or str(path) == STANDARD_STREAM else _started_in / path
 
 
+def has_left() -> bool:
+    """Whether the program is one of its own, which has left the folder that it was started in."""
+    return _started_in is not None
+
+
 def leave_current_folder() -> None:
     """Makes the program's own folder the current one; plain() still begins in the one before.
 
@@ -55,6 +62,9 @@ def leave_current_folder() -> None:
         _started_in = Path(os.sep, "a folder that was deleted")
     if str(_started_in) not in {str(root), *sysconfig.get_paths().values()}:
         sys.path[:] = [entry for entry in sys.path if entry not in ("", str(_started_in))]
+    for name in PATHS_IN_ENVIRONMENT:
+        if given := os.environ.get(name):
+            os.environ[name] = str(_started_in / given) + os.sep * given.endswith(os.sep)
     os.chdir(root)
 
 

@@ -11,6 +11,7 @@ import poisoned_folder
 import pytest
 from splat_scenes import random_layers
 
+from app import first_start
 from app.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -33,6 +34,9 @@ def folder(tmp_path_factory) -> Path:
         write_ply(PlainSplats(*columns), folder / f"{name}.ply")
     (folder / "touch.scene.json").write_text(
         '{"floor_y": -3, "objects": [{"name": "a", "model": "a.ply", "collider": "a.obj"}]}'
+    )
+    (folder / "hulls.scene.json").write_text(
+        '{"objects": [{"name": "a", "model": "a.ply", "collider": "hulls"}]}'
     )
     corners = "".join(f"v {x} {y} {z}\n" for x in (0, 1) for y in (0, 1) for z in (0, 1))
     faces = ("1 2 4", "1 4 3", "5 7 8", "5 8 6", "1 5 6", "1 6 2", "3 4 8", "3 8 7", "1 3 7",
@@ -100,6 +104,7 @@ HEAVY = [
     ("bench", "a.ply", "--frames", "2", "--sweep", "2", *SIZE, "--quality-size", "32x24"),
     ("chart", "a.ply", "--out", "heavy/chart", *SIZE, "--frames", "2"),
     ("stability", "a.ply", "--out", "heavy/stability", "--cases", "behind", *SIZE),
+    ("colliders", "hulls.scene.json", "--out", "heavy/made.scene.json"),  # CoACD, on its own
     ("eval", "light/a.shift", "capture"),
     ("fit", "capture", "--out", "heavy/fit.shift", "--iterations", "2",
      "--final-iterations", "2", "--seeds", "1"),
@@ -175,6 +180,19 @@ def test_relative_paths_begin_where_the_program_was_started(folder, capture, tmp
     assert list((tmp_path / "here" / "pictures").glob("*.png"))
     paths("compare", "./a.ply@0", "../here/b.ply@1", *SIZE, "--out", "sheets")
     assert (tmp_path / "here" / "sheets").is_dir()
+
+
+def test_settings_that_are_paths_begin_there_too(folder, tmp_path):
+    (tmp_path / "here").mkdir()
+    run(tmp_path / "here", tmp_path, ("render", folder / "a.ply", "--out", "a", *SIZE),
+        POCL_CACHE_DIR="kernels", TMPDIR="..")  # fmt: skip
+    assert any((tmp_path / "here" / "kernels").iterdir())
+
+
+@pytest.mark.skipif(not first_start.is_ready(True), reason="not started through launch.py test")
+def test_the_tests_take_nothing_from_there(folder, tmp_path):
+    launch = [sys.executable, str(ROOT / "launch.py")]
+    run(folder, tmp_path, ("test", "-q", "tests/test_plain_text.py"), launch)
 
 
 def test_every_python_that_is_started_leaves_the_current_folder_out():
