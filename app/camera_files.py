@@ -31,9 +31,10 @@ def named_cameras(
     Raises UsageError where nothing lies with the scene, BadFile where it cannot be read.
     """
     from app.errors import UsageError
+    from app.paths import plain
     from scene.read_cameras import find_cameras, find_floor, read_camera_list
 
-    path = Path(camera)
+    path = plain(camera)
     if camera == AUTO:
         path = find_cameras(scene) or find_floor(scene)
         if path is None and not scene.exists():

@@ -9,6 +9,9 @@ from pathlib import Path
 # Installed as shapeshift.app.cli, the folders' flat imports need the package's folder on the path.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from app.paths import leave_current_folder
+from app.terminal import clean_streams, drop_output, say, tell
+
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
     "view": ("viewer.desktop", "open a scene in a window"),
@@ -33,6 +36,10 @@ COMMANDS = {
     "simulate": (
         "commands.simulate",
         "a scene file in motion: hands and rays of a script, told as lines",
+    ),
+    "colliders": (
+        "commands.colliders",
+        "make a scene file's colliders once, into files that travel with it",
     ),
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
     "train": ("training.train", "posed photos of several modalities to a scene"),
@@ -92,7 +99,7 @@ def choose(arguments: list[str]) -> tuple[str, list[str]]:
     if arguments and arguments[0] in COMMANDS:
         return arguments[0], arguments[1:]
     if not arguments and not has_display():
-        print("No display here: drawing the demo without a window.", file=sys.stderr)
+        say("No display here: drawing the demo without a window.")
         return "headless", []
     return "view", arguments
 
@@ -111,15 +118,14 @@ def known_failures() -> tuple[type[Exception], ...]:
 
 def refuse(sentence: str) -> int:
     """One line on stderr, whatever a path or a file put into it."""
-    line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in sentence)
-    warn(f"shapeshift {line}")
+    warn(f"shapeshift {sentence}")
     return BAD_INPUT
 
 
 def warn(text: str) -> None:
     """A line on stderr; the exit code stays what it is where nobody reads it."""
     with contextlib.suppress(BrokenPipeError):
-        print(text, file=sys.stderr, flush=True)
+        say(text)
 
 
 def report_fault(command: str, error: Exception) -> int:
@@ -129,7 +135,8 @@ def report_fault(command: str, error: Exception) -> int:
 
     if os.environ.get("SHAPESHIFT_DEBUG"):
         raise error
-    with tempfile.NamedTemporaryFile("w", prefix="shapeshift-", suffix=".log", delete=False) as log:
+    kept = {"prefix": "shapeshift-", "suffix": ".log", "delete": False, "encoding": "utf-8"}
+    with tempfile.NamedTemporaryFile("w", **kept, errors="backslashreplace") as log:
         traceback.print_exception(error, file=log)
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
     warn(
@@ -140,7 +147,9 @@ def report_fault(command: str, error: Exception) -> int:
 
 
 def run_command(command: str, arguments: list[str]) -> int:
+    from app.caches import settle_caches_for
     from app.command_line import parse, wants_help
+    from app.paths import begin_at_start
     from app.program import program
     from app.progress import lines
 
@@ -149,9 +158,10 @@ def run_command(command: str, arguments: list[str]) -> int:
         from app.command_help import help_text
 
         defaults = getattr(module, "defaults", dict)()
-        print(help_text(module.Options, prog, defaults))
+        tell(help_text(module.Options, prog, defaults))
         return 0
-    options = parse(module.Options, arguments, prog)
+    options = begin_at_start(parse(module.Options, arguments, prog))
+    settle_caches_for(command)
     if command in OPEN_ENDED:
         return module.run(options)
     with lines(command):
@@ -159,53 +169,43 @@ def run_command(command: str, arguments: list[str]) -> int:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The exit code of what was asked for.
-
-    A reader of our output that goes away, as `| head` does, ends it quietly.
-    """
-    arguments = sys.argv[1:] if arguments is None else arguments
-    code = 0
+    """The program's exit code; without arguments, those of this process."""
+    if arguments is None:  # the program itself, not a part of another
+        arguments = sys.argv[1:]
+        leave_current_folder()
     try:
-        code = run(arguments)
-        for stream in (sys.stdout, sys.stderr):
-            if stream is not None:
-                stream.flush()  # now, where a closed pipe can be met, not while Python ends
+        with clean_streams():
+            return answer(arguments)
     except BrokenPipeError:
-        forget_output()
+        drop_output()
+        return 0  # the reader of our output went away, as `| head` does
     except SystemExit as ended:
         if not isinstance(ended.__context__, BrokenPipeError):  # so a table of rich ends it
             raise
-        forget_output()
-    return code
+        drop_output()
+        return 0
+    except OSError as error:  # what was left of the output found no room
+        drop_output()
+        return refuse(f"{error.strerror}: {error.filename}")
 
 
-def forget_output() -> None:
-    """What is still to be written goes nowhere: Python would complain at its end."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(AttributeError, OSError, ValueError):
-            os.dup2(nowhere, stream.fileno())
-    os.close(nowhere)
-
-
-def run(arguments: list[str]) -> int:
-    """The same; BrokenPipeError where output is not read to its end."""
-    from app.paths import plain_path
+def answer(arguments: list[str]) -> int:
+    from app.paths import plain, plain_path
 
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] == ["help"] and len(arguments) == 2:
         arguments = [arguments[1], "--help"]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
-        print(usage())
+        tell(usage())
         return 0
     if arguments[:1] in (["--version"], ["-V"], ["version"]):
         from app.program import version
 
-        print(f"shapeshift {version()}")
+        tell(f"shapeshift {version()}")
         return 0
     command, rest = choose(arguments)
     named = rest[0] if rest else "-"  # an address is left to the readers, who say what to do
-    known = named.startswith("-") or "://" in named or Path(named).exists()
+    known = named.startswith("-") or "://" in named or plain(named).exists()
     if command == "view" and not known:
         return refuse(no_command(rest[0]))
     try:
@@ -217,8 +217,8 @@ def run(arguments: list[str]) -> int:
         raise
     except known_failures() as error:
         if not arguments and command == "view" and type(error).__name__ == "NoContext":
-            print(f"No window here ({error}) Drawing the demo without one.", file=sys.stderr)
-            return run(["headless"])
+            warn(f"No window here ({error}) Drawing the demo without one.")
+            return answer(["headless"])
         return refuse(f"{command}: {error}")
     except OSError as error:
         return refuse(f"{command}: {error.strerror or error}: {error.filename or 'no file named'}")

@@ -2,7 +2,6 @@
 
 import os
 import re
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,9 @@ import moderngl
 import numpy as np
 
 from app.errors import UsageError
+from app.terminal import say
 from renderer.renderer import Renderer
+from runtime_models.whole_file import whole_file
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
 MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer
@@ -63,7 +64,7 @@ def open_renderer(context: str, drawing: str) -> Iterator[tuple[Renderer, modern
         except NoContext as reason:
             if context != "auto" or drawing == "quads":
                 raise
-            print(f"Drawing with OpenCL alone: {reason}", file=sys.stderr)
+            say(f"Drawing with OpenCL alone: {reason}")
     try:
         with Renderer(ctx, drawing if ctx is not None else "tiles") as renderer:
             yield renderer, ctx
@@ -80,12 +81,8 @@ def save_png(image: np.ndarray, path: Path) -> None:
     maker = PngInfo()
     maker.add_text("Software", SOFTWARE)
     pixels = (np.clip(np.nan_to_num(image), 0, 1) * 255 + 0.5).astype(np.uint8)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        Image.fromarray(pixels).save(temporary, format="PNG", pnginfo=maker)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)  # after Ctrl-C or on a full disk
+    with whole_file(path) as file:
+        Image.fromarray(pixels).save(file, format="PNG", pnginfo=maker)
 
 
 def is_our_png(path: Path) -> bool:

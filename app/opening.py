@@ -1,7 +1,6 @@
 """How every command opens its scene: the options of reading, progress, a word on what is wrong."""
 
 import math
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from app.command_line import EXPERT
+from app.terminal import say
 from runtime_models.model import Finding, Model
 from runtime_models.plain_splats import Reading
 
@@ -76,7 +76,7 @@ def open_model(
     with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
         model = read_model(path, replace(options.reading(), told=tell))
     for finding in model.findings:
-        print(sentence(finding), file=sys.stderr)
+        say(sentence(finding))
     return model
 
 
@@ -91,8 +91,6 @@ def sentence(finding: Finding) -> str:
 @contextmanager
 def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
-    from rich.markup import escape
-
     from app.progress import Words, listed, progress_bar
 
     began, bar, task, words = time.monotonic(), None, None, Words()
@@ -105,8 +103,8 @@ def progress_after(seconds: float) -> Iterator:
                 return
             bar = progress_bar()
             bar.start()
-            task = bar.add_task(escape(what), total=1.0)
-        bar.update(task, description=escape(what), completed=part)
+            task = bar.add_task(what, total=1.0)
+        bar.update(task, description=what, completed=part)
 
     try:
         with listed(words):

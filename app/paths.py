@@ -1,8 +1,9 @@
-"""Paths as desktops and shells hand them over: file:// addresses, a leading ~."""
+"""Paths as people, desktops and shells hand them over: relative, file:// addresses, a leading ~."""
 
 import os
 import sys
-from dataclasses import dataclass
+import sysconfig
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -10,6 +11,11 @@ SCHEME = "file:"
 ASSETS = Path(__file__).resolve().parents[1] / "assets"  # what the program brought along
 DEMO, TOUCH = ASSETS / "workshop.shift", ASSETS / "touch.scene.json"
 LONGEST_NAME = 100  # letters, of a file that is named after a thing
+STANDARD_STREAM = "-"  # stands for one where a file is wanted
+# Settings of libraries that people give as paths.
+PATHS_IN_ENVIRONMENT = ("XR_RUNTIME_JSON", "OCL_ICD_VENDORS", "POCL_CACHE_DIR", "TMPDIR")
+
+_started_in: Path | None = None  # where relative paths begin; None: in the current folder
 
 
 def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
@@ -28,8 +34,52 @@ def plain_path(text: str, windows: bool = sys.platform == "win32") -> str:
 
 
 def plain(path: Path | str) -> Path:
-    """The same as a Path; a Path of an address has lost one of its slashes."""
-    return Path(plain_path(str(path)))
+    """The same as a Path that begins where the program was started.
+
+    A Path of an address has lost one of its slashes.
+    """
+    path = Path(plain_path(str(path)))
+    return path if _started_in is None or str(path) == STANDARD_STREAM else _started_in / path
+
+
+def has_left() -> bool:
+    """Whether the program is one of its own, which has left the folder that it was started in."""
+    return _started_in is not None
+
+
+def leave_current_folder() -> None:
+    """Makes the program's own folder the current one; plain() still begins in the one before.
+
+    What lies in the current folder, perhaps one of downloads, is data and no part of the program.
+    Libraries see that otherwise: linkers that OpenCL drivers call take libgcc_s.so.1 from there,
+    matplotlib its settings, Windows DLLs, and other Pythons the modules that they import.
+    """
+    global _started_in
+    os.environ["PYTHONSAFEPATH"] = "1"
+    os.environ.pop("PYTHONPATH", None)
+    root = Path(__file__).resolve().parents[1]
+    try:
+        _started_in = Path.cwd()
+    except FileNotFoundError:  # deleted meanwhile: whatever is relative lies nowhere
+        _started_in = Path(os.sep, "a folder that was deleted")
+    if str(_started_in) not in {str(root), *sysconfig.get_paths().values()}:
+        sys.path[:] = [entry for entry in sys.path if entry not in ("", str(_started_in))]
+    for name in PATHS_IN_ENVIRONMENT:
+        if given := os.environ.get(name):
+            os.environ[name] = str(_started_in / given) + os.sep * given.endswith(os.sep)
+    os.chdir(root)
+
+
+def begin_at_start(value):
+    """The same with each Path in it, also in tuples and dataclasses, made plain()."""
+    if isinstance(value, Path):
+        return plain(value)
+    if isinstance(value, tuple):
+        return tuple(map(begin_at_start, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        found = {field.name: getattr(value, field.name) for field in fields(value) if field.init}
+        return replace(value, **{name: begin_at_start(part) for name, part in found.items()})
+    return value
 
 
 def full(path: Path | str) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from app.terminal import open_console, say
+
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
 
@@ -28,9 +30,14 @@ _under_way: list[Work] = []  # the innermost last; lines are of that
 
 def progress_bar(*columns: "str | ProgressColumn", transient: bool = True) -> "Progress":
     """A bar of rich's; into a file or a pipe it draws nothing, and `lines` tell of it."""
-    from rich.console import Console
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    console = open_console()
+    usual = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    columns = columns or (*usual, TimeRemainingColumn())
+    for column in columns:
+        if isinstance(column, TextColumn):
+            column.markup = False  # names out of files may hold brackets
     return _bar_type()(
         *columns, console=console, transient=transient, disable=not console.is_interactive
     )
@@ -48,15 +55,12 @@ def tracked(work: Collection[Thing], what: str) -> Iterator[Thing]:
 @contextmanager
 def working(what: str) -> Iterator[Callable[[str], None]]:
     """Shows what is done for as long as it takes; gives a function for what comes next."""
-    from rich.console import Console
-    from rich.markup import escape
-
     now = Words(what)
-    with listed(now), Console(stderr=True).status(escape(what)) as status:
+    with listed(now), open_console().status(what) as status:
 
         def tell(text: str) -> None:
             now.text = text
-            status.update(escape(text))
+            status.update(text)
 
         yield tell
 
@@ -74,7 +78,7 @@ def lines(command: str) -> Iterator[None]:
             words = next(filter(None, (work.words() for work in reversed(_under_way))), "at work")
             minutes = (time.monotonic() - began) / 60
             try:
-                print(f"{command}: {words} ({minutes:.0f} min)", file=sys.stderr, flush=True)
+                say(f"{command}: {words} ({minutes:.0f} min)")
             except (OSError, ValueError):
                 return  # nobody reads any more
 
@@ -114,11 +118,9 @@ def listed(work: Work) -> Iterator[None]:
 
 def _bar_type() -> type:
     """A Progress of rich's that lines can tell of.  Made late: rich takes a while to load."""
-    from rich.errors import MarkupError
-    from rich.progress import Progress
-    from rich.text import Text
+    from app.clean_console import CleanProgress
 
-    class Bar(Progress):
+    class Bar(CleanProgress):
         """Listed from start to stop."""
 
         def start(self) -> None:
@@ -135,10 +137,7 @@ def _bar_type() -> type:
             if not running:
                 return ""
             task = running[-1]
-            try:
-                words = [Text.from_markup(task.description).plain]
-            except MarkupError:  # of a bar that takes its texts as they are
-                words = [task.description]
+            words = [task.description]
             if task.total:
                 whole = task.total > 1 and float(task.total).is_integer()
                 part = f"{task.completed:.0f} of {task.total:.0f}"

@@ -1,10 +1,10 @@
 """How commands open a scene file: its models with progress and findings."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
+from app.terminal import say
 
 if TYPE_CHECKING:
     from runtime_models.model import Model
@@ -58,7 +58,7 @@ def tell_findings(models: dict[str, "Model"]) -> None:
     """What is wrong with the models, each told once however many objects have it."""
     for model in {id(model): model for model in models.values()}.values():
         for finding in model.findings:
-            print(sentence(finding), file=sys.stderr)
+            say(sentence(finding))
 
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:

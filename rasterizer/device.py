@@ -1,8 +1,5 @@
 """The OpenCL device that everything here runs on: GPU before CPU, a plain word where is none."""
 
-import os
-import sys
-import tempfile
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -148,35 +145,11 @@ def _literal(value) -> str:
     return f"{value!r}f" if isinstance(value, float) else str(int(value))
 
 
-def cache_folder() -> Path:
-    """Where PoCL keeps built kernels unless POCL_CACHE_DIR says otherwise: a folder of the user's.
-
-    Linux ~/.cache/shapeshift/pocl (XDG_CACHE_HOME is heeded), macOS ~/Library/Caches/...,
-    Windows %LOCALAPPDATA%; a temporary folder of the user's where the home cannot be written.
-    """
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or tempfile.gettempdir())
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "shapeshift" / "pocl"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        user = os.getuid() if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
-        folder = Path(tempfile.gettempdir()) / f"shapeshift-{user}" / "pocl"
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
 def open_device(kind: str | None = None) -> Device:
     """The best OpenCL device: a GPU, else a CPU, the system's PoCL before the wheel's.
 
     kind: "gpu" or "cpu" to insist on one.  Raises NoDevice.
     """
-    if "POCL_CACHE_DIR" not in os.environ:
-        os.environ["POCL_CACHE_DIR"] = str(cache_folder())
     import pyopencl as cl
 
     try:

@@ -7,6 +7,8 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from runtime_models.plain_text import one_line
+
 if TYPE_CHECKING:
     from PIL import ImageFont
 
@@ -26,7 +28,8 @@ def letters(height: int, bold: bool = False) -> "ImageFont.FreeTypeFont":
 
 @lru_cache(maxsize=1024)
 def drawable(text: str, height: int) -> str:
-    """The text with a question mark for every letter that the font has not."""
+    """The text, on one line, with a question mark for every letter that the font has not."""
+    text = one_line(text)
     font = letters(height)
     missing = bytes(font.getmask(MISSING))
     return "".join(c if c == " " or bytes(font.getmask(c)) != missing else "?" for c in text)

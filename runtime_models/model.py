@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from runtime_models.plain_text import one_line
 from runtime_models.shapes import check
 from runtime_models.stop_weights import Controls, Pace, StopBlend, encode_control
 
@@ -14,11 +15,7 @@ SCAFFOLD_HEADS = {"opacity": 1, "covariance": 7, "color": 3}  # numbers a splat
 OCTREE_RULES = ("round", "floor", "ceil", "progressive")
 STOP_KINDS = ("rgb", "thermal", "layer", "style")
 BETWEEN_STOPS = ("blend", "encoding")
-
-
-def one_line(text: str) -> str:
-    """The text with whatever is no letter or sign written out, as \\n: for words out of files."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+LONGEST_SENTENCE = 600  # letters of a refusal, whatever of a file's words is in it
 
 
 class BadFile(ValueError):
@@ -28,7 +25,7 @@ class BadFile(ValueError):
     """
 
     def __init__(self, sentence: str) -> None:
-        line = one_line(sentence)
+        line = one_line(sentence, LONGEST_SENTENCE)
         super().__init__(line if line.endswith((".", "!", "?")) else line + ".")
 
 

@@ -3,9 +3,6 @@
 import io
 import json
 import math
-import os
-import shutil
-import tempfile
 import zipfile
 from pathlib import Path
 
@@ -15,8 +12,9 @@ from runtime_models.feature_codes import encode_features
 from runtime_models.memory import Memory
 from runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST, open_package
+from runtime_models.plain_text import json_text
 from runtime_models.read_package import read_files
-from runtime_models.whole_file import write_whole
+from runtime_models.whole_file import whole_folder, write_whole
 from runtime_models.write_onnx import write_onnx
 
 DATE = (1980, 1, 1, 0, 0, 0)  # of every zip entry: the same model gives the same bytes
@@ -37,7 +35,9 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
     if path.suffix == ".shift":
         write_whole(path, zip_files(files))
         return path.stat().st_size
-    write_folder(files, path)
+    with whole_folder(path) as folder:
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
     return sum(len(data) for data in files.values())
 
 
@@ -47,7 +47,7 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
     np.savez_compressed(
         arrays, positions=model.anchors, **encode_features(model.features, features)
     )
-    manifest = json.dumps(describe_model(model), indent=1, ensure_ascii=False).encode()
+    manifest = json_text(describe_model(model)).encode()
     files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
     for name in HEADS:
         files[f"{name}.onnx"] = write_onnx(model.networks[name], name)
@@ -144,22 +144,3 @@ def zip_files(files: dict[str, bytes]) -> bytes:
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)
     return out.getvalue()
-
-
-def write_folder(files: dict[str, bytes], path: Path) -> None:
-    """The old folder is set aside until the new one stands, and comes back if that fails."""
-    temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=path.name, suffix=".part"))
-    aside = temporary.with_suffix(".old")
-    try:
-        for name, data in files.items():
-            (temporary / name).write_bytes(data)
-        temporary.chmod(0o755)
-        if path.exists():
-            os.replace(path, aside)
-        os.replace(temporary, path)
-    except BaseException:
-        if aside.exists() and not path.exists():
-            os.replace(aside, path)
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-    shutil.rmtree(aside, ignore_errors=True)

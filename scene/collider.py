@@ -14,8 +14,9 @@ from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model
 from scene.collider_cache import content_key, find_kept, keep
 from scene.collider_hulls import cut_into_hulls, hull_volume, solid_hulls
+from scene.collider_pieces import Pieces, hull_faces, read_pieces
 from scene.collider_points import fill_splats
-from scene.collider_wrap import volume, wrap
+from scene.collider_wrap import join_meshes, volume, wrap
 from scene.read_mesh import read_mesh
 from scene.stitch_mesh import is_watertight
 from scene.triangle_mesh import TriangleMesh, sample_faces
@@ -47,13 +48,12 @@ class MassProperties:
 
 @dataclass(frozen=True)
 class Making:
-    """How colliders are made and where they are kept."""
+    """How colliders are made."""
 
     faces: int = FACES  # of the mesh, about
     most_hulls: int = MOST_HULLS
-    beside: Path | None = None  # the scene's folder; None: only the user's cache folder
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
-    kept: bool = True  # False: nothing is read from a cache or written to one
+    kept: bool = True  # False: nothing is read from the user's cache or written to it
     told: Told | None = None  # (what is being done, part done 0..1); may raise to end it
 
     def tell(self, what: str, part: float) -> None:
@@ -95,14 +95,26 @@ def collider_of_model(
 def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:
     """The collider of a mesh file (.glb, .gltf, .obj, .ply, .stl), metres.  Raises BadFile.
 
-    A closed mesh is only simplified, an open one is wrapped; convex parts stay as they are.  A
-    hollow one stays as it is.
+    A closed mesh is only simplified, an open one is wrapped; convex parts stay as they are, and so
+    do convex pieces that the file itself names.  A hollow one stays as it is.
     """
     making = making or Making()
-    given = read_mesh(path)
+    pieces = read_pieces(path)
+    if pieces and not making.hollow:
+        return collider_of_pieces(pieces)
+    given = pieces.skin if pieces else read_mesh(path)
     if making.hollow:  # the physics takes any triangles that stay where they are
         return Collider(around(given), given)
     return known_or_made(making, (given.vertices, given.faces), lambda: closed_mesh(given, making))
+
+
+def collider_of_pieces(pieces: Pieces) -> Collider:
+    """Somebody's own choice, which is not cut again; only what no engine can hold is mended."""
+    hulls = solid_hulls(pieces.points, pieces.skin, MOST_HULLS)
+    skin = pieces.skin
+    if not (is_watertight(skin.faces) and volume(skin.vertices, skin.faces) > 0):
+        skin = join_meshes([TriangleMesh(hull, hull_faces(hull)) for hull in hulls])
+    return Collider(hulls, skin)
 
 
 def known_or_made(
@@ -116,7 +128,7 @@ def known_or_made(
         )
     settings = f"{VERSION} {making.faces} {making.most_hulls} {making.hollow}"
     key = content_key(settings, *columns) if making.kept else ""
-    made = find_kept(key, making.beside) if making.kept else None
+    made = find_kept(key) if making.kept else None
     if made is None:
         mesh = make()
         hulls, finished = around(mesh), True
@@ -124,7 +136,7 @@ def known_or_made(
             hulls, finished = cut_into_hulls(mesh, making.most_hulls, making.tell)
         made = hulls, mesh
         if making.kept and finished:  # what a slow machine gave up on is tried again
-            keep(key, made, making.beside)
+            keep(key, made)
     making.tell("making a collider", 1.0)
     return Collider(*made)
 

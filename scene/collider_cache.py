@@ -1,89 +1,83 @@
-"""Colliders that were made before, kept beside the scene: read in a millisecond, not made in ten s.
+"""Colliders that were made before, in the user's cache: read in a millisecond, not made in ten s.
 
-A file is a digest of what follows, then counts, then the arrays: what does not fit its digest is
-damaged and counts as absent.
+A file is a digest of what follows, then counts, then the arrays: what does not fit its digest, or
+is more than a collider may be, is damaged and made anew.
 """
 
 import hashlib
 import os
-import sys
-import tempfile
+import re
+import stat
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.user_cache import cache_folder
 from runtime_models.whole_file import write_whole
 from scene.triangle_mesh import TriangleMesh
 
-FOLDER = ".shapeshift-colliders"
+FOLDER = "colliders"
 MARK = b"shapeshift collider 1\n"
+NAME = re.compile(r"[0-9a-f]{64}\.collider")
 MOST_BYTES = 16 << 20  # of one file: 2,500 faces and 16 hulls take 60 kB
-MOST_FILES = 256  # in a folder; the ones not used for longest go first
+MOST_ALL = 256 << 20  # bytes of all files; the ones not used for longest go first
+MOST_HULLS, MOST_CORNERS = 64, 1 << 10  # of a collider, of a hull; more were never written
+BINARY = getattr(os, "O_BINARY", 0)  # of Windows
 Made = tuple[tuple[np.ndarray, ...], TriangleMesh]
 
 
 def content_key(settings: str, *arrays: np.ndarray | bytes) -> str:
-    """A name for what a collider is made of and how."""
+    """A name for what a collider is made of and how: a SHA-256 in hex."""
     digest = hashlib.sha256(MARK + settings.encode())
     for array in arrays:
         if isinstance(array, np.ndarray):
             digest.update(f"{array.shape}{array.dtype.str}".encode())
             array = np.ascontiguousarray(array).data
         digest.update(array)
-    return digest.hexdigest()[:40]
+    return digest.hexdigest()
 
 
-def find_kept(key: str, beside: Path | None) -> Made | None:
-    """The collider of a key from beside the scene or from the user's folder; None where absent."""
-    for folder in folders(beside):
-        path = folder / f"{key}.collider"
-        try:
-            if not 0 < path.stat().st_size <= MOST_BYTES:
-                continue
-            data = path.read_bytes()
-        except OSError:
-            continue
-        made = unpack(data)
+def find_kept(key: str) -> Made | None:
+    """The collider of a key; None where there is none that can be used."""
+    try:
+        path = cache_folder(FOLDER) / f"{key}.collider"
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | BINARY)
+        with open(handle, "rb") as file:
+            state = os.fstat(handle)
+            if not (stat.S_ISREG(state.st_mode) and 0 < state.st_size <= MOST_BYTES):
+                return None
+            made = unpack(file.read())
         if made is not None:
-            try:
-                os.utime(path)  # used: the last to be removed
-            except OSError:
-                pass  # of a folder that is only to be read, and is never tidied from here
-            return made
-    return None
+            os.utime(path)  # used: the last to be removed
+    except OSError:
+        return None
+    return made
 
 
-def keep(key: str, made: Made, beside: Path | None) -> Path | None:
-    """Written into the first folder that takes it; where it lies, None where nothing does."""
-    data = pack(made)
-    for folder in folders(beside):
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            write_whole(folder / f"{key}.collider", data)
-            remove_oldest(folder)
-        except OSError:
-            continue
-        return folder / f"{key}.collider"
-    return None
-
-
-def folders(beside: Path | None) -> list[Path]:
-    """Where colliders are kept: beside the scene if it has a place, and a folder of the user's."""
-    own = [] if beside is None else [beside / FOLDER]
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or tempfile.gettempdir())
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return [*own, base / "shapeshift" / "colliders"]
+def keep(key: str, made: Made) -> Path | None:
+    """Writes it; where it lies, None where nothing can be written."""
+    try:
+        folder = cache_folder(FOLDER)
+        write_whole(folder / f"{key}.collider", pack(made))
+        remove_oldest(folder)
+    except OSError:
+        return None
+    return folder / f"{key}.collider"
 
 
 def remove_oldest(folder: Path) -> None:
-    """Leaves MOST_FILES of our files in a folder."""
-    files = sorted(folder.glob("*.collider"), key=lambda path: path.stat().st_mtime)
-    for path in files[: max(0, len(files) - MOST_FILES)]:
+    """Leaves MOST_ALL bytes of our files in the folder."""
+    files = []
+    for path in folder.iterdir():
+        state = path.lstat()
+        if NAME.fullmatch(path.name) and stat.S_ISREG(state.st_mode):
+            files.append((state.st_mtime, state.st_size, path))
+    over = sum(size for _, size, _ in files) - MOST_ALL
+    for _, size, path in sorted(files):
+        if over <= 0:
+            return
         path.unlink(missing_ok=True)
+        over -= size
 
 
 def pack(made: Made) -> bytes:
@@ -107,11 +101,16 @@ def unpack(data: bytes) -> Made | None:
     if head != MARK or len(body) < 12 or hashlib.sha256(body).digest() != digest:
         return None
     count, vertices, faces = (int(n) for n in np.frombuffer(body, "<u4", 3))
-    if len(body) % 4 or not 1 <= count <= len(body) // 4 - 3:
+    if len(body) % 4 or not 1 <= count <= min(len(body) // 4 - 3, MOST_HULLS):
         return None
     sizes = [3 * int(n) for n in np.frombuffer(body, "<u4", count, 12)]
+    if not all(12 <= size <= 3 * MOST_CORNERS for size in sizes):  # a hull has four corners
+        return None
     numbers = np.frombuffer(body, "<f4", offset=12 + 4 * count)
     if len(numbers) != 3 * vertices + 3 * faces + sum(sizes):
+        return None
+    places = np.delete(numbers, np.s_[3 * vertices : 3 * (vertices + faces)])  # without the faces
+    if not np.isfinite(places).all() or vertices < 4 or faces < 4:
         return None
     ends = np.cumsum([3 * vertices, 3 * faces, *sizes[:-1]])
     shown, rows, *hulls = np.split(numbers, ends)

@@ -13,11 +13,11 @@ BACKGROUND_FACES = 10_000  # it stays where it is: the physics looks only at tho
 def colliders_of(
     file: SceneFile, models: Mapping[str, Model], told: Told | None = None
 ) -> dict[str, Collider]:
-    """The collider of each object that has one, by its name; kept beside the scene once made.
+    """The collider of each object that has one, by its name; kept in the user's cache.
 
     Raises BadFile that names the object.
     """
-    making, made, out = Making(beside=file.folder, told=told), {}, {}
+    making, made, out = Making(told=told), {}, {}
     for item in file.all_items:
         if item.collider is not None:
             x = item.x if item.collider == HULLS else 0

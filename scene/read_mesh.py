@@ -7,6 +7,7 @@ but the file itself is opened (no materials, no textures).
 import io
 import re
 import struct
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -34,10 +35,11 @@ OBJ_LINES = re.compile(rb"^[ \t]*([vf][ \t].*)$", re.MULTILINE)  # corners and f
 OBJ_A_BYTE, STL_A_BYTE, PLY_VERTEX, PLY_FACE = 32, 20, 160, 640
 
 
-def read_mesh(path: Path) -> TriangleMesh:
+def read_mesh(path: Path, leave_out: Collection[int] = ()) -> TriangleMesh:
     """The triangles of a file, metres, equal vertices joined.  Raises BadFile.
 
     In the file's own axes, but of glTF (left, up, front) in ours (right, up, back).
+    leave_out: meshes of a glTF file that do not count.
     """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
@@ -51,7 +53,7 @@ def read_mesh(path: Path) -> TriangleMesh:
     refuse_empty(path)
     memory = Memory().of(path)
     if ending in (".glb", ".gltf"):
-        vertices, faces = read_gltf_triangles(path, memory)
+        vertices, faces = read_gltf_triangles(path, memory, leave_out)
     else:
         vertices, faces = read_by_trimesh(path, ending[1:], memory)
     return clean(vertices, faces, path.name)
@@ -167,8 +169,10 @@ def refuse_ply(count: int, least: int, there: int, name: str, element: str) -> N
         )
 
 
-def read_gltf_triangles(path: Path, memory: Account) -> tuple[np.ndarray, np.ndarray]:
-    """All triangles of the shown scene where its nodes stand.  Raises BadFile."""
+def read_gltf_triangles(
+    path: Path, memory: Account, leave_out: Collection[int] = ()
+) -> tuple[np.ndarray, np.ndarray]:
+    """The triangles of the shown scene where its nodes stand.  Raises BadFile."""
     asset = Asset(path, memory)
     for needed in asset.item(asset.json, "extensionsRequired", list, []):
         if not str(needed).startswith(("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_")):
@@ -178,6 +182,8 @@ def read_gltf_triangles(path: Path, memory: Account) -> tuple[np.ndarray, np.nda
     if not asset.in_our_axes:  # as splats of that format are turned
         ours_from_file[:3, :3] = HALF_TURN_Y
     for mesh, world_from_mesh in placed_meshes(asset):
+        if mesh in leave_out:
+            continue
         matrix = ours_from_file @ world_from_mesh
         for primitive in asset.item(asset.entry("meshes", mesh), "primitives", list, []):
             if not isinstance(primitive, dict) or primitive.get("mode", TRIANGLES) != TRIANGLES:

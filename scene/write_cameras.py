@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from runtime_models.model import BadFile
-from runtime_models.whole_file import write_whole
+from runtime_models.whole_file import make_folders, write_whole
 from scene.camera_list import CameraList
 from scene.colmap_tables import TABLES
 from scene.write_camera_path import camera_path
@@ -43,8 +43,7 @@ def write_cameras(cameras: CameraList, path: Path, form: str) -> list[Path]:
     if not cameras.views:
         raise BadFile("there is no camera to be written.")
     if form in COLMAP_FORMS:
-        (path / SPARSE).mkdir(parents=True, exist_ok=True)
-        return write_colmap_cameras(cameras, path / SPARSE, COLMAP_FORMS[form])
+        return write_colmap_cameras(cameras, make_folders(path, SPARSE), COLMAP_FORMS[form])
     data = JSON_FORMS[form](cameras)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_whole(path, (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode())

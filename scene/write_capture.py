@@ -1,11 +1,11 @@
 """Writes a capture in our own form: transforms.json beside its photos (docs/capture.md)."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
 
+from runtime_models.whole_file import whole_file, write_whole
 from scene.capture import Capture, Photo
 
 FORMAT = "shapeshift-capture"
@@ -43,9 +43,7 @@ def write_capture(capture: Capture) -> Path:
     if capture.points is not None:
         write_points(folder / "points.npz", capture)
     target = folder / "transforms.json"
-    beside = target.with_suffix(".json.part")
-    beside.write_text(json.dumps(data, indent=1, ensure_ascii=False), encoding="utf-8")
-    os.replace(beside, target)
+    write_whole(target, json.dumps(data, indent=1, ensure_ascii=False).encode())
     return target
 
 
@@ -81,7 +79,5 @@ def write_points(path: Path, capture: Capture) -> None:
     arrays = {"xyz": np.asarray(capture.points, np.float32)}
     if capture.point_colors is not None:
         arrays["rgb"] = np.round(np.asarray(capture.point_colors) * 255).astype(np.uint8)
-    beside = path.with_name(path.name + ".part")
-    with beside.open("wb") as file:
+    with whole_file(path) as file:
         np.savez_compressed(file, **arrays)
-    os.replace(beside, path)

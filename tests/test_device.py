@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.device import INSTALL, NoDevice, cache_folder, open_device
+from rasterizer.device import INSTALL, NoDevice, open_device
 from rasterizer.program import BuildError, read_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -65,27 +65,6 @@ def test_nothing_happens_at_import():
         "assert 'pyopencl' not in sys.modules; assert dict(os.environ) == before"
     )
     assert run.returncode == 0, run.stderr
-
-
-def test_kernels_are_kept_under_the_users_cache_folder(tmp_path):
-    run = python(
-        "import os; from rasterizer.device import open_device; open_device();"
-        "print(os.environ['POCL_CACHE_DIR'])",
-        XDG_CACHE_HOME=str(tmp_path),
-    )
-    assert run.returncode == 0, run.stderr
-    if sys.platform == "linux":
-        assert Path(run.stdout.strip()) == tmp_path / "shapeshift" / "pocl"
-    assert cache_folder().is_dir()
-
-
-def test_a_cache_folder_that_was_chosen_stays(tmp_path):
-    run = python(
-        "import os; from rasterizer.device import open_device; open_device();"
-        "print(os.environ['POCL_CACHE_DIR'])",
-        POCL_CACHE_DIR=str(tmp_path),
-    )
-    assert run.stdout.strip() == str(tmp_path)
 
 
 @pytest.mark.parametrize("shape", [(0,), (1,), (5, 0, 3), (17, 3)])

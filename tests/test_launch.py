@@ -1,6 +1,8 @@
 """The one door: what it says and does before any of the program is loaded."""
 
+import ast
 import importlib.util
+import os
 import subprocess
 import sys
 import time
@@ -12,75 +14,12 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture
-def launch(tmp_path, monkeypatch):
-    """launch.py as a module, its environment folder moved away from the real one."""
+def launch():
+    """launch.py as a module."""
     spec = importlib.util.spec_from_file_location("launch", ROOT / "launch.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    monkeypatch.setattr(module, "VENV", tmp_path / "venv")
-    monkeypatch.setattr(module, "PYTHON", tmp_path / "venv/bin/python")
     return module
-
-
-@pytest.fixture
-def calls(launch, monkeypatch):
-    """The commands that it would run; none is."""
-    seen = []
-
-    def run(command, **_):
-        seen.append(command)
-        if "venv" in command:
-            launch.PYTHON.parent.mkdir(parents=True)
-            launch.PYTHON.touch()
-        return subprocess.CompletedProcess(command, run.returncode)
-
-    run.returncode = 0
-    monkeypatch.setattr(launch.subprocess, "run", run)
-    monkeypatch.setattr(launch, "missing_packages", lambda testing: [])
-    seen_run = type("Calls", (list,), {})(seen)
-    seen_run.all, seen_run.run = seen, run
-    return seen_run
-
-
-def test_first_start_installs_and_the_second_does_nothing(launch, calls):
-    launch.make_environment(testing=False)
-    assert [c[2] for c in calls.all] == ["venv", "pip"]
-    calls.all.clear()
-    launch.make_environment(testing=False)
-    assert calls.all == []
-
-
-def test_the_test_environment_serves_the_program_too_but_not_the_other_way(launch, calls):
-    launch.make_environment(testing=False)
-    assert launch.is_ready(False) and not launch.is_ready(True)
-    launch.make_environment(testing=True)
-    assert launch.is_ready(False) and launch.is_ready(True)
-
-
-def test_a_failed_install_is_not_taken_for_a_finished_one(launch, calls, capsys):
-    calls.run.returncode = 0
-    launch.make_environment(testing=False)
-    launch.stamp_file(False).unlink()
-    calls.run.returncode = 1
-    with pytest.raises(SystemExit) as stopped:
-        launch.make_environment(testing=False)
-    assert stopped.value.code == 2
-    assert "pip could not install" in capsys.readouterr().err
-    assert not launch.is_ready(False)
-
-
-def test_changed_requirements_install_again(launch, calls, monkeypatch):
-    launch.make_environment(testing=False)
-    monkeypatch.setattr(launch.sys, "version", "another Python")
-    assert not launch.is_ready(False)
-
-
-def test_without_root_one_line_says_what_to_install(launch, monkeypatch, capsys):
-    monkeypatch.setattr(launch.os, "geteuid", lambda: 1000)
-    launch.install_packages(["libegl1", "pocl-opencl-icd"])
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 1
-    assert "sudo apt-get install -y --no-install-recommends libegl1 pocl-opencl-icd" in lines[0]
 
 
 def test_old_python_is_refused_in_one_sentence(launch, monkeypatch, capsys):
@@ -91,9 +30,46 @@ def test_old_python_is_refused_in_one_sentence(launch, monkeypatch, capsys):
     assert "needs Python 3.11 or newer, this is 3.10.4" in capsys.readouterr().err
 
 
-def test_every_library_has_a_package(launch):
-    assert launch.has_library("libc.so.6") or not sys.platform.startswith("linux")
-    assert not launch.has_library("libnot-there.so.9")
+def test_pythons_that_are_refused_can_read_the_refusal():
+    """No syntax, no annotation and no import on the way to it that is newer than 3.6."""
+    tree = ast.parse((ROOT / "launch.py").read_text(), feature_version=(3, 6))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            arguments = [node.returns, *(a.annotation for a in node.args.args)]
+            assert not any(arguments), f"{node.name}: annotations are evaluated there"
+    loaded = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert [alias.name for node in loaded for alias in node.names] == ["os", "subprocess", "sys"]
+
+
+@pytest.mark.parametrize("failure", [KeyboardInterrupt, OSError(30, "Read-only file system", "x")])
+def test_what_ends_the_set_up_is_one_sentence(launch, monkeypatch, capsys, failure):
+    from app import first_start
+
+    def end(testing):
+        raise failure
+
+    monkeypatch.setattr(first_start, "make_environment", end)
+    with pytest.raises(SystemExit) as stopped:
+        launch.main(["info"])
+    assert stopped.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "Interrupted" in line or line.endswith("cannot be made: Read-only file system: x.")
+
+
+def test_what_is_handed_over_finds_nothing_by_pythonpath(launch, monkeypatch):
+    seen = []
+    monkeypatch.setenv("PYTHONPATH", ":")
+    monkeypatch.setenv("PYTHONHOME", "/elsewhere")
+    monkeypatch.setenv("OTHER", "kept")
+    monkeypatch.setattr(launch.os, "name", "posix")
+    monkeypatch.setattr(launch.os, "execve", lambda *given: seen.append(given))
+    monkeypatch.setattr(launch.subprocess, "Popen", lambda *given, **more: pytest.fail("a child"))
+    with pytest.raises(pytest.fail.Exception):  # only since execve came back
+        launch.hand_over("/python", ["app/cli.py", "info"])
+    ((program, command, environment),) = seen
+    assert program == "/python" and command == ["/python", "-P", "app/cli.py", "info"]
+    assert environment["OTHER"] == "kept"
+    assert not {"PYTHONPATH", "PYTHONHOME"} & environment.keys()
 
 
 @pytest.mark.skipif(not (ROOT / ".venv/ready").exists(), reason="not started through launch.py")
@@ -104,7 +80,7 @@ def test_a_second_start_adds_under_a_second():
         return time.perf_counter() - start
 
     door = [sys.executable, "launch.py", "--help"]
-    inside = [ROOT / ".venv/bin/python", "-m", "app.cli", "--help"]
+    inside = [ROOT / ".venv/bin/python", "-P", os.path.join("app", "cli.py"), "--help"]
     seconds(door)  # the set-up, if something changed
     assert min(seconds(door) for _ in range(3)) - min(seconds(inside) for _ in range(3)) < 1.0
 

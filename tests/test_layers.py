@@ -93,7 +93,10 @@ def test_the_physics_engine_is_loaded_only_when_a_world_is_made():
 def test_launch_uses_the_standard_library_alone():
     import sys
 
-    assert imported(ROOT / "launch.py") <= set(sys.stdlib_module_names)
+    own = {"app"}  # app/first_start.py
+    assert imported(ROOT / "launch.py") <= set(sys.stdlib_module_names) | own
+    assert imported(ROOT / "app" / "first_start.py") <= set(sys.stdlib_module_names)
+    assert not (ROOT / "app" / "__init__.py").read_text()
 
 
 def test_no_file_is_over_400_lines():

@@ -1,7 +1,6 @@
 """render: which views and names, what is overwritten, and pictures against the reference."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -253,7 +252,7 @@ def test_a_picture_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     path.write_text("before")
 
     def full(self, where, **options):
-        Path(where).write_bytes(b"half")
+        where.write(b"half")
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Image.Image, "save", full)

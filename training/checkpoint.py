@@ -1,13 +1,13 @@
 """The file beside the output from which an interrupted run goes on."""
 
 import json
-import os
 import zipfile
 from pathlib import Path
 
 import numpy as np
 
 from runtime_models.model import BadFile
+from runtime_models.whole_file import whole_file
 
 
 def checkpoint_path(out: Path) -> Path:
@@ -17,14 +17,8 @@ def checkpoint_path(out: Path) -> Path:
 
 def write_checkpoint(path: Path, state: dict[str, np.ndarray], notes: dict) -> None:
     """All arrays and notes in one file, never half-written."""
-    temporary = path.with_name(path.name + ".partial")
-    try:
-        with open(temporary, "wb") as file:
-            np.savez(file, notes=np.array(json.dumps(notes)), **state)
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+    with whole_file(path) as file:
+        np.savez(file, notes=np.array(json.dumps(notes)), **state)
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict]:

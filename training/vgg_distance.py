@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import BadFile
-from runtime_models.session import open_session
+from runtime_models.session import load_onnxruntime, open_session
 
 LAYERS = ("relu1_2", "relu2_2", "relu3_3", "relu4_3")
 MEAN_BGR = np.array([103.939, 116.779, 123.68], np.float32)  # of ImageNet, as the file wants it off
@@ -69,8 +69,7 @@ def refuse_small(width: int, height: int) -> None:
 
 def opened(data: bytes, path: Path):
     """The session of a network's bytes on all cores.  Raises BadFile."""
-    from onnxruntime.capi import onnxruntime_pybind11_state as errors
-
+    errors = load_onnxruntime().capi.onnxruntime_pybind11_state
     try:
         return open_session(data, threads=0)
     except (

@@ -2,7 +2,6 @@
 
 import json
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -12,8 +11,10 @@ from typing import TYPE_CHECKING
 from app.charts.budget import Budget, Choice, choose
 from app.charts.chart_rows import write_text
 from app.subject import Subject
+from app.terminal import say
 from renderer.renderer import Renderer
 from renderer.settings import RenderSettings
+from runtime_models.whole_file import make_folders
 
 if TYPE_CHECKING:
     from app.charts.chart_measure import ChartRow, Pricing
@@ -48,7 +49,7 @@ def settings_for(budget: Budget, renderer: Renderer, ctx, drawn: Drawn) -> Rende
     """
     rows = budget_rows(renderer, ctx, drawn)
     choice = choose(steady(rows), budget.target_ms, budget.floor_db)
-    print(choice.sentence, file=sys.stderr)
+    say(choice.sentence)
     return applied(choice, renderer.settings)
 
 
@@ -77,14 +78,14 @@ def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
     from app.charts.chart import machine_line
     from app.charts.chart_settings import SETTINGS
     from app.charts.chart_stage import digest
-    from rasterizer.device import cache_folder
+    from runtime_models.user_cache import OURS, cache_base
 
     backends = sorted(renderer.backends.items())
     table = [named for named in SETTINGS if named.quick]
     # The scene by its contents, then everything but that: numbers, names and versions.
     key = digest(drawn.subject.at(drawn.x), drawn.size, drawn.eyes, backends,
                  renderer.settings.background, machine_line(ctx), FORMAT, table)  # fmt: skip
-    return cache_folder().parent / "charts" / f"{key}.json"
+    return cache_base() / OURS / "charts" / f"{key}.json"
 
 
 def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
@@ -131,10 +132,10 @@ def store_rows(path: Path, rows: Sequence[BudgetRow]) -> None:
         if math.isfinite(row.ms) and math.isfinite(row.db)
     ]
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folders(path.parent.parent, path.parent.name)
         write_text(path, json.dumps({"format": FORMAT, "rows": told}, indent=1) + "\n")
     except OSError as error:
-        print(f"The chart is not kept for the next time: {error}.", file=sys.stderr)
+        say(f"The chart is not kept for the next time: {error}.")
 
 
 def read_rows(path: Path) -> list[BudgetRow] | None:

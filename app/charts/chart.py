@@ -1,7 +1,6 @@
 """launch.py chart: what every named setting saves in time and costs in the picture."""
 
 import shlex
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,6 +8,7 @@ from typing import Annotated, Literal
 from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from app.opening import ReadingOptions
 from app.paths import full
+from app.terminal import open_console, say
 
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
@@ -190,13 +190,11 @@ def scene_line(options: Options, stage, contents: str) -> str:
 
 def print_front(front: list, count: int, out: Path) -> None:
     """The settings that nothing beats, on stderr."""
-    from rich.console import Console
     from rich.table import Table
 
     table = Table("nothing is both faster and more alike", "ms", "x exact", "dB", "SSIM")
     for row in front:
         ssim = f"{row.ssim:.4f}" if row.ssim == row.ssim else "-"
         table.add_row(row.name, f"{row.ms:.2f}", f"{row.ratio:.3f}", f"{row.db:.1f}", ssim)
-    Console(stderr=True, highlight=False).print(table)
-    print(f"{count} settings in {full(out / 'rows.csv')}; {full(out / 'chart.png')} shows them.",
-          file=sys.stderr)  # fmt: skip
+    open_console().print(table)
+    say(f"{count} settings in {full(out / 'rows.csv')}; {full(out / 'chart.png')} shows them.")

@@ -1,6 +1,5 @@
 """The chart as a picture: speed against likeness, the Pareto front drawn and named."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -10,6 +9,8 @@ import numpy as np
 
 from app.charts.chart_measure import ChartRow
 from app.charts.pareto import pareto_front
+from runtime_models.plain_text import one_line
+from runtime_models.whole_file import whole_file
 
 WIDTH, HEIGHTS, DPI = 8.3, (4.6, 3.4), 200  # inches: a README shows it 830 pixels wide
 SAME_SPEED = 0.02  # of the exact setting's: less than this is no difference
@@ -134,7 +135,7 @@ def _style(axis, places: list[tuple[float, float]], title: str, clock: str) -> N
     axis.set_axisbelow(True)
     for side in ("top", "right"):
         axis.spines[side].set_visible(False)
-    axis.set_title(title, fontsize=9, color=INK, loc="left")
+    axis.set_title(one_line(title), fontsize=9, color=INK, loc="left")
     axis.legend(fontsize=7.5, loc="upper right", frameon=True, framealpha=0.9, edgecolor=PALE)
 
 
@@ -211,10 +212,6 @@ def save_figure(figure, path: Path) -> None:
 
     fixed = {"svg.hashsalt": "shapeshift", "svg.fonttype": "path"}
     for ending, metadata in (("svg", {"Date": None}), ("png", {"Software": "Shapeshift"})):
-        temporary = path.with_name(f"{path.name}.{ending}.part")
-        try:
-            with matplotlib.rc_context(fixed):
-                figure.savefig(temporary, format=ending, dpi=DPI, metadata=metadata)
-            os.replace(temporary, path.with_name(f"{path.name}.{ending}"))
-        finally:
-            temporary.unlink(missing_ok=True)
+        whole = whole_file(path.with_name(f"{path.name}.{ending}"))
+        with whole as file, matplotlib.rc_context(fixed):
+            figure.savefig(file, format=ending, dpi=DPI, metadata=metadata)

@@ -2,12 +2,12 @@
 
 import csv
 import io
-import os
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
 from app.errors import UsageError
+from runtime_models.whole_file import write_whole
 
 
 class RowsFile:
@@ -66,9 +66,4 @@ class RowsFile:
 
 def write_text(path: Path, text: str) -> None:
     """The whole file or none of it."""
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, text.encode())

@@ -1,6 +1,5 @@
 """The paper's Figure 10 here: decode time against anchors, all five networks and colour alone."""
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ import numpy as np
 
 from app.charts.chart_rows import RowsFile
 from app.paths import full
+from app.terminal import say
 from runtime_models.model import AnchorModel
 
 ANCHORS = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000)
@@ -52,7 +52,7 @@ def run_decode(folder: Path, context: str, command: str) -> int:
             file.add(decode_row(name, ctx, with_anchors(model, anchors)))
     draw_decode(file.rows, folder)
     rows, picture = full(folder / "decode.csv"), full(folder / "decode.png")
-    print(f"{len(file.rows)} rows in {rows}; {picture} shows them.", file=sys.stderr)
+    say(f"{len(file.rows)} rows in {rows}; {picture} shows them.")
     return 0
 
 

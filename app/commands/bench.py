@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
 from app.paths import full
+from app.terminal import open_console, say, tell_json
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -79,10 +80,10 @@ def run(options: Options) -> int:
         result = measure(work, options, quality_size)
     print_table(result)
     if options.json == STANDARD_OUTPUT:
-        print(json.dumps(result, indent=1, allow_nan=False))
+        tell_json(result)
     elif options.json is not None:
         write_json(options.json, result)
-        print(f"written to {full(options.json)}", file=sys.stderr)
+        say(f"written to {full(options.json)}")
     return 0
 
 
@@ -152,16 +153,12 @@ def is_result(path: Path) -> bool:
 
 
 def write_json(path: Path, result: dict) -> None:
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    from runtime_models.whole_file import write_whole
+
+    write_whole(path, (json.dumps(result, indent=1, allow_nan=False) + "\n").encode())
 
 
 def print_table(result: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     backends = ", ".join(f"{what} {name}" for what, name in result["backends"].items())
@@ -188,7 +185,7 @@ def print_table(result: dict) -> None:
         f"worst frame of the x sweep {result['sweep_worst_ms']:.1f} ms{frame_over_draw(result)}; "
         f"{result['frames']} frames after {result['warm_up']} that do not count"
     )
-    console = Console(stderr=True, highlight=False)
+    console = open_console()
     title = f"{result['scene']}, {result['size']}, {backends}, {result['gl_renderer']}"
     console.print(title, markup=False)  # a scene's name may hold brackets
     console.print(table)

@@ -1,14 +1,13 @@
 """launch.py cameras: what is in a file of cameras, or the same in another form."""
 
-import json
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 from app.command_line import POSITIONAL
 from app.paths import full
+from app.terminal import open_console, say, tell_json
 
 
 @dataclass(frozen=True)
@@ -44,11 +43,11 @@ def run(options: Options) -> int:
         raise UsageError("--to wants --out, the file or folder to write.")
     cameras = read_camera_list(options.cameras, camera_reading(options))
     for note in cameras.notes:
-        print(note, file=sys.stderr)
+        say(note)
     if options.out is not None:
         write(options, cameras)
     elif options.json:
-        print(json.dumps(facts_of(cameras), indent=1, ensure_ascii=False))
+        tell_json(facts_of(cameras))
     else:
         print_table(cameras)
     return 0
@@ -68,10 +67,10 @@ def write(options: Options, cameras) -> None:
     written = write_cameras(cameras, options.out, form)
     count = len(cameras.views)
     if form == "vr" and count > 1:
-        print(f"A floor has one view: the first of {count} is taken.", file=sys.stderr)
+        say(f"A floor has one view: the first of {count} is taken.")
         count = 1
     names = full(written[0] if len(written) == 1 else written[0].parent)
-    print(f"{count} camera{'s' * (count > 1)} in {names}", file=sys.stderr)
+    say(f"{count} camera{'s' * (count > 1)} in {names}")
 
 
 def is_part(path: Path, source: Path) -> bool:
@@ -95,7 +94,6 @@ def facts_of(cameras) -> dict:
 
 
 def print_table(cameras) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -114,4 +112,4 @@ def print_table(cameras) -> None:
             f"{degrees:.1f}",
             f"{view.size[0]}x{view.size[1]}",
         )
-    Console().print(table)
+    open_console(stderr=False).print(table)

@@ -1,8 +1,6 @@
 """launch.py compare: two scenes, two stops or two folders of pictures, in numbers and pictures."""
 
-import json
 import math
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,7 @@ import numpy as np
 from app.command_line import EXPERT, POSITIONAL, SIZE
 from app.opening import ReadingOptions
 from app.paths import full
+from app.terminal import open_console, say, tell_json
 
 VIEWS = 8  # of the orbit where no cameras are given
 DEFAULT_SIZE = (640, 360)
@@ -90,7 +89,7 @@ def run(options: Options) -> int:
         compared = drawn_pairs(options, a, b)
     result = score(compared, (a.name, b.name), options)
     if options.json:
-        print(json.dumps(result, indent=1, ensure_ascii=False, allow_nan=False))
+        tell_json(result)
     else:
         print_table(result)
     return 0
@@ -116,7 +115,7 @@ def picture_pairs(a, b) -> Iterator[Compared]:
     from runtime_models.model import BadFile
 
     pairs, how = match_pictures(a, b)
-    print(f"{len(pairs)} pictures, {how}", file=sys.stderr)
+    say(f"{len(pairs)} pictures, {how}")
     for name, file, other in pairs:
         one, two = read_picture(file), read_picture(other)
         if one.shape != two.shape:
@@ -238,12 +237,11 @@ def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options
         save_png(sheet(pair.a, pair.b, names, amplify), both)
         difference = difference_picture(pair.a, pair.b, amplify)
         save_png(written(difference, scale_text(amplify)), alone)
-    print(f"{len(pairs)} sheets in {full(options.out)}", file=sys.stderr)
+    say(f"{len(pairs)} sheets in {full(options.out)}")
     return amplify
 
 
 def print_table(result: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -255,9 +253,9 @@ def print_table(result: dict) -> None:
         last = i >= len(rows) - 2
         cells = (Text(name), told, f"{row['ssim']:.4f}", f"{255 * row['largest']:.1f}")
         table.add_row(*cells, end_section=last)
-    console = Console()
+    console = open_console(stderr=False)
     console.print(Text(f"A  {result['a']}\nB  {result['b']}"))
     console.print(table)
     equal = result["mean"]["equal_views"]
     if 0 < equal < len(result["views"]):
-        print(f"{equal} views are equal; the mean PSNR is of the others.", file=sys.stderr)
+        say(f"{equal} views are equal; the mean PSNR is of the others.")

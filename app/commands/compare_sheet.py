@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from runtime_models.plain_text import one_line
+
 AMPLIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200)
 BRIGHT = 0.8  # what the 99.9th percentile of an amplified difference may reach
 PERCENTILE = 99.9
@@ -34,7 +36,7 @@ def written(picture: np.ndarray, text: str) -> np.ndarray:
     margin = height // 2
     width = draw.textlength(text, font) + 2 * margin
     draw.rectangle((0, 0, width, height + 2 * margin), fill=BEHIND)
-    draw.text((margin, margin), text, fill=TEXT, font=font)
+    draw.text((margin, margin), one_line(text), fill=TEXT, font=font)
     return np.asarray(image, np.float32) / 255
 
 

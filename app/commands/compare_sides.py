@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from app.opening import ReadingOptions
+from app.paths import plain
 from app.subject import Subject, open_subject
 from runtime_models.model import BadFile
 
@@ -46,9 +47,9 @@ def open_side(text: str, options: ReadingOptions) -> SceneSide | PictureSide:
 def split_stop(text: str) -> tuple[Path, str]:
     """(path, stop or ""): a path that is there as it is written has no stop."""
     before, sign, at = text.rpartition("@")
-    if not sign or not before or not at or Path(text).exists():
-        return Path(text), ""
-    return Path(before), at
+    if not sign or not before or not at or plain(text).exists():
+        return plain(text), ""
+    return plain(before), at
 
 
 def pictures_in(path: Path) -> tuple[Path, ...]:

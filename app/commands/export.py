@@ -1,6 +1,5 @@
 """launch.py export: a scene at one control value as a file for other programs."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,6 +8,7 @@ from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
 from app.paths import full
 from app.program import program
+from app.terminal import say
 
 PACKAGE = ".shift"
 
@@ -77,10 +77,9 @@ def run(options: Options) -> int:
     if package:
         return export_package(options, opened)
     if eye and not any(map(follows_eye, models)):
-        print(
+        say(
             "--eye changes nothing: the shapes of this scene are the same from everywhere, and its "
-            "colours are written for all directions.",
-            file=sys.stderr,
+            "colours are written for all directions."
         )
     origin = opened[0].origin
     parts = [
@@ -92,12 +91,11 @@ def run(options: Options) -> int:
     with progress_after(PATIENCE_S) as told:
         splats = export(parts, look, options.out, told)
     for finding in splats.findings:
-        print(sentence(finding), file=sys.stderr)
+        say(sentence(finding))
     degree = round(splats.sh.shape[1] ** 0.5) - 1
-    print(
+    say(
         f"{full(options.out)}: {len(splats.means):,} splats, SH degree {degree}, "
-        f"{options.out.stat().st_size:,} bytes, {told_x(parts)}.",
-        file=sys.stderr,
+        f"{options.out.stat().st_size:,} bytes, {told_x(parts)}."
     )
     return 0
 
@@ -283,5 +281,5 @@ def export_package(options: Options, opened: list) -> int:
     features = model.features
     halves = np.array_equal(features.astype(np.float16), features)  # as the scene was filed
     size = write_package(model, options.out, "float16" if halves else "float32")
-    print(f"{full(options.out)}: {size:,} bytes, every x.", file=sys.stderr)
+    say(f"{full(options.out)}: {size:,} bytes, every x.")
     return 0

@@ -1,7 +1,5 @@
 """launch.py headless: the bundled demo and touch scene, pictures and frame times, no window."""
 
-import json
-import sys
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -9,6 +7,7 @@ from typing import Annotated
 
 from app.command_line import SIZE
 from app.program import program
+from app.terminal import say, tell_json
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
 TOUCH = "touch.png"
@@ -59,12 +58,9 @@ def run(options: Options) -> int:
             result["touch"] = play_touch(renderer, ctx, size, options.out)
     print_table(result)
     write_json(result_path, result)
-    print(
-        f"{told_pictures(result)} and bench.json are in {options.out.resolve()}",
-        file=sys.stderr,
-    )
-    print(json.dumps({"out": str(options.out), "frame_ms": result["frame_ms"],
-                      "psnr_db": result["psnr_db"], "touch": result.get("touch")}))  # fmt: skip
+    say(f"{told_pictures(result)} and bench.json are in {options.out.resolve()}")
+    told = {"out": str(options.out), "frame_ms": result["frame_ms"]}
+    tell_json(told | {"psnr_db": result["psnr_db"], "touch": result.get("touch")}, indent=None)
     return 0
 
 
@@ -83,7 +79,7 @@ def play_touch(renderer, ctx, size: tuple[int, int], out: Path) -> dict | None:
     try:
         return film(renderer, ctx, size, out / TOUCH)
     except BadFile as error:
-        print(f"The touch scene is left out: {error}", file=sys.stderr)
+        say(f"The touch scene is left out: {error}")
         return None
 
 

@@ -1,12 +1,12 @@
 """launch.py info: what is in a scene."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from app.command_line import POSITIONAL
 from app.opening import ReadingOptions, open_model
+from app.terminal import open_console, tell_json
 
 
 @dataclass(frozen=True)
@@ -30,14 +30,13 @@ def run(options: Options) -> int:
     else:
         facts = describe(open_model(options.scene, options), options.scene)
     if options.json:
-        print(json.dumps(facts, indent=1, ensure_ascii=False))
+        tell_json(facts)
     else:
         print_table(facts)
     return 0
 
 
 def print_table(facts: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -59,7 +58,7 @@ def print_table(facts: dict) -> None:
         elif isinstance(value, int) and not isinstance(value, bool):
             value = f"{value:,}"
         table.add_row(key, Text("" if value is None else str(value)))  # names may hold brackets
-    Console().print(table)
+    open_console(stderr=False).print(table)
 
 
 def object_line(item: dict) -> str:

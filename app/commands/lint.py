@@ -1,6 +1,5 @@
 """launch.py lint: what is wrong with a file of splats or a scene file, and what opening repairs."""
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +7,7 @@ from typing import Annotated
 from app.command_line import POSITIONAL
 from app.opening import PATIENCE_S, ReadingOptions, progress_after
 from app.scene_files import open_scene_file
+from app.terminal import open_console, tell_json
 from runtime_models.model import BadFile
 
 
@@ -28,10 +28,10 @@ def run(options: Options) -> int:
     except BadFile as refusal:
         if options.json:
             why = {"file": str(options.scene), "refused": True, "why": str(refusal), "findings": []}
-            print(json.dumps(why, indent=1, ensure_ascii=False))
+            tell_json(why)
         raise
     if options.json:
-        print(json.dumps(facts, indent=1, ensure_ascii=False))
+        tell_json(facts)
     else:
         print_report(facts)
     return 0
@@ -165,11 +165,10 @@ def splats_of(model):
 
 
 def print_report(facts: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    console = Console()
+    console = open_console(stderr=False)
     extent = " x ".join(f"{side:,.3g}" for side in facts["extent_m"])
     objects = f"{facts['objects']} objects, " if "objects" in facts else ""
     degree = "" if facts["sh_degree"] is None else f", SH degree {facts['sh_degree']}"

@@ -49,9 +49,9 @@ def draw_outputs(
         write_png16(as_steps(values, output, metres_per_step), path, texts)
         held = io.BytesIO()
         np.save(held, values)
-        write_whole(held.getvalue(), path.with_suffix(".npy"))
+        write_whole(path.with_suffix(".npy"), held.getvalue())
     text = json.dumps(legend, indent=1) + "\n"
-    write_whole(text.encode(), paths[0].with_name(LEGEND))
+    write_whole(paths[0].with_name(LEGEND), text.encode())
 
 
 def values_of(surface: "Surface", output: str) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from runtime_models.plain_text import name_line
+
 Rows = list[tuple[str, tuple[float, float, float]]]
 TEXT = (235, 235, 235)
 BEHIND = (16, 16, 16)
@@ -19,7 +21,7 @@ def with_legend(picture: np.ndarray, rows: Rows) -> np.ndarray:
     draw = ImageDraw.Draw(image)
     height = max(11, image.height // 45)  # pixels of a line's letters
     font = letters(height)
-    rows = [(drawable(text, height), color) for text, color in rows]
+    rows = [(drawable(name_line(text), height), color) for text, color in rows]
     line, margin = round(height * 1.4), round(height * 0.6)
     width = max(draw.textlength(text, font) for text, _ in rows) + height + 3 * margin
     draw.rectangle((0, 0, width, line * len(rows) + margin), fill=BEHIND)

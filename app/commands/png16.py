@@ -1,6 +1,5 @@
 """PNG files of 16 bits a number: depth, normals, coverage.  Pillow writes no such colours."""
 
-import os
 import struct
 import zlib
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from app.drawing import SOFTWARE
+from runtime_models.whole_file import write_whole
 
 MARK = b"\x89PNG\r\n\x1a\n"
 MOST = 65535
@@ -29,16 +29,7 @@ def write_png16(pixels: np.ndarray, path: Path, texts: dict[str, str] | None = N
     for key, text in ({"Software": SOFTWARE} | (texts or {})).items():
         data += _chunk(b"tEXt", key.encode("latin-1") + b"\0" + text.encode("latin-1"))
     data += _chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + _chunk(b"IEND", b"")
-    write_whole(data, path)
-
-
-def write_whole(data: bytes, path: Path) -> None:
-    temporary = path.with_name(path.name + ".part")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, data)
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:

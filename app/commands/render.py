@@ -1,6 +1,5 @@
 """launch.py render: a scene into PNG files, without a window."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
@@ -10,6 +9,7 @@ from typing import Annotated, Literal
 from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
 from app.opening import ReadingOptions, open_model
 from app.paths import full
+from app.terminal import say
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LEGEND = "legend.json"  # of --output
@@ -130,7 +130,7 @@ def run(options: Options) -> int:
             draw_all(*work)
         else:
             draw_outputs(*work, options.output, unit_of(options, opened.subject, views))
-    print(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}", file=sys.stderr)
+    say(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}")
     return 0
 
 
@@ -245,7 +245,7 @@ def choose_cameras(options: Options, size: tuple[int, int] | None):
         return None
     cameras = named_cameras(options.camera, options.scene, options, size)
     for note in cameras.notes:
-        print(note, file=sys.stderr)
+        say(note)
     return cameras
 
 

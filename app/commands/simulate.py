@@ -2,13 +2,13 @@
 
 import json
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
 from app.paths import full
+from app.terminal import say
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -74,8 +74,7 @@ def run(options: Options) -> int:
         for _ in told:
             pass
     pictures = f" and {len(paths)} pictures" if paths else ""
-    summary = f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {full(options.out)}"
-    print(summary, file=sys.stderr)
+    say(f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {full(options.out)}")
     return 0
 
 
@@ -107,7 +106,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
     world = World(file, models, colliders, hz=HZ)
     tell_findings(models)
     for finding in world.findings:
-        print(sentence(finding), file=sys.stderr)
+        say(sentence(finding))
     return Simulation(world, acts)
 
 
@@ -128,8 +127,10 @@ def tell(simulation, steps: int, path: Path, options: Options):
 
     Lines are whole at every moment: who stops it keeps what was told until then.
     """
+    from runtime_models.whole_file import open_lines
+
     world = simulation.world
-    with path.open("w", encoding="utf-8", newline="\n") as out:
+    with open_lines(path) as out:
         head = {"scene": options.scene.name, "hz": world.hz, "steps": steps}
         out.write(line({**head, "objects": list(world.things)}))
         yield 0

@@ -1,6 +1,5 @@
 """launch.py stability: a scene, and the renderer with it, in the cases where methods fail."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -8,6 +7,7 @@ from typing import Annotated, Literal
 from app.command_line import EXPERT, POSITIONAL, SIZE, Opt
 from app.opening import ReadingOptions
 from app.paths import full
+from app.terminal import open_console, say
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -72,7 +72,7 @@ def run(options: Options) -> int:
     failed = [name for name in names if table.failed(name)]
     told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
-    print(f"{count}, {told}; {full(table.path)} and pictures beside it", file=sys.stderr)
+    say(f"{count}, {told}; {full(table.path)} and pictures beside it")
     return FAILED if failed else 0
 
 
@@ -110,12 +110,11 @@ def command_line() -> str:
 
 def perform(stage, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
-    from rich.console import Console
 
     from app.progress import working
     from app.stability_cases.table import CASES, save_panels
 
-    console = Console(stderr=True, highlight=False)
+    console = open_console()
     with working("starting") as tell:
         for i, name in enumerate(names):
             if name in table.rows:
@@ -129,7 +128,6 @@ def perform(stage, names: list[str], table) -> None:
 
 
 def print_table(table, names: list[str]) -> None:
-    from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
@@ -140,4 +138,4 @@ def print_table(table, names: list[str]) -> None:
             cells = (case if i == 0 else "", figure, measured, bound, verdict)
             shown.add_row(*(Text(cell, style) for cell in cells))  # figures may hold brackets
         shown.add_section()
-    Console(stderr=True, highlight=False).print(shown)
+    open_console().print(shown)

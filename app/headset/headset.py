@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from app.opening import ReadingOptions
+from app.terminal import say
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 NO_HEADSET = 4  # exit code
@@ -136,7 +137,7 @@ def wear(options: Options) -> int:
         ):
             rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
             for profile in session.hands.refused:
-                print(f"{instance.runtime} does not know {profile}.", file=sys.stderr)
+                say(f"{instance.runtime} does not know {profile}.")
             wearing = Wearing(
                 session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand,
                 options.floor, options.hints,
@@ -194,11 +195,11 @@ def without_headset(reason: str, options: Options) -> int:
     """Says why, and opens the viewer, unless nobody looks: a measured run, or no display."""
     from app.cli import has_display
 
-    print(f"shapeshift vr: {reason}", file=sys.stderr)
+    say(f"shapeshift vr: {reason}")
     if options.frames or options.report or not has_display():
         return NO_HEADSET
     from app.viewer import desktop
 
-    print("Opening the scene in a window instead.", file=sys.stderr)
+    say("Opening the scene in a window instead.")
     reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}
     return desktop.run(desktop.Options(scenes=(options.scene or DEMO,), x=options.x, **reading))

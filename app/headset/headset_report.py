@@ -1,7 +1,6 @@
 """What a run in the headset leaves behind for tests and benchmarks: a report, lines, pictures."""
 
 import json
-import sys
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -9,7 +8,8 @@ import numpy as np
 
 from app.drawing import save_png
 from app.paths import full
-from runtime_models.whole_file import write_whole
+from app.terminal import say
+from runtime_models.whole_file import open_lines, write_whole
 from scene.json_fields import control_row
 from scene.pose import Pose
 from vr.carried import panel_row
@@ -36,7 +36,7 @@ class Report:
         self._path, self._pictures, self._every = path, pictures, every
         self._lines: IO[str] | None = None
         if lines is not None:
-            self._lines = lines.open("w", encoding="utf-8", newline="\n")
+            self._lines = open_lines(lines)
 
     def note(self, wearing: "Wearing", frame: Frame, records: list) -> None:
         """A frame that has been handed over."""
@@ -56,7 +56,7 @@ class Report:
             write_whole(self._path, text.encode())
         written = [self._path, self._lines and self._lines.name, self._pictures]
         if names := [full(path) for path in written if path]:
-            print(f"written to {', '.join(names)}", file=sys.stderr)
+            say(f"written to {', '.join(names)}")
 
     def close(self) -> None:
         if self._lines is not None:

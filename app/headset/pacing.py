@@ -1,6 +1,5 @@
 """Keeps the drawing of a headset's frames within the runtime's period: settings, then pixels."""
 
-import sys
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -11,6 +10,7 @@ import numpy as np
 
 from app.charts.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
 from app.charts.quick_chart import QUICK, QuickChart, QuickRow
+from app.terminal import say
 from renderer.renderer import Renderer
 from renderer.resolution import Resolution
 from renderer.settings import RenderSettings
@@ -111,7 +111,7 @@ class Pacing:
         self._rows = self._rows or chart.rows()
         self.choice = choose(self._rows, target_ms, self.floor_db)
         if self.choice.name != EXACT:
-            print(self.choice.sentence, file=sys.stderr)
+            say(self.choice.sentence)
         # Fewer pixels are priced alone: on top of other shortcuts nobody knows what they cost.
         chosen = self.choice.settings
         priced = least_scale(self._rows, self.floor_db)

@@ -1,6 +1,5 @@
 """Opens what is to be seen in a headset as a world of objects: a scene file, or one scene alone."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
 from app.scene_files import file_at, open_scene_file
 from app.subject import control_of_text, pace_of
+from app.terminal import say
 from runtime_models.model import Model
 from scene.collider_files import colliders_of
 from scene.framing import default_background, default_view, frame_points, scene_points
@@ -50,7 +50,7 @@ def open_worn(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
         colliders = colliders_of(file, models, told)
     world = World(file, models, colliders, hz=HZ)
     for finding in world.findings:
-        print(sentence(finding), file=sys.stderr)
+        say(sentence(finding))
     eye = first_view(file, scene, ANY_SIZE).world_from_eye
     return WornScene(world, models, eye, file.floor_y, BACKGROUND)
 

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,8 @@ from app.drawing import save_png
 from app.errors import UsageError
 from app.stability_cases import eyes, life, motion, networks, places, popping, shapes
 from app.stability_cases.finding import Finding, Panel
+from runtime_models.plain_text import one_line
+from runtime_models.whole_file import write_whole
 
 CASES = {
     "sweep": motion.sweep,
@@ -72,12 +73,7 @@ class Table:
         rows.writerow(COLUMNS)
         for case in CASES:
             rows.writerows(self.rows.get(case, []))
-        temporary = self.path.with_name(NAME + ".part")
-        try:
-            temporary.write_text(text.getvalue(), encoding="utf-8")
-            os.replace(temporary, self.path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_whole(self.path, text.getvalue().encode())
 
 
 def open_table(folder: Path, command: str, subject: str, overwrite: bool) -> Table:
@@ -123,6 +119,6 @@ def captioned(panel: Panel, height: int) -> np.ndarray:
     canvas = np.zeros((height + CAPTION, image.shape[1], 3))
     canvas[CAPTION : CAPTION + len(image)] = image
     strip = Image.new("RGB", (image.shape[1], CAPTION), (40, 40, 40))
-    ImageDraw.Draw(strip).text((4, 3), panel.caption, fill=(235, 235, 235))
+    ImageDraw.Draw(strip).text((4, 3), one_line(panel.caption), fill=(235, 235, 235))
     canvas[:CAPTION] = np.asarray(strip) / 255
     return canvas

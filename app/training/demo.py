@@ -1,13 +1,13 @@
 """launch.py demo: the bundled demo again, from its ray-traced capture to its package."""
 
 import os
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from app.command_line import EXPERT, SIZE
 from app.paths import full
+from app.terminal import say
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 20 minutes of a core
@@ -72,6 +72,7 @@ def run(options: Options) -> int:
 def publish(package: Path, target: Path) -> None:
     """The finished package to where it is wanted, whole or not at all."""
     from app.errors import UsageError
+    from runtime_models.whole_file import write_whole
 
     data = package.read_bytes()
     if len(data) > MOST_BYTES:
@@ -79,9 +80,7 @@ def publish(package: Path, target: Path) -> None:
             f"{package} has {len(data):,} bytes, more than the {MOST_BYTES:,} that a bundled "
             "package may have; lower MOST_ANCHORS"
         )
-    beside = target.with_name(target.name + ".part")
-    beside.write_bytes(data)
-    os.replace(beside, target)
+    write_whole(target, data)
     say(f"{full(target)}: {len(data) / 1e6:.2f} MB")
 
 
@@ -106,7 +105,3 @@ def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
             progress.update(task, completed=done, total=all_of_them)
 
         make_workshop(folder, size, options.views, options.test_views, processes, tell)
-
-
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

@@ -1,7 +1,5 @@
 """launch.py eval: PSNR and SSIM of a scene on the held-out photos of a capture."""
 
-import json
-import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL
 from app.opening import ReadingOptions, open_model
+from app.terminal import open_console, say, tell_json
 
 if TYPE_CHECKING:
     from scene.capture import Capture
@@ -75,16 +74,15 @@ def run(options: Options) -> int:
         result["vgg_file"] = distance.name
     print_table(result)
     if options.downscale is None and (downscale or 1) > 1:
-        print(
+        say(
             f"Photos made {downscale} times smaller, as in the training; --downscale 1 takes them "
-            "whole.",
-            file=sys.stderr,
+            "whole."
         )
     if options.json == Path("-"):
-        print(json.dumps(result, indent=1))
+        tell_json(result)
     elif options.json is not None:
         write_json(options.json, result)
-        print(f"written to {full(options.json)}", file=sys.stderr)
+        say(f"written to {full(options.json)}")
     return 0
 
 
@@ -110,7 +108,6 @@ def only(capture: "Capture", name: str) -> "Capture":
 
 
 def print_table(result: dict) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     vgg = ["VGG distance"] if "vgg_file" in result else []
@@ -126,7 +123,7 @@ def print_table(result: dict) -> None:
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")
         table.add_row(name, *row, str(score["photos"]), f"{result['alive'][name]:,}")
-    console = Console(file=sys.stderr)
+    console = open_console()
     console.print(table)
     console.print(f"worst: {', '.join(worst.values())}", highlight=False, markup=False)
     console.print(f"{result['bytes']:,} bytes on disk, {result['seconds']:.1f} s")

@@ -1,12 +1,12 @@
 """launch.py fit: the smallest scene that shows a capture as well as the largest, and why."""
 
-import json
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL
+from app.terminal import open_console, tell_json
 from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def run(options: Options) -> int:
     what = "the fitted model of the first seed with this report in it"
     say(f"{full(options.out)}: {size:,} bytes, {what}")
     if options.json == Path("-"):
-        print(json.dumps(result, indent=1))
+        tell_json(result)
     elif options.json is not None:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")
@@ -120,11 +120,10 @@ def run(options: Options) -> int:
 
 def print_report(need: "Need") -> None:
     """The need report on standard error."""
-    from rich.console import Console
     from rich.table import Table
 
     wide = None if sys.stderr.isatty() else 160  # into a file, no row needs to be broken
-    console, names = Console(stderr=True, width=wide), list(need.photos)
+    console, names = open_console(width=wide), list(need.photos)
     table = Table(
         "without", *(f"{n} dB" for n in names), "verdict", "bytes", "decode ms", "train s"
     )

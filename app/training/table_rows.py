@@ -1,8 +1,9 @@
 """Rows of a comparison of methods, shown in the form of the paper's Tables 1 and 2."""
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+from app.terminal import open_console
 
 MEAN = "mean"  # the modality of the row that sums a method up
 NAMES = {
@@ -53,7 +54,6 @@ def mean_row(rows: list[Row], runs: list) -> Row:
 
 def finish(rows: list[Row], out: Path, head: list[str]) -> None:
     """table.md, and the same on standard error."""
-    from rich.console import Console
     from rich.table import Table
 
     from app.charts.chart_rows import write_text
@@ -62,7 +62,7 @@ def finish(rows: list[Row], out: Path, head: list[str]) -> None:
     shown = Table(*columns)
     for line in lines:
         shown.add_row(*line)
-    console = Console(file=sys.stderr)
+    console = open_console()
     console.print(shown)
     verdicts = compare(rows)
     for text in (*verdicts, head[2]):

@@ -2,7 +2,6 @@
 
 import shlex
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from app.command_line import EXPERT, MODALITY, POSITIONAL, Opt
 from app.paths import full
 from app.program import program
+from app.terminal import say
 from app.training.train_options import (
     ModelOptions,
     PhotoOptions,
@@ -198,7 +198,7 @@ def run(options: Options) -> int:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training(), working("reading photos, finding the first anchors"):
         trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
-    say("\n".join([describe(trainer), *trainer.doubts]))
+    say(describe(trainer), *trainer.doubts)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     with kept_when_memory_ends(trainer, options.out, checkpoint):
         interrupted = train(trainer, checkpoint)
@@ -260,10 +260,6 @@ def refuse_plain_options(options: Options) -> None:
         if getattr(options, name) is not None:
             option = f"--{name.replace('_', '-')}"
             raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
-
-
-def say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def describe(trainer: "Trainer") -> str:

@@ -102,11 +102,15 @@ def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":
     Raises UsageError, also when a resumed run is asked for anything but another budget.
     """
     from app.errors import UsageError
+    from app.paths import plain
+    from training.initial import SOURCES
     from training.settings import TrainSettings, preset
 
     names = {f.name for f in fields(TrainSettings)} - {"preset"}
     asked = {n: getattr(options, n) for n in names & {f.name for f in fields(options)}}
     asked = {n: value for n, value in asked.items() if value is not None}
+    if asked.get("points", SOURCES[0]) not in SOURCES:
+        asked["points"] = str(plain(asked["points"]))
     settings = preset(options.preset) if before is None else TrainSettings(**(OLD | before))
     if before is not None:
         known = settings.as_dict()  # an older checkpoint may not have all of them

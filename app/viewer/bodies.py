@@ -6,7 +6,6 @@ The picture does not wait for it: a scene is there to be seen before it can be t
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.opening import sentence
@@ -129,7 +128,6 @@ class Bodies:
         """Makes one collider in a thread that the program's end does not wait for."""
         future = self._future = Future()
         file, model, unwanted = document.file, document.model(item), self._unwanted
-        beside = document.path.absolute().parent if document.path is not None else None
         self._told = (f"{item.name}: making a collider", 0.0)
 
         def told(what: str, part: float) -> None:
@@ -139,7 +137,7 @@ class Bodies:
 
         def work() -> None:
             try:
-                future.set_result((making_of(item), *make(file, item, model, beside, told)))
+                future.set_result((making_of(item), *make(file, item, model, told)))
             except Unwanted:
                 future.cancel()
             except BaseException as error:  # handed to the window's thread, which raises it again
@@ -167,14 +165,14 @@ def making_of(item: SceneItem) -> tuple:
 
 
 def make(
-    file: SceneFile, item: SceneItem, model: Model, beside: Path | None, told: Told
+    file: SceneFile, item: SceneItem, model: Model, told: Told
 ) -> "tuple[Collider | None, str]":
     """The collider, or None and why there is none."""
     from scene.collider import Making
     from scene.collider_files import one_collider
 
     try:
-        return one_collider(file, item, model, Making(beside=beside, told=told)), ""
+        return one_collider(file, item, model, Making(told=told)), ""
     except BadFile as error:
         return None, f"{error} It cannot be touched."
     except MemoryError:

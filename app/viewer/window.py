@@ -12,11 +12,13 @@ from moderngl_window.context.glfw import Window as GlfwWindow
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
 from app.panels import theme
+from app.panels.clean_texts import clean_texts
 from app.paths import plain
 from app.program import program
 from app.viewer.monitor import grow_window, monitor_height
 from app.viewer.settings import default_text_size
 from renderer.context import NoContext
+from runtime_models.plain_text import one_line
 
 BUTTONS = {0: "left", 1: "right", 2: "middle"}
 DOUBLE_CLICK_S = 0.3
@@ -110,6 +112,7 @@ class Window:
         self._handle = self._window._window  # moderngl-window keeps glfw's own handle private
         self._window.exit_key = None  # Escape belongs to the overlay
         self.ctx: moderngl.Context = self._window.ctx
+        clean_texts()
         self._imgui = imgui.create_context()
         imgui.get_io().set_ini_filename("")  # leaves no imgui.ini behind
         self._chosen_size = text_size  # None: by the monitor
@@ -204,7 +207,7 @@ class Window:
         return not self._over_overlay(*self._cursor)
 
     def set_title(self, title: str) -> None:
-        self._window.title = title
+        self._window.title = one_line(title)
 
     def held(self, key: int) -> bool:
         """Whether a key is down right now and not typed into the overlay."""

@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image
 
 from runtime_models.model import Stop
+from runtime_models.whole_file import make_folders, whole_file
 from scene.capture import Capture, Photo
 from scene.pose import View, look_at
 from scene.write_capture import write_capture
@@ -130,13 +131,15 @@ def radiance(here: Place, modality: str):
 
 
 def save_png(path: Path, image: np.ndarray) -> None:
-    Image.fromarray(np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)).save(path)
+    with whole_file(path) as file:
+        Image.fromarray(np.round(255 * np.clip(image, 0, 1)).astype(np.uint8)).save(file, "PNG")
 
 
 def save_depth(path: Path, metres: np.ndarray) -> Path:
     """A depth photo of 16 bits, DEPTH_UNIT metres a step."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(np.rint(metres / DEPTH_UNIT).astype(np.uint16)).save(path)
+    make_folders(path.parent.parent, path.parent.name)
+    with whole_file(path) as file:
+        Image.fromarray(np.rint(metres / DEPTH_UNIT).astype(np.uint16)).save(file, "PNG")
     return path
 
 
@@ -151,7 +154,7 @@ def make_balls(
     here, photos = place(), []
     for number, stop in enumerate(STOPS):
         number = 0 if rig else number
-        (folder / stop.name.lower()).mkdir(parents=True, exist_ok=True)
+        make_folders(folder, stop.name.lower())
         for split, count, seed in (
             ("train", views, number),
             ("test", test_views, 50 + number),

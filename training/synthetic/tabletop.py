@@ -12,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.plain_splats import PlainSplats
+from runtime_models.plain_splats import PlainSplats, Reading
+from runtime_models.read_scene import read_model
 from runtime_models.whole_file import write_whole
 from runtime_models.write_spz import write_spz
+from scene.collider import Making, collider_of_model
+from scene.collider_pieces import write_collider
 from scene.reactions import Reaction, State, TwoAxes
-from scene.scene_file import HULLS, FirstView, SceneFile, SceneItem
+from scene.scene_file import FirstView, SceneFile, SceneItem
 from scene.selector import Box
 from scene.write_scene_file import write_scene_file
 
@@ -197,15 +200,16 @@ def scene(folder: Path) -> SceneFile:
         ),
     )  # fmt: skip
     globe = SceneItem(
-        name="ball", model="touch/ball", mode="exclusive", up="+Y", collider=HULLS,
-        position=(0.0, BALL + 0.001, -0.12), mass_kg=0.2, restitution=0.4, reactions=(
+        name="ball", model="touch/ball", mode="exclusive", up="+Y",
+        collider="touch/ball.glb", position=(0.0, BALL + 0.001, -0.12), mass_kg=0.2,
+        restitution=0.4, reactions=(
             Reaction(on="ray", to="confetti", after=("ball",), seconds=0.3, ease="slow end"),
             Reaction(on="ray", to="ball", after=("confetti",), seconds=1.0),
         ),
     )  # fmt: skip
     hoop = SceneItem(
-        name="ring", model="touch/ring", mode="exclusive", up="+Y", collider=HULLS, x=0.5,
-        position=(0.05, RING[1] + 0.001, 0.14), mass_kg=0.3,
+        name="ring", model="touch/ring", mode="exclusive", up="+Y", x=0.5,
+        collider="touch/ring.glb", position=(0.05, RING[1] + 0.001, 0.14), mass_kg=0.3,
         states=(State("cold", 0.0), State("brass", 0.5), State("hot", 1.0)), reactions=(
             Reaction(on="grab", to="hot", seconds=0.8),
             Reaction(on="enter", to="cold", region=above_plate, seconds=0.8),
@@ -248,12 +252,27 @@ SCRIPT = """\
 """
 
 
+def write_colliders(folder: Path) -> None:
+    """The two that are no boxes, which take most of a minute, as `launch.py colliders` makes them.
+
+    What they are made of is looked at as it is in the scene at first.
+    """
+    for item in scene(folder).items:
+        path = folder / item.collider
+        if path.suffix == ".glb":
+            model = read_model(folder / item.model, Reading(mode=item.mode, up=item.up))
+            made = collider_of_model(model, item.x, Making(kept=False))
+            write_collider(made.hulls, made.mesh, path)
+
+
 def write_example(folder: Path) -> None:
-    """All of it into a folder."""
+    """All of it but the colliders into a folder."""
     write_models(folder / "touch")
     write_scene_file(scene(folder), folder / "touch.scene.json")
     write_whole(folder / "touch.jsonl", SCRIPT.encode())
 
 
 if __name__ == "__main__":
-    write_example(Path(sys.argv[1] if len(sys.argv) > 1 else "assets"))
+    here = Path(sys.argv[1] if len(sys.argv) > 1 else "assets")
+    write_example(here)
+    write_colliders(here)

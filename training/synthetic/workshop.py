@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import Stop
+from runtime_models.whole_file import make_folders
 from scene.capture import Capture, Photo
 from scene.pose import View, look_at
 from scene.write_capture import write_capture
@@ -168,8 +169,8 @@ def make_workshop(
     photos, jobs = [], []
     for number, stop in enumerate(STOPS):
         name = stop.name.lower()
-        (folder / name).mkdir(parents=True, exist_ok=True)
-        (folder / "masks" / name).mkdir(parents=True, exist_ok=True)
+        make_folders(folder, name)
+        make_folders(folder, f"masks/{name}")
         shots = [("train", v) for v in dome(views, number / 3, size)]
         shots += [("test", v) for v in dome(test_views, number / 3 + 0.17, size)]
         for i, (split, view) in enumerate(shots):

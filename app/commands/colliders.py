@@ -1,0 +1,117 @@
+"""launch.py colliders: what "hulls" asks for, made once and written into files beside a scene file.
+
+python3 launch.py colliders room.scene.json --out room.made.scene.json
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from app.command_line import POSITIONAL
+from app.paths import full
+from app.terminal import say
+
+if TYPE_CHECKING:
+    from scene.collider import Collider
+    from scene.scene_file import SceneFile
+
+FOLDER = "colliders"  # beside the scene file that is written
+
+
+@dataclass(frozen=True)
+class Options:
+    """Make the colliders of a scene file once, into files that travel with it."""
+
+    scene: Annotated[Path, POSITIONAL]
+    """A scene file with objects whose collider is "hulls"."""
+    out: Path
+    """The scene file to write, which names the colliders in the folder "colliders" beside it."""
+    overwrite: bool = False
+    """Replace files that are there."""
+
+
+def run(options: Options) -> int:
+    from app.opening import ReadingOptions
+    from app.scene_files import open_scene_file
+    from scene.scene_file import BACKGROUND, HULLS
+    from scene.write_scene_file import write_scene_file
+
+    file, models, _ = open_scene_file(options.scene, ReadingOptions())
+    paths = paths_of(file, options.out)
+    refuse(options, file, list(paths.values()))
+    made: dict[tuple, Path] = {}  # objects of one model at one x share a file
+    for item in file.all_items:
+        if item.collider != HULLS:
+            continue
+        key = (id(models[item.name]), item.x, item.name == BACKGROUND)
+        if key not in made:
+            made[key] = paths[item.name]
+            told = write_one(make_one(file, item, models[item.name]), made[key])
+            say(f"{item.name}: {told} in {full(made[key])}")
+        file = naming(file, item.name, made[key])
+    write_scene_file(file, options.out)
+    say(f"{full(options.out)} names them.")
+    return 0
+
+
+def paths_of(file: "SceneFile", out: Path) -> dict[str, Path]:
+    """Where the collider of each object that asks for one is written."""
+    from app.paths import file_name
+    from scene.scene_file import HULLS
+
+    found: dict[str, Path] = {}
+    for number, item in enumerate(file.all_items):
+        if item.collider == HULLS:
+            path = out.parent / FOLDER / f"{file_name(item.name)}.glb"
+            taken = path in found.values()
+            found[item.name] = path.with_stem(f"{path.stem}-{number}") if taken else path
+    return found
+
+
+def refuse(options: Options, file: "SceneFile", paths: list[Path]) -> None:
+    """Before minutes of work.  Raises UsageError."""
+    from app.errors import UsageError
+    from scene.scene_file import ENDING
+
+    if not paths:
+        raise UsageError(f'no object of {options.scene.name} has "hulls" as its collider.')
+    if not options.out.name.lower().endswith(ENDING):
+        raise UsageError(f"--out is {options.out.name}; name a file that ends in {ENDING}.")
+    inputs = {file.path(item.model).resolve() for item in file.all_items}
+    for path in (options.out, *paths):
+        if path.resolve() in inputs | {options.scene.resolve()}:
+            raise UsageError(f"{path} is read in this run; choose another --out.")
+        if path.exists() and not options.overwrite:
+            raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
+
+
+def make_one(file: "SceneFile", item, model) -> "Collider":
+    from app.opening import PATIENCE_S, progress_after
+    from scene.collider import Making
+    from scene.collider_files import one_collider
+
+    with progress_after(PATIENCE_S) as told:
+        return one_collider(file, item, model, Making(told=told))
+
+
+def write_one(collider: "Collider", path: Path) -> str:
+    """Writes it; in words what it is."""
+    from runtime_models.whole_file import make_folders
+    from scene.collider_pieces import write_collider
+
+    make_folders(path.parent.parent, path.parent.name)
+    write_collider(collider.hulls, collider.mesh, path)
+    count = len(collider.hulls)
+    return f"{count} convex piece{'s' * (count > 1)}, {len(collider.mesh.faces):,} faces"
+
+
+def naming(file: "SceneFile", name: str, path: Path) -> "SceneFile":
+    """The file with that path as the collider of an object."""
+    from scene import edits
+
+    try:
+        text = Path(os.path.relpath(path, file.folder)).as_posix()
+    except ValueError:  # on another drive of Windows
+        text = path.absolute().as_posix()
+    return edits.change(file, name, collider=text)

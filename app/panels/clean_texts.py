@@ -1,0 +1,61 @@
+"""What the panel hands to ImGui passes here: words out of files cannot break a line or end a frame.
+
+ImGui shows control characters as boxes and lets signs of direction turn a line around; halves of
+surrogate pairs, which any name in JSON may hold, raise an error in the middle of a frame.
+"""
+
+import functools
+
+from imgui_bundle import imgui
+
+from runtime_models.plain_text import one_line, several_lines
+
+EDITED = ("input_text", "input_text_multiline", "input_text_with_hint")  # what somebody types
+WITH_LINES = ("text", "calc_text_size", "set_tooltip", "set_item_tooltip")  # may have several
+
+
+def clean_texts() -> None:
+    """Makes ImGui's functions that take texts clean them; once a process is enough."""
+    for name, function in vars(imgui).copy().items():
+        if type(function).__name__ == "nb_func" and "str" in (function.__doc__ or ""):
+            setattr(imgui, name, cleaning(function, maker(name)))
+    lists = imgui.ImDrawList
+    if not hasattr(lists.add_text, "__wrapped__"):
+        lists.add_text = cleaning(lists.add_text, clean_line)
+
+
+def maker(name: str):
+    """What cleans the texts of one of ImGui's functions."""
+    if name in EDITED:
+        return takeable
+    return clean_lines if name.startswith(WITH_LINES) else clean_line
+
+
+def cleaning(function, make):
+    """The function over texts that `make` has cleaned."""
+
+    @functools.wraps(function, assigned=("__doc__", "__name__"))
+    def call(*arguments, **named):
+        return function(*map(make, arguments), **{key: make(named[key]) for key in named})
+
+    return call
+
+
+def clean_line(value):
+    """A text, or each text of a list, on one line."""
+    if isinstance(value, str):
+        return one_line(value)
+    if isinstance(value, list | tuple) and value and isinstance(value[0], str):
+        return [one_line(text) for text in value]
+    return value
+
+
+def clean_lines(value):
+    return several_lines(value) if isinstance(value, str) else value
+
+
+def takeable(value):
+    """As it was typed, but for what no text of ImGui's can hold."""
+    if not isinstance(value, str):
+        return value
+    return value.encode("utf-8", "replace").decode().replace("\0", "?")
