@@ -22,6 +22,14 @@ def launch():
     return module
 
 
+@pytest.fixture
+def no_set_up(monkeypatch):
+    """Fails the test where an environment would be made."""
+    from app import first_start
+
+    monkeypatch.setattr(first_start, "make_environment", lambda testing: pytest.fail("a set-up"))
+
+
 def test_old_python_is_refused_in_one_sentence(launch, monkeypatch, capsys):
     monkeypatch.setattr(launch.sys, "version_info", (3, 10, 4))
     with pytest.raises(SystemExit) as stopped:
@@ -86,13 +94,14 @@ def test_a_second_start_adds_under_a_second():
 
 
 @pytest.mark.parametrize("words", [["--help"], ["-h"], ["help"], ["--version"]])
-def test_what_is_only_asked_installs_nothing(launch, calls, monkeypatch, words):
+def test_what_is_only_asked_installs_nothing(launch, no_set_up, monkeypatch, words):
     """The Python that started it answers; its standard library is enough."""
     handed = []
     monkeypatch.setattr(launch, "hand_over", lambda *given: handed.append(given) or 0)
     assert launch.main(words) == 0
-    ((arguments, python),) = handed
-    assert calls.all == [] and str(python) == sys.executable and arguments[-1] == words[0]
+    ((python, (program, asked)),) = handed
+    assert python == sys.executable and asked == words[0]
+    assert Path(program) == ROOT / "app" / "cli.py"
 
 
 @pytest.mark.parametrize("words", [["--help"], ["-h"], ["help"], ["--version"]])
@@ -105,8 +114,8 @@ def test_what_is_only_asked_needs_the_standard_library_alone(words):
 
 
 @pytest.mark.parametrize("words", [["--help"], ["-h"], ["-q", "--help"]])
-def test_help_of_the_tests_installs_nothing(launch, calls, capsys, words):
+def test_help_of_the_tests_installs_nothing(launch, no_set_up, capsys, words):
     assert launch.main(["test", *words]) == 0
     told = capsys.readouterr()
-    assert calls.all == [] and told.err == ""
+    assert told.err == ""
     assert told.out.startswith("usage: python3 launch.py test") and "--slow" in told.out
