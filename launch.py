@@ -3,8 +3,8 @@
 
 Uses the standard library alone.  On first use it makes the environment in .venv (and, as root on
 Debian or Ubuntu, installs the few system libraries), see app/first_start.py; later starts go
-straight to app/cli.py.  `python3 launch.py` opens the viewer, `python3 launch.py test` runs the
-tests, `--help` lists all.
+straight to shapeshift/__main__.py.  `python3 launch.py` opens the viewer, `python3 launch.py test`
+runs the tests, `--help` lists all.
 """
 
 import os
@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 ROOT = os.path.dirname(os.path.realpath(__file__))
-CLI = os.path.join(ROOT, "app", "cli.py")
+CLI = os.path.join(ROOT, "shapeshift", "__main__.py")
 OLDEST_PYTHON = (3, 11)
 
 # Answered without the environment, by whatever Python started this.
@@ -58,7 +58,10 @@ def main(arguments):
         stop(f"Shapeshift needs Python 3.11 or newer, this is {found}; start it with that.")
     if ROOT not in sys.path:  # PYTHONSAFEPATH leaves a script's folder out
         sys.path.insert(0, ROOT)
-    from app.first_start import PYTHON, make_environment  # too new for the Pythons refused above
+    from shapeshift.app.first_start import (  # too new for the Pythons refused above
+        PYTHON,
+        make_environment,
+    )
 
     testing = arguments[:1] == ["test"]
     if testing and set(arguments[1:]) & {"-h", "--help"}:

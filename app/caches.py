@@ -13,10 +13,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from app.paths import has_left
-from app.terminal import say
-from runtime_models.user_cache import OURS, cache_base, cache_folder
-from runtime_models.whole_file import write_whole
+from shapeshift.app.paths import has_left
+from shapeshift.app.terminal import say
+from shapeshift.runtime_models.files.user_cache import OURS, cache_base, cache_folder
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 CACHELESS = ("info", "lint", "cameras", "export")  # commands that draw and keep nothing
 ROOM = 1 << 16  # bytes that have to fit: a cache on a full disk is none

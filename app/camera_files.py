@@ -6,16 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from runtime_models.model import AnchorModel, SplatLayers
-    from scene.camera_list import CameraList, CameraReading
+    from shapeshift.runtime_models.model import AnchorModel, SplatLayers
+    from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
 
 AUTO = "auto"
 
 
 def camera_reading(options, size: tuple[int, int] | None = None) -> "CameraReading":
     """The same of options with up and flip, and fov_y (degrees) if they have that; UsageError."""
-    from app.errors import UsageError
-    from scene.camera_list import CameraReading
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.cameras.camera_list import CameraReading
 
     fov_y = getattr(options, "fov_y", 0.0)
     if not (fov_y == 0 or 0 < fov_y < 180):
@@ -30,9 +30,9 @@ def named_cameras(
 
     Raises UsageError where nothing lies with the scene, BadFile where it cannot be read.
     """
-    from app.errors import UsageError
-    from app.paths import plain
-    from scene.read_cameras import find_cameras, find_floor, read_camera_list
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.paths import plain
+    from shapeshift.scene.cameras.read_cameras import find_cameras, find_floor, read_camera_list
 
     path = plain(camera)
     if camera == AUTO:
@@ -46,7 +46,7 @@ def named_cameras(
 
 def in_scene(cameras: "CameraList", model: "AnchorModel | SplatLayers") -> "CameraList":
     """The cameras where the model is: one that was re-centred has an origin of its own."""
-    from scene.camera_list import moved
+    from shapeshift.scene.cameras.camera_list import moved
 
     origin = getattr(model, "origin", (0.0, 0.0, 0.0))
     return replace(cameras, views=tuple(moved(cameras.views, [-c for c in origin])))

@@ -9,8 +9,8 @@ from rich.progress import Progress
 from rich.segment import Segment
 from rich.text import Text
 
-from app.terminal import CleanStream
-from runtime_models.plain_text import one_line, several_lines
+from shapeshift.app.terminal import CleanStream
+from shapeshift.runtime_models.files.plain_text import one_line, several_lines
 
 
 class CleanConsole(Console):

@@ -4,13 +4,9 @@ import contextlib
 import importlib
 import os
 import sys
-from pathlib import Path
 
-# Installed as shapeshift.app.cli, the folders' flat imports need the package's folder on the path.
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from app.paths import leave_current_folder
-from app.terminal import clean_streams, drop_output, say, tell
+from shapeshift.app.paths import leave_current_folder
+from shapeshift.app.terminal import clean_streams, drop_output, say, tell
 
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
@@ -44,10 +40,13 @@ COMMANDS = {
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
     "train": ("training.train", "posed photos of several modalities to a scene"),
     "fit": (
-        "training.fit",
+        "training.fit.fit",
         "the smallest scene that shows a capture as well as the largest, and why",
     ),
-    "eval": ("training.evaluate", "PSNR and SSIM of a scene on the held-out photos of a capture"),
+    "eval": (
+        "training.evaluate",
+        "PSNR and SSIM of a scene on the held-out photos of a capture",
+    ),
     "table": (
         "training.table",
         "one model beside separate ones and plain splats: dB, bytes, seconds",
@@ -63,7 +62,7 @@ INTERRUPTED = 130
 
 
 def usage() -> str:
-    from app.program import program
+    from shapeshift.app.program import program
 
     name = program()
     return "\n".join(
@@ -82,7 +81,7 @@ def usage() -> str:
 
 def offered() -> dict[str, str]:
     """Every command and what it does; an installed package has no tests to run."""
-    from app.program import is_installed
+    from shapeshift.app.program import is_installed
 
     rows = {command: text for command, (_, text) in COMMANDS.items()}
     return rows if is_installed() else rows | LAUNCHED
@@ -107,10 +106,10 @@ def choose(arguments: list[str]) -> tuple[str, list[str]]:
 def known_failures() -> tuple[type[Exception], ...]:
     """Errors whose text is meant for the user.  Looked up late: they live with heavy modules."""
     names = {
-        "runtime_models.model": "BadFile",
-        "app.errors": "UsageError",
-        "rasterizer.device": "NoDevice",
-        "renderer.context": "NoContext",
+        "shapeshift.runtime_models.model": "BadFile",
+        "shapeshift.app.errors": "UsageError",
+        "shapeshift.rasterizer.device": "NoDevice",
+        "shapeshift.renderer.gl.context": "NoContext",
     }
     loaded = [(sys.modules.get(module), name) for module, name in names.items()]
     return tuple(getattr(module, name) for module, name in loaded if module)
@@ -147,15 +146,18 @@ def report_fault(command: str, error: Exception) -> int:
 
 
 def run_command(command: str, arguments: list[str]) -> int:
-    from app.caches import settle_caches_for
-    from app.command_line import parse, wants_help
-    from app.paths import begin_at_start
-    from app.program import program
-    from app.progress import lines
+    from shapeshift.app.caches import settle_caches_for
+    from shapeshift.app.command_line import parse, wants_help
+    from shapeshift.app.paths import begin_at_start
+    from shapeshift.app.program import program
+    from shapeshift.app.progress import lines
 
-    module, prog = importlib.import_module(f"app.{COMMANDS[command][0]}"), f"{program()} {command}"
+    module, prog = (
+        importlib.import_module(f"shapeshift.app.{COMMANDS[command][0]}"),
+        f"{program()} {command}",
+    )
     if wants_help(arguments):
-        from app.command_help import help_text
+        from shapeshift.app.command_help import help_text
 
         defaults = getattr(module, "defaults", dict)()
         tell(help_text(module.Options, prog, defaults))
@@ -190,7 +192,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def answer(arguments: list[str]) -> int:
-    from app.paths import plain, plain_path
+    from shapeshift.app.paths import plain, plain_path
 
     arguments = [plain_path(argument) for argument in arguments]
     if arguments[:1] == ["help"] and len(arguments) == 2:
@@ -199,7 +201,7 @@ def answer(arguments: list[str]) -> int:
         tell(usage())
         return 0
     if arguments[:1] in (["--version"], ["-V"], ["version"]):
-        from app.program import version
+        from shapeshift.app.program import version
 
         tell(f"shapeshift {version()}")
         return 0
@@ -228,12 +230,8 @@ def answer(arguments: list[str]) -> int:
 
 def no_command(word: str) -> str:
     """What is said of a first word that is nothing."""
-    from app.command_line import nearest
+    from shapeshift.app.command_line import nearest
 
     meant = nearest(word, list(offered()))
     hint = f"did you mean {meant}? " if meant else ""
     return f"'{word}' is neither a command nor a file; {hint}--help lists the commands."
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

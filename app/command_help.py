@@ -5,7 +5,7 @@ import shutil
 import textwrap
 from collections.abc import Mapping
 
-from app.command_line import Argument, arguments_of
+from shapeshift.app.command_line import Argument, arguments_of
 
 WIDEST = 100  # letters of a line
 COLUMN = 26  # where the texts begin

@@ -24,7 +24,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from app.errors import UsageError
+from shapeshift.app.errors import UsageError
 
 Options = TypeVar("Options")
 LIKE = 0.6  # of difflib's ratio: as alike a word is taken for a slip of the hand

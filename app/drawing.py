@@ -9,10 +9,10 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-from app.errors import UsageError
-from app.terminal import say
-from renderer.renderer import Renderer
-from runtime_models.whole_file import whole_file
+from shapeshift.app.errors import UsageError
+from shapeshift.app.terminal import say
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.files.whole_file import whole_file
 
 LARGEST_SIDE = 16384  # pixels: the texture limit of common drivers
 MOST_PIXELS = LARGEST_SIDE * 8192  # float images of more do not fit one OpenCL buffer
@@ -53,7 +53,7 @@ def open_renderer(context: str, drawing: str) -> Iterator[tuple[Renderer, modern
 
     auto goes on without GL where none is to be had, and says so, unless quads were asked for.
     """
-    from renderer.context import NoContext, open_context
+    from shapeshift.renderer.gl.context import NoContext, open_context
 
     if context == "none" and drawing == "quads":
         raise UsageError("--drawing quads needs GL; leave --context at auto.")

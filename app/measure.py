@@ -11,15 +11,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.subject import Subject
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from scene.framing import distances_from, orbit_path
-from scene.json_fields import control_row
-from scene.metrics import psnr
-from scene.pose import View
-from scene.scene import Scene
-from scene.stereo import eyes_apart, stereo_pair
+from shapeshift.app.subject import Subject
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.cameras.framing import distances_from, orbit_path
+from shapeshift.scene.json.json_fields import control_row
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+from shapeshift.scene.stereo import eyes_apart, stereo_pair
 
 WARM_UP = 3  # frames that do not count: first use compiles and allocates
 QUALITY_VIEWS = 3
@@ -184,15 +184,15 @@ def percentiles(values: list[float]) -> dict[str, float]:
 
 
 def gl_renderer(ctx) -> str:
-    from renderer.context import describe
+    from shapeshift.renderer.gl.context import describe
 
     return describe(ctx)["gl_renderer"] if ctx is not None else "none (OpenCL tiles)"
 
 
 def machine(ctx) -> dict[str, object]:
     """What a reader needs in order to compare: processor, drivers, versions."""
-    from rasterizer.device import NoDevice, open_device
-    from renderer.context import describe
+    from shapeshift.rasterizer.device import NoDevice, open_device
+    from shapeshift.renderer.gl.context import describe
 
     try:
         device = open_device()

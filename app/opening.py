@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import EXPERT
-from app.terminal import say
-from runtime_models.model import Finding, Model
-from runtime_models.plain_splats import Reading
+from shapeshift.app.command_line import EXPERT
+from shapeshift.app.terminal import say
+from shapeshift.runtime_models.model import Finding, Model
+from shapeshift.runtime_models.splats.plain_splats import Reading
 
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
 
@@ -39,7 +39,7 @@ class ReadingOptions:
 
     def reading(self) -> Reading:
         """The same for readers.  Raises UsageError."""
-        from app.errors import UsageError
+        from shapeshift.app.errors import UsageError
 
         if self.max_splats < 0:
             raise UsageError(f"--max-splats is {self.max_splats}, expected 0 (all) or more.")
@@ -65,9 +65,9 @@ def open_model(
     """
     from dataclasses import replace
 
-    from runtime_models.model import BadFile
-    from runtime_models.read_scene import read_model
-    from scene.scene_file import is_scene_file
+    from shapeshift.runtime_models.model import BadFile
+    from shapeshift.runtime_models.read_scene import read_model
+    from shapeshift.scene.document.scene_file import is_scene_file
 
     if is_scene_file(path):
         raise BadFile(
@@ -91,7 +91,7 @@ def sentence(finding: Finding) -> str:
 @contextmanager
 def progress_after(seconds: float) -> Iterator:
     """told(what, part 0..1) that shows a bar from `seconds` on."""
-    from app.progress import Words, listed, progress_bar
+    from shapeshift.app.progress import Words, listed, progress_bar
 
     began, bar, task, words = time.monotonic(), None, None, Words()
 

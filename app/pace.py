@@ -3,9 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from runtime_models.model import AnchorModel
-from runtime_models.read_package import read_package
-from runtime_models.write_package import write_package
+from shapeshift.runtime_models.model import AnchorModel
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.write_package import write_package
 
 PATIENCE_S = 2.0  # a bar is shown from then on
 
@@ -23,8 +23,8 @@ def with_pace(model: AnchorModel) -> AnchorModel:
     """
     if model.pace:
         return model
-    from app.opening import progress_after
-    from renderer.pace import measure_pace
+    from shapeshift.app.opening import progress_after
+    from shapeshift.renderer.pace import measure_pace
 
     with progress_after(PATIENCE_S) as told:
         return replace(model, pace=measure_pace(model, told))

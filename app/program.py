@@ -4,7 +4,7 @@ import os
 import shlex
 from pathlib import Path
 
-from app.paths import full
+from shapeshift.app.paths import full
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from app.terminal import open_console, say
+from shapeshift.app.terminal import open_console, say
 
 if TYPE_CHECKING:
     from rich.progress import Progress, ProgressColumn
@@ -118,7 +118,7 @@ def listed(work: Work) -> Iterator[None]:
 
 def _bar_type() -> type:
     """A Progress of rich's that lines can tell of.  Made late: rich takes a while to load."""
-    from app.clean_console import CleanProgress
+    from shapeshift.app.clean_console import CleanProgress
 
     class Bar(CleanProgress):
         """Listed from start to stop."""

@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
-from app.terminal import say
+from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after, sentence
+from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    from runtime_models.model import Model
-    from scene.scene import Scene
-    from scene.scene_file import SceneFile
+    from shapeshift.runtime_models.model import Model
+    from shapeshift.scene.document.scene_file import SceneFile
+    from shapeshift.scene.scene import Scene
 
 OF_OBJECTS = ("mode", "up", "flip")  # options that the file has for each object of its own
 
@@ -24,9 +24,9 @@ def open_scene_file(
     """
     from dataclasses import replace
 
-    from app.errors import UsageError
-    from scene.read_scene_file import read_scene_file
-    from scene.scene_file import read_models, scene_of
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.read_scene_file import read_scene_file
+    from shapeshift.scene.document.scene_file import read_models, scene_of
 
     for name in OF_OBJECTS:
         if getattr(options, name):
@@ -44,9 +44,9 @@ def file_at(file: "SceneFile", models: dict[str, "Model"], text: str) -> "SceneF
 
     Raises UsageError where none has.
     """
-    from app.subject import placed
-    from scene import edits
-    from scene.scene_file import scene_of
+    from shapeshift.app.subject import placed
+    from shapeshift.scene.document import edits
+    from shapeshift.scene.document.scene_file import scene_of
 
     states = {item.name: item.states for item in file.all_items}
     for thing in placed(scene_of(file, models).objects, text, states=states):
@@ -63,8 +63,8 @@ def tell_findings(models: dict[str, "Model"]) -> None:
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:
     """What `launch.py info` prints of a scene file."""
-    from scene.json_fields import control_row
-    from scene.scene_file import FORMAT
+    from shapeshift.scene.document.scene_file import FORMAT
+    from shapeshift.scene.json.json_fields import control_row
 
     return {
         "format": FORMAT,

@@ -8,19 +8,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.command_line import nearest
-from app.errors import UsageError
-from app.opening import ReadingOptions, open_model
-from runtime_models.model import Model, Stop
-from runtime_models.stop_weights import Control, Pace, StopWeights, parse_control
-from scene.framing import default_background, default_view, frame_points, scene_points
-from scene.pose import Pose, View
-from scene.scene import IDENTITY, Scene, SceneObject
-from scene.scene_file import SceneFile, first_view, is_scene_file
-from scene.selector import carried
+from shapeshift.app.command_line import nearest
+from shapeshift.app.errors import UsageError
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.runtime_models.model import Model, Stop
+from shapeshift.runtime_models.stop_weights import Control, Pace, StopWeights, parse_control
+from shapeshift.scene.cameras.framing import (
+    default_background,
+    default_view,
+    frame_points,
+    scene_points,
+)
+from shapeshift.scene.document.scene_file import SceneFile, first_view, is_scene_file
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.scene.selectors.selector import carried
 
 if TYPE_CHECKING:
-    from scene.camera_list import CameraList
+    from shapeshift.scene.cameras.camera_list import CameraList
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ class Subject:
 
     def sees(self, cameras: "CameraList") -> "CameraList":
         """Cameras of the file's world where the scene is."""
-        from scene.camera_list import moved
+        from shapeshift.scene.cameras.camera_list import moved
 
         return replace(cameras, views=tuple(moved(cameras.views, -self.origin)))
 
@@ -175,11 +180,11 @@ def open_subject(path: Path, options: ReadingOptions) -> Subject:
     """A model or a scene file; progress and findings go to stderr.  Raises BadFile, UsageError."""
     if not is_scene_file(path):
         return Subject.of(open_model(path, options))
-    from app.scene_files import open_scene_file
+    from shapeshift.app.scene_files import open_scene_file
 
     file, _, scene = open_scene_file(path, options)
     if not scene.objects:
-        from runtime_models.model import BadFile
+        from shapeshift.runtime_models.model import BadFile
 
         raise BadFile(f"{path} has no object; nothing is there to be drawn.")
     return Subject(scene, file)

@@ -1,7 +1,8 @@
 """The way out to standard output and standard error: all that the commands say passes here.
 
-Names in files may hold what steers a terminal (runtime_models/plain_text.py); here it is written
-out, in plain lines, in tables, in progress and in what libraries say.  JSON keeps its meaning.
+Names in files may hold what steers a terminal (runtime_models/files/plain_text.py); here it is
+written out, in plain lines, in tables, in progress and in what libraries say.  JSON keeps its
+meaning.
 """
 
 import os
@@ -10,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
-from runtime_models.plain_text import json_text, one_line, several_lines
+from shapeshift.runtime_models.files.plain_text import json_text, one_line, several_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -113,7 +114,7 @@ def trusted(stream: TextIO) -> TextIO:
 
 def open_console(stderr: bool = True, **more) -> "Console":
     """rich's, for tables and progress; words are words, no markup, and clean."""
-    from app.clean_console import CleanConsole
+    from shapeshift.app.clean_console import CleanConsole
 
     stream = trusted(sys.stderr if stderr else sys.stdout)
     return CleanConsole(file=stream, markup=False, highlight=False, **more)

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rasterizer.device import Device
-from rasterizer.project import LOW_BITS, Found, Projected, chunks_of, grid_of
-from rasterizer.sort import prefix_sums, sort_pairs
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import LOW_BITS, Found, Projected, chunks_of, grid_of
+from shapeshift.rasterizer.sort import prefix_sums, sort_pairs
 
 if TYPE_CHECKING:
     from pyopencl.array import Array

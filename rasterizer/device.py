@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rasterizer.program import build
+from shapeshift.rasterizer.program import build
 
 if TYPE_CHECKING:
     import pyopencl as cl

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rasterizer.device import Device
-from rasterizer.project import Projected
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import Projected
 
 KERNEL = Path(__file__).parent / "kernels" / "overdraw.cl"
 GROUP = 64  # work-items

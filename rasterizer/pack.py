@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rasterizer.device import Device
+from shapeshift.rasterizer.device import Device
 
 if TYPE_CHECKING:
     from pyopencl.array import Array

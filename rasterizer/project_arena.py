@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rasterizer.device import Device
-from rasterizer.project import (
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import (
     CULL_REASONS,
     LEAST_ALPHA,
     LOW_BITS,

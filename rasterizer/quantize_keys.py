@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rasterizer.device import Device
-from rasterizer.project import Found
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import Found
 
 KERNEL = Path(__file__).parent / "kernels" / "quantize_keys.cl"
 

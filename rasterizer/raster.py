@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rasterizer.bin import Tiles
-from rasterizer.device import Device
-from rasterizer.project import RECORD, Projected
+from shapeshift.rasterizer.bin import Tiles
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import RECORD, Projected
 
 if TYPE_CHECKING:
     from pyopencl.array import Array

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rasterizer.project import LEAST_ALPHA, LOW_PASS, Camera
+from shapeshift.rasterizer.project import LEAST_ALPHA, LOW_PASS, Camera
 
 MAX_ALPHA = 0.99
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rasterizer.device import Device
+from shapeshift.rasterizer.device import Device
 
 KERNEL = Path(__file__).parent / "kernels" / "resolve.cl"
 NO_PALETTE = np.zeros((1, 3), np.float32)  # its place in the kernel's arguments

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rasterizer.bin import Tiles
-from rasterizer.device import Device
-from rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
-from rasterizer.raster import FORMS, Frame
+from shapeshift.rasterizer.bin import Tiles
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
+from shapeshift.rasterizer.raster import FORMS, Frame
 
 if TYPE_CHECKING:
     from pyopencl.array import Array

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rasterizer.project import Camera
-from rasterizer.reference import MAX_ALPHA, project_reference, rotations
+from shapeshift.rasterizer.project import Camera
+from shapeshift.rasterizer.reference import MAX_ALPHA, project_reference, rotations
 
 REACH = 6.0  # sigmas along the view within which a splat's depth is held
 

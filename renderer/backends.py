@@ -2,7 +2,7 @@
 
 import moderngl
 
-from renderer.context import is_software
+from shapeshift.renderer.gl.context import is_software
 
 CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
 

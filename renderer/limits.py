@@ -1,8 +1,8 @@
 """How many splats a device can hold, and one sentence for a scene that has more."""
 
-from rasterizer.device import Device
-from rasterizer.project import RECORD
-from runtime_models.model import BadFile, Model, SplatLayers
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import RECORD
+from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
 
 MOST_INDEX = 2**31 - 1  # the kernels count floats with 32 bits and a sign
 

@@ -8,13 +8,13 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.model import AnchorModel, Model
-from runtime_models.stop_weights import Control, Pace, StopWeights
-from scene.framing import default_view, frame_points, orbit_path, scene_points
-from scene.pose import View
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import AnchorModel, Model
+from shapeshift.runtime_models.stop_weights import Control, Pace, StopWeights
+from shapeshift.scene.cameras.framing import default_view, frame_points, orbit_path, scene_points
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene, SceneObject
 
 SIZE = (96, 72)  # pixels of the pictures that are compared
 VIEWS = 3  # the first look, and others from all around

@@ -24,8 +24,8 @@ class RenderSettings:
     min_alpha: float = 1 / 255  # a pixel's alpha below this is not drawn (3DGS)
     low_pass: float = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)  # display sRGB
-    # What quads blend into (renderer/target.py); tiles blend float32 in registers.  auto: 16 bits
-    # from 0 to the scene's brightest colour, half floats where that is above 64 or not bounded.
+    # What quads blend into (renderer/gl/target.py); tiles blend float32 in registers.  auto: 16
+    # bits from 0 to the scene's brightest colour, half floats where that is over 64 or not bounded.
     target: str = "auto"
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
     min_through: float = 1e-4  # tiles: a pixel is done when less than this comes through (3DGS)
@@ -45,7 +45,7 @@ class RenderSettings:
 
     # Colour
     # Of two eyes: each its own; shared, for the middle between them; auto: shared where nobody can
-    # tell (renderer/eye_colors.py), else each.
+    # tell (renderer/colors/eye_colors.py), else each.
     stereo_colors: str = "auto"
     recolor_degrees: float = 0.0  # colours again after the eye has moved so far around an object
     skip_unseen: bool = False  # no colours (Scaffold-GS: nothing) for anchors that no view can see

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import moderngl
 
-from renderer.context import is_software
+from shapeshift.renderer.gl.context import is_software
 
 
 class PassTimer:

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.evaluate import Evaluator, follows_eye
-from runtime_models.model import BadFile, Finding, Model, ScaffoldModel, SplatLayers
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.spherical_harmonics import COEFFICIENTS, basis
-from runtime_models.stop_weights import Controls
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, basis
+from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
+from shapeshift.runtime_models.model import BadFile, Finding, Model, ScaffoldModel, SplatLayers
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.stop_weights import Controls
 
 LEAST_ALPHA = 1 / 255  # no renderer draws a fainter splat
 DIRECTIONS = 64  # colours are asked for along so many: four times the functions of degree 3

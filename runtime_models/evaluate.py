@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.evaluate_scaffold import ScaffoldEvaluator
-from runtime_models.model import (
+from shapeshift.runtime_models.colors.spherical_harmonics import shade
+from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
     AnchorModel,
@@ -15,11 +15,11 @@ from runtime_models.model import (
     SplatLayers,
     Splats,
 )
-from runtime_models.rotation import normalize
-from runtime_models.session import BATCH, open_session
-from runtime_models.spherical_harmonics import shade
-from runtime_models.stop_weights import Controls
-from runtime_models.write_onnx import write_onnx
+from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.rotation import normalize
+from shapeshift.runtime_models.scaffold.evaluate_scaffold import ScaffoldEvaluator
+from shapeshift.runtime_models.session import BATCH, open_session
+from shapeshift.runtime_models.stop_weights import Controls
 
 
 def follows_eye(model: Model) -> bool:

@@ -5,9 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-from runtime_models.plain_text import one_line
-from runtime_models.shapes import check
-from runtime_models.stop_weights import Controls, Pace, StopBlend, encode_control
+from shapeshift.runtime_models.files.plain_text import one_line
+from shapeshift.runtime_models.shapes import check
+from shapeshift.runtime_models.stop_weights import Controls, Pace, StopBlend, encode_control
 
 HEADS = ("offset", "scale", "rotation", "opacity", "color")
 SIZE_PER_SPLAT = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1, "color": 3}

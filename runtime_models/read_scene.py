@@ -5,32 +5,48 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.foreign.foreign_files import is_address, refusal
-from runtime_models.formats import format_of, head_of
-from runtime_models.lcc.read_lcc import is_lcc, read_lcc
-from runtime_models.lcc.read_lcc2 import is_lcc2, read_lcc2
-from runtime_models.lint_package import refuse_filling
-from runtime_models.memory import refuse_empty
-from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
-from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
-from runtime_models.plain_splats import Reading
-from runtime_models.read_layer_list import LIST, has_layer_list, read_layer_list
-from runtime_models.read_layers import layer_files, read_layers
-from runtime_models.read_output_folder import (
+from shapeshift.runtime_models.files.memory import refuse_empty
+from shapeshift.runtime_models.files.zip_files import member_names
+from shapeshift.runtime_models.model import (
+    AnchorModel,
+    BadFile,
+    Mlp,
+    Model,
+    ScaffoldModel,
+    SplatLayers,
+)
+from shapeshift.runtime_models.package.lint_package import refuse_filling
+from shapeshift.runtime_models.package.package_files import ANCHORS, FORMAT, MANIFEST
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.refit_encoding import encoding_findings
+from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold, read_scaffold
+from shapeshift.runtime_models.splats.foreign_files import is_address, refusal
+from shapeshift.runtime_models.splats.formats import format_of, head_of
+from shapeshift.runtime_models.splats.layers.read_layer_list import (
+    LIST,
+    has_layer_list,
+    read_layer_list,
+)
+from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
+from shapeshift.runtime_models.splats.lcc.read_lcc import is_lcc, read_lcc
+from shapeshift.runtime_models.splats.lcc.read_lcc2 import is_lcc2, read_lcc2
+from shapeshift.runtime_models.splats.operations.prune_by_importance import left_whole, thin
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.read_output_folder import (
     in_run,
     newest_cloud,
     read_file,
     read_pair,
     thermal_pair,
 )
-from runtime_models.read_package import read_package
-from runtime_models.read_scaffold import is_scaffold, read_scaffold
-from runtime_models.read_sog import is_sog
-from runtime_models.read_streamed import TREE, is_streamed, read_sog_folder, read_streamed
-from runtime_models.refit_encoding import encoding_findings
-from runtime_models.sog_files import META
-from runtime_models.thin import left_whole, thin
-from runtime_models.zip_files import member_names
+from shapeshift.runtime_models.splats.sog.read_sog import is_sog
+from shapeshift.runtime_models.splats.sog.read_streamed import (
+    TREE,
+    is_streamed,
+    read_sog_folder,
+    read_streamed,
+)
+from shapeshift.runtime_models.splats.sog.sog_files import META
 
 THINNING = 160  # bytes a splat on the way, beside what is kept
 KNOWN = (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime_models.blocks import each_block
+from shapeshift.runtime_models.files.blocks import each_block
 
 NUMBERS = 1 << 16  # looked at at a time: a quarter of a megabyte
 

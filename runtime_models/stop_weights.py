@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from runtime_models.model import ControlEncoding, Stop
+    from shapeshift.runtime_models.model import ControlEncoding, Stop
 
 SUM_SLACK = 1e-6  # by which weights may miss 1: what six decimals in a file leave
 

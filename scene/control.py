@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend
-from scene.scene import SceneObject
-from scene.selector import Selector
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend
+from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.selectors.selector import Selector
 
 SNAP = 0.02  # of the slider's range: nearer than this to a stop is on the stop
 

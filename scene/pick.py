@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from runtime_models.evaluate import Evaluator, follows_eye
-from runtime_models.model import Model, SplatLayers
-from runtime_models.rotation import rotation_matrices
-from scene.control import control_of
-from scene.scene import Scene, SceneObject
+from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
+from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.rotation import rotation_matrices
+from shapeshift.scene.control import control_of
+from shapeshift.scene.scene import Scene, SceneObject
 
 SIGMAS = 3.0  # farther from its mean a splat takes no light worth counting
 MIN_ALPHA = 1 / 255  # as in the drawing rule

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import Model
-from runtime_models.stop_weights import Control, StopWeights, check_control
-from scene.pose import UNIT_SLACK, Pose
-from scene.selector import Selector
+from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
+from shapeshift.scene.pose import UNIT_SLACK, Pose
+from shapeshift.scene.selectors.selector import Selector
 
 IDENTITY = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scene.pose import Pose, View
+from shapeshift.scene.pose import Pose, View
 
 PUPILS_M = 0.064  # metres between the eyes of a person
 LOOKED_FROM_M = 1.8  # metres: from where a person looks at a thing

@@ -19,13 +19,13 @@ LONGEST_S = 60  # of processor time
 
 
 def read_photo(path: Path) -> object:
-    from scene.photo import read_pixels
+    from shapeshift.scene.captures.photo import read_pixels
 
     return read_pixels(path)
 
 
 def read_depth(path: Path) -> object:
-    from scene.depth_photo import _integers
+    from shapeshift.scene.captures.depth_photo import _integers
 
     return _integers(path, 0)
 
@@ -43,12 +43,12 @@ def readers() -> dict:
     import zstandard
 
     assert all((laspy, lazrs, onnx, PIL, scipy, trimesh, zstandard))
-    from runtime_models.read_scene import read_model
-    from scene.read_cameras import read_camera_list
-    from scene.read_capture import read_capture
-    from scene.read_mesh import read_mesh
-    from scene.read_points import read_points
-    from scene.read_scene_file import read_scene_file
+    from shapeshift.runtime_models.read_scene import read_model
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.scene.captures.read_points import read_points
+    from shapeshift.scene.colliders.read_mesh import read_mesh
+    from shapeshift.scene.document.read_scene_file import read_scene_file
 
     return {
         "model": read_model, "points": read_points, "capture": read_capture, "photo": read_photo,
@@ -66,7 +66,7 @@ def resident() -> tuple[int, int]:
 
 def measured(read, path: Path) -> dict:
     """What came of it, in this process, which ends afterwards."""
-    from runtime_models.model import BadFile
+    from shapeshift.runtime_models.model import BadFile
 
     resource.setrlimit(resource.RLIMIT_CPU, (LONGEST_S, LONGEST_S))
     Path("/proc/self/clear_refs").write_text("5")  # the most begins anew

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from models import make_random_model
 
-from runtime_models.write_package import package_files
+from shapeshift.runtime_models.package.write_package import package_files
 
 BOMBS: dict[str, tuple[Callable[[Path], Path], str]] = {}
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scene.camera_list import CameraList
-from scene.pose import Pose, View, perspective
-from scene.write_cameras import COLMAP_FORMS
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.write_cameras import COLMAP_FORMS
+from shapeshift.scene.pose import Pose, View, perspective
 
 HALF = np.diag([1.0, -1.0, -1.0, 1.0])
 NAMES = ("a.png", "sub folder/b ä ツ.jpg", "c")

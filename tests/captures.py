@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from scene.capture_rules import turn_upright
-from scene.pose import OPENCV_FROM_EYE, View, look_at
+from shapeshift.scene.captures.capture_rules import turn_upright
+from shapeshift.scene.pose import OPENCV_FROM_EYE, View, look_at
 
 RANDOM = np.random.default_rng(7)
 CLOUD = RANDOM.normal(0, 0.3, (20, 3))

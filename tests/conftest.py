@@ -45,8 +45,8 @@ def data() -> Path:
 @pytest.fixture(scope="module")
 def renderer():
     """One that draws tiles, for all tests of a module; skips where there is no OpenCL device."""
-    from rasterizer.device import NoDevice
-    from renderer.renderer import Renderer
+    from shapeshift.rasterizer.device import NoDevice
+    from shapeshift.renderer.renderer import Renderer
 
     try:
         with Renderer(None) as made:
@@ -58,6 +58,6 @@ def renderer():
 @pytest.fixture(scope="module")
 def device():
     """The OpenCL device that training is tested on."""
-    from rasterizer.device import open_device
+    from shapeshift.rasterizer.device import open_device
 
     return open_device("cpu")

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import Stop
-from scene.capture import Capture, Photo
-from scene.write_capture import write_capture
-from training.synthetic.balls import celsius, dome_views, moved, radiance, save_png
-from training.synthetic.solids import Ball, Box, Disc
-from training.synthetic.tracer import Place, Solid, Surface, photograph, surface_points
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.training.synthetic.balls import celsius, dome_views, moved, radiance, save_png
+from shapeshift.training.synthetic.solids import Ball, Box, Disc
+from shapeshift.training.synthetic.tracer import Place, Solid, Surface, photograph, surface_points
 
 
 def stripes(p: np.ndarray) -> np.ndarray:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from renderer.renderer import Renderer
-from renderer.settings import FrameStats, RenderSettings
-from scene.pose import View
-from scene.scene import Scene
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
 
 
 def draw_told(

@@ -11,8 +11,8 @@ import numpy as np
 from fuzz_run import Seed
 from ply_files import names_of, random_rows, write_rows
 
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_scene import read_model
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
 Made = Callable[[int, int], PlainSplats]  # of a count and a number of coefficients
 
@@ -34,7 +34,7 @@ def mesh_seeds() -> list[Seed]:
     """A box in every form that a collider may have; by trimesh, as it writes them."""
     import trimesh
 
-    from scene.read_mesh import read_mesh
+    from shapeshift.scene.colliders.read_mesh import read_mesh
 
     box = trimesh.creation.box((1.0, 2.0, 3.0))
     forms = {
@@ -52,7 +52,7 @@ def mesh_seeds() -> list[Seed]:
 
 def act_seeds() -> list[Seed]:
     """A scene file with all that it may say, and a script."""
-    from scene.read_scene_file import read_scene_file
+    from shapeshift.scene.document.read_scene_file import read_scene_file
 
     assets = Path(__file__).resolve().parents[1] / "assets"
     items = read_scene_file(assets / "touch.scene.json").all_items
@@ -68,7 +68,7 @@ def act_seeds() -> list[Seed]:
 
 
 def named_script(path: Path, items: tuple) -> tuple:
-    from scene.read_script import read_script
+    from shapeshift.scene.world.read_script import read_script
 
     return read_script(path, items)
 
@@ -110,7 +110,7 @@ def lcc_seeds(folder: Path, some_splats: Made) -> list[Seed]:
     from fuzz_seeds import files_of
     from lcc_files import write_lcc, write_lcc2
 
-    from runtime_models.write_spz import write_spz
+    from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
     chunks = {}
     for i, count in enumerate((20, 6)):
@@ -145,7 +145,7 @@ def checkpoint_seeds() -> list[Seed]:
 
 
 def packed_seeds(folder: Path, some_splats: Made) -> list[Seed]:
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     write_ply(some_splats(20, 4), folder / "a.ply")
     data, zipped = (folder / "a.ply").read_bytes(), io.BytesIO()

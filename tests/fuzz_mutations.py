@@ -183,7 +183,7 @@ def spz4_changed(data: bytes, step: tuple[int, int, int]) -> bytes:
     """A stream of version 4 changed inside and packed again, its sizes stated anew."""
     import zstandard
 
-    from runtime_models.spz_file import HEADER, TABLE_ROW
+    from shapeshift.runtime_models.splats.spz.spz_file import HEADER, TABLE_ROW
 
     how, where, what = step
     try:

@@ -16,7 +16,7 @@ from fuzz_mutations import kind_of, mutate
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from runtime_models.model import BadFile
+from shapeshift.runtime_models.model import BadFile
 
 LONGEST_S = 5.0
 MOST_MEMORY = 200 << 20  # bytes beyond twice the files' size

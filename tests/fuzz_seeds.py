@@ -11,9 +11,9 @@ from fuzz_format_seeds import format_seeds
 from fuzz_run import Seed
 from models import make_random_model
 
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_scene import read_model
-from scene.read_selector import read_selector
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.scene.selectors.read_selector import read_selector
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 COUNT = 300  # splats: more than one chunk of 256
@@ -46,11 +46,11 @@ def files_of(folder: Path) -> dict[str, bytes]:
 
 def splat_seeds(folder: Path) -> list[Seed]:
     """What our own writers write, one file each."""
-    from runtime_models.write_compressed_ply import write_compressed_ply
-    from runtime_models.write_gltf import write_gltf
-    from runtime_models.write_ply import write_ply
-    from runtime_models.write_splat import write_splat
-    from runtime_models.write_spz import write_spz
+    from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
+    from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+    from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+    from shapeshift.runtime_models.splats.write_splat import write_splat
 
     def written(
         name: str, write: Callable, splats: PlainSplats, ending: str, kind: str = ""
@@ -112,7 +112,7 @@ def forgiving(path: Path) -> object:
     """For seeds that may be refused themselves: a refusal in a sentence is as good as a model."""
     from fuzz_run import check_sentence
 
-    from runtime_models.model import BadFile
+    from shapeshift.runtime_models.model import BadFile
 
     try:
         return read_model(path)
@@ -125,7 +125,7 @@ def archive_seeds(folder: Path) -> list[Seed]:
     """SOG, streamed SOG, packages, Scaffold-GS and Gaussian Grouping: zips and folders."""
     from sog_scenes import random_sog, write_folder, write_zip
 
-    from runtime_models.write_package import write_package
+    from shapeshift.runtime_models.package.write_package import write_package
 
     model = make_random_model(anchors=6, k=2, features=4, hidden=(4,))
     write_package(model, folder / "package.shift")
@@ -167,8 +167,8 @@ def torch_seeds(folder: Path) -> list[Seed]:
     from scaffold_scenes import random_raw, write_run
     from torch_files import write_tensors
 
-    from runtime_models.read_labels import read_classifier
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+    from shapeshift.runtime_models.splats.read_labels import read_classifier
 
     seeds = []
     for name, how, kind in (
@@ -196,9 +196,9 @@ def thermal_seeds(folder: Path) -> list[Seed]:
     """A pair, a list of stops, and ThermalGaussian's two sets of harmonics in one PLY."""
     from test_output_folder import with_thermal_harmonics
 
-    from runtime_models.model import Stop
-    from runtime_models.write_layer_list import write_layer_list
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.model import Stop
+    from shapeshift.runtime_models.splats.layers.write_layer_list import write_layer_list
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     (folder / "pair").mkdir()
     for name in ("rgb", "thermal"):
@@ -220,7 +220,7 @@ def picture_seeds() -> list[Seed]:
 
     from PIL import Image
 
-    from scene.photo import read_pixels
+    from shapeshift.scene.captures.photo import read_pixels
 
     rng = np.random.default_rng(0)
     seeds = []
@@ -243,8 +243,8 @@ def picture_seeds() -> list[Seed]:
 
 def capture_seeds(folder: Path) -> list[Seed]:
     """Captures with their photos and points, as training and eval read them, and parts of them."""
-    from scene.read_capture import read_capture
-    from scene.read_points import read_points
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.scene.captures.read_points import read_points
     from tests.captures import simple, whole, write_transforms
 
     seeds = []
@@ -275,7 +275,7 @@ def with_photos(photos: dict[str, bytes], read: Callable) -> Callable:
 
 def recent_seed() -> Seed:
     """The list of recent files: a broken one counts as empty."""
-    from app.viewer.recent import RecentFiles
+    from shapeshift.app.viewer.recent import RecentFiles
 
     recent = json.dumps({"recent": ["/a/b.ply", "C:\\c d\\\u00e9.splat"]}).encode()
     return Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent))
@@ -283,10 +283,10 @@ def recent_seed() -> Seed:
 
 def camera_seeds(folder: Path) -> list[Seed]:
     """Every form of cameras that we write."""
-    from scene.camera_list import CameraList
-    from scene.framing import orbit_path
-    from scene.read_cameras import read_camera_list
-    from scene.write_cameras import FORMS, write_cameras
+    from shapeshift.scene.cameras.camera_list import CameraList
+    from shapeshift.scene.cameras.framing import orbit_path
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
+    from shapeshift.scene.cameras.write_cameras import FORMS, write_cameras
 
     views = tuple(orbit_path(3, np.zeros(3), 1.0, (64, 48)))
     seeds = []

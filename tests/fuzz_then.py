@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from renderer.renderer import Renderer
-from runtime_models.model import AnchorModel, Finding, ScaffoldModel, SplatLayers
-from runtime_models.read_scene import describe
-from scene.camera_list import CameraList
-from scene.framing import framing_view, model_points
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import AnchorModel, Finding, ScaffoldModel, SplatLayers
+from shapeshift.runtime_models.read_scene import describe
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.framing import framing_view, model_points
+from shapeshift.scene.scene import Scene, SceneObject
 
 SIZE = (16, 16)
 

@@ -15,7 +15,7 @@ import numpy as np
 from fuzz_mutations import DEEP
 from models import make_random_model
 
-from runtime_models.write_package import package_files, zip_files
+from shapeshift.runtime_models.package.write_package import package_files, zip_files
 
 CASES: dict[str, Callable[[Path], Path]] = {}
 
@@ -138,7 +138,7 @@ def plain_pickle_as_a_network(folder: Path) -> Path:
 def pickle_as_a_classifier(folder: Path) -> Path:
     from fuzz_seeds import some_splats
 
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     extra = {f"obj_dc_{i}": np.zeros(4, np.float32) for i in range(16)}
     splats = some_splats(4, 1, extra=extra)

@@ -5,9 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp, Stop
-from runtime_models.stop_weights import StopWeights
-from runtime_models.write_package import write_package
+from shapeshift.runtime_models.model import (
+    HEADS,
+    SIZE_PER_SPLAT,
+    AnchorModel,
+    ControlEncoding,
+    Mlp,
+    Stop,
+)
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.stop_weights import StopWeights
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0, "thermal", "ironbow", (15.0, 95.0), "°C"))
 HEAD = {

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.turn import turn
-from scene.pose import Pose, View
-from scene.scene import Scene, SceneObject
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.splats.operations.rotate_splats import turn
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.splat_scenes import only
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from scene.physics import Physics
-from scene.pose import Pose
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.physics import Physics
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 PLATE = (0.1, 0.001, 0.07)  # metres, half: a plate 2 mm thick

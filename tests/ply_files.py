@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
 CODES = {"float": "f", "double": "d", "uchar": "B", "short": "h", "int": "i"}
 

@@ -9,13 +9,13 @@ from itertools import combinations
 import numpy as np
 from splat_scenes import FIELDS, only
 
-from app.stability_cases.scenes import small_model
-from renderer import layout
-from renderer.settings import RenderSettings
-from runtime_models.model import AnchorModel, SplatLayers, Stop
-from scene.pose import Pose, View
-from scene.scene import IDENTITY, Scene, SceneObject
-from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.app.stability_cases.scenes import small_model
+from shapeshift.renderer import layout
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import AnchorModel, SplatLayers, Stop
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
 
 SIZE = (40, 28)  # pixels: three tiles by two, none of them whole at the border
 NEAR = 0.5  # metres; the eye is at z = 3, so depth is exactly 3 - z

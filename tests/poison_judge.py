@@ -5,10 +5,10 @@ import warnings
 import numpy as np
 import poison
 
-from app.stability_cases.finding import covered
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from scene.pose import View
+from shapeshift.app.stability_cases.finding import covered
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.pose import View
 
 TOLERANCE = 0.012  # of the largest colour: three grey steps; rounding at the 1/255 cut is one
 STEEP = 0.05  # where an opacity far above 1 makes an edge: half axes are rounded by 0.0005

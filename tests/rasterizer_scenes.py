@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 
-from rasterizer.device import Device, open_device
-from rasterizer.project import Camera
+from shapeshift.rasterizer.device import Device, open_device
+from shapeshift.rasterizer.project import Camera
 
 GROUPS = ("means", "scales", "wxyz", "opacity", "color")
 
@@ -57,7 +57,7 @@ def psnr(a: np.ndarray, b: np.ndarray) -> float:
 
 def arena(splats: list) -> list:
     """The same splats as project_arena takes them, on the device, all of object 0."""
-    from rasterizer.reference import rotations
+    from shapeshift.rasterizer.reference import rotations
 
     means, scales, wxyz, opacity, color = splats
     root = rotations(wxyz.astype(np.float64)) * scales[:, None, :]

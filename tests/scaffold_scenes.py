@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.evaluate import evaluate
-from runtime_models.model import AnchorModel, Mlp
-from runtime_models.turn import HALF_TURN, turn_quaternions
-from runtime_models.write_onnx import write_onnx
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import AnchorModel, Mlp
+from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, turn_quaternions
 from tests.models import psi_of
 from tests.torch_files import write_tensors
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, ControlEncoding, Mlp, SplatLayers, Stop
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene, SceneObject
+from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, Mlp, SplatLayers, Stop
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene, SceneObject
 
 POISON = (np.nan, np.inf, -np.inf)
 FIELDS = ("means", "scales", "wxyz", "opacity", "sh")

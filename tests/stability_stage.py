@@ -2,9 +2,9 @@
 
 from splat_scenes import random_layers
 
-from app.stability_cases.stage import Stage
-from app.subject import Subject
-from runtime_models.model import SplatLayers
+from shapeshift.app.stability_cases.stage import Stage
+from shapeshift.app.subject import Subject
+from shapeshift.runtime_models.model import SplatLayers
 
 SIZE = (96, 64)
 

@@ -13,25 +13,25 @@ from splat_scenes import (
     stereo_views,
 )
 
-from renderer.classify import classify
-from renderer.debug import object_poses
-from renderer.reference import (
+from shapeshift.renderer.debug.classify import classify
+from shapeshift.renderer.debug.debug import object_poses
+from shapeshift.renderer.reference.reference import (
     gate_object,
     project_object,
     reference_counts,
     reference_image,
     reference_reasons,
 )
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.formats import read_plain
-from runtime_models.model import SplatLayers
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_scene import describe, read_model
-from runtime_models.write_ply import write_ply
-from runtime_models.write_spz import write_spz
-from scene.pose import Pose, View
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene, SceneObject
 
 STRAIGHT = View(
     Pose(np.array([0, 0, 4.0]), np.array([1.0, 0, 0, 0])), (-0.25, 0.25, -0.25, 0.25), 0.05, 50,

@@ -7,19 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.headset.worn_panel import sliders_of
-from app.viewer import arrange
-from app.viewer.files import opened_scene
-from app.viewer.opened import Found, Source, read_files
-from app.viewer.stage import Stage
-from runtime_models.model import BadFile, SplatLayers, Stop
-from scene import collider_files, edits
-from scene.camera_list import CameraReading
-from scene.collider import Collider
-from scene.follow import put_back
-from scene.pose import Pose
-from scene.selector import Painted, Sphere
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.app.headset.worn_panel import sliders_of
+from shapeshift.app.viewer import arrange
+from shapeshift.app.viewer.files import opened_scene
+from shapeshift.app.viewer.opened import Found, Source, read_files
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.colliders import collider_files
+from shapeshift.scene.colliders.collider import Collider
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.document import edits
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.selectors.selector import Painted, Sphere
+from shapeshift.scene.world.follow import put_back
 
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = ["background", "cube", "ball", "ring", "plate"]

@@ -5,20 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.commands.exported import Look, Part, bake_part
-from renderer.palette import LUMINANCE, through_palette
-from renderer.renderer import Renderer
-from runtime_models.bake import BLOCK, LEAST_ALPHA, bake, fit_rows, recolored, spread_directions
-from runtime_models.evaluate import directions, evaluate
-from runtime_models.model import BadFile, SplatLayers, Stop
-from runtime_models.read_scene import read_model
-from runtime_models.spherical_harmonics import COEFFICIENTS, basis, shade
-from runtime_models.write_plain import merged, placed
-from scene.framing import default_view
-from scene.metrics import psnr
-from scene.pose import Pose
-from scene.scene import Scene, SceneObject
-from scene.selector import Painted, Sphere
+from shapeshift.app.commands.exported import Look, Part, bake_part
+from shapeshift.renderer.colors.palette import LUMINANCE, through_palette
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.bake import (
+    BLOCK,
+    LEAST_ALPHA,
+    bake,
+    fit_rows,
+    recolored,
+    spread_directions,
+)
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, basis, shade
+from shapeshift.runtime_models.evaluate import directions, evaluate
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.write_plain import merged, placed
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.selectors.selector import Painted, Sphere
 from tests.models import make_random_model
 from tests.scaffold_scenes import random_raw, write_run
 from tests.splat_scenes import random_layers

@@ -6,12 +6,12 @@ import fit_scenes
 import numpy as np
 import pytest
 
-from rasterizer.reference import finite_differences
-from runtime_models.model import BadFile
-from training.schedule import Schedule, balance_of, turns_of
-from training.settings import TrainSettings
-from training.smooth import roughness, smooth_picture
-from training.train import Trainer
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.training.losses.smooth import roughness, smooth_picture
+from shapeshift.training.schedule import Schedule, balance_of, turns_of
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.train import Trainer
 
 
 def test_turns_are_read_out_of_a_sentence():

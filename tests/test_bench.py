@@ -6,15 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app import cli, measure
-from app.commands import bench
-from app.errors import UsageError
-from app.subject import Subject
-from renderer.reference import reference_image
-from renderer.settings import FrameStats, RenderSettings
-from runtime_models.model import Stop
-from runtime_models.write_package import write_package
-from scene.metrics import psnr
+from shapeshift.app import cli, measure
+from shapeshift.app.commands import bench
+from shapeshift.app.errors import UsageError
+from shapeshift.app.subject import Subject
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.scene.metrics import psnr
 from tests.models import make_random_model
 from tests.test_cli import assert_refused, launch
 
@@ -219,7 +219,7 @@ def test_a_missing_scene_is_one_sentence(tmp_path):
 
 def test_gl_quads_beside_their_error(tmp_path):
     """The whole way with GL: rows of a driver, a picture as good as half floats are."""
-    from renderer.context import NoContext, open_context
+    from shapeshift.renderer.gl.context import NoContext, open_context
 
     try:
         open_context().release()

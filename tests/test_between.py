@@ -11,23 +11,23 @@ import numpy as np
 import pytest
 from test_training_gradients import LAYOUT, VOXEL, situation
 
-from app import cli
-from rasterizer.reference import finite_differences
-from runtime_models.model import BadFile, ControlEncoding, Stop
-from runtime_models.read_scene import read_model
-from scene.capture import Capture
-from scene.pose import Pose, View, perspective
+from shapeshift.app import cli
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.pose import Pose, View, perspective
+from shapeshift.training.between import Between, Way, add, alike, blended, shared, straight_pull
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.evaluation.evaluate import Painter
+from shapeshift.training.evaluation.midpoints import Frequencies, between, draw_in_training, draw_of
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.reference import decode_reference
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.step import Step
+from shapeshift.training.train import Trainer
 from tests.training_runs import bits, run
-from training.between import Between, Way, add, alike, blended, shared, straight_pull
-from training.checkpoint import read_checkpoint, write_checkpoint
-from training.evaluate import Painter
-from training.midpoints import Frequencies, between, draw_in_training, draw_of
-from training.optimizer import Adam
-from training.photos import LoadedPhoto
-from training.reference import decode_reference
-from training.settings import TrainSettings
-from training.step import Step
-from training.train import Trainer
 
 ROOT = Path(__file__).resolve().parents[1]
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))

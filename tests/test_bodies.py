@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import scene.collider_files
-import scene.physics
-from app.viewer.bodies import Bodies
-from app.viewer.document import Document, key_of
-from app.viewer.opened import Source
-from runtime_models.model import BadFile, SplatLayers, Stop
-from scene import edits
-from scene.collider import Collider
-from scene.edits import History
-from scene.scene_file import HULLS, SceneFile, SceneItem
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.app.viewer.bodies import Bodies
+from shapeshift.app.viewer.document import Document, key_of
+from shapeshift.app.viewer.opened import Source
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.scene.colliders import collider_files
+from shapeshift.scene.colliders.collider import Collider
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.edits import History
+from shapeshift.scene.document.scene_file import HULLS, SceneFile, SceneItem
+from shapeshift.scene.world import physics
 
 STOPS = (Stop("one", 0.0), Stop("two", 1.0))
 
@@ -57,7 +57,7 @@ def made(monkeypatch) -> list:
             raise BadFile("object 'bad': there is nothing to touch.")
         return cube()
 
-    monkeypatch.setattr(scene.collider_files, "one_collider", one_collider)
+    monkeypatch.setattr(collider_files, "one_collider", one_collider)
     return asked
 
 
@@ -119,7 +119,7 @@ def test_without_physics_a_scene_can_be_seen_and_edited(made, monkeypatch):
     def absent(self, *_, **__):
         raise BadFile("the physics needs rapier3d; pip install rapier3d.")
 
-    monkeypatch.setattr(scene.physics.Physics, "__init__", absent)
+    monkeypatch.setattr(physics.Physics, "__init__", absent)
     bodies, of = Bodies(), document(thing("a"))
     until_there(bodies, of)
     assert "rapier3d" in bodies.problem and bodies.world is None
@@ -142,7 +142,7 @@ def test_another_scene_ends_what_is_being_made(monkeypatch):
         finally:
             ended.set()
 
-    monkeypatch.setattr(scene.collider_files, "one_collider", one_collider)
+    monkeypatch.setattr(collider_files, "one_collider", one_collider)
     of = document(thing("a"))
     with Bodies() as bodies:
         assert bodies.poll(of) and begun.wait(10)

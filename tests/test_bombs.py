@@ -12,7 +12,7 @@ import format_bombs  # noqa: F401  which adds its own to BOMBS
 import pytest
 from bombs import BOMBS
 
-from scene.photo import FREE_PIXELS, PIXEL
+from shapeshift.scene.captures.photo import FREE_PIXELS, PIXEL
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="memory is told by /proc"

@@ -9,14 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app import cli
-from app.charts import budget_chart
-from app.charts.budget import Budget, choose, least_scale, read_budget
-from app.charts.budget_chart import BudgetRow, Drawn, budget_rows, read_rows, steady, store_rows
-from app.errors import UsageError
-from app.subject import Subject
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
+from shapeshift.app import cli
+from shapeshift.app.charts import budget_chart
+from shapeshift.app.charts.budget import Budget, choose, least_scale, read_budget
+from shapeshift.app.charts.budget_chart import (
+    BudgetRow,
+    Drawn,
+    budget_rows,
+    read_rows,
+    steady,
+    store_rows,
+)
+from shapeshift.app.errors import UsageError
+from shapeshift.app.subject import Subject
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
 from tests.models import make_random_model, random_package
 from tests.test_cli import assert_refused, launch
 

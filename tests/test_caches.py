@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app import caches
-from runtime_models.user_cache import cache_base, cache_folder
+from shapeshift.app import caches
+from shapeshift.runtime_models.files.user_cache import cache_base, cache_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 posix = pytest.mark.skipif(os.name == "nt", reason="rights and links of POSIX")
@@ -33,7 +33,7 @@ def environment(tmp_path, monkeypatch):
 @posix
 @pytest.mark.parametrize("platform", ["linux", "darwin"])
 def test_each_platform_has_its_place(tmp_path, monkeypatch, platform):
-    monkeypatch.setattr("runtime_models.user_cache.sys.platform", platform)
+    monkeypatch.setattr("shapeshift.runtime_models.files.user_cache.sys.platform", platform)
     usual = {"linux": ".cache", "darwin": "Library/Caches"}[platform]
     for named in ("", "relative/path"):  # the XDG rule: a relative one counts as unset
         monkeypatch.setenv("XDG_CACHE_HOME", named)
@@ -43,7 +43,7 @@ def test_each_platform_has_its_place(tmp_path, monkeypatch, platform):
 
 
 def test_windows_has_its_place(tmp_path, monkeypatch):
-    monkeypatch.setattr("runtime_models.user_cache.sys.platform", "win32")
+    monkeypatch.setattr("shapeshift.runtime_models.files.user_cache.sys.platform", "win32")
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "local"))
     assert cache_base() == tmp_path / "local"
 
@@ -121,7 +121,7 @@ def test_pictures_are_drawn_whatever_the_home_is(tmp_path, kind):
     size = "64k" if kind == "full" else "1m"
     then = f"dd if=/dev/zero of={home}/fill 2>/dev/null;" if kind == "full" else \
         f"mount -o remount,ro {home};"  # fmt: skip
-    draw = f"{sys.executable} -P {ROOT}/app/cli.py render {ROOT}/assets/workshop.shift"
+    draw = f"{sys.executable} -P {ROOT}/shapeshift/__main__.py render {ROOT}/assets/workshop.shift"
     script = (
         f"mount -t tmpfs -o size={size} tmpfs {home} && {{ {then} "
         f"HOME={home} exec {draw} --size 32x24 --out {out}; }}"

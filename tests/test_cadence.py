@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.cadence import Cadence, sort_frames
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.renderer.sort_policy import Cadence, sort_frames
+from shapeshift.scene.pose import Pose, View
 
 TANGENTS = (-0.5, 0.5, -0.4, 0.4)
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from camera_files import HALF, NAMES, cameras, views
 
-from runtime_models.model import BadFile
-from scene.camera_list import CameraList, data_from_ours
-from scene.colmap_points import read_colmap_points
-from scene.read_cameras import read_camera_list
-from scene.write_cameras import COLMAP_FORMS, write_cameras
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.camera_list import CameraList, data_from_ours
+from shapeshift.scene.cameras.read_cameras import read_camera_list
+from shapeshift.scene.cameras.write_cameras import COLMAP_FORMS, write_cameras
+from shapeshift.scene.captures.colmap_points import read_colmap_points
 
 
 @pytest.mark.parametrize("form", COLMAP_FORMS)
@@ -57,7 +57,7 @@ def test_we_read_what_pycolmap_writes(tmp_path, text):
 
 def test_every_lens_of_colmap_has_its_numbers():
     pycolmap = pytest.importorskip("pycolmap", reason="pycolmap is not installed")
-    from scene.colmap_tables import LENSES
+    from shapeshift.scene.captures.colmap_tables import LENSES
 
     for number, (name, focals, count) in LENSES.items():
         kind = getattr(pycolmap.CameraModelId, name)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from camera_files import HALF, NAMES, assert_same, cameras, target, views
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import AXES
-from runtime_models.turn import ours_from_file
-from scene.camera_list import CameraList, CameraReading, moved
-from scene.pose import View, look_at, perspective
-from scene.read_cameras import find_cameras, find_floor, read_camera_list
-from scene.write_cameras import FORMS, paths_of, write_cameras
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
+from shapeshift.runtime_models.splats.plain_splats import AXES
+from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, moved
+from shapeshift.scene.cameras.read_cameras import find_cameras, find_floor, read_camera_list
+from shapeshift.scene.cameras.write_cameras import FORMS, paths_of, write_cameras
+from shapeshift.scene.pose import View, look_at, perspective
 
 
 @pytest.mark.parametrize("form", [form for form in FORMS if form not in ("nerfstudio", "vr")])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from camera_files import cameras
 
-from runtime_models.model import BadFile
-from scene.read_cameras import read_camera_list
-from scene.write_cameras import FORMS, paths_of, write_cameras
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.read_cameras import read_camera_list
+from shapeshift.scene.cameras.write_cameras import FORMS, paths_of, write_cameras
 
 TIMES = 150  # a form
 NUMBERS = [

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from camera_files import HALF, views
 
-from scene.camera_path import along, slerp
-from scene.read_cameras import read_camera_list
+from shapeshift.scene.cameras.camera_path import along, slerp
+from shapeshift.scene.cameras.read_cameras import read_camera_list
 
 
 def key(matrix, **more) -> dict:

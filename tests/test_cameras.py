@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from scene.camera_list import CameraList, first_of_each
-from scene.pose import OPENCV_FROM_EYE, look_at, perspective
-from scene.read_cameras import read_cameras
-from scene.write_cameras import write_cameras
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.camera_list import CameraList, first_of_each
+from shapeshift.scene.cameras.read_cameras import read_cameras
+from shapeshift.scene.cameras.write_cameras import write_cameras
+from shapeshift.scene.pose import OPENCV_FROM_EYE, look_at, perspective
 
 UPRIGHT = np.eye(4).tolist()
 

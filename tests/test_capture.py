@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from runtime_models.model import BadFile, Stop
-from runtime_models.read_layers import layer_files, read_layers
-from scene.capture import Capture, Photo
-from scene.capture_rules import spread_stops, turn_upright
-from scene.photo import load_photo
-from scene.pose import View, look_at
-from scene.read_capture import read_capture
-from scene.read_points import read_points
-from scene.write_capture import write_capture
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.capture_rules import spread_stops, turn_upright
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.read_points import read_points
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.scene.pose import View, look_at
 from tests.captures import (
     CLOUD,
     RANDOM,

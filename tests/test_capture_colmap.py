@@ -7,8 +7,8 @@ import numpy as np
 import pycolmap
 import pytest
 
-from runtime_models.model import BadFile, Stop
-from scene.read_capture import read_capture
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.captures.read_capture import read_capture
 from tests.captures import (
     CLOUD,
     opencv_pose,

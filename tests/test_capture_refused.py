@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from scene.read_capture import read_capture
-from scene.read_points import read_points
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.read_points import read_points
 from tests.captures import CLOUD, save_image, simple, write_transforms
 
 

@@ -13,10 +13,10 @@ pytest.importorskip("hypothesis")  # of the fuzzer, whose judge of sentences is 
 from fuzz_mutations import SPECIAL_VALUES, places_of
 from fuzz_run import check_sentence, watched
 
-from runtime_models.model import BadFile
-from scene.capture import Capture
-from scene.read_capture import read_capture
-from scene.read_points import read_points
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.read_points import read_points
 from tests.captures import CLOUD, whole, write_transforms
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from physics_things import at, box
 
-from scene.grab import jumped
-from scene.physics import Physics
-from scene.pose import Pose
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.grab import jumped
+from shapeshift.scene.world.physics import Physics
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app import cli
-from app.charts import chart
-from app.charts.chart_measure import ChartRow, Pricing
-from app.charts.chart_picture import draw_chart, family, family_of, name_points
-from app.charts.chart_rows import RowsFile
-from app.charts.chart_settings import EXACT, SETTINGS, settings_of
-from app.charts.chart_stage import (
+from shapeshift.app import cli
+from shapeshift.app.charts import chart
+from shapeshift.app.charts.chart_measure import ChartRow, Pricing
+from shapeshift.app.charts.chart_picture import draw_chart, family, family_of, name_points
+from shapeshift.app.charts.chart_rows import RowsFile
+from shapeshift.app.charts.chart_settings import EXACT, SETTINGS, settings_of
+from shapeshift.app.charts.chart_stage import (
     QUICK,
     WARM_UP,
     Walk,
@@ -24,12 +24,12 @@ from app.charts.chart_stage import (
     make_stage,
     side_by_side,
 )
-from app.charts.comparison import MOST_DB
-from app.charts.pareto import pareto_front
-from app.errors import UsageError
-from app.subject import Subject
-from runtime_models.write_package import write_package
-from scene.framing import frame_points, model_points
+from shapeshift.app.charts.comparison import MOST_DB
+from shapeshift.app.charts.pareto import pareto_front
+from shapeshift.app.errors import UsageError
+from shapeshift.app.subject import Subject
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.scene.cameras.framing import frame_points, model_points
 from tests.models import make_random_model, random_package
 from tests.test_cli import assert_refused, launch
 
@@ -236,7 +236,7 @@ def test_families_of_the_whole_table():
 
 def test_a_whole_chart_is_what_a_budget_finds(package, tmp_path, monkeypatch):
     """Every row of one eye is kept for --target-ms, which then measures nothing."""
-    from app.charts import budget_chart
+    from shapeshift.app.charts import budget_chart
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     words = ["chart", str(package), "--out", str(tmp_path / "out"), "--size", "40x30",

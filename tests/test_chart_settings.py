@@ -5,7 +5,7 @@ from itertools import product
 
 import pytest
 
-from app.charts.chart_settings import (
+from shapeshift.app.charts.chart_settings import (
     EXACT,
     NOT_READ,
     SETTINGS,
@@ -15,9 +15,9 @@ from app.charts.chart_settings import (
     settings_of,
     told_changes,
 )
-from app.charts.comparison import exact
-from app.errors import UsageError
-from renderer.settings import RenderSettings
+from shapeshift.app.charts.comparison import exact
+from shapeshift.app.errors import UsageError
+from shapeshift.renderer.settings import RenderSettings
 
 PLACES = Distances(2.0, 4.0)
 BLACK = (0.0, 0.0, 0.0)

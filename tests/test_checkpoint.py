@@ -7,12 +7,12 @@ import pytest
 import torch_files
 from ply_files import write_rows
 
-from runtime_models.checkpoint.read_checkpoint import read_raw_checkpoint
-from runtime_models.formats import format_of, read_plain
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import describe, read_model
-from runtime_models.spherical_harmonics import C0
+from shapeshift.runtime_models.checkpoint.read_checkpoint import read_raw_checkpoint
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.splats.formats import format_of, read_plain
+from shapeshift.runtime_models.splats.plain_splats import Reading
 
 TORCH = Path(__file__).parent / "fixtures" / "torch_2_15"
 SAVED = np.load(TORCH / "ckpt_splats.npz")

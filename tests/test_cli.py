@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from app import cli
-from runtime_models.model import BadFile
+from shapeshift.app import cli
+from shapeshift.runtime_models.model import BadFile
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
 def launch(*arguments, **keywords):
     return subprocess.run(
-        [sys.executable, "-m", "app.cli", *map(str, arguments)],
+        [sys.executable, "-m", "shapeshift", *map(str, arguments)],
         capture_output=True,
         text=True,
         cwd=ROOT,
@@ -103,7 +103,7 @@ def test_a_fault_of_ours_is_one_sentence_and_a_log(monkeypatch, capsys):
 
 
 def test_a_display_that_gives_no_window_means_headless(monkeypatch, capsys):
-    from renderer.context import NoContext
+    from shapeshift.renderer.gl.context import NoContext
 
     asked = []
 

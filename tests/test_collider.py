@@ -15,11 +15,11 @@ from models import make_random_model
 from scaffold_scenes import random_raw, write_run
 from scipy.spatial import ConvexHull
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import read_model
-from scene import collider
-from scene.collider import (
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.scene.colliders import collider
+from shapeshift.scene.colliders.collider import (
     Collider,
     Making,
     collider_of_model,
@@ -28,8 +28,8 @@ from scene.collider import (
     mass_properties,
     mesh_of_splats,
 )
-from scene.collider_hulls import MOST_VERTICES, SEARCH, cut_into_hulls
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_hulls
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
 FRESH = Making(kept=False)
 

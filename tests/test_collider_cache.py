@@ -7,10 +7,17 @@ import numpy as np
 import pytest
 from collider_shapes import shapes, splatted
 
-from scene import collider_cache
-from scene.collider import Making, collider_of_splats
-from scene.collider_cache import MARK, content_key, find_kept, keep, pack, unpack
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.scene.colliders import collider_cache
+from shapeshift.scene.colliders.collider import Making, collider_of_splats
+from shapeshift.scene.colliders.collider_cache import (
+    MARK,
+    content_key,
+    find_kept,
+    keep,
+    pack,
+    unpack,
+)
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 
 KEY = "0123456789abcdef" * 4
 posix = pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")

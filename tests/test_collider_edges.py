@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from physics_things import box, cup
 
-from scene.collider import Collider, box_around
-from scene.collider_edges import edges_of, hull_edges, mesh_edges
+from shapeshift.scene.colliders.collider import Collider, box_around
+from shapeshift.scene.colliders.collider_edges import edges_of, hull_edges, mesh_edges
 
 
 def lengths(edges: np.ndarray) -> list[float]:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from scene.marching_tetrahedra import find_surface
-from scene.stitch_mesh import is_closed, is_watertight, stitch
-from scene.triangle_mesh import TriangleMesh, sample_faces, separate
+from shapeshift.scene.colliders.marching_tetrahedra import find_surface
+from shapeshift.scene.colliders.stitch_mesh import is_closed, is_watertight, stitch
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh, sample_faces, separate
 
 
 def solid(mesh: TriangleMesh) -> trimesh.Trimesh:

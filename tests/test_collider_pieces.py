@@ -9,13 +9,19 @@ import trimesh
 from collider_shapes import shapes
 from trimesh import creation
 
-from runtime_models.model import BadFile
-from scene.collider import Collider, Making, collider_of_mesh, hulls_volume, mass_properties
-from scene.collider_pieces import hull_faces, read_pieces, write_collider
-from scene.collider_wrap import volume
-from scene.read_scene_file import read_scene_file
-from scene.stitch_mesh import is_watertight
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.colliders.collider import (
+    Collider,
+    Making,
+    collider_of_mesh,
+    hulls_volume,
+    mass_properties,
+)
+from shapeshift.scene.colliders.collider_pieces import hull_faces, read_pieces, write_collider
+from shapeshift.scene.colliders.collider_wrap import volume
+from shapeshift.scene.colliders.stitch_mesh import is_watertight
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.document.read_scene_file import read_scene_file
 
 ROOT = Path(__file__).resolve().parents[1]
 ASSETS = ROOT / "assets"
@@ -60,7 +66,7 @@ def test_a_collider_is_the_same_after_a_file(tmp_path):
 @pytest.mark.parametrize("node_names", [True, False])
 def test_pieces_of_game_engines_are_taken_as_they_are(tmp_path, node_names, monkeypatch):
     """A torus that somebody cut in two convex pieces: they are kept though they fill its hole."""
-    monkeypatch.setattr("scene.collider.cut_into_hulls", None)  # never called
+    monkeypatch.setattr("shapeshift.scene.colliders.collider.cut_into_hulls", None)  # never called
     parts = {"Torus": shapes()["torus"], "UCX_Torus_00": box(-0.05), "ucx_Torus_01": box(0.05)}
     found = collider_of_mesh(saved(tmp_path / "a.glb", parts, node_names))
     assert sorted(hull[:, 0].mean().round(3) for hull in found.hulls) == [-0.05, 0.05]
@@ -147,11 +153,11 @@ def test_faces_of_a_hull_look_outwards():
 
 def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
     """Somebody who opens it for the first time waits for none: CoACD takes 40 s for the ring."""
-    from scene.collider_files import one_collider
-    from scene.scene_file import read_models
+    from shapeshift.scene.colliders.collider_files import one_collider
+    from shapeshift.scene.document.scene_file import read_models
 
-    monkeypatch.setattr("scene.collider_hulls.run_coacd", None)
-    monkeypatch.setattr("scene.collider.wrap", None)
+    monkeypatch.setattr("shapeshift.scene.colliders.convex_parts.run_coacd", None)
+    monkeypatch.setattr("shapeshift.scene.colliders.collider.wrap", None)
     file = read_scene_file(ASSETS / "touch.scene.json")
     models = read_models(file)
     made = {i.name: one_collider(file, i, models[i.name], Making(kept=False))
@@ -162,7 +168,7 @@ def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
 
 @pytest.mark.slow
 def test_the_shipped_colliders_are_what_the_program_makes(tmp_path):
-    from training.synthetic.tabletop import write_colliders, write_example
+    from shapeshift.training.synthetic.tabletop import write_colliders, write_example
 
     write_example(tmp_path)
     write_colliders(tmp_path)

@@ -9,13 +9,18 @@ from collider_shapes import Cloud, refined, splatted
 from physics_things import at, box, run
 from trimesh import creation
 
-from runtime_models.model import BadFile
-from scene.collider import Making, collider_of_mesh, collider_of_splats, mesh_of_splats
-from scene.collider_hulls import run_coacd
-from scene.collider_wrap import volume
-from scene.physics import Physics
-from scene.physics_rules import engine
-from scene.stitch_mesh import is_watertight
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.colliders.collider import (
+    Making,
+    collider_of_mesh,
+    collider_of_splats,
+    mesh_of_splats,
+)
+from shapeshift.scene.colliders.collider_wrap import volume
+from shapeshift.scene.colliders.convex_parts import run_coacd
+from shapeshift.scene.colliders.stitch_mesh import is_watertight
+from shapeshift.scene.world.physics import Physics
+from shapeshift.scene.world.physics_rules import engine
 
 FRESH = Making(kept=False)
 ROOM = Making(kept=False, hollow=True, faces=10_000)

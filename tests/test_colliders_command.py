@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from collider_shapes import shapes, splatted
 
-from app import cli
-from app.commands.colliders import Options, run
-from app.errors import UsageError
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.write_ply import write_ply
-from scene.collider_pieces import read_pieces
-from scene.read_scene_file import read_scene_file
+from shapeshift.app import cli
+from shapeshift.app.commands.colliders import Options, run
+from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.colliders.collider_pieces import read_pieces
+from shapeshift.scene.document.read_scene_file import read_scene_file
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime_models.color_range import color_range, output_range
-from runtime_models.evaluate import Evaluator, evaluate
-from runtime_models.model import Mlp
+from shapeshift.runtime_models.colors.color_range import color_range, output_range
+from shapeshift.runtime_models.evaluate import Evaluator, evaluate
+from shapeshift.runtime_models.model import Mlp
 from tests.splat_scenes import one_splat, random_layers, random_model
 
 HEADS = ("none", "tanh", "sigmoid", "softplus", "exp")

@@ -8,10 +8,18 @@ from typing import Annotated, Literal
 
 import pytest
 
-from app import cli
-from app.command_help import help_text
-from app.command_line import EXPERT, POSITIONAL, Opt, arguments_of, nearest, parse, wants_help
-from app.errors import UsageError
+from shapeshift.app import cli
+from shapeshift.app.command_help import help_text
+from shapeshift.app.command_line import (
+    EXPERT,
+    POSITIONAL,
+    Opt,
+    arguments_of,
+    nearest,
+    parse,
+    wants_help,
+)
+from shapeshift.app.errors import UsageError
 
 ROOT = Path(__file__).resolve().parents[1]
 PROG = "python3 launch.py draw"
@@ -177,7 +185,7 @@ def test_every_option_of_every_command_says_what_it_does_and_what_holds_without_
 
 
 def test_presets_numbers_are_those_of_the_training(capsys):
-    from training.settings import preset
+    from shapeshift.training.settings import preset
 
     assert cli.main(["train", "--help"]) == 0
     told = " ".join(capsys.readouterr().out.split())

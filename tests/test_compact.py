@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime_models.compact import LEAST_ALPHA, compact, shown
-from runtime_models.evaluate import evaluate
-from runtime_models.model import HEADS
-from runtime_models.read_package import read_package
-from runtime_models.write_package import write_package
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import HEADS
+from shapeshift.runtime_models.package.drop_unused import LEAST_ALPHA, compact, shown
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.write_package import write_package
 from tests.models import make_random_model, without_control
 
 EYE = np.array([0.4, 0.2, 2.0])

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 from test_output_folder import put, splats
 
-from app.commands.compare import Options, choose_views, run
-from app.commands.compare_sheet import amplification, difference_picture, sheet
-from app.commands.compare_sides import (
+from shapeshift.app.commands.compare import Options, choose_views, run
+from shapeshift.app.commands.compare_sheet import amplification, difference_picture, sheet
+from shapeshift.app.commands.compare_sides import (
     PictureSide,
     SceneSide,
     match_pictures,
@@ -19,13 +19,13 @@ from app.commands.compare_sides import (
     pictures_in,
     split_stop,
 )
-from app.errors import UsageError
-from app.opening import ReadingOptions
-from app.subject import Subject
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
-from runtime_models.write_ply import write_ply
-from scene.metrics import psnr, ssim
+from shapeshift.app.errors import UsageError
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.subject import Subject
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.metrics import psnr, ssim
 
 SMALL = "64x48"
 
@@ -100,7 +100,7 @@ def test_the_same_place_in_the_world_is_compared_whatever_the_zero(tmp_path, cap
     a = open_side(str(tmp_path / "a.ply"), ReadingOptions())
     (model,) = a.subject.models
     shifted = replace(model, means=model.means - np.float32([3, 0, -2]), origin=(3.0, 0.0, -2.0))
-    from app.commands.compare import drawn_pairs
+    from shapeshift.app.commands.compare import drawn_pairs
 
     options = Options("a", "b", size=SMALL)
     for pair in drawn_pairs(options, a, SceneSide("b", Subject.of(shifted, 0.0))):
@@ -166,7 +166,7 @@ def test_a_scene_is_no_folder_of_pictures(pair, tmp_path):
 
 
 def test_names_in_any_letters_are_drawn_or_marked():
-    from renderer.letters import drawable
+    from shapeshift.renderer.debug.letters import drawable
 
     assert drawable("M\u00f6hre a\u2192b \u03a9", 20) == "M\u00f6hre a\u2192b \u03a9"
     assert drawable("\u30c4 \u6f22", 20) == "? ?"

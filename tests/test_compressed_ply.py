@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from splat_scenes import random_layers
 
-from runtime_models.formats import format_of, read_plain
-from runtime_models.model import BadFile
-from runtime_models.morton import morton_order
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_compressed_ply import (
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.formats import format_of, read_plain
+from shapeshift.runtime_models.splats.operations.morton import morton_order
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.ply.read_compressed_ply import (
     from_smallest_three,
     harmonics,
     read_raw_compressed_ply,
 )
-from runtime_models.write_compressed_ply import write_compressed_ply
+from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
 
 C0 = 0.28209479177387814
 SIZES = (1, 2, 255, 256, 257, 512, 513)

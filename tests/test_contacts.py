@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from physics_things import at, box, cup, run, table
 
-from scene.contacts import Touch, share_out
-from scene.physics import FLOOR, Physics
+from shapeshift.scene.world.contacts import Touch, share_out
+from shapeshift.scene.world.physics import FLOOR, Physics
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

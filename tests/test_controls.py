@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from app.viewer.controls import DIRECTIONS, MAX_RADII, MIN_RADII, POLE, Camera, Push
-from app.viewer.stage import Stage
-from runtime_models.model import Stop
-from runtime_models.stop_weights import StopBlend, StopWeights
-from scene.control import EASES, MODES, Sweep, ease, snap, unease
-from scene.framing import fit_distance, orbit_path
-from scene.scene import Scene, SceneObject
+from shapeshift.app.viewer.controls import DIRECTIONS, MAX_RADII, MIN_RADII, POLE, Camera, Push
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import StopBlend, StopWeights
+from shapeshift.scene.cameras.framing import fit_distance, orbit_path
+from shapeshift.scene.control import EASES, MODES, Sweep, ease, snap, unease
+from shapeshift.scene.scene import Scene, SceneObject
 
 SIZE = (640, 360)
 CENTRE = np.array([1.0, 2.0, 3.0])

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime_models.model import AnchorModel, ControlEncoding, SplatLayers, Stop
-from scene.pose import Pose, View, look_at, perspective
-from scene.stereo import eyes_apart, stereo_pair
+from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, SplatLayers, Stop
+from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.stereo import eyes_apart, stereo_pair
 
 HALF = np.sqrt(0.5)
 HERE = Pose(np.zeros(3), np.array([1.0, 0, 0, 0]))

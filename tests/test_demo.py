@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.training import demo
-from renderer.pace import EVEN_ENOUGH, largest_step
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.evaluate import evaluate
-from runtime_models.read_package import read_package
-from runtime_models.read_scene import read_model
-from scene.scene import Scene, SceneObject
-from training.synthetic.workshop import STOPS, dome
+from shapeshift.app.training import demo
+from shapeshift.renderer.pace import EVEN_ENOUGH, largest_step
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.training.synthetic.workshop import STOPS, dome
 
 BUNDLED = Path(__file__).resolve().parents[1] / "assets" / "workshop.shift"
 

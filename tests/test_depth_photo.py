@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from runtime_models.model import BadFile
-from scene.depth_photo import load_depth, refuse_other_units
-from scene.read_capture import read_capture
-from scene.write_capture import write_capture
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.depth_photo import load_depth, refuse_other_units
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.training.synthetic.balls import DEPTH_UNIT, make_balls
 from tests.captures import simple, write_transforms
-from training.synthetic.balls import DEPTH_UNIT, make_balls
 
 STEPS = np.array([[0, 1, 2, 1000], [65534, 65535, 7, 30000], [5, 5, 5, 5]], np.uint16)
 

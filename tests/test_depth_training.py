@@ -7,29 +7,29 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.training.evaluate import print_table
-from rasterizer.device import open_device
-from rasterizer.reference import finite_differences
-from rasterizer.surface_reference import render_depth_reference
-from runtime_models.model import SplatLayers
-from scene.capture import Capture
-from scene.depth_photo import load_depth
+from shapeshift.app.training.evaluate import print_table
+from shapeshift.rasterizer.device import open_device
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.rasterizer.surface_reference import render_depth_reference
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.depth_photo import load_depth
+from shapeshift.training.baselines.plain_reference import decode_plain_reference
+from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
+from shapeshift.training.coarse import smaller
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.evaluation.evaluate import evaluate_model, report
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.depth_loss import HOLE, DepthLoss, DepthWish
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.photos import Targets, read
+from shapeshift.training.reference import decode_reference, image_loss_reference
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.step import Step
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 from tests.test_plain_gradients import situation as plain_situation
 from tests.test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
-from training.coarse import smaller
-from training.depth_loss import HOLE, DepthLoss, DepthWish
-from training.drawing import camera_of
-from training.evaluate import evaluate_model, report
-from training.losses import ImageLoss
-from training.optimizer import Adam
-from training.photos import Targets, read
-from training.plain_reference import decode_plain_reference
-from training.plain_step import GROUPS, PlainStep
-from training.reference import decode_reference, image_loss_reference
-from training.settings import TrainSettings
-from training.step import Step
-from training.synthetic.balls import make_balls
-from training.train import Trainer
 
 SHARE = 0.7
 

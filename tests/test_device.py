@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.device import INSTALL, NoDevice, open_device
-from rasterizer.program import BuildError, read_source
+from shapeshift.rasterizer.device import INSTALL, NoDevice, open_device
+from shapeshift.rasterizer.program import BuildError, read_source
 
 ROOT = Path(__file__).resolve().parents[1]
 

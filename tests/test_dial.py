@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.viewer.dial import LEAST_SCALE, Dial
-from renderer.settings import RenderSettings
+from shapeshift.app.viewer.dial import LEAST_SCALE, Dial
+from shapeshift.renderer.settings import RenderSettings
 
 
 def slow_dial() -> Dial:

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scene import edits
-from scene.edits import Change, History, changes
-from scene.pose import Pose
-from scene.read_scene_file import read_scene_file
-from scene.scene_file import BACKGROUND, SceneFile, SceneItem
-from scene.write_scene_file import write_scene_file
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.edits import Change, History, changes
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from shapeshift.scene.document.scene_file import BACKGROUND, SceneFile, SceneItem
+from shapeshift.scene.document.write_scene_file import write_scene_file
+from shapeshift.scene.pose import Pose
 
 ROOT = Path(__file__).resolve().parents[1]
 TURN = round(math.sqrt(0.5), 9)

@@ -6,14 +6,20 @@ import numpy as np
 import onnxruntime
 import pytest
 
-from runtime_models.evaluate import BATCH, Evaluator, directions, evaluate
-from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, SplatLayers, Stop
-from runtime_models.read_package import read_package
-from runtime_models.rotation import covariance, normalize, rotation_matrices
-from runtime_models.spherical_harmonics import C0, basis, shade
-from runtime_models.stop_weights import StopWeights
-from runtime_models.turn import signs_of_harmonics
-from runtime_models.write_package import write_package
+from shapeshift.runtime_models.colors.spherical_harmonics import C0, basis, shade
+from shapeshift.runtime_models.evaluate import BATCH, Evaluator, directions, evaluate
+from shapeshift.runtime_models.model import (
+    HEADS,
+    SIZE_PER_SPLAT,
+    ControlEncoding,
+    SplatLayers,
+    Stop,
+)
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.rotation import covariance, normalize, rotation_matrices
+from shapeshift.runtime_models.splats.operations.rotate_splats import signs_of_harmonics
+from shapeshift.runtime_models.stop_weights import StopWeights
 from tests.models import make_random_model, psi_of, run_in_numpy
 
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import (
+from shapeshift.runtime_models.evaluate import (
     Evaluator,
     directions,
     evaluate,
     shape_follows_control,
 )
-from runtime_models.model import HEADS, ControlEncoding
-from runtime_models.stop_weights import encode_rows
+from shapeshift.runtime_models.model import HEADS, ControlEncoding
+from shapeshift.runtime_models.stop_weights import encode_rows
 from tests.models import make_random_model, without_control
 
 EYE = np.array([0.3, -0.2, 2.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import BATCH, Evaluator, evaluate
+from shapeshift.runtime_models.evaluate import BATCH, Evaluator, evaluate
 from tests.models import make_random_model
 from tests.splat_scenes import random_layers
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from runtime_models.formats import read_plain
-from runtime_models.plain_splats import Reading
-from runtime_models.read_gltf import read_raw_gltf
-from runtime_models.read_scene import read_model
-from runtime_models.turn import HALF_TURN_Y
-from runtime_models.write_package import write_package
-from runtime_models.write_ply import write_ply
+from shapeshift.app import cli
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.gltf.read_gltf import read_raw_gltf
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.models import make_random_model
 from tests.test_gltf import plain_splats
 from tests.writers import EACH_WRITER
@@ -107,7 +107,7 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
     near = read_model(scenes / "plain.ply")
     places = {"one.ply": (4e6, 1e6, -3e6), "two.ply": (4e6 + 3, 1e6, -3e6)}
     monkeypatch.setattr(
-        "app.commands.export.open_model",
+        "shapeshift.app.commands.export.open_model",
         lambda path, options: replace(near, origin=places[path.name]),
     )
     both = (tmp_path / "one.ply", tmp_path / "two.ply")
@@ -125,7 +125,7 @@ def test_far_places_come_back(scenes, tmp_path, monkeypatch):
 def test_a_label(scenes, tmp_path, capsys, monkeypatch):
     model = read_model(scenes / "plain.ply")
     labelled = replace(model, labels=np.arange(40, dtype=np.int32) % 3)
-    monkeypatch.setattr("app.commands.export.open_model", lambda path, options: labelled)
+    monkeypatch.setattr("shapeshift.app.commands.export.open_model", lambda path, options: labelled)
     assert export(scenes / "plain.ply", "--out", tmp_path / "a.ply", "--label", 2) == 0
     np.testing.assert_allclose(read_plain(tmp_path / "a.ply").means, model.means[2::3], atol=1e-6)
     refused(
@@ -138,7 +138,7 @@ def test_what_a_format_has_no_place_for_is_said(scenes, tmp_path, capsys, monkey
     model = read_model(scenes / "plain.ply")
     more = {"labels": np.arange(40, dtype=np.int32) % 3, "extra": {"error": np.ones(40, "f4")}}
     rich = replace(model, antialiased=True, **more)
-    monkeypatch.setattr("app.commands.export.open_model", lambda path, options: rich)
+    monkeypatch.setattr("shapeshift.app.commands.export.open_model", lambda path, options: rich)
     out = tmp_path / f"a{writer.ending}"
     assert export(scenes / "plain.ply", "--out", out) == 0
     said, back = capsys.readouterr().err, read_plain(out)

@@ -9,14 +9,14 @@ import pytest
 from PIL import Image
 from ply_files import names_of, random_rows, write_rows
 
-from runtime_models.formats import read_plain
-from runtime_models.lint_whole import Sample
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.plain_splats import Reading
-from runtime_models.read_layers import read_layers
-from runtime_models.recentre import COARSE, FINE, place_of
-from runtime_models.write_plain import told_lost, writer_of
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.lint.lint_whole import Sample
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.layers.read_layers import read_layers
+from shapeshift.runtime_models.splats.operations.recentre import COARSE, FINE, place_of
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.write_plain import told_lost, writer_of
 
 FAR = (5e6 + 0.25, -3_141_592.5, 4e5)  # metres, in the file's axes
 DOUBLES = {"x": "double", "y": "double", "z": "double"}
@@ -44,7 +44,7 @@ def near_and_far(tmp_path):
 
 @pytest.mark.parametrize("up, flip", [("", False), ("+Z", False), ("-X", True)])
 def test_a_far_scene_is_the_near_one_about_another_zero(near_and_far, up, flip):
-    from runtime_models.turn import ours_from_file
+    from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 
     near, far = (read_plain(path, Reading(up=up, flip=flip, strict=True)) for path in near_and_far)
     assert near.origin == (0, 0, 0) and near.findings == ()
@@ -147,7 +147,7 @@ def test_outliers_do_not_frame_the_scene():
     """As MCMC leaves them: 20,000 km away, while the scene is 3 m wide."""
     from test_lint_whole import cloud, ours
 
-    from scene.framing import default_view
+    from shapeshift.scene.cameras.framing import default_view
 
     raw = cloud(5000, 0.02)
     core = default_view(layers_of(ours(raw)), (640, 360)).world_from_eye.position
@@ -188,10 +188,10 @@ def test_cameras_of_the_file_see_the_same_picture_there(near_and_far, tmp_path):
 
 
 def test_the_oracle_draws_both_alike(near_and_far):
-    from renderer.reference import reference_image
-    from renderer.settings import RenderSettings
-    from scene.framing import default_view
-    from scene.scene import Scene, SceneObject
+    from shapeshift.renderer.reference.reference import reference_image
+    from shapeshift.renderer.settings import RenderSettings
+    from shapeshift.scene.cameras.framing import default_view
+    from shapeshift.scene.scene import Scene, SceneObject
 
     near, far = (layers_of(read_plain(path)) for path in near_and_far)
     shift = np.array(far.origin) - np.array(FAR) * (1, -1, -1)  # the part of a metre

@@ -5,10 +5,14 @@ import io
 import numpy as np
 import pytest
 
-from runtime_models.feature_codes import FEATURES, decode_features, encode_features
-from runtime_models.model import BadFile
-from runtime_models.read_package import read_anchors, read_files, read_package
-from runtime_models.write_package import package_files, write_package
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.feature_codes import (
+    FEATURES,
+    decode_features,
+    encode_features,
+)
+from shapeshift.runtime_models.package.read_package import read_anchors, read_files, read_package
+from shapeshift.runtime_models.package.write_package import package_files, write_package
 from tests.models import make_random_model
 
 

@@ -12,20 +12,20 @@ import pytest
 from camera_files import cameras
 from PIL import Image
 
-from app import cli
-from app.panels.status_line import bytes_text, scene_words
-from app.paths import config_folder, plain, plain_path
-from app.viewer.files import told_of
-from app.viewer.opened import Opener, means_cameras, read_files
-from app.viewer.recent import FILE, MOST, RecentFiles
-from app.viewer.scene_objects import scene_of
-from app.viewer.stage import Stage
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_scene import read_model
-from runtime_models.write_ply import write_ply
-from scene.camera_list import CameraReading
-from scene.write_cameras import write_cameras
+from shapeshift.app import cli
+from shapeshift.app.panels.status_line import bytes_text, scene_words
+from shapeshift.app.paths import config_folder, plain, plain_path
+from shapeshift.app.viewer.files import told_of
+from shapeshift.app.viewer.opened import Opener, means_cameras, read_files
+from shapeshift.app.viewer.recent import FILE, MOST, RecentFiles
+from shapeshift.app.viewer.scene_objects import scene_of
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.cameras.write_cameras import write_cameras
 from tests.splat_scenes import random_layers
 
 NAME = "Möbel 3 ツ/stuhl äöü.ply"

@@ -7,15 +7,15 @@ import laspy
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from scene import las_run
-from scene.capture import Capture
-from scene.las_run import las_points
-from scene.pose import View, look_at, perspective
-from scene.read_capture import read_capture
-from scene.read_las import read_las
-from training import point_sources
-from training.initial import (
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures import las_run
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.las_run import las_points
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.read_las import read_las
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.first_anchors import point_sources
+from shapeshift.training.first_anchors.initial import (
     carved,
     choose_voxel,
     first_voxel,
@@ -23,8 +23,8 @@ from training.initial import (
     initial_points,
     voxel_centres,
 )
-from training.photos import LoadedPhoto, load_photos
-from training.synthetic.balls import make_balls
+from shapeshift.training.photos import LoadedPhoto, load_photos
+from shapeshift.training.synthetic.balls import make_balls
 
 RNG = np.random.default_rng
 HEADER = "ply\nformat ascii 1.0\nelement vertex {}\n" + "".join(
@@ -195,7 +195,9 @@ def test_a_decoder_that_ends_its_process_is_one_sentence(tmp_path, end, monkeypa
     write_las(path, RNG(0).uniform(-2, 2, (300, 3)))
     text = Path(las_run.__file__).read_text().replace("A_BYTE = 5,", "A_BYTE = 1,")
     script.write_text(text.replace("    import laspy\n", f"    {end}\n", 1))
-    monkeypatch.setattr("scene.read_las.__file__", str(tmp_path / "read_las.py"))
+    monkeypatch.setattr(
+        "shapeshift.scene.captures.read_las.__file__", str(tmp_path / "read_las.py")
+    )
     with pytest.raises(BadFile, match="no LAZ that can be unpacked; copy it again"):
         read_las(path, 1000)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import poisoned_folder
 import pytest
 
-from app import first_start
+from shapeshift.app import first_start
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -235,9 +235,15 @@ class Project:
         self.folder, self.wheels = folder / "project", folder / "wheels"
         (self.folder / "app").mkdir(parents=True)
         self.wheels.mkdir()
-        for name in ("launch.py", "app/__init__.py", "app/first_start.py"):
+        (self.folder / "shapeshift").mkdir()
+        for name in (
+            "launch.py",
+            "shapeshift/__init__.py",
+            "app/__init__.py",
+            "app/first_start.py",
+        ):
             shutil.copy(ROOT / name, self.folder / name)
-        (self.folder / "app" / "cli.py").write_text(
+        (self.folder / "shapeshift" / "__main__.py").write_text(
             "import one_wheel, other_wheel\nprint('started', one_wheel.VERSION)\n"
         )
         self.require("1.0")

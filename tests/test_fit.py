@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.errors import UsageError
-from app.training import fit as command
-from rasterizer.device import open_device
-from runtime_models.model import HEADS, BadFile
-from runtime_models.read_package import read_package
+from shapeshift.app.errors import UsageError
+from shapeshift.app.training import fit as command
+from shapeshift.rasterizer.device import open_device
+from shapeshift.runtime_models.model import HEADS, BadFile
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.training.fit.ablation import DROPPED, KEPT, PARTS, SHAPE
+from shapeshift.training.fit.fit import Fit
+from shapeshift.training.settings import TrainSettings
 from tests.fit_scenes import make_shapes
-from training.fit import Fit
-from training.need import DROPPED, KEPT, PARTS, SHAPE
-from training.settings import TrainSettings
 
 SMALL = TrainSettings(
     iterations=250,
@@ -71,7 +71,7 @@ def test_what_goes_without_training_changes_next_to_nothing(captures):
 
 
 def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("training.fit.Fit.__init__.__defaults__", (PARTS[-2:], None))
+    monkeypatch.setattr("shapeshift.training.fit.fit.Fit.__init__.__defaults__", (PARTS[-2:], None))
     options = command.Options(
         captures["shared"].folder, tmp_path / "fit.shift", tolerance_db=5.0, seeds=2,
         json=tmp_path / "fit.json", iterations=20, grow=False, anchors=90, splats_per_anchor=2,
@@ -117,7 +117,7 @@ def test_too_few_photos_to_tell_are_refused(captures):
 
 
 def test_a_trial_that_ends_unsettled_is_refused(captures, monkeypatch):
-    monkeypatch.setattr("training.train.Trainer.settled", False)
+    monkeypatch.setattr("shapeshift.training.train.Trainer.settled", False)
     with pytest.raises(BadFile, match="of 2 steps ends while new anchors still settle"):
         needs(captures["shared"], (), replace(SMALL, iterations=2))
 

@@ -7,10 +7,10 @@ import pytest
 from test_simulation import STATES, item, model, reaction
 from test_world import BOX, at, place, real
 
-from scene.follow import changed, follow, put_back
-from scene.scene_file import SceneFile
-from scene.selector import Sphere
-from scene.world import World
+from shapeshift.scene.document.scene_file import SceneFile
+from shapeshift.scene.selectors.selector import Sphere
+from shapeshift.scene.world.follow import changed, follow, put_back
+from shapeshift.scene.world.world import World
 
 pytest.importorskip("rapier3d")
 

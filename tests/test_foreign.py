@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(40)
 FILES: dict[str, tuple[str, bytes, str]] = {

@@ -8,14 +8,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from runtime_models import write_compressed_ply as compressed_ply
-from runtime_models import write_spz as spz
-from runtime_models.blocks import each_block
-from runtime_models.model import SplatLayers
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_scene import read_model
-from runtime_models.write_compressed_ply import write_compressed_ply
-from runtime_models.write_spz import write_spz
+from shapeshift.runtime_models.files.blocks import each_block
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply import write_compressed_ply as compressed_ply
+from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
+from shapeshift.runtime_models.splats.spz import write_spz as spz
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
 COUNT = 300_000
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime_models.model import SplatLayers, Stop
-from scene.framing import (
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.scene.cameras.framing import (
     broadside,
     common_side,
     default_background,
@@ -18,8 +18,8 @@ from scene.framing import (
     point_under,
     scene_points,
 )
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene, SceneObject
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.models import make_random_model
 
 

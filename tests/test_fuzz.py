@@ -21,7 +21,7 @@ from fuzz_run import Hung, fuzz, watched
 from fuzz_seeds import all_seeds
 from fuzz_then import Then
 
-from renderer.renderer import Renderer
+from shapeshift.renderer.renderer import Renderer
 
 EXAMPLES = 800  # over all seeds together
 

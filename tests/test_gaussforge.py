@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from splat_scenes import alone, front_view, psnr_db
 
-from renderer.reference import reference_image
-from runtime_models.formats import read_raw
-from runtime_models.lint import judge
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.write_ply import write_ply
-from runtime_models.write_splat import write_splat
-from runtime_models.write_spz import write_spz
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.splats.formats import read_raw
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+from shapeshift.runtime_models.splats.write_splat import write_splat
 
 gaussforge = pytest.importorskip("gaussforge", reason="the other converter is not installed")
 

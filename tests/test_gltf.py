@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.formats import format_of, read_plain
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_gltf import display_from_linear, read_raw_gltf
-from runtime_models.rotation import covariance
-from runtime_models.spherical_harmonics import C0, shade
-from runtime_models.turn import HALF_TURN_Y, turn
-from runtime_models.write_gltf import write_gltf
+from shapeshift.runtime_models.colors.spherical_harmonics import C0, shade
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.runtime_models.splats.formats import format_of, read_plain
+from shapeshift.runtime_models.splats.gltf.read_gltf import display_from_linear, read_raw_gltf
+from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, turn
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from tests.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
 
 SIZES = (1, 2, 255, 256, 257)
@@ -222,7 +222,7 @@ def test_primitives_of_other_degrees_and_other_kinds_are_merged(tmp_path):
 @pytest.mark.parametrize("draft", [False, True])
 def test_spz_within(tmp_path, draft):
     """The extension stores it half a turn about +Y away; drafts, without a colour space, do not."""
-    from runtime_models.write_spz import write_spz
+    from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
     splats = plain_splats(30, 2)
     write_spz(splats, tmp_path / "a.spz", version=2)

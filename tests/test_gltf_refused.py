@@ -8,12 +8,12 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from runtime_models.gltf_files import MOST_MARKS, parse_json
-from runtime_models.memory import A_BYTE, FREE
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_gltf import read_raw_gltf
-from runtime_models.write_spz import write_spz
+from shapeshift.runtime_models.files.memory import A_BYTE, FREE
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.gltf.gltf_files import MOST_MARKS, parse_json
+from shapeshift.runtime_models.splats.gltf.read_gltf import read_raw_gltf
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 from tests.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
 from tests.test_gltf import plain_splats
 

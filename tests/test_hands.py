@@ -8,10 +8,19 @@ from types import SimpleNamespace as Thing
 import numpy as np
 import pytest
 
-from scene.pose import Pose
-from vr.bindings import CLICKS, HAPTIC, NUMBERS, PLANES, POSES, PROFILES, paths, pressed_pad
-from vr.frame import LOST, SIDES
-from vr.hands import Hands, checked, pose_of, within
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import LOST, SIDES
+from shapeshift.vr.openxr.bindings import (
+    CLICKS,
+    HAPTIC,
+    NUMBERS,
+    PLANES,
+    POSES,
+    PROFILES,
+    paths,
+    pressed_pad,
+)
+from shapeshift.vr.openxr.hands import Hands, checked, pose_of, within
 
 # What each controller has, from the OpenXR specification 1.0, section 6.4.
 HAS = {
@@ -221,7 +230,7 @@ def test_an_unknown_profile_is_told_and_the_others_stay(runtime):
 
 def test_there_and_back_through_the_library():
     xr = pytest.importorskip("xr", reason="pyopenxr is not installed")
-    from vr.hands import posef_of
+    from shapeshift.vr.openxr.hands import posef_of
 
     pose = Pose(np.array([1.0, -2, 3]), np.array([0.5, -0.5, 0.5, 0.5]))
     posef = posef_of(pose)

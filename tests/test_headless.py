@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from app.commands import headless, touch_film
-from app.subject import Subject
-from runtime_models.model import BadFile
-from scene.framing import default_view, frame_points, model_points
+from shapeshift.app import cli
+from shapeshift.app.commands import headless, touch_film
+from shapeshift.app.subject import Subject
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.framing import default_view, frame_points, model_points
 from tests.models import make_random_model, random_package
 
 QUICK = ["--size", "48x32", "--frames", "2", "--sweep", "2"]

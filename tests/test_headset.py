@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.cli import main
-from app.headset import headset
-from app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
-from app.headset.worn_scene import BACKGROUND, open_worn
-from vr.instance import Lost, NoHeadset
+from shapeshift.app.cli import main
+from shapeshift.app.headset import headset
+from shapeshift.app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
+from shapeshift.app.headset.worn_scene import BACKGROUND, open_worn
+from shapeshift.vr.openxr.instance import Lost, NoHeadset
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture
 def viewer(monkeypatch) -> list:
     """What the viewer would be opened with; there is a display."""
-    from app.viewer import desktop
+    from shapeshift.app.viewer import desktop
 
     opened = []
     monkeypatch.setenv("DISPLAY", ":99")

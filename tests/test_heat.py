@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.bin import bin_tiles
-from rasterizer.heat import add_heat, blend_heat
-from rasterizer.project import project
-from rasterizer.raster import rasterize_rgba, rasterize_with_heat
-from renderer.false_colors import (
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.heat import add_heat, blend_heat
+from shapeshift.rasterizer.project import project
+from shapeshift.rasterizer.raster import rasterize_rgba, rasterize_with_heat
+from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     NO_HEAT,
     PICTURE,
@@ -22,16 +22,21 @@ from renderer.false_colors import (
     shade_of,
     split_colors,
 )
-from renderer.palette import LUMINANCE, apply_palette, palette_colors, through_palette
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from runtime_models.model import Stop
-from runtime_models.stop_weights import StopWeights
-from scene.scene import Scene, SceneObject
-from scene.selector import Painted, Sphere
+from shapeshift.renderer.colors.palette import (
+    LUMINANCE,
+    apply_palette,
+    palette_colors,
+    through_palette,
+)
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.selectors.selector import Painted, Sphere
+from shapeshift.training.drawing import camera_of
 from tests.models import make_random_model, without_control
 from tests.splat_scenes import front_view, psnr_db, random_layers
-from training.drawing import camera_of
 
 VIEW = front_view((96, 72), distance=3.0)
 STOPS = (

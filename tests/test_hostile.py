@@ -12,8 +12,8 @@ from fuzz_run import check_sentence, watched
 from hostile_files import CASES, put
 from PIL import Image
 
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
 
 ROOT = Path(__file__).resolve().parents[1]
 # Audit events of the interpreter that no reader may cause.
@@ -85,7 +85,7 @@ def test_hostile_files_are_one_sentence_and_do_nothing(tmp_path, monkeypatch, na
 
 @pytest.mark.parametrize("ending", [".png", ".webp", ".jpg", ".bmp", ".tif"])
 def test_pictures_that_are_none_or_bombs(tmp_path, ending):
-    from app.commands.compare_sides import read_picture
+    from shapeshift.app.commands.compare_sides import read_picture
 
     Image.new("RGB", (40, 30)).save(tmp_path / f"a{ending}")
     data = (tmp_path / f"a{ending}").read_bytes()
@@ -116,7 +116,7 @@ def test_pictures_that_are_none_or_bombs(tmp_path, ending):
      b'{"camera_path": {}}', b'[{"position": [], "rotation": "x"}]'],
 )  # fmt: skip
 def test_hostile_cameras(tmp_path, text):
-    from scene.read_cameras import read_camera_list
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
 
     path = put(tmp_path / "transforms.json", text)
     check_sentence(refusal(read_camera_list, path), tmp_path)
@@ -126,7 +126,7 @@ def test_hostile_cameras(tmp_path, text):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in folders")
 def test_pipes_as_cameras_do_not_wait(tmp_path):
-    from scene.read_cameras import read_camera_list
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
 
     os.mkfifo(tmp_path / "cameras.json")
     check_sentence(refusal(read_camera_list, tmp_path / "cameras.json"), tmp_path)
@@ -142,7 +142,7 @@ def test_a_file_that_may_not_be_read_is_exit_2(tmp_path):
 
 
 def launch(*arguments: object) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "app.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "shapeshift", *map(str, arguments)]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60)
 
 
@@ -180,7 +180,7 @@ def some(count: int = 3, coefficients: int = 1, **kind):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_signalling_nan_in_logarithms_and_normals_warns_of_nothing(tmp_path):
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     path = tmp_path / "a.ply"
     normals = {name: np.ones(3, np.float32) for name in ("nx", "ny", "nz")}
@@ -197,7 +197,7 @@ def test_signalling_nan_in_logarithms_and_normals_warns_of_nothing(tmp_path):
 
 
 def test_negative_metres_are_no_negative_sigmas(tmp_path):
-    from runtime_models.write_splat import write_splat
+    from shapeshift.runtime_models.splats.write_splat import write_splat
 
     path = tmp_path / "a.splat"
     write_splat(some(), path)
@@ -211,7 +211,7 @@ def test_negative_metres_are_no_negative_sigmas(tmp_path):
 @pytest.mark.parametrize("place", [0.0, 1e-45, 256.0, 1e30])
 @pytest.mark.parametrize("count", [1, 2])
 def test_scenes_all_in_one_place_are_framed(place, count):
-    from scene.framing import framing_view
+    from shapeshift.scene.cameras.framing import framing_view
 
     means = np.full((count, 3), place, np.float32)
     means[-1] += np.float32(1e-45)
@@ -221,7 +221,7 @@ def test_scenes_all_in_one_place_are_framed(place, count):
 
 @pytest.mark.parametrize("text", ["x" * 5000, "sphere:" + "\x00" * 300 + ":1:1", "a\nb", "lens:é"])
 def test_selectors_are_quoted_in_one_line_and_in_part(tmp_path, text):
-    from scene.read_selector import read_selector
+    from shapeshift.scene.selectors.read_selector import read_selector
 
     with pytest.raises(ValueError, match=r"write|known") as caught:
         read_selector(text)
@@ -231,7 +231,7 @@ def test_selectors_are_quoted_in_one_line_and_in_part(tmp_path, text):
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("number", ["1e308", "-1e308", "1e999"])
 def test_poses_of_huge_numbers(tmp_path, number):
-    from scene.read_cameras import read_camera_list
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
 
     row = f'{{"matrix": [{", ".join([number] * 12)}, 0, 0, 0, 1], "fov_y": 1}}'
     path = put(tmp_path / "cameras.json", f"[{row}]".encode())

@@ -11,11 +11,11 @@ import poisoned_folder
 import pytest
 from splat_scenes import random_layers
 
-from app import first_start
-from app.cli import COMMANDS
+from shapeshift.app import first_start
+from shapeshift.app.cli import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
-CLI = [sys.executable, "-P", str(ROOT / "app" / "cli.py")]  # as launch.py starts it
+CLI = [sys.executable, "-P", str(ROOT / "shapeshift" / "__main__.py")]  # as launch.py starts it
 INSTALLED = "from shapeshift.app.cli import main\nraise SystemExit(main())\n"
 SHIPPED = ("app", "renderer", "rasterizer", "runtime_models", "scene", "training", "vr")
 
@@ -23,8 +23,8 @@ SHIPPED = ("app", "renderer", "rasterizer", "runtime_models", "scene", "training
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """Poison, and between it the files that somebody wants to look at."""
-    from runtime_models.plain_splats import PlainSplats
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     folder = tmp_path_factory.mktemp("downloads")
     poisoned_folder.fill(folder)
@@ -49,7 +49,7 @@ def folder(tmp_path_factory) -> Path:
 def capture(folder) -> Path:
     from test_first_points import write_las
 
-    from training.synthetic.balls import make_balls
+    from shapeshift.training.synthetic.balls import make_balls
 
     make_balls(folder / "capture", views=6, test_views=1, size=32)
     write_las(folder / "points.laz", np.random.default_rng(0).uniform(-1, 1, (500, 3)))
@@ -72,10 +72,10 @@ def test_the_poison_works(folder, tmp_path):
     """What the other tests rest on: without -P, each of these names is taken from the folder."""
     mark = tmp_path / "mark"
     env = poisoned_folder.environment(mark)
-    for name in ("numpy", "rich", "app.cli", "multiprocessing"):
+    for name in ("numpy", "rich", "shapeshift.app.cli", "multiprocessing"):
         subprocess.run([sys.executable, "-c", f"import {name}"], cwd=folder, env=env, check=False)
     taken = [Path(line).relative_to(folder).parts[0] for line in mark.read_text().splitlines()]
-    assert taken == ["numpy.py", "rich.py", "app", "multiprocessing.py"]
+    assert taken == ["numpy.py", "rich.py", "shapeshift", "multiprocessing.py"]
 
 
 SIZE = ("--size", "32x24")
@@ -161,7 +161,7 @@ def test_a_pythonpath_that_leads_there_is_not_followed(folder, tmp_path, named):
     env["AFTER"] = named
     code = f"import os; os.environ['PYTHONPATH'] = os.environ['AFTER']; {launch}"
     done = subprocess.run(
-        [sys.executable, "-P", "-c", code, str(ROOT / "app" / "cli.py"), "info", "a.ply"],
+        [sys.executable, "-P", "-c", code, CLI[-1], "info", "a.ply"],
         cwd=folder, env=env, capture_output=True, text=True, timeout=60,
     )  # fmt: skip
     assert not mark.exists() and done.returncode == 0, done.stderr

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from app import cli
-from runtime_models.write_package import write_package
+from shapeshift.app import cli
+from shapeshift.runtime_models.package.write_package import write_package
 from tests.models import STOPS, make_random_model
 
 KEYS = {"format", "anchors", "splats", "sh_degree", "stops", "bytes"}
@@ -61,7 +61,7 @@ def test_the_table_says_the_same(tmp_path, capsys):
 
 
 def test_names_with_brackets_are_no_markup(capsys):
-    from app.commands.info import print_table
+    from shapeshift.app.commands.info import print_table
 
     print_table({"stops": [{"name": "[red]a[/b]", "x": 0.5, "kind": "rgb"}], "bytes": 1234567})
     table = capsys.readouterr().out

@@ -63,7 +63,7 @@ def test_what_needs_no_scene_is_said_at_once(words):
 
 def launch(*words: str) -> subprocess.CompletedProcess:
     return subprocess.run(
-        [sys.executable, "-m", "app.cli", *words], capture_output=True, text=True, cwd=ROOT,
+        [sys.executable, "-m", "shapeshift", *words], capture_output=True, text=True, cwd=ROOT,
         timeout=120,
     )  # fmt: skip
 
@@ -86,7 +86,7 @@ def test_nobody_has_to_read_to_the_end(what, streams):
     os.close(read_end)
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "app.cli", *LONG_READS[what]], cwd=ROOT, timeout=120,
+            [sys.executable, "-m", "shapeshift", *LONG_READS[what]], cwd=ROOT, timeout=120,
             stdout=write_end, stderr=write_end if streams == "both" else subprocess.PIPE,
             env={**os.environ, "PYTHONUNBUFFERED": ""},
         )  # fmt: skip
@@ -101,7 +101,7 @@ def test_a_refusal_that_nobody_reads_is_one_all_the_same():
     read_end, write_end = os.pipe()
     os.close(read_end)
     done = subprocess.run(
-        [sys.executable, "-m", "app.cli", "info", "nothing.ply"], cwd=ROOT, timeout=120,
+        [sys.executable, "-m", "shapeshift", "info", "nothing.ply"], cwd=ROOT, timeout=120,
         stdout=subprocess.PIPE, stderr=write_end,
     )  # fmt: skip
     os.close(write_end)

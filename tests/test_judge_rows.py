@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from ply_files import some_splats
 
-from runtime_models.blocks import BLOCK, WORTH_A_THREAD, each_block
-from runtime_models.formats import read_plain
-from runtime_models.lint import judge
-from runtime_models.model import BadFile
-from runtime_models.odd_rows import odd_rows
-from runtime_models.own_units import to_own_units
-from runtime_models.plain_splats import AXES, RawSplats, Reading
-from runtime_models.rotation import covariance
-from runtime_models.spherical_harmonics import shade
-from runtime_models.turn import ours_from_file, turn
+from shapeshift.runtime_models.colors.spherical_harmonics import shade
+from shapeshift.runtime_models.files.blocks import BLOCK, WORTH_A_THREAD, each_block
+from shapeshift.runtime_models.lint.invalid_rows import odd_rows
+from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.operations.activate import to_own_units
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, turn
+from shapeshift.runtime_models.splats.plain_splats import AXES, RawSplats, Reading
 
 COUNTS = (1, 256, 257, BLOCK, BLOCK + 1, WORTH_A_THREAD * BLOCK + 1)
 POISON = (np.nan, np.inf, -np.inf, 3e38, -3e38, 1e-42, 0.0, 81.0, 79.0)
@@ -143,7 +143,7 @@ def test_an_empty_range_is_no_block():
 
 def test_a_real_file_is_the_same_by_the_plain_forms(data):
     path = data / "anatomy_leg_ml3dgs" / "layer0.ply"
-    from runtime_models.read_ply import read_raw_ply
+    from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 
     raw, plain = read_raw_ply(path, Reading()), read_plain(path)
     np.testing.assert_array_equal(plain.means, raw.means * np.float32([1, -1, -1]))

@@ -7,19 +7,19 @@ import numpy as np
 import pyopencl
 import pytest
 
-from app.cli import main
-from app.errors import UsageError
-from app.training.keeping import last_of, refuse_place
-from rasterizer.device import open_device
-from runtime_models.read_scene import read_model
-from scene.capture import Capture
-from training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
-from training.doubts import FEW, usable
-from training.photos import load_photos
-from training.settings import TrainSettings
-from training.suspects import hopeless
-from training.synthetic.balls import make_balls
-from training.train import Trainer
+from shapeshift.app.cli import main
+from shapeshift.app.errors import UsageError
+from shapeshift.app.training.keeping import last_of, refuse_place
+from shapeshift.rasterizer.device import open_device
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.calibration.outlier_views import hopeless
+from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
+from shapeshift.training.doubts import FEW, usable
+from shapeshift.training.photos import load_photos
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 
 STEPS = 12
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from ksplat_files import HandSection, ksplat
 
-from runtime_models.formats import format_of, read_plain
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import RawSplats, Reading
-from runtime_models.read_ksplat import read_raw_ksplat
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.formats import format_of, read_plain
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.read_ksplat import read_raw_ksplat
 
 
 @pytest.fixture

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 from torch_files import write_tensors
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import RawSplats
-from runtime_models.read_labels import CLASSIFIER, most_likely, read_classifier, with_labels
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import RawSplats
+from shapeshift.runtime_models.splats.read_labels import (
+    CLASSIFIER,
+    most_likely,
+    read_classifier,
+    with_labels,
+)
 
 
 def raw(count: int, extra: dict) -> RawSplats:
@@ -91,8 +96,8 @@ def test_the_object_view_counts_labels_and_colours_them():
 
     from splat_scenes import random_layers
 
-    from renderer.debug import MOST_LABELS, label_ranks, object_counts
-    from scene.scene import Scene, SceneObject
+    from shapeshift.renderer.debug.debug import MOST_LABELS, label_ranks, object_counts
+    from shapeshift.scene.scene import Scene, SceneObject
 
     plain = random_layers(60)
     labels = np.repeat([5, 0, 9], [10, 30, 20]).astype(np.int32)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app import cli, program
-from app.paths import full
-from app.training.train import FEW_STEPS, Options, what_next
+from shapeshift.app import cli, program
+from shapeshift.app.paths import full
+from shapeshift.app.training.train import FEW_STEPS, Options, what_next
 from tests.conftest import ROOT
 from tests.models import random_package
 

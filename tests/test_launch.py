@@ -25,7 +25,7 @@ def launch():
 @pytest.fixture
 def no_set_up(monkeypatch):
     """Fails the test where an environment would be made."""
-    from app import first_start
+    from shapeshift.app import first_start
 
     monkeypatch.setattr(first_start, "make_environment", lambda testing: pytest.fail("a set-up"))
 
@@ -51,7 +51,7 @@ def test_pythons_that_are_refused_can_read_the_refusal():
 
 @pytest.mark.parametrize("failure", [KeyboardInterrupt, OSError(30, "Read-only file system", "x")])
 def test_what_ends_the_set_up_is_one_sentence(launch, monkeypatch, capsys, failure):
-    from app import first_start
+    from shapeshift.app import first_start
 
     def end(testing):
         raise failure
@@ -73,9 +73,9 @@ def test_what_is_handed_over_finds_nothing_by_pythonpath(launch, monkeypatch):
     monkeypatch.setattr(launch.os, "execve", lambda *given: seen.append(given))
     monkeypatch.setattr(launch.subprocess, "Popen", lambda *given, **more: pytest.fail("a child"))
     with pytest.raises(pytest.fail.Exception):  # only since execve came back
-        launch.hand_over("/python", ["app/cli.py", "info"])
+        launch.hand_over("/python", ["shapeshift/__main__.py", "info"])
     ((program, command, environment),) = seen
-    assert program == "/python" and command == ["/python", "-P", "app/cli.py", "info"]
+    assert program == "/python" and command == ["/python", "-P", "shapeshift/__main__.py", "info"]
     assert environment["OTHER"] == "kept"
     assert not {"PYTHONPATH", "PYTHONHOME"} & environment.keys()
 
@@ -88,7 +88,7 @@ def test_a_second_start_adds_under_a_second():
         return time.perf_counter() - start
 
     door = [sys.executable, "launch.py", "--help"]
-    inside = [ROOT / ".venv/bin/python", "-P", os.path.join("app", "cli.py"), "--help"]
+    inside = [ROOT / ".venv/bin/python", "-P", os.path.join("shapeshift", "__main__.py"), "--help"]
     seconds(door)  # the set-up, if something changed
     assert min(seconds(door) for _ in range(3)) - min(seconds(inside) for _ in range(3)) < 1.0
 
@@ -101,13 +101,13 @@ def test_what_is_only_asked_installs_nothing(launch, no_set_up, monkeypatch, wor
     assert launch.main(words) == 0
     ((python, (program, asked)),) = handed
     assert python == sys.executable and asked == words[0]
-    assert Path(program) == ROOT / "app" / "cli.py"
+    assert Path(program) == ROOT / "shapeshift" / "__main__.py"
 
 
 @pytest.mark.parametrize("words", [["--help"], ["-h"], ["help"], ["--version"]])
 def test_what_is_only_asked_needs_the_standard_library_alone(words):
     answer = subprocess.run(
-        [sys.executable, "-I", "-S", ROOT / "app" / "cli.py", *words],
+        [sys.executable, "-I", "-S", ROOT / "shapeshift" / "__main__.py", *words],
         capture_output=True, text=True, cwd=ROOT, check=True,
     )  # fmt: skip
     assert answer.stdout.startswith(("usage: ", "shapeshift ")) and answer.stderr == ""

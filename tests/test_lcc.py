@@ -12,16 +12,16 @@ from fuzz_seeds import some_splats
 from lcc_files import RANGES, put, random_rows, write_lcc, write_lcc2
 from sog_scenes import random_sog, write_zip
 
-from runtime_models.formats import read_plain
-from runtime_models.lcc.read_lcc import INDEX, find_meta, read_level, read_meta
-from runtime_models.lcc.read_lcc2 import read_meta as read_meta2
-from runtime_models.memory import Memory
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import describe, read_model
-from runtime_models.rotation import covariance
-from runtime_models.spherical_harmonics import C0
-from runtime_models.write_spz import write_spz
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.lcc.read_lcc import INDEX, find_meta, read_level, read_meta
+from shapeshift.runtime_models.splats.lcc.read_lcc2 import read_meta as read_meta2
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
 HUGE = Reading(allow_huge=True)
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from splat_scenes import random_layers
 
-from rasterizer.device import Device, NoMemory
-from rasterizer.project import RECORD
-from renderer.limits import MOST_INDEX, TooLarge, check_tiles
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
+from shapeshift.rasterizer.device import Device, NoMemory
+from shapeshift.rasterizer.project import RECORD
+from shapeshift.renderer.limits import MOST_INDEX, TooLarge, check_tiles
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
 
 
 @dataclass
@@ -68,6 +68,6 @@ def test_a_machine_whose_memory_is_full_says_so_in_one_sentence(tmp_path, monkey
     def full(*_):
         raise MemoryError("Unable to allocate 7 TiB")
 
-    monkeypatch.setattr("runtime_models.read_scene.read_whole", full)
+    monkeypatch.setattr("shapeshift.runtime_models.read_scene.read_whole", full)
     with pytest.raises(BadFile, match=r"big\.ply does not fit this machine's memory"):
         read_model(tmp_path / "big.ply")

@@ -8,8 +8,8 @@ import pytest
 from ply_files import names_of, random_rows, write_rows
 from test_cli import assert_refused, launch
 
-from app.commands.lint import Options, run, summary
-from runtime_models.model import BadFile
+from shapeshift.app.commands.lint import Options, run, summary
+from shapeshift.runtime_models.model import BadFile
 
 KEYS = {"file", "refused", "format", "splats", "sh_degree", "bytes", "extent_m", "origin_m",
         "splats_over_a_pixel", "findings"}  # fmt: skip
@@ -102,7 +102,7 @@ def test_a_point_cloud_names_what_it_lacks(tmp_path, capsys):
 
 
 def test_packages_folders_and_anchors(data, capsys):
-    from app.commands.headless import DEMO
+    from shapeshift.app.commands.headless import DEMO
 
     for scene in (DEMO, data / "anatomy_leg_ml3dgs"):
         files = [scene] if scene.is_file() else sorted(scene.glob("*.ply"))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from models import make_random_model
 
-from runtime_models import lint_whole
-from runtime_models.evaluate import evaluate
-from runtime_models.lint_package import refuse_filling
-from runtime_models.lint_whole import fill_ratio, sample_of
-from runtime_models.model import AnchorModel, BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import read_model
-from runtime_models.write_package import write_package
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.lint import lint_whole
+from shapeshift.runtime_models.lint.lint_whole import fill_ratio, sample_of
+from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.runtime_models.package.lint_package import refuse_filling
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import Reading
 
 
 def huge(anchors: int, gain: float) -> AnchorModel:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from ply_files import some_splats
 
-from runtime_models.blocks import BLOCK
-from runtime_models.lint import judge
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.files.blocks import BLOCK
+from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 
 LARGEST = float(np.finfo(np.float32).max)
 LONGEST_LOG = float(np.log(np.float64(LARGEST)))  # exp of the next float32 is Inf

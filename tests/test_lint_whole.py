@@ -4,13 +4,19 @@ import numpy as np
 import pytest
 from test_lint_rows import copied, raw_splats
 
-from runtime_models import lint_whole
-from runtime_models.formats import read_plain, read_raw
-from runtime_models.lint import judge
-from runtime_models.lint_whole import LARGEST_SCENE, MOST_LAYERS, TELLING, fill_ratio, sample_of
-from runtime_models.model import BadFile, SplatLayers
-from runtime_models.plain_splats import PlainSplats, RawSplats, Reading
-from runtime_models.read_scene import read_model
+from shapeshift.runtime_models.lint import lint_whole
+from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.lint.lint_whole import (
+    LARGEST_SCENE,
+    MOST_LAYERS,
+    TELLING,
+    fill_ratio,
+    sample_of,
+)
+from shapeshift.runtime_models.model import BadFile, SplatLayers
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.formats import read_plain, read_raw
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, RawSplats, Reading
 
 FIXTURES = (
     ("anatomy_leg_ml3dgs", "layer*.ply", 3),

@@ -7,11 +7,20 @@ import numpy as np
 import pytest
 from vr_frames import LOST, at, frame, hand, tilted, yawed
 
-from scene.pose import Pose
-from vr.locomotion import HOME_S, LONGEST_S, RISES_S, RULES, Comfort, Rules, Travel, move
-from vr.stance import underfoot
-from vr.standing import Standing
-from vr.teleport import Arc, level_ground, throw_arc
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.locomotion.locomotion import (
+    HOME_S,
+    LONGEST_S,
+    RISES_S,
+    RULES,
+    Comfort,
+    Rules,
+    Travel,
+    move,
+)
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import underfoot
+from shapeshift.vr.locomotion.teleport import Arc, level_ground, throw_arc
 
 HZ = 90
 START = Standing(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from vr_frames import LOST, frame, hand, yawed
 
-from scene.pose import Pose
-from vr.locomotion import LONGEST_S, RULES, Rules, Travel, move
-from vr.stance import FAR_M, LEAST_SCALE, MOST_SCALE
-from vr.standing import Standing
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.locomotion.locomotion import LONGEST_S, RULES, Rules, Travel, move
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import FAR_M, LEAST_SCALE, MOST_SCALE
 
 START = Standing(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)
 

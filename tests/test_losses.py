@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from training.gaussians import Gaussians
-from training.losses import ImageLoss, regularise
-from training.metrics import psnr, ssim, weighted_mean
-from training.reference import image_loss_reference
+from shapeshift.training.evaluation.metrics import psnr, ssim, weighted_mean
+from shapeshift.training.heads.gaussians import Gaussians
+from shapeshift.training.losses.losses import ImageLoss, regularise
+from shapeshift.training.reference import image_loss_reference
 
 
 def photo_and_image(width, height, seed=0):

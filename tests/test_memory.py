@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from runtime_models import memory
-from runtime_models.memory import A_BYTE, FREE, Account, Memory, size_of, unlimited
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
+from shapeshift.runtime_models.files import memory
+from shapeshift.runtime_models.files.memory import A_BYTE, FREE, Account, Memory, size_of, unlimited
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import Reading
 
 NEAR = 10 * FREE  # more than any of these takes, so that only the account's own bound counts
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from scene.metrics import psnr, ssim, ssim_map, window
-from training import metrics as training_metrics
+from shapeshift.scene.metrics import psnr, ssim, ssim_map, window
+from shapeshift.training.evaluation import metrics as training_metrics
 
 
 def pair(height, width, channels=3, seed=0, noise=0.1):

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.commands.bench import command_line
-from scene.pose import look_at
+from shapeshift.app.commands.bench import command_line
+from shapeshift.scene.pose import look_at
 from tests.models import random_package
 from tests.test_cli import assert_refused, launch
 
@@ -139,8 +139,8 @@ CAMERAS = {
 
 @pytest.mark.parametrize("text", CAMERAS)
 def test_broken_camera_files_are_one_sentence(tmp_path, text):
-    from runtime_models.model import BadFile
-    from scene.read_cameras import read_cameras
+    from shapeshift.runtime_models.model import BadFile
+    from shapeshift.scene.cameras.read_cameras import read_cameras
 
     (tmp_path / "c.json").write_text(text)
     with pytest.raises(BadFile, match=CAMERAS[text].replace("[", r"\[")):
@@ -179,7 +179,7 @@ def test_interrupt_leaves_whole_pictures_only(scene, tmp_path):
     import time
 
     child = subprocess.Popen(
-        [sys.executable, "-m", "app.cli", "render", str(scene), "--x", "sweep:5000", "--size",
+        [sys.executable, "-m", "shapeshift", "render", str(scene), "--x", "sweep:5000", "--size",
          "64x48", "--out", str(tmp_path / "out"), "--context", "none"],
         cwd=ROOT, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip

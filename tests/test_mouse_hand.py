@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from scene.mouse_hand import (
+from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.world.mouse_hand import (
     NOTCH,
     MouseHand,
     moved,
@@ -15,7 +16,6 @@ from scene.mouse_hand import (
     take,
     turned,
 )
-from scene.pose import Pose, View, look_at, perspective
 
 SIZE = (800.0, 600.0)  # logical pixels, half of the view's
 OFF_CENTRE = (-0.9, 0.5, -0.3, 0.6)

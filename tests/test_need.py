@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from runtime_models.model import Stop
-from tests.models import STOPS, make_random_model
-from training.need import (
+from shapeshift.runtime_models.model import Stop
+from shapeshift.training.fit.ablation import (
     DROPPED,
     KEPT,
     PARTS,
@@ -16,7 +15,8 @@ from training.need import (
     change_of,
     judge,
 )
-from training.settings import TrainSettings
+from shapeshift.training.settings import TrainSettings
+from tests.models import STOPS, make_random_model
 
 BY_NAME = {part.name: part for part in PARTS}
 RNG = np.random.default_rng

@@ -6,14 +6,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import evaluate
-from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
-from runtime_models.read_package import read_files
-from runtime_models.write_package import package_files
-from training.export import model_of
-from training.gaussians import Activation, Gaussians
-from training.networks import HeadLayout, Heads, initial_weights, padded
-from training.reference import activate_reference, directions, head_inputs, heads_reference
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
+from shapeshift.runtime_models.package.read_package import read_files
+from shapeshift.runtime_models.package.write_package import package_files
+from shapeshift.training.export import model_of
+from shapeshift.training.heads.gaussians import Activation, Gaussians
+from shapeshift.training.heads.networks import HeadLayout, Heads, initial_weights, padded
+from shapeshift.training.reference import (
+    activate_reference,
+    directions,
+    head_inputs,
+    heads_reference,
+)
 
 FORMS = ("cpu", "gpu")
 VOXEL = 0.05

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.frames import draw_told
 from tests.object_scenes import (
     CYCLE,

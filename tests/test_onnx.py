@@ -6,9 +6,9 @@ import onnxruntime
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from runtime_models.model import HEADS, BadFile, Mlp
-from runtime_models.read_onnx import read_onnx
-from runtime_models.write_onnx import write_onnx
+from shapeshift.runtime_models.model import HEADS, BadFile, Mlp
+from shapeshift.runtime_models.package.read_onnx import read_onnx
+from shapeshift.runtime_models.package.write_onnx import write_onnx
 from tests.models import make_random_model, run_in_numpy
 
 node = helper.make_node

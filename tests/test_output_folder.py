@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.formats import read_plain
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_output_folder import newest_cloud, thermal_pair
-from runtime_models.read_scene import describe, files_of, read_model
-from runtime_models.stop_names import guess_kind, is_thermal_name
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, files_of, read_model
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.read_output_folder import newest_cloud, thermal_pair
+from shapeshift.runtime_models.stop_names import guess_kind, is_thermal_name
 
 
 def splats(count: int, seed: int = 0, coefficients: int = 4) -> PlainSplats:
@@ -135,7 +135,7 @@ def read_file_sh(folder: Path, twin: PlainSplats, thermal: np.ndarray) -> np.nda
     """Our harmonics of a PLY whose own ones, in its axes, are `thermal`."""
     from dataclasses import replace
 
-    from runtime_models.turn import turn_half
+    from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
 
     write_ply(turn_half(replace(twin, sh=thermal)), folder / "twin.ply")
     return read_plain(folder / "twin.ply").sh

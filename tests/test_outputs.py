@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from app.commands.outputs import as_steps, choose_unit, summary
-from app.commands.png16 import write_png16
-from renderer.settings import RenderSettings
-from renderer.surface_reference import reference_surface
-from runtime_models.read_scene import read_model
-from scene.framing import default_view
-from scene.scene import Scene, SceneObject
-from scene.stereo import stereo_pair
+from shapeshift.app import cli
+from shapeshift.app.commands.outputs import as_steps, choose_unit, summary
+from shapeshift.app.commands.png16 import write_png16
+from shapeshift.renderer.reference.surface_reference import reference_surface
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.stereo import stereo_pair
 from tests.models import random_package
 
 NO_GL = ["--context", "none", "--size", "60x44"]

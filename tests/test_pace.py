@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from renderer.pace import (
+from shapeshift.app import cli
+from shapeshift.renderer.pace import (
     EVEN_ENOUGH,
     MOST,
     STEPS,
@@ -17,10 +17,10 @@ from renderer.pace import (
     measure_pace,
     views_of,
 )
-from renderer.renderer import Renderer
-from runtime_models.model import Stop
-from runtime_models.read_package import read_package
-from runtime_models.write_package import write_package
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.write_package import write_package
 from tests.models import make_random_model
 from tests.splat_scenes import random_layers
 

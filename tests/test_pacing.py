@@ -7,12 +7,21 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from app.charts.quick_chart import QUICK, QuickRow
-from app.headset.pacing import AUTO, FIXED, LATE, PART, PRICED, QUALITIES, Pacing, StereoChart
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene
-from vr.panel_state import QUALITIES as ON_THE_PANEL
+from shapeshift.app.charts.quick_chart import QUICK, QuickRow
+from shapeshift.app.headset.pacing import (
+    AUTO,
+    FIXED,
+    LATE,
+    PART,
+    PRICED,
+    QUALITIES,
+    Pacing,
+    StereoChart,
+)
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene
+from shapeshift.vr.panel.panel_state import QUALITIES as ON_THE_PANEL
 
 BACKGROUND = (0.1, 0.2, 0.3)
 PERIOD = 0.010  # seconds

@@ -13,12 +13,16 @@ import numpy as np
 import onnx
 import pytest
 
-from runtime_models.evaluate import evaluate
-from runtime_models.model import HEADS, BadFile
-from runtime_models.read_package import read_package
-from runtime_models.read_scene import describe, read_model
-from runtime_models.stop_weights import Pace
-from runtime_models.write_package import describe_model, package_files, write_package
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import HEADS, BadFile
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.write_package import (
+    describe_model,
+    package_files,
+    write_package,
+)
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.stop_weights import Pace
 from tests.models import make_random_model
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -130,7 +134,7 @@ def test_a_failing_write_leaves_the_old_package(tmp_path, name, monkeypatch):
         real(source, target)
 
     monkeypatch.setattr(os, "replace", full_disk)
-    monkeypatch.setattr("runtime_models.whole_file.swap", lambda one, other: False)
+    monkeypatch.setattr("shapeshift.runtime_models.files.whole_file.swap", lambda one, other: False)
     with pytest.raises(OSError, match="no space"):
         write_package(make_random_model(4), tmp_path / name)
     assert len(read_model(tmp_path / name).anchors) == 3

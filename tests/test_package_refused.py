@@ -7,11 +7,11 @@ import zipfile
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from runtime_models.package_files import ANCHORS, LARGEST, MANIFEST
-from runtime_models.read_package import read_anchors
-from runtime_models.read_scene import read_model
-from runtime_models.write_package import package_files, write_package
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.package_files import ANCHORS, LARGEST, MANIFEST
+from shapeshift.runtime_models.package.read_package import read_anchors
+from shapeshift.runtime_models.package.write_package import package_files, write_package
+from shapeshift.runtime_models.read_scene import read_model
 from tests.models import make_random_model
 
 FILES = package_files(make_random_model(), "float32")

@@ -14,7 +14,7 @@ def test_every_folder_is_shipped():
     listed = set(PROJECT["tool"]["setuptools"]["packages"])
     folders = {p.parent.relative_to(ROOT).parts for kind in SHIPPED_KINDS for p in ROOT.rglob(kind)}
     needed = {
-        ".".join(("shapeshift", *f))
+        ".".join(f if f[0] == "shapeshift" else ("shapeshift", *f))
         for f in folders
         if f and f[0] not in NOT_SHIPPED and not f[0].startswith(".")
     }

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from renderer.palette import (
+from shapeshift.renderer.colors.palette import (
     LUMINANCE,
     PALETTES,
     apply_palette,
@@ -12,8 +12,8 @@ from renderer.palette import (
     palette_colors,
     thermal_blend,
 )
-from runtime_models.model import BadFile, SplatLayers, Stop
-from scene.scene import Scene, SceneObject
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.scene.scene import Scene, SceneObject
 
 STOPS = (
     Stop("rgb", 0.0),

@@ -9,10 +9,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from renderer.classify import classify
-from renderer.reference import reference_image, reference_reasons
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View, look_at, perspective
+from shapeshift.renderer.debug.classify import classify
+from shapeshift.renderer.reference.reference import reference_image, reference_reasons
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View, look_at, perspective
 from tests.frames import draw
 from tests.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model
 
@@ -134,7 +134,7 @@ def test_a_centred_view_projects_as_3dgs_does(place):
     y = min(1.3 * tan_y, max(-1.3 * tan_y, mean[1] / z)) * z
     j = np.array([[focal_x / z, 0, -focal_x * x / z**2], [0, focal_y / z, -focal_y * y / z**2]])
     want = j @ np.diag(np.float64(np.float32(scale)) ** 2) @ j.T + 0.3 * np.eye(2)
-    from renderer.reference import gate_object
+    from shapeshift.renderer.reference.reference import gate_object
 
     found = gate_object(alone(splat).objects[0], view, RenderSettings(), np.zeros(3))
     np.testing.assert_allclose(found.covariance[0], want, rtol=1e-6)

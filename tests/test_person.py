@@ -8,9 +8,9 @@ from test_simulation import item, reaction
 from test_world import real
 from vr_frames import at, frame, hand, tilted
 
-from app.headset.person import Person
-from vr.stance import resized, underfoot
-from vr.standing import Standing
+from shapeshift.app.headset.person import Person
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import resized, underfoot
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 HZ = 90

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from runtime_models.model import BadFile
-from scene.capture import Photo
-from scene.photo import area_weights, load_photo
-from scene.pose import Pose, View
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.photo import area_weights, load_photo
+from shapeshift.scene.pose import Pose, View
 from tests.captures import (
     save_image,
 )

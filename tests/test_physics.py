@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from physics_things import at, box, cup, run, sheet, table
 
-from scene.grab import hand_velocity, turn_between
-from scene.physics import FLOOR, Physics
-from scene.pose import Pose
-from scene.thicken import THICKNESS
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.scene.colliders.thicken import THICKNESS
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.grab import hand_velocity, turn_between
+from shapeshift.scene.world.physics import FLOOR, Physics
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

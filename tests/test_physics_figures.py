@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from physics_things import PLATE, at, box, cup, lowest, run, sheet, table
 
-from scene.physics import FLOOR, Physics
+from shapeshift.scene.world.physics import FLOOR, Physics
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from models import make_random_model
 
-from runtime_models.evaluate import evaluate
-from runtime_models.model import SplatLayers, Stop
-from scene.pick import Picker
-from scene.pose import Pose
-from scene.scene import Scene, SceneObject
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.scene.pick import Picker
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene, SceneObject
 
 EYE = np.array([0.0, 0.0, 5.0])
 AHEAD = np.array([0.0, 0.0, -1.0])

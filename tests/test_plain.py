@@ -9,17 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.reference import rotations
-from runtime_models.model import BadFile, Stop
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_layer_list import LIST
-from runtime_models.read_scene import describe, read_model
-from runtime_models.write_layer_list import layer_name, write_layer_list
-from scene.read_capture import read_capture
-from tests.training_runs import run
-from training.evaluate import evaluate_model
-from training.plain import PlainTrainer, first_scales, one_modality, seen_colors
-from training.plain_density import (
+from shapeshift.rasterizer.reference import rotations
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
+from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name, write_layer_list
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.training.baselines.plain import (
+    PlainTrainer,
+    first_scales,
+    one_modality,
+    seen_colors,
+)
+from shapeshift.training.baselines.plain_density import (
     AFTER_RESET,
     SMALLER,
     changed_splats,
@@ -28,9 +31,11 @@ from training.plain_density import (
     halves,
     reset_opacity,
 )
-from training.plain_settings import PlainSettings
-from training.plain_step import GROUPS
-from training.synthetic.balls import STOPS, make_balls
+from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.baselines.plain_step import GROUPS
+from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.synthetic.balls import STOPS, make_balls
+from tests.training_runs import run
 
 ROOT = Path(__file__).resolve().parents[1]
 SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_every=20, sh_degree=2)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from rasterizer.reference import finite_differences
-from scene.pose import View, look_at, perspective
-from training.drawing import camera_of
-from training.losses import ImageLoss
-from training.optimizer import Adam
-from training.plain_reference import decode_plain_reference
-from training.plain_step import GROUPS, REST, PlainEvidence, PlainStep
-from training.reference import step_loss_reference
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.baselines.plain_reference import decode_plain_reference
+from shapeshift.training.baselines.plain_step import GROUPS, REST, PlainEvidence, PlainStep
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.reference import step_loss_reference
 
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
 BACKGROUND = (0.2, 0.5, 0.9)

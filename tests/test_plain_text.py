@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from runtime_models.model import BadFile
-from runtime_models.plain_text import (
+from shapeshift.runtime_models.files.plain_text import (
     LONGEST_LINE,
     LONGEST_NAME,
     LONGEST_WORD,
@@ -18,6 +17,7 @@ from runtime_models.plain_text import (
     one_line,
     several_lines,
 )
+from shapeshift.runtime_models.model import BadFile
 
 ANY = st.text(st.characters(exclude_categories=()))  # halves of surrogate pairs, too
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.formats import format_of
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_points_ply import SIGMA, read_raw_points_ply
-from runtime_models.read_scene import read_model
-from runtime_models.spacing import nearest_distances, spacing
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.formats import format_of
+from shapeshift.runtime_models.splats.operations.knn_distance import nearest_distances, spacing
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.read_points_ply import SIGMA, read_raw_points_ply
 
 C0 = 0.28209479177387814
 TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "u2": "ushort", "i4": "int"}

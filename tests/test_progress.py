@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app import cli, progress
+from shapeshift.app import cli, progress
 from tests.conftest import ROOT
 from tests.models import random_package
 
@@ -133,7 +133,7 @@ def test_every_long_command_tells(package, tmp_path, monkeypatch, capsys, comman
     places = {"PACKAGE": str(package), "OUT": str(tmp_path / "out")}
     words = [re.sub("PACKAGE|OUT", lambda found: places[found[0]], word) for word in LONG[command]]
     if command == "demo":  # its training tells as any other does
-        monkeypatch.setattr("app.training.train.run", lambda options: 0)
+        monkeypatch.setattr("shapeshift.app.training.train.run", lambda options: 0)
     assert cli.main(words) == 0
     told = re.findall(rf"^{command}: (.+) \(0 min\)$", capsys.readouterr().err, re.M)
     assert set(told) - {"at work"}, told

@@ -12,11 +12,11 @@ from rasterizer_scenes import (
     upload,
 )
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import LEAST_ALPHA, Camera, project
-from rasterizer.project_arena import project_arena
-from rasterizer.raster import rasterize, rasterize_rgba, rasterize_rgba_views
-from rasterizer.reference import project_reference, rasterize_reference
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import LEAST_ALPHA, Camera, project
+from shapeshift.rasterizer.project_arena import project_arena
+from shapeshift.rasterizer.raster import rasterize, rasterize_rgba, rasterize_rgba_views
+from shapeshift.rasterizer.reference import project_reference, rasterize_reference
 
 FORMS = ("cpu", "gpu")
 BACKGROUND = (0.2, 0.5, 0.9)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from rasterizer_scenes import arena, as_double, device, off_centre_camera, random_splats, upload
 
-from rasterizer.project import CULL_REASONS, LEAST_ALPHA, Camera, project
-from rasterizer.project_arena import Limits, SortFrames, project_arena
-from rasterizer.reference import project_reference, rotations
+from shapeshift.rasterizer.project import CULL_REASONS, LEAST_ALPHA, Camera, project
+from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
+from shapeshift.rasterizer.reference import project_reference, rotations
 
 
 def turned(seed: int) -> np.ndarray:

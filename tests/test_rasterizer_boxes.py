@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device, off_centre_camera, random_splats, upload
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Projected, project
-from rasterizer.raster import FORMS as RASTER_FORMS
-from rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import Projected, project
+from shapeshift.rasterizer.raster import FORMS as RASTER_FORMS
+from shapeshift.rasterizer.raster import rasterize, rasterize_backward
 
 FORMS = ("cpu", "gpu")
 BOX = 2 << 24  # of a place, as in common/tiles.cl

@@ -16,10 +16,15 @@ from rasterizer_scenes import (
     upload,
 )
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, Projected, project
-from rasterizer.raster import LEAST_THROUGH, rasterize, rasterize_rgba, rasterize_rgba_views
-from rasterizer.reference import project_reference, rasterize_reference
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import Camera, Projected, project
+from shapeshift.rasterizer.raster import (
+    LEAST_THROUGH,
+    rasterize,
+    rasterize_rgba,
+    rasterize_rgba_views,
+)
+from shapeshift.rasterizer.reference import project_reference, rasterize_reference
 
 STOP = LEAST_THROUGH
 BATCH = 32

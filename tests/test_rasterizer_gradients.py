@@ -16,10 +16,10 @@ from rasterizer_scenes import (
     upload,
 )
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, project, project_backward
-from rasterizer.raster import rasterize, rasterize_backward
-from rasterizer.reference import finite_differences, render_reference
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import Camera, project, project_backward
+from shapeshift.rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.reference import finite_differences, render_reference
 
 ROOT = Path(__file__).resolve().parents[1]
 FORMS = ("cpu", "gpu")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.pack import pack, pack_color, pack_opacity
-from rasterizer.reference import rotations
+from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
+from shapeshift.rasterizer.reference import rotations
 
 BEFORE, AFTER = 3, 5  # rows of other objects
 

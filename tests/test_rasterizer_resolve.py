@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.resolve import resolve
-from renderer.palette import apply_palette, lay_heat, palette_colors
+from shapeshift.rasterizer.resolve import resolve
+from shapeshift.renderer.colors.palette import apply_palette, lay_heat, palette_colors
 
 
 def image(height: int, width: int, seed: int = 0) -> np.ndarray:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from rasterizer_scenes import device
 
-from rasterizer.shade_sh import shade_sh, upload_sh
-from runtime_models.evaluate import directions
-from runtime_models.spherical_harmonics import shade
+from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
+from shapeshift.runtime_models.colors.spherical_harmonics import shade
+from shapeshift.runtime_models.evaluate import directions
 
 EYE = np.array([0.3, -0.2, 2.0], np.float32)
 BEFORE, AFTER = 3, 5  # rows of other objects

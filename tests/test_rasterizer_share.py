@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from rasterizer_scenes import as_double, device, off_centre_camera, random_splats, upload
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import project
-from rasterizer.raster import rasterize, rasterize_backward
-from rasterizer.reference import render_reference
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import project
+from shapeshift.rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.reference import render_reference
 
 FORMS = ("cpu", "gpu")
 

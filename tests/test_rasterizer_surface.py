@@ -12,18 +12,18 @@ from rasterizer_scenes import (
     upload,
 )
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, project, project_backward
-from rasterizer.raster import rasterize, rasterize_backward
-from rasterizer.reference import finite_differences
-from rasterizer.surface import (
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import Camera, project, project_backward
+from shapeshift.rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.rasterizer.surface import (
     rasterize_depth,
     rasterize_depth_backward,
     surface,
     surface_arena,
     surface_backward,
 )
-from rasterizer.surface_reference import render_depth_reference
+from shapeshift.rasterizer.surface_reference import render_depth_reference
 
 FORMS = ("cpu", "gpu")
 BACKGROUND = (0.2, 0.5, 0.9)

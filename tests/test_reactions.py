@@ -7,10 +7,11 @@ from fractions import Fraction
 
 import pytest
 
-from runtime_models.model import Stop
-from runtime_models.stop_weights import StopBlend, StopWeights
-from scene.control import EASES
-from scene.reactions import (
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import StopBlend, StopWeights
+from shapeshift.scene.control import EASES
+from shapeshift.scene.selectors.selector import Box, Sphere
+from shapeshift.scene.world.reactions import (
     KINDS,
     Event,
     Machine,
@@ -23,7 +24,6 @@ from scene.reactions import (
     start,
     steer,
 )
-from scene.selector import Box, Sphere
 
 NAMES = ("normal", "ice", "fire", "charcoal")
 STATES = tuple(State(name, i / 4) for i, name in enumerate(NAMES))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from runtime_models.model import BadFile
-from scene.read_mesh import read_mesh
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.colliders.read_mesh import read_mesh
 
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 ENDINGS = ("obj", "ply", "stl", "glb")

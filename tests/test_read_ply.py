@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from ply_files import names_of, random_rows, sh_of, some_splats, write_rows
 
-from runtime_models.blocks import BLOCK, WORTH_A_THREAD, block_of
-from runtime_models.formats import read_plain
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_ply import read_raw_ply
-from runtime_models.read_scene import read_model
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.files.blocks import BLOCK, WORTH_A_THREAD, block_of
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 
 def check_rows(raw, rows, coefficients):
@@ -175,7 +175,7 @@ def test_a_word_without_end_is_not_collected(tmp_path):
 
 def test_a_file_that_shrinks_while_it_is_read_is_one_sentence(tmp_path, monkeypatch):
     path = write_rows(tmp_path / "a.ply", random_rows(3, names_of(1)))
-    from runtime_models import read_ply
+    from shapeshift.runtime_models.splats.ply import read_ply
 
     header = read_ply.read_header(path)
     monkeypatch.setattr(read_ply, "read_header", lambda _: header)

@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import Evaluator
-from runtime_models.formats import read_plain as read_ply
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_layers import read_layers
-from runtime_models.read_scene import describe, read_model
-from runtime_models.read_splat import ROW
-from runtime_models.rotation import covariance
-from runtime_models.spherical_harmonics import shade
-from runtime_models.turn import turn_half
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.colors.spherical_harmonics import shade
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.runtime_models.splats.formats import read_plain as read_ply
+from shapeshift.runtime_models.splats.layers.read_layers import read_layers
+from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.read_splat import ROW
 from tests.ply_files import some_splats
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

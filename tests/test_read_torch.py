@@ -8,9 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from runtime_models.read_torch import is_torch_archive, read_script, read_tensors
-from runtime_models.scaffold_networks import ACTIVATIONS, STEMS, mlp_of
+from shapeshift.runtime_models.checkpoint.read_torch import (
+    is_torch_archive,
+    read_script,
+    read_tensors,
+)
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.scaffold.scaffold_networks import ACTIVATIONS, STEMS, mlp_of
 from tests import torch_files as made
 from tests.models import run_in_numpy
 

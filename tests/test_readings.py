@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.charts.comparison import (
+from shapeshift.app.charts.comparison import (
     MOST_DB,
     REST_S,
     Comparison,
@@ -14,13 +14,13 @@ from app.charts.comparison import (
     measure_error,
     shortcuts,
 )
-from app.charts.quick_chart import QUICK, QuickChart, turned
-from app.viewer.dial import Dial
-from app.viewer.readings import FEWEST, Meter
-from app.viewer.shown import Shown, Wish, rested
-from renderer.settings import FrameStats, RenderSettings
-from scene.pose import View, look_at
-from scene.scene import Scene
+from shapeshift.app.charts.quick_chart import QUICK, QuickChart, turned
+from shapeshift.app.viewer.dial import Dial
+from shapeshift.app.viewer.readings import FEWEST, Meter
+from shapeshift.app.viewer.shown import Shown, Wish, rested
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.pose import View, look_at
+from shapeshift.scene.scene import Scene
 
 VIEW = View(look_at(np.array([0.0, 0, 4]), np.zeros(3)), (-0.4, 0.4, -0.3, 0.3), 0.1, 50.0, (8, 6))
 NOISE = np.random.default_rng(0).normal(size=(6, 8, 3))
@@ -119,7 +119,7 @@ def test_a_picture_is_compared_once_after_it_has_rested():
 
 
 def make_shown(drawing: str = "tiles (test)"):
-    from app.viewer.readings import Readings
+    from shapeshift.app.viewer.readings import Readings
 
     renderer, readings = KnownRenderer(drawing), Readings(drawing=drawing)
     return renderer, readings, Shown(renderer, readings)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.read_scene import read_model
-from scene.photo import load_photo
-from scene.read_capture import read_capture
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.splat_scenes import psnr_db
 
 

@@ -4,9 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from renderer.recolor import Colored, centre_of, color_key, reach_of, seen_anchors
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View, look_at
+from shapeshift.renderer.colors.color_cache import (
+    Colored,
+    centre_of,
+    color_key,
+    reach_of,
+    seen_anchors,
+)
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View, look_at
 from tests.splat_scenes import alone, front_view, psnr_db, random_layers, random_model, stereo_views
 
 TURNED = Pose(np.array([0.1, 0.2, 0.3]), np.array([0.8, 0, 0.6, 0]))

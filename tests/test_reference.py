@@ -15,10 +15,10 @@ from splat_scenes import (
     two_objects,
 )
 
-from renderer.reference import project_object, reference_image
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene
+from shapeshift.renderer.reference.reference import project_object, reference_image
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene
 
 STRAIGHT = View(look_at((0, 0, 2), (0, 0, 0)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (65, 65))
 EXACT = RenderSettings()

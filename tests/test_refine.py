@@ -10,12 +10,12 @@ import pytest
 from splat_scenes import one_splat
 from test_streamed import COUNTS, write_streamed
 
-import app.viewer.refine as refine
-from app.opening import ReadingOptions
-from app.viewer.refine import Refiner, attach_refiner
-from app.viewer.sections import Hooks
-from app.viewer.stage import Stage
-from runtime_models.model import BadFile
+import shapeshift.app.viewer.refine as refine
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.viewer.refine import Refiner, attach_refiner
+from shapeshift.app.viewer.sections import Hooks
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import BadFile
 
 LONGEST_S = 10.0
 
@@ -104,8 +104,8 @@ def test_the_budget_bounds_it(scene):
 
 
 def test_files_without_levels_are_left_alone(tmp_path, scene):
-    from runtime_models.plain_splats import PlainSplats
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     one, path = one_splat(), tmp_path / "one.ply"
     write_ply(PlainSplats(one.means, one.scales, one.wxyz, one.opacity, one.sh), path)

@@ -6,19 +6,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from app import cli
-from renderer.pace import largest_step
-from runtime_models.evaluate import evaluate
-from runtime_models.model import BadFile, ControlEncoding, Stop
-from runtime_models.read_package import read_package
-from runtime_models.read_scene import read_model
-from runtime_models.refit_encoding import (
+from shapeshift.app import cli
+from shapeshift.renderer.pace import largest_step
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.refit_encoding import (
     encoding_findings,
     encoding_for,
     refit_encoding,
     untaught_units,
 )
-from runtime_models.write_package import write_package
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.read_scene import read_model
 from tests.models import make_random_model, without_control
 
 EYE = np.array([0.3, -0.2, 2.0])

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from models import make_random_model
 
-from app.viewer.outlines import on_screen, segments
-from app.viewer.regions import KINDS, Region, Regions, brushed, region_of, selector_of
-from app.viewer.stage import Stage
-from runtime_models.model import SplatLayers, Stop
-from scene.pose import Pose, View, look_at
-from scene.scene import SceneObject
-from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.app.viewer.outlines import on_screen, segments
+from shapeshift.app.viewer.regions import KINDS, Region, Regions, brushed, region_of, selector_of
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
 
 SIZE = (400, 300)
 VIEW = View(look_at(np.array([0.0, 0, 4]), np.zeros(3)), (-0.4, 0.4, -0.3, 0.3), 0.1, 50.0, SIZE)

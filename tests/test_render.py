@@ -6,24 +6,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from app.drawing import (
-    is_our_png,
-    open_renderer,
-    parse_size,
-    save_png,
-    split_controls,
-)
-from app.errors import UsageError
-from renderer.palette import palette_colors
-from renderer.reference import reference_image
-from runtime_models.read_scene import read_model
-from scene.framing import default_view
-from scene.metrics import psnr
-from scene.pose import look_at
-from scene.read_cameras import read_cameras
-from scene.scene import Scene, SceneObject
-from scene.stereo import stereo_pair
+from shapeshift.app import cli
+from shapeshift.app.drawing import is_our_png, open_renderer, parse_size, save_png, split_controls
+from shapeshift.app.errors import UsageError
+from shapeshift.renderer.colors.palette import palette_colors
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.cameras.read_cameras import read_cameras
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import look_at
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.stereo import stereo_pair
 from tests.models import random_package
 
 TINY = ["--size", "40x30", "--context", "none"]
@@ -70,7 +64,7 @@ def test_pictures_are_those_of_the_reference(scene, tmp_path, x, drawing):
 
 
 def gl_is_here():
-    from renderer.context import NoContext, open_context
+    from shapeshift.renderer.gl.context import NoContext, open_context
 
     try:
         open_context().release()
@@ -168,12 +162,13 @@ def test_a_file_in_place_of_the_folder_is_one_sentence(scene, tmp_path, capsys):
 
 
 def test_no_gl_is_said_and_the_tiles_draw(scene, tmp_path, capsys, monkeypatch):
-    import renderer.context
+
+    from shapeshift.renderer.gl import context
 
     def none(kind="auto"):
-        raise renderer.context.NoContext("no GL on this machine.")
+        raise context.NoContext("no GL on this machine.")
 
-    monkeypatch.setattr(renderer.context, "open_context", none)
+    monkeypatch.setattr(context, "open_context", none)
     assert render(scene, "--out", tmp_path, "--size", "8x8") == 0
     assert "Drawing with OpenCL alone: no GL on this machine." in capsys.readouterr().err
     for strict in (["--drawing", "quads"], ["--context", "egl"]):

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.write_ply import write_ply
-from scene.camera_list import CameraList
-from scene.metrics import psnr
-from scene.pose import View, look_at, perspective
-from scene.write_cameras import write_cameras
+from shapeshift.app import cli
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.write_cameras import write_cameras
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import View, look_at, perspective
 from tests.splat_scenes import random_layers
 
 SIZE = (48, 36)

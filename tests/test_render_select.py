@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from runtime_models.read_scene import read_model
-from runtime_models.stop_weights import StopBlend
-from scene.control import Sweep, control_of, snap
-from scene.framing import default_view
-from scene.read_selector import read_selector
-from scene.scene import Scene, SceneObject
+from shapeshift.app import cli
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.stop_weights import StopBlend
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.control import Sweep, control_of, snap
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.selectors.read_selector import read_selector
 from tests.models import STOPS, random_package
 
 TINY = ["--size", "40x30", "--context", "none", "--camera", "front"]
@@ -39,7 +39,7 @@ def test_the_picture_is_the_scenes_with_these_selectors(scene, tmp_path):
     selectors = tuple(read_selector(text, STOPS, view.world_from_eye) for text in texts)
     thing = SceneObject("scene", model, selectors=selectors)
     assert len(np.unique(control_of(thing))) > 3
-    from renderer.renderer import Renderer
+    from shapeshift.renderer.renderer import Renderer
 
     with Renderer(None) as renderer:
         renderer.update(Scene((thing,)))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from renderer.resolution import OVER, SEEN, STEP, Resolution
+from shapeshift.renderer.resolution import OVER, SEEN, STEP, Resolution
 
 
 def run(control, load, frames):

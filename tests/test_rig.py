@@ -5,19 +5,32 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
-from rasterizer.reference import finite_differences, render_reference
-from runtime_models.model import BadFile
-from scene.capture import Capture
-from scene.pose import View, look_at, perspective
-from training.drawing import camera_of, draw_splats, splats_backward
-from training.gaussians import Gaussians
-from training.photos import LoadedPhoto
-from training.rig import moved_by, offset_view, pose_gradient, rig_of, told, with_found
-from training.rig_search import STAGES, calibrate, descend, factors_of, reference_of
-from training.rig_solve import Frozen
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
+from shapeshift.rasterizer.device import open_device
+from shapeshift.rasterizer.reference import finite_differences, render_reference
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.calibration.calibrate import (
+    STAGES,
+    calibrate,
+    descend,
+    factors_of,
+    reference_of,
+)
+from shapeshift.training.calibration.extrinsics import (
+    moved_by,
+    offset_view,
+    pose_gradient,
+    rig_of,
+    told,
+    with_found,
+)
+from shapeshift.training.calibration.residuals import Frozen
+from shapeshift.training.drawing import camera_of, draw_splats, splats_backward
+from shapeshift.training.heads.gaussians import Gaussians
+from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
 
 RNG = np.random.default_rng
 TWICE = f'{{"RGB": {(2 * np.eye(4)).ravel().tolist()}}}'

@@ -6,17 +6,17 @@ import json
 import numpy as np
 import pytest
 
-from app.errors import UsageError
-from app.training import fit, table
-from app.training.evaluate import Options as EvalOptions
-from app.training.evaluate import run as evaluate
-from app.training.train import Options as TrainOptions
-from app.training.train import run as train
-from runtime_models.read_package import read_package
-from scene.write_capture import write_capture
-from training import rig_search
-from training.rig import moved_by, offset_capture, rig_of, told
-from training.synthetic.balls import make_balls
+from shapeshift.app.errors import UsageError
+from shapeshift.app.training import fit, table
+from shapeshift.app.training.evaluate import Options as EvalOptions
+from shapeshift.app.training.evaluate import run as evaluate
+from shapeshift.app.training.train import Options as TrainOptions
+from shapeshift.app.training.train import run as train
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.training.calibration import calibrate as rig_search
+from shapeshift.training.calibration.extrinsics import moved_by, offset_capture, rig_of, told
+from shapeshift.training.synthetic.balls import make_balls
 
 PLANTED = moved_by(np.array([0.1, -0.2, 0.05, 0.1, 0.05, -0.1]))
 SMALL = {"anchors": 300, "iterations": 20, "device": "cpu"}
@@ -85,9 +85,9 @@ def test_separate_models_keep_it(folders, asked, tmp_path):
 
 
 def test_fit_keeps_it(folders, asked, tmp_path, monkeypatch):
-    from training.fit import Fit
+    from shapeshift.training.fit.fit import Fit
 
-    monkeypatch.setattr("training.fit.PARTS", ())
+    monkeypatch.setattr("shapeshift.training.fit.fit.PARTS", ())
     monkeypatch.setattr(Fit.__init__, "__defaults__", ((), None))
     monkeypatch.setattr(Fit, "clean", lambda self: None)
     out = tmp_path / "fit.shift"

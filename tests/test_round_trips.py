@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer.renderer import Renderer
-from runtime_models.formats import read_plain
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.write_plain import cut
-from scene.framing import frame_points, orbit_path
-from scene.metrics import psnr
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.write_plain import cut
+from shapeshift.scene.cameras.framing import frame_points, orbit_path
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.writers import EACH_WRITER
 
 ALIKE = 50.0  # dB between our picture and theirs of one file

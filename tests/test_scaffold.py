@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import Evaluator, evaluate, follows_eye
-from runtime_models.evaluate_scaffold import drawn_anchors, views_of
-from runtime_models.model import BadFile, Octree, ScaffoldModel
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scaffold import read_scaffold
-from runtime_models.read_scene import describe, files_of, read_model
-from runtime_models.rotation import covariance, rotation_matrices
-from runtime_models.turn import ours_from_file
+from shapeshift.runtime_models.evaluate import Evaluator, evaluate, follows_eye
+from shapeshift.runtime_models.model import BadFile, Octree, ScaffoldModel
+from shapeshift.runtime_models.read_scene import describe, files_of, read_model
+from shapeshift.runtime_models.rotation import covariance, rotation_matrices
+from shapeshift.runtime_models.scaffold.evaluate_scaffold import drawn_anchors, views_of
+from shapeshift.runtime_models.scaffold.read_scaffold import read_scaffold
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
+from shapeshift.runtime_models.splats.plain_splats import Reading
 from tests.scaffold_scenes import decode_by_hand, random_raw, write_cloud, write_run
 
 FIXTURES = Path(__file__).resolve().parent / "fixtures"

@@ -6,22 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice, open_device
-from renderer.recolor import reach_of_scaffold
-from renderer.reference import reference_image
-from runtime_models.evaluate import evaluate
-from runtime_models.read_scene import read_model
-from scene.control import control_of
-from scene.framing import default_view, model_points
-from scene.pick import Picker, anchor_places
-from scene.pose import Pose, View, look_at, perspective
-from scene.scene import IDENTITY, Scene, SceneObject
-from scene.selector import Painted
-from scene.stereo import stereo_pair
+from shapeshift.rasterizer.device import NoDevice, open_device
+from shapeshift.renderer.colors.color_cache import reach_of_scaffold
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.framing import default_view, model_points
+from shapeshift.scene.control import control_of
+from shapeshift.scene.pick import Picker, anchor_places
+from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.scene.selectors.selector import Painted
+from shapeshift.scene.stereo import stereo_pair
+from shapeshift.training.evaluation.evaluate import Painter
 from tests.frames import draw_told
 from tests.scaffold_scenes import from_anchors, random_raw, write_run
 from tests.splat_scenes import psnr_db, random_layers
-from training.evaluate import Painter
 
 SIZE = (160, 100)
 TURNED = Pose(np.array([0.3, -0.2, 0.4]), np.array([0.8, 0.0, 0.6, 0.0]))

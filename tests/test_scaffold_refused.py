@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scaffold import is_scaffold
-from runtime_models.read_scene import read_model
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold
+from shapeshift.runtime_models.splats.plain_splats import Reading
 from tests.scaffold_scenes import random_raw, write_cloud, write_run
 from tests.torch_files import write_tensors
 

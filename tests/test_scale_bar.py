@@ -2,7 +2,7 @@
 
 import pytest
 
-from renderer.ticks import nice_ticks, tick_text
+from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
 
 
 @pytest.mark.parametrize(

@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.charts import budget_chart
-from app.charts.budget_chart import BudgetRow
-from app.commands.info import Options as Info
-from app.commands.info import run as info
-from app.commands.lint import Options as Lint
-from app.commands.lint import run as lint
-from app.commands.render import Options, run
-from app.errors import UsageError
-from app.opening import ReadingOptions, open_model
-from app.training.evaluate import Options as Evaluate
-from app.training.evaluate import run as evaluate
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.model import BadFile
-from runtime_models.write_ply import write_ply
-from scene.read_scene_file import read_scene_file
-from scene.scene_file import first_view, read_models, scene_of
+from shapeshift.app.charts import budget_chart
+from shapeshift.app.charts.budget_chart import BudgetRow
+from shapeshift.app.commands.info import Options as Info
+from shapeshift.app.commands.info import run as info
+from shapeshift.app.commands.lint import Options as Lint
+from shapeshift.app.commands.lint import run as lint
+from shapeshift.app.commands.render import Options, run
+from shapeshift.app.errors import UsageError
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.training.evaluate import Options as Evaluate
+from shapeshift.app.training.evaluate import run as evaluate
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from shapeshift.scene.document.scene_file import first_view, read_models, scene_of
 from tests.test_gltf import plain_splats
 
 SCENE = Path(__file__).resolve().parents[1] / "assets" / "touch.scene.json"

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.stop_weights import StopWeights
-from runtime_models.write_ply import write_ply
-from scene.reactions import Reaction, State, TwoAxes
-from scene.read_scene_file import read_scene_file
-from scene.scene_file import (
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from shapeshift.scene.document.scene_file import (
     FORMAT,
     FirstView,
     SceneFile,
@@ -25,8 +24,9 @@ from scene.scene_file import (
     read_models,
     scene_of,
 )
-from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
-from scene.write_scene_file import write_scene_file
+from shapeshift.scene.document.write_scene_file import write_scene_file
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.scene.world.reactions import Reaction, State, TwoAxes
 
 HALF = math.sqrt(0.5)
 THIRD = 1 / 3

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile
-from scene.pose import Pose
-from scene.reactions import TwoAxes
-from scene.read_script import HandPath, between, read_script
-from scene.scene_file import SceneItem
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.document.scene_file import SceneItem
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.reactions import TwoAxes
+from shapeshift.scene.world.read_script import HandPath, between, read_script
 
 ITEMS = (SceneItem(name="a", model="a"), SceneItem(name="b", model="b", two_axes=TwoAxes()))
 HALF = math.sqrt(0.5)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.palette import thermal_blend, thermal_weights
-from renderer.reference import reference_image
-from runtime_models.evaluate import evaluate
-from runtime_models.model import Stop
-from runtime_models.stop_weights import StopBlend
-from scene.control import control_of
-from scene.pose import Pose
-from scene.scene import Scene, SceneObject
-from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.renderer.colors.palette import thermal_blend, thermal_weights
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import StopBlend
+from shapeshift.scene.control import control_of
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
 from tests.splat_scenes import front_view, psnr_db, random_layers, random_model
 
 VIEW = front_view((160, 120))

@@ -8,13 +8,13 @@ import pytest
 from models import make_random_model
 from splat_scenes import random_layers
 
-from runtime_models.model import Stop
-from runtime_models.stop_weights import Pace, StopWeights
-from scene.control import control_key, control_of, covered
-from scene.pose import Pose, look_at
-from scene.read_selector import read_selector
-from scene.scene import SceneObject
-from scene.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import Pace, StopWeights
+from shapeshift.scene.control import control_key, control_of, covered
+from shapeshift.scene.pose import Pose, look_at
+from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.selectors.read_selector import read_selector
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
 
 TURNED = tuple(np.array([0.8, 0.2, -0.4, 0.4]) / np.linalg.norm([0.8, 0.2, -0.4, 0.4]))
 EYE = look_at(np.array([0.2, 0.3, 2.5]), np.array([0.1, 0.0, 0.0]))

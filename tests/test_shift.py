@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.viewer import arrange
-from app.viewer.files import opened_scene
-from app.viewer.opened import Found, Source
-from app.viewer.stage import Stage
-from runtime_models.model import Stop
-from runtime_models.stop_weights import Pace, StopBlend
-from scene.control import SHIFT_S, Shift
+from shapeshift.app.viewer import arrange
+from shapeshift.app.viewer.files import opened_scene
+from shapeshift.app.viewer.opened import Found, Source
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.stop_weights import Pace, StopBlend
+from shapeshift.scene.control import SHIFT_S, Shift
 from tests.models import make_random_model
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 0.5, "thermal", "ironbow"), Stop("Opened", 1.0))

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.commands.simulate import Options, run
-from app.errors import UsageError
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
+from shapeshift.app.commands.simulate import Options, run
+from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
 
 absent = [name for name in ("rapier3d", "coacd") if find_spec(name) is None]
 # coacd is only looked for: in a process that has loaded it OpenCL's compiler finds no headers.
@@ -143,8 +143,8 @@ def test_a_collider_that_is_none_names_its_object(tmp_path):
 
 def test_ctrl_c_leaves_whole_lines(tmp_path):
     """After some steps the user has had enough."""
-    from app.commands import simulate
-    from scene.simulation import Simulation
+    from shapeshift.app.commands import simulate
+    from shapeshift.scene.world.simulation import Simulation
 
     step, count = Simulation.step, 0
 
@@ -165,7 +165,7 @@ def test_ctrl_c_leaves_whole_lines(tmp_path):
 
 
 def test_the_example_is_what_its_program_writes(tmp_path):
-    from training.synthetic.tabletop import write_example
+    from shapeshift.training.synthetic.tabletop import write_example
 
     write_example(tmp_path)
     for path in sorted(p for p in tmp_path.rglob("*") if p.is_file()):

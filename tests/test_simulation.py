@@ -8,14 +8,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from runtime_models.model import BadFile, Finding, SplatLayers, Stop
-from scene.pose import Pose
-from scene.reactions import Reaction, State, TwoAxes
-from scene.read_script import Act
-from scene.scene_file import SceneFile, SceneItem
-from scene.selector import Sphere
-from scene.simulation import Simulation
-from scene.world import World
+from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.selectors.selector import Sphere
+from shapeshift.scene.world.reactions import Reaction, State, TwoAxes
+from shapeshift.scene.world.read_script import Act
+from shapeshift.scene.world.simulation import Simulation
+from shapeshift.scene.world.world import World
 
 UP = np.array([1.0, 0, 0, 0])
 SOLID = SimpleNamespace(hulls=(), mesh="mesh")

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from rasterizer.device import open_device
-from runtime_models.model import BadFile, Stop
-from runtime_models.read_scene import read_model
-from scene.capture import Capture
-from scene.photo import load_photo
-from scene.read_capture import read_capture
-from scene.write_capture import write_capture
+from shapeshift.app import cli
+from shapeshift.rasterizer.device import open_device
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.synthetic.balls import make_balls
 from tests.captures import simple, write_transforms
-from training.evaluate import evaluate_model
-from training.synthetic.balls import make_balls
 
 KELVIN = 273.15
 HEAT = {"name": "Heat", "x": 1, "kind": "thermal", "palette": "ironbow",

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from sog_scenes import random_sog, splat_by_hand, write_folder, write_zip
 
-from runtime_models.formats import format_of, read_plain
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import describe, is_package, read_model
-from runtime_models.read_sog import read_raw_sog
+from shapeshift.runtime_models.read_scene import describe, is_package, read_model
+from shapeshift.runtime_models.splats.formats import format_of, read_plain
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.sog.read_sog import read_raw_sog
 
 FIELDS = ("means", "scales", "wxyz", "opacity", "sh")
 

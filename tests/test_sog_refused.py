@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 from sog_scenes import random_sog, webp, write_folder, write_zip
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import read_model
-from runtime_models.read_sog import read_raw_sog
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.sog.read_sog import read_raw_sog
 
 
 def refused(path: Path, words: str, megabytes: float = 20) -> None:

@@ -10,15 +10,15 @@ import pytest
 from splat_scenes import alone, psnr_db
 from spz_files import legacy, modern, random_streams, splat_by_hand
 
-from rasterizer.device import NoDevice
-from renderer.renderer import Renderer
-from runtime_models.formats import format_of, read_plain, read_raw
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import RawSplats, Reading
-from runtime_models.read_scene import read_model
-from runtime_models.read_spz import read_spz_bytes
-from runtime_models.spz_file import is_spz
-from scene.pose import View, look_at
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.formats import format_of, read_plain, read_raw
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.spz.read_spz import read_spz_bytes
+from shapeshift.runtime_models.splats.spz.spz_file import is_spz
+from shapeshift.scene.pose import View, look_at
 
 BIKER = View(look_at((0.5, 1.2, -3), (0, 1.0, 0)), (-0.25, 0.25, -0.4, 0.4), 0.05, 50, (160, 256))
 

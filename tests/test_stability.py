@@ -13,14 +13,14 @@ from splat_scenes import random_layers
 from stability_stage import SIZE, failures, make_stage
 from test_cli import assert_refused, launch
 
-from app.drawing import open_renderer
-from app.stability_cases.finding import at_least, at_most, broken_pixels, not_here
-from app.stability_cases.scenes import small_model
-from app.stability_cases.stage import Stage
-from app.stability_cases.table import CASES, COLUMNS, open_table
-from rasterizer.device import NoDevice
-from runtime_models.stop_weights import Pace
-from runtime_models.write_package import write_package
+from shapeshift.app.drawing import open_renderer
+from shapeshift.app.stability_cases.finding import at_least, at_most, broken_pixels, not_here
+from shapeshift.app.stability_cases.scenes import small_model
+from shapeshift.app.stability_cases.stage import Stage
+from shapeshift.app.stability_cases.table import CASES, COLUMNS, open_table
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.stop_weights import Pace
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -130,7 +130,7 @@ def test_the_case_fails_where_the_renderer_does(stage, name, spoil):
 
 def test_colours_of_the_middle_between_the_eyes_fail(stage, monkeypatch):
     """What every stereo frame had before each eye got colours of its own."""
-    monkeypatch.setattr("renderer.eye_colors.SHARED_DB", -1e9)
+    monkeypatch.setattr("shapeshift.renderer.colors.eye_colors.SHARED_DB", -1e9)
     assert any("glossy ball" in text for text in failures(CASES["stereo"](stage)))
 
 
@@ -144,7 +144,7 @@ def test_a_clamp_about_the_tangents_fails(stage, monkeypatch):
             -k * camera.cy / camera.fy, k * (height - camera.cy) / camera.fy,
         )  # fmt: skip
 
-    monkeypatch.setattr("rasterizer.project.Camera.limits", limits)
+    monkeypatch.setattr("shapeshift.rasterizer.project.Camera.limits", limits)
     found = failures(CASES["lenses"](stage))
     assert sum("parts" in text for text in found) >= 3, found
 

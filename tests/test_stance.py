@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from vr_frames import at, tilted, yawed
 
-from scene.pose import Pose
-from vr.stance import (
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import (
     FAR_M,
     LEAST_SCALE,
     MOST_SCALE,
@@ -20,7 +21,6 @@ from vr.stance import (
     turned,
     underfoot,
 )
-from vr.standing import Standing
 
 POINTS = np.random.default_rng(3).uniform(-2, 2, (20, 3))  # metres
 ANYWHERE = Standing(Pose(np.array([3.0, -1, 7]), yawed(0.7)), 2.5)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from camera_files import NAMES, cameras, views
 
-from app.viewer.controls import Camera, Push
-from app.viewer.stepping import FLIGHT_S, Steps, between, fitted, picture_box
-from scene.camera_list import CameraList
-from scene.framing import orbit_path
-from scene.pose import Pose, look_at
+from shapeshift.app.viewer.controls import Camera, Push
+from shapeshift.app.viewer.stepping import FLIGHT_S, Steps, between, fitted, picture_box
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.framing import orbit_path
+from shapeshift.scene.pose import Pose, look_at
 
 SIZE, FREE = (1280, 720), (292.0, 0.0, 1280.0, 604.0)
 NOW = orbit_path(1, np.zeros(3), 1.0, SIZE)[0]

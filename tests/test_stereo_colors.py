@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.eye_colors import SHARED_DB, Look
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.color_slope import color_slope
-from runtime_models.evaluate import Evaluator
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.read_scene import read_model
-from scene.framing import frame_points, scene_points
-from scene.pose import Pose, View, look_at, perspective
-from scene.scene import Scene, SceneObject
-from scene.stereo import stereo_pair
+from shapeshift.renderer.colors.eye_colors import SHARED_DB, Look
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.colors.color_slope import color_slope
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.framing import frame_points, scene_points
+from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.stereo import stereo_pair
 from tests.frames import draw_told
 from tests.models import without_direction
 from tests.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model, shell

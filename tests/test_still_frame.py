@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from ply_files import names_of, random_rows, write_rows
 
-from runtime_models.plain_splats import Reading
-from runtime_models.read_ply import read_raw_ply
-from runtime_models.read_scene import read_model
-from runtime_models.spherical_harmonics import C0
-from runtime_models.still_frame import still
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
+from shapeshift.runtime_models.splats.still_frame import still
 
 MOVING = [
     "trbf_center", "trbf_scale", *(f"motion_{i}" for i in range(9)),

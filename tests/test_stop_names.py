@@ -2,7 +2,7 @@
 
 import pytest
 
-from runtime_models.stop_names import stems_named
+from shapeshift.runtime_models.stop_names import stems_named
 
 
 @pytest.mark.parametrize(

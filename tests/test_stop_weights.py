@@ -6,8 +6,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from runtime_models.model import ControlEncoding, Stop
-from runtime_models.stop_weights import (
+from shapeshift.runtime_models.model import ControlEncoding, Stop
+from shapeshift.runtime_models.stop_weights import (
     Pace,
     StopBlend,
     StopWeights,

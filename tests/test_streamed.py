@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 from sog_scenes import random_sog, write_folder, write_zip
 
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import describe, read_model
-from runtime_models.read_sog import read_raw_sog
-from runtime_models.read_streamed import finest_within, levels, read_streamed, read_tree, steps
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.sog.read_sog import read_raw_sog
+from shapeshift.runtime_models.splats.sog.read_streamed import (
+    finest_within,
+    levels,
+    read_streamed,
+    read_tree,
+    steps,
+)
 
 COUNTS = (400, 150, 60, 20)  # splats of each level, finest first
 
@@ -99,7 +105,7 @@ def test_levels_come_coarsest_first_and_end_as_the_whole_is_read(scene):
 def test_levels_share_one_origin_however_far_they_are(tmp_path, monkeypatch):
     from dataclasses import replace
 
-    import runtime_models.read_streamed as module
+    import shapeshift.runtime_models.splats.sog.read_streamed as module
 
     judge, turn = module.judge, iter([(1000.0, 0.0, -3.0), (1001.0, 2.0, -3.5), (0.0, 0.0, 0.0)])
 

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import cli
-from app.charts.chart_stage import side_by_side
-from app.commands.compare_sides import open_side
-from app.errors import UsageError
-from app.opening import ReadingOptions
-from app.subject import Subject, open_subject
-from runtime_models.formats import read_plain
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
-from runtime_models.write_ply import write_ply
-from scene.metrics import psnr
-from scene.pose import Pose
-from scene.scene import Scene
+from shapeshift.app import cli
+from shapeshift.app.charts.chart_stage import side_by_side
+from shapeshift.app.commands.compare_sides import open_side
+from shapeshift.app.errors import UsageError
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.subject import Subject, open_subject
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import Scene
 from tests.object_scenes import ODD, turned_view
 from tests.test_gltf import plain_splats
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rasterizer.device import open_device
-from scene.pose import Pose
-from scene.read_capture import read_capture
-from training.rig import moved_by, offset_view
-from training.settings import TrainSettings
-from training.suspects import judge, recolored, report, suspects
-from training.synthetic.balls import make_balls
-from training.train import Trainer
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.pose import Pose
+from shapeshift.training.calibration.extrinsics import moved_by, offset_view
+from shapeshift.training.calibration.outlier_views import judge, recolored, report, suspects
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 
 
 @pytest.fixture(scope="module")

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from runtime_models.model import STOP_KINDS
-from scene.photo import load_photo
-from scene.pose import View, look_at
-from scene.read_capture import read_capture
-from training.synthetic import balls, workshop
-from training.synthetic.openness import FAR, Clearance
-from training.synthetic.placing import elbow, frame, inside, noise, run_of_pipe, turned
-from training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, unit
-from training.synthetic.tracer import (
+from shapeshift.runtime_models.model import STOP_KINDS
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.pose import View, look_at
+from shapeshift.training.synthetic import balls, workshop
+from shapeshift.training.synthetic.openness import FAR, Clearance
+from shapeshift.training.synthetic.placing import elbow, frame, inside, noise, run_of_pipe, turned
+from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, unit
+from shapeshift.training.synthetic.tracer import (
     Light,
     Place,
     Solid,

@@ -12,22 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.errors import UsageError
-from app.training.evaluate import Options as EvalOptions
-from app.training.evaluate import run as evaluate
-from app.training.table import Options, command_line, run, train_options
-from app.training.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
-from app.training.train import Options as TrainOptions
-from app.training.train import run as run_training
-from app.training.train_baselines import Run, plain_settings, share_of
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
+from shapeshift.app.errors import UsageError
+from shapeshift.app.training.evaluate import Options as EvalOptions
+from shapeshift.app.training.evaluate import run as evaluate
+from shapeshift.app.training.table import Options, command_line, run, train_options
+from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
+from shapeshift.app.training.train import Options as TrainOptions
+from shapeshift.app.training.train import run as run_training
+from shapeshift.app.training.train_baselines import Run, plain_settings, share_of
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.training.baselines.plain import PlainTrainer
+from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 from tests.test_vgg_distance import write_small
-from training.plain import PlainTrainer
-from training.plain_settings import PlainSettings
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
-from training.train import Trainer
 
 SMALL = {"anchors": 300, "max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
 

@@ -13,15 +13,15 @@ from pathlib import Path
 import pytest
 from models import make_random_model
 
-from app import cli
-from app.terminal import CleanStream, clean_streams, open_console, say, tell, tell_json
-from runtime_models.model import Stop
-from runtime_models.plain_text import LONGEST_LINE, UNSAFE
-from runtime_models.write_package import write_package
-from scene.write_cameras import write_cameras
+from shapeshift.app import cli
+from shapeshift.app.terminal import CleanStream, clean_streams, open_console, say, tell, tell_json
+from shapeshift.runtime_models.files.plain_text import LONGEST_LINE, UNSAFE
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.scene.cameras.write_cameras import write_cameras
 
 ROOT = Path(__file__).resolve().parents[1]
-CLI = [sys.executable, "-P", str(ROOT / "app" / "cli.py")]
+CLI = [sys.executable, "-P", str(ROOT / "shapeshift" / "__main__.py")]
 NAMES = {
     "escape": "\x1b[2J\x1b]0;owned\x07\x1b]52;c;b3duZWQ=\x07red",
     "eight bits": "\x9b2J\x9d0;owned\x9c",
@@ -186,10 +186,10 @@ def test_tables_and_bars_are_clean(monkeypatch):
     from rich.table import Table
     from rich.text import Text
 
-    from app.progress import progress_bar
+    from shapeshift.app.progress import progress_bar
 
     screen = {"force_terminal": True, "force_interactive": True, "width": 200}
-    monkeypatch.setattr("app.progress.open_console", lambda: open_console(**screen))
+    monkeypatch.setattr("shapeshift.app.progress.open_console", lambda: open_console(**screen))
     with streams() as (out, err), clean_streams():
         table = Table(f"column {BAD}", title=BAD)
         table.add_row(BAD)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from physics_things import at, box, run, sheet
 
-from scene.physics import Physics
-from scene.thicken import THICKNESS, thickened
-from scene.triangle_mesh import TriangleMesh
+from shapeshift.scene.colliders.thicken import THICKNESS, thickened
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.world.physics import Physics
 
 BOX_FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],

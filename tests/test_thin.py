@@ -7,12 +7,19 @@ import pytest
 from models import make_random_model
 from ply_files import some_splats
 
-from runtime_models.model import Stop
-from runtime_models.plain_splats import Reading
-from runtime_models.read_layers import join_layers
-from runtime_models.read_scene import read_model
-from runtime_models.thin import certain_ones, evenly, largest, left_whole, prominence, thin
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.layers.read_layers import join_layers
+from shapeshift.runtime_models.splats.operations.prune_by_importance import (
+    certain_ones,
+    evenly,
+    largest,
+    left_whole,
+    prominence,
+    thin,
+)
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 WEIGHTS = {
     "any": lambda n: np.random.default_rng(n).random(n),

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from test_round_trips import compare, rows
 
-from runtime_models.formats import read_plain
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.write_compressed_ply import write_compressed_ply
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 ALIKE = 50.0  # dB
 
@@ -154,7 +154,7 @@ def test_our_glb_holds_splat_transform_s_numbers(leg, tmp_path):
     """It writes .glb and reads none: so ours is held beside its own, attribute by attribute."""
     from test_gltf import attributes_in
 
-    from runtime_models.write_gltf import write_gltf
+    from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
 
     path = tmp_path / "a.ply"
     write_ply(degree(leg, 3), path)

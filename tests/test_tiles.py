@@ -18,15 +18,15 @@ from splat_scenes import (
     two_objects,
 )
 
-from renderer.palette import palette_colors
-from renderer.recolor import color_key
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import CULL_REASONS, RenderSettings
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.read_scene import read_model
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.colors.color_cache import color_key
+from shapeshift.renderer.colors.palette import palette_colors
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.models import without_control
 
 AWAY = View(look_at((0, 0, 9), (0, 0, 20)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (32, 16))

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.classify import classify
-from renderer.reference import reference_counts, reference_image
-from renderer.renderer import Renderer
-from renderer.settings import CULL_REASONS, RenderSettings
-from scene.scene import Scene
+from shapeshift.renderer.debug.classify import classify
+from shapeshift.renderer.reference.reference import reference_counts, reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.scene.scene import Scene
 from tests.gl.test_culls import FRONT, LIMITS, SCENES, THRESHOLDS
 from tests.splat_scenes import alone, front_view, psnr_db, stereo_views, two_objects
 

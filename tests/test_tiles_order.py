@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import FrameStats, RenderSettings
-from renderer.sort import quantize, stable_order
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene, SceneObject
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.renderer.gl.sort import quantize, stable_order
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.splat_scenes import alone, front_view, psnr_db, random_layers, stereo_views, two_objects
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.reference import reference_image
-from scene.pose import Pose, View, look_at
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.scene.pose import Pose, View, look_at
 from tests.frames import draw
 from tests.splat_scenes import alone, front_view, one_splat, psnr_db, stereo_views, two_objects
 

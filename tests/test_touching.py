@@ -10,14 +10,14 @@ from test_simulation import item, reaction
 from test_world import real
 from vr_frames import LOST, at, frame, hand, tilted, yawed
 
-from scene.pose import Pose
-from scene.world import FLOOR_NAME
-from vr.frame import SIDES, Pulse
-from vr.locomotion import Travel, move
-from vr.stance import pinned, turned
-from vr.standing import Standing
-from vr.teleport import ground_of
-from vr.touching import (
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.world import FLOOR_NAME
+from shapeshift.vr.frame import SIDES, Pulse
+from shapeshift.vr.locomotion.locomotion import Travel, move
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import pinned, turned
+from shapeshift.vr.locomotion.teleport import ground_of
+from shapeshift.vr.touching import (
     ACTED,
     FULL_N_S,
     LEFT,

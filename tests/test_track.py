@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from app.viewer.messages import LONGEST, MOST_PROBLEMS, NOTE_S, Messages
-from app.viewer.split_state import SplitState, name_of
-from app.viewer.track import Grip, Track, half_ways, next_stop, read_x, stepped
-from runtime_models.model import SplatLayers, Stop
-from scene.control import SNAP
-from scene.scene import Scene, SceneObject
+from shapeshift.app.viewer.messages import LONGEST, MOST_PROBLEMS, NOTE_S, Messages
+from shapeshift.app.viewer.split_state import SplitState, name_of
+from shapeshift.app.viewer.track import Grip, Track, half_ways, next_stop, read_x, stepped
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.scene.control import SNAP
+from shapeshift.scene.scene import Scene, SceneObject
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 0.5), Stop("Opened", 1.0))
 TRACK = Track(left=100.0, width=400.0, knob=10.0)

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.evaluate import evaluate
-from runtime_models.model import BadFile
-from runtime_models.read_scene import read_model
-from runtime_models.write_package import write_package
-from scene.capture import Capture
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
+from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 from tests.training_runs import run
-from training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
-from training.evaluate import evaluate_model
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
-from training.train import Trainer
 
 ROOT = Path(__file__).resolve().parents[1]
 # An even encoding tells two stops apart within fewer steps than one unit a stop does.
@@ -71,7 +71,7 @@ write_checkpoint(Path(sys.argv[2]), *trainer.checkpoint())
 
 
 def test_one_thread_gives_the_same_bits_as_all(device, balls, tmp_path):
-    from scene.read_capture import read_capture
+    from shapeshift.scene.captures.read_capture import read_capture
 
     here = run(Trainer(device, read_capture(balls.folder), SETTINGS), steps=40)
     out = tmp_path / "one.npz"

@@ -16,15 +16,21 @@ from test_training_gradients import (
     situation,
 )
 
-from scene.capture import Capture
-from training.losses import ImageLoss
-from training.networks import HeadLayout, Heads, blocks_of_weights, initial_weights, padded
-from training.optimizer import Adam
-from training.plain_step import GROUPS, PlainStep
-from training.settings import TrainSettings
-from training.step import Step
-from training.synthetic.balls import make_balls
-from training.train import Trainer
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
+from shapeshift.training.heads.networks import (
+    HeadLayout,
+    Heads,
+    blocks_of_weights,
+    initial_weights,
+    padded,
+)
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.step import Step
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 
 SETTINGS = TrainSettings(iterations=40, anchors=300, grow=False)
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.reference import finite_differences
-from scene.pose import View, look_at, perspective
-from training.drawing import camera_of
-from training.losses import ImageLoss
-from training.networks import HeadLayout, initial_weights
-from training.optimizer import Adam
-from training.reference import decode_reference, step_loss_reference
-from training.step import Step
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.heads.networks import HeadLayout, initial_weights
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.reference import decode_reference, step_loss_reference
+from shapeshift.training.step import Step
 
 LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
 OTHERS = {

@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 from test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
-from rasterizer.reference import render_reference
-from runtime_models.model import BadFile, ControlEncoding, Stop
-from runtime_models.write_package import write_package
-from training.coarse import Coarse, smaller
-from training.density import Evidence, Newcomers, Watch, newcomers
-from training.density_budget import most_anchors, within
-from training.density_grow import change, given, useless, weakest
-from training.density_strategy import STRATEGIES
-from training.drawing import camera_of
-from training.export import model_of
-from training.losses import ImageLoss
-from training.networks import HeadLayout
-from training.optimizer import Adam
-from training.photos import LoadedPhoto
-from training.reference import decode_reference
-from training.settings import TrainSettings
-from training.step import Step
+from shapeshift.rasterizer.reference import render_reference
+from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.training.coarse import Coarse, smaller
+from shapeshift.training.density.density import Evidence, Newcomers, Watch, newcomers
+from shapeshift.training.density.density_budget import most_anchors, within
+from shapeshift.training.density.density_grow import change, given, useless, weakest
+from shapeshift.training.density.density_strategy import STRATEGIES
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.export import model_of
+from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.reference import decode_reference
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.step import Step
 
 RNG = np.random.default_rng
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0))

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runtime_models.write_package import write_package
-from scene.capture import Capture
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import SETTLE, Trainer
 from tests.training_runs import bits
-from training.checkpoint import read_checkpoint, write_checkpoint
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
-from training.train import SETTLE, Trainer
 
 BASE = TrainSettings(iterations=120, grow_every=30, anchors=600, max_anchors=900)
 WAYS = {

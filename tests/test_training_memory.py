@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from training.memory import step_memory
-from training.networks import HeadLayout
+from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.memory import step_memory
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rasterizer.device import open_device
-from runtime_models.model import BadFile, Stop
-from scene.capture import Capture, Photo
-from scene.pose import View, look_at, perspective
-from training.density import Newcomers, changed_state, given_up, newcomers
-from training.guard import Guard
-from training.initial import (
+from shapeshift.rasterizer.device import open_device
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.density.density import Newcomers, changed_state, given_up, newcomers
+from shapeshift.training.first_anchors.initial import (
     choose_voxel,
     filler_points,
     initial_points,
@@ -18,11 +17,12 @@ from training.initial import (
     pixel_of,
     voxel_centres,
 )
-from training.networks import HeadLayout
-from training.optimizer import Adam
-from training.photos import LoadedPhoto, choose_downscale, load_photos
-from training.schedule import Budget, Schedule, choose_background
-from training.settings import LONG, PAPER, SHORT, TrainSettings, preset
+from shapeshift.training.guard import Guard
+from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
+from shapeshift.training.schedule import Budget, Schedule, choose_background
+from shapeshift.training.settings import LONG, PAPER, SHORT, TrainSettings, preset
 
 RNG = np.random.default_rng
 

@@ -6,14 +6,22 @@ import fit_scenes
 import numpy as np
 import pytest
 
-from rasterizer.reference import finite_differences
-from runtime_models.model import Stop
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.runtime_models.model import Stop
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.heads.gaussians import Gaussians
+from shapeshift.training.rise import (
+    AFTER_A_FALL,
+    FAINT,
+    LEAST_RATE,
+    PULL,
+    Rise,
+    after_fall,
+    draw_up,
+)
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.train import Trainer
 from tests.training_runs import bits, run
-from training.checkpoint import read_checkpoint, write_checkpoint
-from training.gaussians import Gaussians
-from training.rise import AFTER_A_FALL, FAINT, LEAST_RATE, PULL, Rise, after_fall, draw_up
-from training.settings import TrainSettings
-from training.train import Trainer
 
 SETTINGS = TrainSettings(iterations=450, grow=False, anchors=600)
 

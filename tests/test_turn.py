@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from ply_files import some_splats
 
-from runtime_models.formats import read_plain
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import AXES, Reading
-from runtime_models.read_scene import read_model
-from runtime_models.rotation import rotation_matrices
-from runtime_models.spherical_harmonics import COEFFICIENTS, shade
-from runtime_models.turn import (
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS, shade
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.rotation import rotation_matrices
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.operations.rotate_splats import (
     HALF_TURN,
     OURS_FROM_UP,
     UPSIDE_DOWN,
@@ -23,7 +22,8 @@ from runtime_models.turn import (
     turn_quaternions,
     turner,
 )
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.splats.plain_splats import AXES, Reading
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 QUARTERS = [
     np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
@@ -201,7 +201,7 @@ def test_a_real_file_upside_down_is_its_own_picture_turned(data):
 
 @pytest.mark.parametrize("reading", [Reading(up="-Y"), Reading(flip=True), Reading(up="+Z")])
 def test_packages_have_one_way_up(reading):
-    from app.commands.headless import DEMO
+    from shapeshift.app.commands.headless import DEMO
 
     with pytest.raises(BadFile, match=r"is a package, and \+Y is up .*--up and --flip"):
         read_model(DEMO, reading)
@@ -210,8 +210,8 @@ def test_packages_have_one_way_up(reading):
 
 @pytest.mark.parametrize("words", [["--up", "-Z"], ["--up=-Z"], ["--up", "+Z"], ["--up=+Z"]])
 def test_the_option_takes_an_axis_with_its_sign(words):
-    from app.command_line import parse
-    from app.commands.info import Options
+    from shapeshift.app.command_line import parse
+    from shapeshift.app.commands.info import Options
 
     options = parse(Options, ["scene.ply", *words], "info")
     assert options.reading().up == words[-1][-2:]

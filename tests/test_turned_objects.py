@@ -6,11 +6,11 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from renderer.reference import reference_image
-from renderer.settings import RenderSettings
-from scene.pose import Pose
-from scene.scene import IDENTITY, Scene, SceneObject
-from scene.selector import Box, HalfSpace, Lens, Sphere
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Sphere
 from tests.frames import draw
 from tests.object_scenes import ODD, put, turned_view
 from tests.splat_scenes import (

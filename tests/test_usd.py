@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from ply_files import some_splats
 
-from runtime_models.formats import format_of, read_plain
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import describe, read_model
-from runtime_models.rotation import covariance
-from runtime_models.turn import ours_from_file, turn
-from runtime_models.usd import read_usd
-from runtime_models.usd.write_usd import write_usd
-from runtime_models.write_plain import writer_of
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.runtime_models.splats.formats import format_of, read_plain
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, turn
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.usd import read_usd
+from shapeshift.runtime_models.splats.usd.write_usd import write_usd
+from shapeshift.runtime_models.splats.write_plain import writer_of
 
 pytest.importorskip("pxr", reason="usd-core is not installed (an optional extra)")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdVol, Vt
@@ -371,7 +371,7 @@ def test_what_nvidia_s_converter_writes_is_our_ply(tmp_path):
     """usd-convert-gsplat leaves a PLY's axes as they are, under +Y: it has to be said."""
     if not (program := shutil.which("usd-convert-gsplat")):
         pytest.skip("usd-convert-gsplat is not installed (pip install usd-convert-gsplat[usd])")
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     splats = some_splats(40, 16)
     write_ply(splats, tmp_path / "a.ply")

@@ -7,8 +7,8 @@ import onnx
 import pytest
 from onnx import helper, numpy_helper
 
-from runtime_models.model import BadFile
-from training.vgg_distance import LAYERS, MEAN_BGR, VggDistance, distance_of
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.training.evaluation.vgg_distance import LAYERS, MEAN_BGR, VggDistance, distance_of
 
 RNG = np.random.default_rng
 

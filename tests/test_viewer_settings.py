@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from app.paths import ASSETS, DEMO, WorkFolders, is_bundled
-from app.viewer.own_files import MOST, OwnFiles
-from app.viewer.settings import TEXT_SIZES, Settings, default_text_size, other_text_size
+from shapeshift.app.paths import ASSETS, DEMO, WorkFolders, is_bundled
+from shapeshift.app.viewer.own_files import MOST, OwnFiles
+from shapeshift.app.viewer.settings import TEXT_SIZES, Settings, default_text_size, other_text_size
 
 
 def test_settings_come_back(tmp_path):

@@ -4,7 +4,7 @@ import ctypes
 
 import pytest
 
-from vr.events import (
+from shapeshift.vr.openxr.events import (
     ControllersChanged,
     GoingAway,
     Recentred,

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from vr.graphics import _need, _set_pointer
-from vr.instance import NoHeadset
+from shapeshift.vr.openxr.graphics import _need, _set_pointer
+from shapeshift.vr.openxr.instance import NoHeadset
 
 
 class Base(ctypes.Structure):

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scene.pose import Pose
-from scene.scene import IDENTITY
-from vr.instance import Instance, Lost, NoHeadset, load
-from vr.life import BEGIN, END, Life
-from vr.pace import RECOVER, SETTLED, Pace
-from vr.session import choose_blend, eye_size, known_part, tangents_of
-from vr.spaces import KINDS, choose_kind, moved_by
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import IDENTITY
+from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset, load
+from shapeshift.vr.openxr.life import BEGIN, END, Life
+from shapeshift.vr.openxr.session import choose_blend, eye_size, known_part, tangents_of
+from shapeshift.vr.openxr.spaces import KINDS, choose_kind, moved_by
+from shapeshift.vr.pace import RECOVER, SETTLED, Pace
 
 PERIOD = 1 / 90
 
@@ -209,7 +209,7 @@ class FakeXr:
 def fake(monkeypatch):
     def use(**how) -> FakeXr:
         xr = FakeXr(**how)
-        monkeypatch.setattr("vr.instance.load", lambda: xr)
+        monkeypatch.setattr("shapeshift.vr.openxr.instance.load", lambda: xr)
         return xr
 
     return use

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from vr_hands import HEAD, a_frame, hand_at
 
-from scene.pose import Pose
-from vr.bindings import PROFILES
-from vr.card import HALF_CLEAR, card_picture
-from vr.frame import LOST, SIDES
-from vr.hints import FADES_S, SHOWN_S, hint_lines, hints
-from vr.locomotion import Rules
-from vr.outline import AWAY_M, BY_HAND, Outlines, hull_of, outline
-from vr.standing import Standing
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.card import HALF_CLEAR, card_picture
+from shapeshift.vr.frame import LOST, SIDES
+from shapeshift.vr.hints import FADES_S, SHOWN_S, hint_lines, hints
+from shapeshift.vr.locomotion.locomotion import Rules
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.openxr.bindings import PROFILES
+from shapeshift.vr.outline import AWAY_M, BY_HAND, Outlines, hull_of, outline
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.05
 THERE = Pose(np.array([0.3, 0.9, -0.6]), np.array([1.0, 0.0, 0.0, 0.0]))

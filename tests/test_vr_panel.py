@@ -5,11 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime_models.model import Stop
-from vr.panel import DEAD, EXIT_S, Pointer, press, push, taken
-from vr.panel_layout import TRACK, WIDTH, item_at, knob_place, lay_out
-from vr.panel_picture import ACCENT, LEAST, SURFACE, TEXT, WARNING, panel_picture, picture_key
-from vr.panel_state import (
+from shapeshift.runtime_models.model import Stop
+from shapeshift.vr.panel.panel import DEAD, EXIT_S, Pointer, press, push, taken
+from shapeshift.vr.panel.panel_layout import TRACK, WIDTH, item_at, knob_place, lay_out
+from shapeshift.vr.panel.panel_picture import (
+    ACCENT,
+    LEAST,
+    SURFACE,
+    TEXT,
+    WARNING,
+    panel_picture,
+    picture_key,
+)
+from shapeshift.vr.panel.panel_state import (
     QUALITIES,
     Exit,
     Facts,

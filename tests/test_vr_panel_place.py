@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from vr_hands import HEAD, OPEN, a_frame, hand_at, moved
 
-from runtime_models.model import Stop
-from scene.pose import Pose
-from vr.carried import Carried, carry, panel_row
-from vr.frame import LOST, Hand, Pulse
-from vr.glove import fingertip, glove
-from vr.panel_layout import knob_place, lay_out
-from vr.panel_place import ABOVE_M, ASIDE, NEAR_M, RAY_M, hang, play_point
-from vr.panel_state import Facts, Recentre, SetX, Slider
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import LOST, Hand, Pulse
+from shapeshift.vr.glove import fingertip, glove
+from shapeshift.vr.panel.carried import Carried, carry, panel_row
+from shapeshift.vr.panel.panel_layout import knob_place, lay_out
+from shapeshift.vr.panel.panel_place import ABOVE_M, ASIDE, NEAR_M, RAY_M, hang, play_point
+from shapeshift.vr.panel.panel_state import Facts, Recentre, SetX, Slider
 
 STOPS = (Stop("normal", 0.0), Stop("ice", 0.25), Stop("fire", 1.0))
 FACTS = Facts((Slider("cube", STOPS, 0.25),))

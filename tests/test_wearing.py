@@ -6,18 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.headset.headset import DEMO, Options
-from app.headset.headset_report import Report
-from app.headset.pacing import Pacing
-from app.headset.wearing import LONGEST_STEP_S, Wearing
-from app.headset.worn_scene import open_worn
-from renderer.settings import FrameStats, RenderSettings
-from scene.pose import Pose, View
-from scene.scene import IDENTITY
-from vr.floor import REST
-from vr.frame import LOST, SIDES, Frame
-from vr.life import Life
-from vr.pace import Pace
+from shapeshift.app.headset.headset import DEMO, Options
+from shapeshift.app.headset.headset_report import Report
+from shapeshift.app.headset.pacing import Pacing
+from shapeshift.app.headset.wearing import LONGEST_STEP_S, Wearing
+from shapeshift.app.headset.worn_scene import open_worn
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import IDENTITY
+from shapeshift.vr.floor import REST
+from shapeshift.vr.frame import LOST, SIDES, Frame
+from shapeshift.vr.openxr.life import Life
+from shapeshift.vr.pace import Pace
 
 PERIOD = 1 / 90
 HEAD = Pose(np.array([0.3, 1.6, -0.2]), np.array([np.cos(0.4), 0.0, np.sin(0.4), 0.0]))

@@ -13,12 +13,18 @@ import numpy as np
 import pytest
 from models import make_random_model
 
-from runtime_models import whole_file
-from runtime_models.read_scene import read_model
-from runtime_models.swap_folders import swap
-from runtime_models.whole_file import PART, make_folders, open_lines, whole_folder, write_whole
-from runtime_models.write_package import write_package
-from training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.runtime_models.files import whole_file
+from shapeshift.runtime_models.files.swap_folders import swap
+from shapeshift.runtime_models.files.whole_file import (
+    PART,
+    make_folders,
+    open_lines,
+    whole_folder,
+    write_whole,
+)
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 
 ROOT = Path(__file__).resolve().parents[1]
 posix = pytest.mark.skipif(os.name == "nt", reason="rights and links of POSIX")
@@ -181,8 +187,8 @@ def test_the_command_line_names_the_file_that_found_no_room(tmp_path):
     """A real limit of the kernel's: no file may grow beyond 512 bytes."""
     from splat_scenes import random_layers
 
-    from runtime_models.plain_splats import PlainSplats
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     cloud = random_layers(200)
     columns = (cloud.means, cloud.scales, cloud.wxyz, cloud.opacity, cloud.sh)

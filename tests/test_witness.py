@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
-from rasterizer.reference import render_reference
-from runtime_models.evaluate import evaluate
-from runtime_models.model import Mlp
-from scene.pose import View, look_at, perspective
+from shapeshift.rasterizer.reference import render_reference
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import Mlp
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.evaluation.metrics import psnr
+from shapeshift.training.fit.view_metrics import likeness, most_pixels, shared_outlines
+from shapeshift.training.photos import LoadedPhoto
 from tests.models import make_random_model, without_control
-from training.drawing import camera_of
-from training.metrics import psnr
-from training.photos import LoadedPhoto
-from training.witness import likeness, most_pixels, shared_outlines
 
 SIZE = (40, 30)
 SHAPE = ("offset", "scale", "rotation", "opacity")

@@ -7,10 +7,10 @@ import pytest
 from physics_things import box
 from test_simulation import STATES, UP, Points, item, model, reaction
 
-from scene.collider import Collider, box_around
-from scene.pose import Pose
-from scene.scene_file import SceneFile
-from scene.world import FLOOR_NAME, World
+from shapeshift.scene.colliders.collider import Collider, box_around
+from shapeshift.scene.document.scene_file import SceneFile
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.world import FLOOR_NAME, World
 
 pytest.importorskip("rapier3d")
 HALF = 0.05

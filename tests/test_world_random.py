@@ -8,9 +8,9 @@ import pytest
 from test_simulation import STATES, item, model, reaction
 from test_world import BOX, at, real
 
-from scene.follow import follow, put_back
-from scene.scene_file import SceneFile
-from scene.world import World
+from shapeshift.scene.document.scene_file import SceneFile
+from shapeshift.scene.world.follow import follow, put_back
+from shapeshift.scene.world.world import World
 
 pytest.importorskip("rapier3d")
 HANDS = ("left", "right", "mouse")

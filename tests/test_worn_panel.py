@@ -8,16 +8,17 @@ import pytest
 from splat_scenes import random_layers
 from vr_hands import HEAD, OPEN, a_frame, hand_at
 
-from app.headset.notices import BEGINS_S, BELOW, QUIET_S, SHOWN_S, Late, late_card
-from app.headset.pacing import Pacing
-from app.headset.person import Person
-from app.headset.worn_panel import HINT, WornPanel, facts_of, grant, sliders_of
-from runtime_models.model import Stop
-from scene.reactions import State
-from scene.scene_file import SceneFile, SceneItem, named_stops
-from scene.world import World
-from vr.carried import panel_row
-from vr.panel_state import (
+from shapeshift.app.headset.notices import BEGINS_S, BELOW, QUIET_S, SHOWN_S, Late, late_card
+from shapeshift.app.headset.pacing import Pacing
+from shapeshift.app.headset.person import Person
+from shapeshift.app.headset.worn_panel import HINT, WornPanel, facts_of, grant, sliders_of
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem, named_stops
+from shapeshift.scene.world.reactions import State
+from shapeshift.scene.world.world import World
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.panel.carried import panel_row
+from shapeshift.vr.panel.panel_state import (
     Exit,
     Pulse,
     PutBack,
@@ -27,8 +28,7 @@ from vr.panel_state import (
     SetScale,
     SetX,
 )
-from vr.standing import Standing
-from vr.touching import Touched
+from shapeshift.vr.touching import Touched
 
 LEFT = hand_at((-0.15, 1.15, -0.45))
 HEAT = (Stop("seen", 0.0), Stop("half", 0.5), Stop("heat", 1.0, "thermal", "ironbow", (0, 9), "K"))

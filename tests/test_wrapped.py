@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from fuzz_seeds import some_splats
 
-from runtime_models.formats import format_of
-from runtime_models.memory import FREE
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import describe, read_model
-from runtime_models.write_compressed_ply import write_compressed_ply
-from runtime_models.write_gltf import write_gltf
-from runtime_models.write_ply import write_ply
-from runtime_models.write_splat import write_splat
-from runtime_models.write_spz import write_spz
+from shapeshift.runtime_models.files.memory import FREE
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.splats.formats import format_of
+from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+from shapeshift.runtime_models.splats.write_splat import write_splat
 
 WRITERS = {
     "a.ply": write_ply, "a.splat": write_splat, "a.spz": write_spz, "a.glb": write_gltf,

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from ply_files import names_of, random_rows, some_splats, write_rows
 
-from runtime_models.blocks import BLOCK
-from runtime_models.formats import read_plain
-from runtime_models.plain_splats import Reading
-from runtime_models.ply_file import read_header, read_table
-from runtime_models.read_ply import read_raw_ply
-from runtime_models.turn import turn_half
-from runtime_models.whole_file import write_whole
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.files.blocks import BLOCK
+from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.ply.ply_file import read_header, read_table
+from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 
 def ulps(a: np.ndarray, b: np.ndarray) -> np.ndarray:

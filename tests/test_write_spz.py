@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runtime_models.formats import read_plain
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_spz import read_raw_spz
-from runtime_models.write_spz import write_spz
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.spz.read_spz import read_raw_spz
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
 SLACK = 1.001  # of a bound: float32 rounding
 

@@ -1,4 +1,4 @@
-"""Nobody writes files but by runtime_models/whole_file.py."""
+"""Nobody writes files but by runtime_models/files/whole_file.py."""
 
 import ast
 import re

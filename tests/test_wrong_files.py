@@ -8,8 +8,8 @@ import pytest
 from captures import save_image, simple, write_transforms
 from ply_files import some_splats
 
-from app import cli
-from runtime_models.write_ply import write_ply
+from shapeshift.app import cli
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 COMMANDS = {
     "info": ("info", "FILE"), "lint": ("lint", "FILE"), "bench": ("bench", "FILE"),

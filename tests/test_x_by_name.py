@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app import cli
-from app.errors import UsageError
-from app.subject import Subject, control_of_text
-from runtime_models.model import Stop
-from runtime_models.write_package import write_package
-from runtime_models.write_ply import write_ply
+from shapeshift.app import cli
+from shapeshift.app.errors import UsageError
+from shapeshift.app.subject import Subject, control_of_text
+from shapeshift.runtime_models.model import Stop
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.models import make_random_model
 from tests.test_gltf import plain_splats
 
@@ -145,8 +145,8 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
     if command == "compare":
         done = run(command, f"{package}@Thermic", package)
     elif command == "vr":
-        from app.headset.worn_scene import open_worn
-        from app.opening import ReadingOptions
+        from shapeshift.app.headset.worn_scene import open_worn
+        from shapeshift.app.opening import ReadingOptions
 
         with pytest.raises(UsageError, match=r"'Thermic' is no x of this scene"):
             open_worn(package, ReadingOptions(), "Thermic")
@@ -159,12 +159,12 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
 
 
 def test_the_viewer_and_the_headset_start_there(package, objects):
-    from app.headset.worn_scene import open_worn
-    from app.opening import ReadingOptions
-    from app.viewer.files import opened_scene
-    from app.viewer.opened import read_files
-    from runtime_models.read_scene import read_model
-    from scene.camera_list import CameraReading
+    from shapeshift.app.headset.worn_scene import open_worn
+    from shapeshift.app.opening import ReadingOptions
+    from shapeshift.app.viewer.files import opened_scene
+    from shapeshift.app.viewer.opened import read_files
+    from shapeshift.runtime_models.read_scene import read_model
+    from shapeshift.scene.cameras.camera_list import CameraReading
 
     def shown(*paths: Path, x: str) -> dict[str, float]:
         found = read_files(paths, lambda path, told: read_model(path), CameraReading(), None)

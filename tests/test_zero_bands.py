@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from test_cli import launch
 
-from renderer.renderer import Renderer
-from runtime_models.model import SplatLayers
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_layers import read_layers, used_coefficients
-from runtime_models.read_scene import read_model
-from runtime_models.write_compressed_ply import write_compressed_ply
-from runtime_models.write_gltf import write_gltf
-from runtime_models.write_ply import write_ply
-from runtime_models.write_spz import write_spz
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
+from shapeshift.runtime_models.splats.layers.read_layers import read_layers, used_coefficients
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 from tests.frames import draw
 from tests.splat_scenes import alone, front_view, random_layers, stereo_views
 

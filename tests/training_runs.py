@@ -1,7 +1,7 @@
 """How tests make a training run, and the bits that it left."""
 
-from training.run import Run
-from training.train import Trainer
+from shapeshift.training.run import Run
+from shapeshift.training.train import Trainer
 
 
 def run(trainer: Run, steps: int | None = None) -> Run:

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scene.pose import Pose
-from vr.frame import LOST, Frame, Hand
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import LOST, Frame, Hand
 
 LEVEL = np.array([1.0, 0, 0, 0])
 HERE = {"left": (-0.2, 1.2, -0.4), "right": (0.2, 1.2, -0.4)}

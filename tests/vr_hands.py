@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from scene.pose import Pose, View, look_at
-from vr.carried import Carried
-from vr.frame import LOST, Frame, Hand
-from vr.panel_state import Panel
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.vr.frame import LOST, Frame, Hand
+from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel.panel_state import Panel
 
 OPEN = Carried(Panel(side="left"), pinned=True)  # a panel that a menu button has opened
 HEAD = Pose(np.array([0.0, 1.6, 0.0]), np.array([1.0, 0.0, 0.0, 0.0]))

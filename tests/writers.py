@@ -4,7 +4,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from runtime_models.write_plain import WRITERS
+from shapeshift.runtime_models.splats.write_plain import WRITERS
 
 WITHOUT = pytest.mark.skipif(find_spec("pxr") is None, reason="usd-core is not installed")
 EACH_WRITER = pytest.mark.parametrize(

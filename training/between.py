@@ -14,13 +14,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from runtime_models.model import HEADS, BadFile, ControlEncoding, Stop
-from scene.pose import View
-from training.drawing import Color
-from training.gaussians import Gaussians
-from training.networks import KERNELS
-from training.photos import LoadedPhoto
-from training.step import Step
+from shapeshift.runtime_models.model import HEADS, BadFile, ControlEncoding, Stop
+from shapeshift.scene.pose import View
+from shapeshift.training.drawing import Color
+from shapeshift.training.heads.gaussians import Gaussians
+from shapeshift.training.heads.networks import KERNELS
+from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.step import Step
 
 CURES = ("none", "photos", "pictures", "shapes", "splats")
 SAME_PLACE = 1e-4  # of the cameras' mean distance from their middle

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import BadFile
-from runtime_models.whole_file import whole_file
+from shapeshift.runtime_models.files.whole_file import whole_file
+from shapeshift.runtime_models.model import BadFile
 
 
 def checkpoint_path(out: Path) -> Path:

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scene.depth_photo import at_centres
-from scene.photo import shrink
-from training.photos import LoadedPhoto
+from shapeshift.scene.captures.depth_photo import at_centres
+from shapeshift.scene.captures.photo import shrink
+from shapeshift.training.photos import LoadedPhoto
 
 LEAST_SIDE = 16  # pixels: a photo is not made smaller than that
 

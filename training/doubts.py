@@ -1,6 +1,6 @@
 """What is doubtful about the photos of a capture before they are trained on, in words."""
 
-from training.photos import LoadedPhoto
+from shapeshift.training.photos import LoadedPhoto
 
 FEW = 10  # training photos of a modality, up to which what lies between them is a guess
 

@@ -4,19 +4,19 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera, project, project_backward
-from rasterizer.raster import rasterize, rasterize_backward
-from rasterizer.surface import (
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import Camera, project, project_backward
+from shapeshift.rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.surface import (
     DepthFrame,
     rasterize_depth,
     rasterize_depth_backward,
     surface,
     surface_backward,
 )
-from scene.pose import View
-from training.depth_loss import DepthWish
-from training.gaussians import Gaussians
+from shapeshift.scene.pose import View
+from shapeshift.training.heads.gaussians import Gaussians
+from shapeshift.training.losses.depth_loss import DepthWish
 
 Color = tuple[float, float, float]
 Timed = Callable[[str], AbstractContextManager]  # of a pass, by its name

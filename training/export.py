@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from runtime_models.model import HEADS, AnchorModel, ControlEncoding, Mlp, Stop
-from training.gaussians import REACH, SCALE_CLIP, UNIT
-from training.networks import HeadLayout
+from shapeshift.runtime_models.model import HEADS, AnchorModel, ControlEncoding, Mlp, Stop
+from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
+from shapeshift.training.heads.networks import HeadLayout
 
 ACTIVATION = {
     "offset": "tanh", "scale": "exp", "rotation": "none", "opacity": "tanh", "color": "sigmoid",

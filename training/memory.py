@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from rasterizer.project import LOW_BITS, RECORD
-from training.networks import CHUNKS, HeadLayout, padded
+from shapeshift.rasterizer.project import LOW_BITS, RECORD
+from shapeshift.training.heads.networks import CHUNKS, HeadLayout, padded
 
 FLOAT = 4  # bytes; every array of a step has entries of 4
 SPLAT = 14  # floats: mean 3, scale 3, quaternion 4, opacity, colour 3

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import BadFile
-from scene.capture import Capture, Photo
-from scene.depth_photo import load_depth
-from scene.photo import load_photo
-from scene.pose import View
-from training.depth_loss import DepthLoss, DepthTarget, DepthWish
-from training.losses import ImageLoss, Target
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.depth_photo import load_depth
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.pose import View
+from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthWish
+from shapeshift.training.losses.losses import ImageLoss, Target
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
 CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use

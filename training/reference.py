@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from rasterizer.project import Camera
-from rasterizer.reference import render_reference
-from runtime_models.model import HEADS
-from scene.metrics import ssim_map
-from training.gaussians import REACH, SCALE_CLIP, UNIT
-from training.networks import HeadLayout
+from shapeshift.rasterizer.project import Camera
+from shapeshift.rasterizer.reference import render_reference
+from shapeshift.runtime_models.model import HEADS
+from shapeshift.scene.metrics import ssim_map
+from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
+from shapeshift.training.heads.networks import HeadLayout
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:

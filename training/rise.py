@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from training.gaussians import Gaussians
-from training.networks import KERNELS
+from shapeshift.training.heads.gaussians import Gaussians
+from shapeshift.training.heads.networks import KERNELS
 
 LEAST_RATE = 0.01  # of the networks' rates, at the first step
 AFTER_A_FALL = 200  # steps

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rasterizer.device import Device
-from training.drawing import Color, Drawing
-from training.metrics import psnr
-from training.optimizer import Adam
-from training.photos import LoadedPhoto
-from training.plain_settings import PlainRates, PlainSettings
-from training.schedule import Budget
-from training.settings import Rates, TrainSettings
+from shapeshift.rasterizer.device import Device
+from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettings
+from shapeshift.training.drawing import Color, Drawing
+from shapeshift.training.evaluation.metrics import psnr
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.schedule import Budget
+from shapeshift.training.settings import Rates, TrainSettings
 
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
 PACE_STEPS = 20  # steps after which the length of a timed run is known

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from runtime_models.model import BadFile
-from training.photos import BLACK, LoadedPhoto
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.training.photos import BLACK, LoadedPhoto
 
 MOST_TURNS = 100  # of a modality in a round
 NAMED_BACKGROUNDS = {"black": BLACK, "white": (1.0, 1.0, 1.0), "gray": (0.5, 0.5, 0.5)}

@@ -3,11 +3,11 @@
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 
-from runtime_models.model import Stop
-from training.between import CURES
-from training.density_strategy import strategy
-from training.networks import HeadLayout
-from training.schedule import balance_of
+from shapeshift.runtime_models.model import Stop
+from shapeshift.training.between import CURES
+from shapeshift.training.density.density_strategy import strategy
+from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.schedule import balance_of
 
 
 @dataclass(frozen=True)

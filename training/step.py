@@ -6,16 +6,16 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from scene.pose import View
-from training.density import Evidence
-from training.depth_loss import DepthWish
-from training.drawing import Color, Drawing, draw_splats, splats_backward
-from training.gaussians import Activation, Gaussians
-from training.losses import ImageLoss, Target, regularise
-from training.networks import HeadLayout, Heads
-from training.optimizer import Adam
-from training.rise import draw_up
-from training.smooth import smooth_picture
+from shapeshift.scene.pose import View
+from shapeshift.training.density.density import Evidence
+from shapeshift.training.drawing import Color, Drawing, draw_splats, splats_backward
+from shapeshift.training.heads.gaussians import Activation, Gaussians
+from shapeshift.training.heads.networks import HeadLayout, Heads
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.depth_loss import DepthWish
+from shapeshift.training.losses.losses import ImageLoss, Target, regularise
+from shapeshift.training.losses.smooth import smooth_picture
+from shapeshift.training.rise import draw_up
 
 
 class Step:

@@ -2,34 +2,28 @@
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, BadFile, ControlEncoding
-from scene.capture import Capture
-from training.between import Between, Way, add, blended, own_blend, straight_pull
-from training.coarse import Coarse
-from training.density import Evidence, Watch
-from training.density_budget import most_anchors, within
-from training.density_grow import changed
-from training.density_strategy import strategy
-from training.doubts import usable
-from training.drawing import Color
-from training.export import model_of
-from training.guard import EVERY as GUARD_EVERY
-from training.guard import SNAPSHOT_EVERY, Guard
-from training.initial import first_voxel, initial_points, voxel_centres
-from training.networks import HeadLayout, initial_weights, padded
-from training.optimizer import Adam
-from training.photos import (
-    BLACK,
-    LoadedPhoto,
-    Targets,
-    choose_downscale,
-    load_photos,
-)
-from training.rise import Rise, after_fall
-from training.run import SETTLE, Run
-from training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
-from training.settings import Rates, TrainSettings
-from training.step import Step
+from shapeshift.runtime_models.model import AnchorModel, BadFile, ControlEncoding
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.between import Between, Way, add, blended, own_blend, straight_pull
+from shapeshift.training.coarse import Coarse
+from shapeshift.training.density.density import Evidence, Watch
+from shapeshift.training.density.density_budget import most_anchors, within
+from shapeshift.training.density.density_grow import changed
+from shapeshift.training.density.density_strategy import strategy
+from shapeshift.training.doubts import usable
+from shapeshift.training.drawing import Color
+from shapeshift.training.export import model_of
+from shapeshift.training.first_anchors.initial import first_voxel, initial_points, voxel_centres
+from shapeshift.training.guard import EVERY as GUARD_EVERY
+from shapeshift.training.guard import SNAPSHOT_EVERY, Guard
+from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.photos import BLACK, LoadedPhoto, Targets, choose_downscale, load_photos
+from shapeshift.training.rise import Rise, after_fall
+from shapeshift.training.run import SETTLE, Run
+from shapeshift.training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
+from shapeshift.training.settings import Rates, TrainSettings
+from shapeshift.training.step import Step
 
 GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
 EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background

@@ -5,9 +5,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from renderer.letters import drawable, letters
-from scene.pose import Pose
-from vr.panel_picture import MUTED, SURFACE, TEXT
+from shapeshift.renderer.debug.letters import drawable, letters
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.panel.panel_picture import MUTED, SURFACE, TEXT
 
 EM, LINE_PX, PAD_PX, CORNER_PX = 40, 58, 26, 26  # of its picture
 METRES_PER_PIXEL = 0.00026  # letters of 10 mm: ten pixels high in an eye of 1,000 at 0.45 m

@@ -9,16 +9,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from scene.pose import Pose
-from vr.card import Card
-from vr.carried import Carried
-from vr.frame import SIDES, Hand
-from vr.glove import Capsule, glove
-from vr.locomotion import Comfort
-from vr.panel_layout import lay_out
-from vr.panel_place import play_point
-from vr.panel_state import Panel
-from vr.touching import Beam, Touched
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.card import Card
+from shapeshift.vr.frame import SIDES, Hand
+from shapeshift.vr.glove import Capsule, glove
+from shapeshift.vr.locomotion.locomotion import Comfort
+from shapeshift.vr.panel.carried import Carried
+from shapeshift.vr.panel.panel_layout import lay_out
+from shapeshift.vr.panel.panel_place import play_point
+from shapeshift.vr.panel.panel_state import Panel
+from shapeshift.vr.touching import Beam, Touched
 
 FINE, WRONG, PALE = (0.96, 0.66, 0.30), (0.90, 0.32, 0.26), (0.92, 0.93, 0.96)  # display sRGB
 RAY_M, RAY_FROM_M = 1.2, 0.06  # metres of a ray that meets nothing, and where it begins to show

@@ -5,8 +5,8 @@ from collections.abc import Callable, Hashable
 import moderngl
 import numpy as np
 
-from renderer.shader import compile_program
-from vr.shown import SHADERS
+from shapeshift.renderer.gl.shader import compile_program
+from shapeshift.vr.shown import SHADERS
 
 
 class Flats:

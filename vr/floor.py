@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from renderer.shader import compile_program
-from scene.pose import View
-from vr.shown import SHADERS
-from vr.standing import Standing
+from shapeshift.renderer.gl.shader import compile_program
+from shapeshift.scene.pose import View
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.shown import SHADERS
 
 REST = 0.35  # of the clearness while one moves
 RISES_S, FALLS_S = 0.08, 0.7  # time constants of that

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vr.frame import Hand
+from shapeshift.vr.frame import Hand
 
 GLOVE, CUFF, LIT = (0.82, 0.83, 0.86), (0.30, 0.31, 0.35), (0.96, 0.66, 0.30)  # display sRGB
 WRIST = np.array([0.020, 0.058, 0.0])  # metres, right hand

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scene.pose import Pose
-from vr.glove import Capsule
-from vr.standing import Standing
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.glove import Capsule
+from shapeshift.vr.locomotion.play_space import Standing
 
 AWAY_M = 0.004  # of the room, from the hull: lines beside what they are around
 THICK_M = 0.0028  # radius

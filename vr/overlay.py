@@ -6,16 +6,16 @@ from functools import partial
 import moderngl
 import numpy as np
 
-from renderer.context import is_software
-from renderer.shader import compile_program
-from scene.pose import View
-from vr.card import card_picture
-from vr.drawn import Drawn
-from vr.flat import Flats
-from vr.glove import Capsule
-from vr.panel_layout import lay_out
-from vr.panel_picture import panel_picture, picture_key
-from vr.shown import SHADERS
+from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.shader import compile_program
+from shapeshift.scene.pose import View
+from shapeshift.vr.card import card_picture
+from shapeshift.vr.drawn import Drawn
+from shapeshift.vr.flat import Flats
+from shapeshift.vr.glove import Capsule
+from shapeshift.vr.panel.panel_layout import lay_out
+from shapeshift.vr.panel.panel_picture import panel_picture, picture_key
+from shapeshift.vr.shown import SHADERS
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import moderngl
 
-from renderer.shader import compile_program
+from shapeshift.renderer.gl.shader import compile_program
 
 SHADERS = Path(__file__).parent / "shaders"
 GL_FRAMEBUFFER_SRGB = 0x8DB9

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from scene.pose import Pose
-from vr.frame import SIDES, Frame, Hand, Pulse
-from vr.locomotion import GRIPS_AT, LETS_GO_AT
-from vr.standing import Standing
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import SIDES, Frame, Hand, Pulse
+from shapeshift.vr.locomotion.locomotion import GRIPS_AT, LETS_GO_AT
+from shapeshift.vr.locomotion.play_space import Standing
 
 REACH_M = 0.10  # of the room, from the palm to what it takes
 SKIN_M = 0.02  # so near a palm touches

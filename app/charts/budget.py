@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Protocol
 
-from app.errors import UsageError
-from renderer.settings import RenderSettings
+from shapeshift.app.errors import UsageError
+from shapeshift.renderer.settings import RenderSettings
 
 EXACT = "exact"  # name of the row that leaves nothing out
 FLOOR_DB = 35.0  # where a difference begins to be seen side by side

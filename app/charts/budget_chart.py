@@ -8,16 +8,16 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-from app.charts.budget import Budget, Choice, choose
-from app.charts.chart_rows import write_text
-from app.subject import Subject
-from app.terminal import say
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.whole_file import make_folders
+from shapeshift.app.charts.budget import Budget, Choice, choose
+from shapeshift.app.charts.chart_rows import write_text
+from shapeshift.app.subject import Subject
+from shapeshift.app.terminal import say
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.files.whole_file import make_folders
 
 if TYPE_CHECKING:
-    from app.charts.chart_measure import ChartRow, Pricing
+    from shapeshift.app.charts.chart_measure import ChartRow, Pricing
 
 FORMAT = 3  # of the stored file, and of what the measure means: others are measured again
 
@@ -75,10 +75,10 @@ def budget_rows(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
 
 def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
     """Where the chart of this scene, machine, size, back end and background lies."""
-    from app.charts.chart import machine_line
-    from app.charts.chart_settings import SETTINGS
-    from app.charts.chart_stage import digest
-    from runtime_models.user_cache import OURS, cache_base
+    from shapeshift.app.charts.chart import machine_line
+    from shapeshift.app.charts.chart_settings import SETTINGS
+    from shapeshift.app.charts.chart_stage import digest
+    from shapeshift.runtime_models.files.user_cache import OURS, cache_base
 
     backends = sorted(renderer.backends.items())
     table = [named for named in SETTINGS if named.quick]
@@ -90,10 +90,10 @@ def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
 
 def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
     """Prices the quick settings with progress on stderr; the renderer keeps its settings."""
-    from app.charts.chart_measure import Pricing, twin_of
-    from app.charts.chart_settings import settings_of
-    from app.charts.chart_stage import QUICK, make_stage
-    from app.progress import tracked
+    from shapeshift.app.charts.chart_measure import Pricing, twin_of
+    from shapeshift.app.charts.chart_settings import settings_of
+    from shapeshift.app.charts.chart_stage import QUICK, make_stage
+    from shapeshift.app.progress import tracked
 
     kept = renderer.settings
     stage = make_stage([drawn.subject], drawn.x, drawn.size, QUICK)
@@ -117,7 +117,7 @@ def budget_rows_of(priced: Sequence[tuple[RenderSettings, "ChartRow"]]) -> list[
 
 def keep_chart(pricing: "Pricing", renderer: Renderer, ctx, drawn: Drawn, rows: Sequence) -> None:
     """Keeps a whole chart's rows of one eye in place of the quick one that would be measured."""
-    from app.charts.chart_settings import settings_of
+    from shapeshift.app.charts.chart_settings import settings_of
 
     named = {each.name: each for each in settings_of(pricing.drawing, eyes=1)}
     priced = [(pricing.settings(named[row.name]), row) for row in rows if row.name in named]

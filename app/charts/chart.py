@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
-from app.opening import ReadingOptions
-from app.paths import full
-from app.terminal import open_console, say
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import open_console, say
 
 MOST_FRAMES = 1000
 PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
@@ -48,14 +48,14 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.drawing import make_folder, parse_size
-    from app.errors import UsageError
+    from shapeshift.app.drawing import make_folder, parse_size
+    from shapeshift.app.errors import UsageError
 
     size = parse_size(options.size)
     if options.decode:
         if options.scenes:
             raise UsageError("--decode takes no scene; leave it out, or leave --decode out.")
-        from app.charts.decode_chart import run_decode
+        from shapeshift.app.charts.decode_chart import run_decode
 
         make_folder(options.out)
         return run_decode(options.out, options.context, command_line(options))
@@ -71,7 +71,7 @@ def run(options: Options) -> int:
 
 def read_subjects(options: Options) -> list:
     """The scenes in order; one that is named twice is read once and shared."""
-    from app.subject import open_subject
+    from shapeshift.app.subject import open_subject
 
     known = {path: open_subject(path, options) for path in dict.fromkeys(options.scenes)}
     if options.x:
@@ -80,8 +80,8 @@ def read_subjects(options: Options) -> list:
 
 
 def read_views(options: Options, subject, size: tuple[int, int]) -> list:
-    from app.camera_files import named_cameras
-    from app.errors import UsageError
+    from shapeshift.app.camera_files import named_cameras
+    from shapeshift.app.errors import UsageError
 
     if options.cameras is None:
         return []
@@ -92,12 +92,12 @@ def read_views(options: Options, subject, size: tuple[int, int]) -> list:
 
 
 def measure_and_draw(options: Options, subjects: list, cameras: list, size: tuple) -> int:
-    from app.charts.budget_chart import Drawn, keep_chart
-    from app.charts.chart_measure import ChartRow, Pricing, open_pair
-    from app.charts.chart_picture import draw_chart
-    from app.charts.chart_rows import RowsFile
-    from app.charts.chart_settings import settings_of
-    from app.charts.chart_stage import QUICK, Walk, digest, make_stage
+    from shapeshift.app.charts.budget_chart import Drawn, keep_chart
+    from shapeshift.app.charts.chart_measure import ChartRow, Pricing, open_pair
+    from shapeshift.app.charts.chart_picture import draw_chart
+    from shapeshift.app.charts.chart_rows import RowsFile
+    from shapeshift.app.charts.chart_settings import settings_of
+    from shapeshift.app.charts.chart_stage import QUICK, Walk, digest, make_stage
 
     x = None
     if not (options.x or any(subject.file for subject in subjects)):
@@ -124,8 +124,8 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
 
 def draws_on_cpu(drawing: str, ctx) -> bool:
     """Whether the processor makes the pixels: then its time is what a frame costs."""
-    from rasterizer.device import open_device
-    from renderer.context import is_software
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.renderer.gl.context import is_software
 
     return open_device().kind == "cpu" if drawing == "tiles" else is_software(ctx)
 
@@ -135,7 +135,7 @@ def measure_rows(pricing, file, settings, pictures: bool) -> None:
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining
 
-    from app.progress import progress_bar
+    from shapeshift.app.progress import progress_bar
 
     known = {row.name for row in file.rows}
     missing = [named for named in settings if named.name not in known]
@@ -164,7 +164,7 @@ def command_line(options: Options) -> str:
 
 def machine_line(ctx) -> str:
     """Processor, cores, drivers and versions, as they matter for a time."""
-    from app.measure import gl_renderer, machine
+    from shapeshift.app.measure import gl_renderer, machine
 
     told = machine(ctx) | {"gl": gl_renderer(ctx)}
     versions = PARTS[4:]
@@ -177,7 +177,7 @@ def scene_line(options: Options, stage, contents: str) -> str:
     """What was drawn: names, splats, contents, and what near and far are there."""
     from collections import Counter
 
-    from app.charts.chart_stage import WARM_UP
+    from shapeshift.app.charts.chart_stage import WARM_UP
 
     names = Counter(path.name for path in options.scenes)
     words = [name if n == 1 else f"{n} x {name}" for name, n in names.items()]

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from app.charts.chart_settings import Named, render_settings, told_changes
-from app.charts.chart_stage import WARM_UP, Stage
-from app.charts.comparison import MOST_DB, exact
-from renderer.renderer import Renderer
-from renderer.settings import FrameStats, RenderSettings
-from scene.metrics import psnr, ssim
-from scene.pose import View
-from scene.stereo import stereo_pair
+from shapeshift.app.charts.chart_settings import Named, render_settings, told_changes
+from shapeshift.app.charts.chart_stage import WARM_UP, Stage
+from shapeshift.app.charts.comparison import MOST_DB, exact
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.metrics import psnr, ssim
+from shapeshift.scene.pose import View
+from shapeshift.scene.stereo import stereo_pair
 
 SSIM_PATH, SSIM_SWEEP = 3, 2  # pictures whose SSIM is taken: it costs more than a frame does
 
@@ -171,7 +171,7 @@ def _rounded(value: float) -> float:
 @contextmanager
 def open_pair(context: str, drawing: str) -> Iterator[tuple]:
     """((Renderer, Renderer), context or None): two of the same kind in one context."""
-    from app.drawing import open_renderer
+    from shapeshift.app.drawing import open_renderer
 
     with open_renderer(context, drawing) as (first, ctx):
         with twin_of(first, ctx) as second:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.charts.chart_measure import ChartRow
-from app.charts.pareto import pareto_front
-from runtime_models.plain_text import one_line
-from runtime_models.whole_file import whole_file
+from shapeshift.app.charts.chart_measure import ChartRow
+from shapeshift.app.charts.pareto import pareto_front
+from shapeshift.runtime_models.files.plain_text import one_line
+from shapeshift.runtime_models.files.whole_file import whole_file
 
 WIDTH, HEIGHTS, DPI = 8.3, (4.6, 3.4), 200  # inches: a README shows it 830 pixels wide
 SAME_SPEED = 0.02  # of the exact setting's: less than this is no difference

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
-from app.errors import UsageError
-from runtime_models.whole_file import write_whole
+from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 
 class RowsFile:

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field, fields, replace
 
-from app.charts.comparison import exact
-from app.errors import UsageError
-from renderer.settings import RenderSettings
+from shapeshift.app.charts.comparison import exact
+from shapeshift.app.errors import UsageError
+from shapeshift.renderer.settings import RenderSettings
 
 EXACT = "exact"
 # Fields that a drawing does not read: a setting with one of them is left out of its chart.

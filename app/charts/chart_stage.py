@@ -6,13 +6,18 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 
 import numpy as np
 
-from app.charts.chart_settings import Distances
-from app.charts.quick_chart import turned
-from app.subject import Subject
-from scene.framing import distances_from, frame_points, framing_view, scene_points
-from scene.pose import Pose, View
-from scene.scene import IDENTITY, Scene
-from scene.stereo import eyes_apart
+from shapeshift.app.charts.chart_settings import Distances
+from shapeshift.app.charts.quick_chart import turned
+from shapeshift.app.subject import Subject
+from shapeshift.scene.cameras.framing import (
+    distances_from,
+    frame_points,
+    framing_view,
+    scene_points,
+)
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import IDENTITY, Scene
+from shapeshift.scene.stereo import eyes_apart
 
 WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
 GAP = 1.05  # of the sum of two radii, between neighbours

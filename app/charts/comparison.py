@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, fields, replace
 
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from scene.metrics import psnr
-from scene.pose import View
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import View
 
 REST_S = 0.4  # so long nothing must move before two frames are spent on a comparison
 MOST_DB = 200.0  # for pictures that are equal

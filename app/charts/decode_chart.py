@@ -9,10 +9,10 @@ from statistics import median
 
 import numpy as np
 
-from app.charts.chart_rows import RowsFile
-from app.paths import full
-from app.terminal import say
-from runtime_models.model import AnchorModel
+from shapeshift.app.charts.chart_rows import RowsFile
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
+from shapeshift.runtime_models.model import AnchorModel
 
 ANCHORS = (1_000, 2_000, 5_000, 10_000, 20_000, 50_000, 100_000, 200_000)
 MOST_RUNS, LEAST_RUNS = 9, 3
@@ -35,11 +35,11 @@ class DecodeRow:
 
 def run_decode(folder: Path, context: str, command: str) -> int:
     """Writes decode.csv, decode.svg and decode.png; rows that are there are kept."""
-    from app.charts.chart import machine_line
-    from app.commands.headless import DEMO
-    from app.drawing import open_renderer
-    from app.progress import tracked
-    from runtime_models.read_scene import read_model
+    from shapeshift.app.charts.chart import machine_line
+    from shapeshift.app.commands.headless import DEMO
+    from shapeshift.app.drawing import open_renderer
+    from shapeshift.app.progress import tracked
+    from shapeshift.runtime_models.read_scene import read_model
 
     model = read_model(DEMO)
     with open_renderer(context, "auto") as (_, ctx):
@@ -95,7 +95,7 @@ def decode_row(back_end: str, ctx, model: AnchorModel) -> DecodeRow:
 def opened(back_end: str, ctx, model: AnchorModel) -> Iterator[tuple[Callable, Callable, Callable]]:
     """(geometry, colour, finish) of one model in an arena of its own; finish waits for both."""
     if back_end == "onnxruntime":
-        from renderer.tiles import TilesDrawing
+        from shapeshift.renderer.tiles.tiles import TilesDrawing
 
         drawing = TilesDrawing()
         drawing.allocate([model])
@@ -104,9 +104,9 @@ def opened(back_end: str, ctx, model: AnchorModel) -> Iterator[tuple[Callable, C
         finally:
             drawing.close()
         return
-    from renderer.buffers import Arena
-    from renderer.decode import Decoder
-    from renderer.gpu import Gpu
+    from shapeshift.renderer.gl.buffers import Arena
+    from shapeshift.renderer.gl.decode import Decoder
+    from shapeshift.renderer.gl.gpu import Gpu
 
     gpu = Gpu(ctx)
     arena = Arena(gpu, [model.splat_count])
@@ -137,7 +137,7 @@ def draw_decode(rows: list[DecodeRow], folder: Path) -> None:
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    from app.charts.chart_picture import INK, PALE, WIDTH, save_figure
+    from shapeshift.app.charts.chart_picture import INK, PALE, WIDTH, save_figure
 
     figure = Figure((WIDTH, 4.2), layout="constrained", facecolor="white")
     axis = figure.subplots()

@@ -7,13 +7,13 @@ from statistics import median
 
 import numpy as np
 
-from app.charts.budget import EXACT
-from app.charts.comparison import MOST_DB, exact
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from scene.metrics import psnr
-from scene.pose import Pose, View
-from scene.scene import Scene
+from shapeshift.app.charts.budget import EXACT
+from shapeshift.app.charts.comparison import MOST_DB, exact
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene
 
 FRAMES = 5  # of each setting that count, along the turn; one before them does not
 BETWEEN = 3  # exact frames that count between two settings, again after one that does not

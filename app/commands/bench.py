@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
-from app.opening import ReadingOptions
-from app.paths import full
-from app.terminal import open_console, say, tell_json
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import open_console, say, tell_json
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -53,11 +53,11 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.charts.budget import read_budget
-    from app.drawing import open_renderer, parse_size
-    from app.errors import UsageError
-    from app.measure import Measure
-    from app.subject import open_subject
+    from shapeshift.app.charts.budget import read_budget
+    from shapeshift.app.drawing import open_renderer, parse_size
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.measure import Measure
+    from shapeshift.app.subject import open_subject
 
     size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
     quality_size = parse_size(options.quality_size, "--quality-size")
@@ -71,7 +71,7 @@ def run(options: Options) -> int:
         subject = subject.placed(options.x)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         if budget:
-            from app.charts.budget_chart import Drawn, settings_for
+            from shapeshift.app.charts.budget_chart import Drawn, settings_for
 
             renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, None, size))
         elif options.settings or options.target:
@@ -91,10 +91,10 @@ def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
     """RenderSettings of --settings and --target; UsageError where there is none such."""
     from dataclasses import replace
 
-    from app.charts.chart_settings import named_settings, render_settings
-    from app.charts.chart_stage import distances_of
-    from app.errors import UsageError
-    from scene.framing import orbit_path
+    from shapeshift.app.charts.chart_settings import named_settings, render_settings
+    from shapeshift.app.charts.chart_stage import distances_of
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.cameras.framing import orbit_path
 
     drawing = renderer.backends["drawing"].split()[0]
     settings = renderer.settings
@@ -109,7 +109,7 @@ def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
 
 def measure(work, options, quality_size: tuple[int, int]) -> dict:
     """All rows of a Measure, with what was asked; says on stderr what it is at."""
-    from app.progress import working
+    from shapeshift.app.progress import working
 
     with working("starting") as tell:
         result = work.all(options.frames, options.sweep, quality_size, tell)
@@ -124,8 +124,8 @@ def command_line() -> str:
 
 def check_counts(options) -> None:
     """--frames and --sweep: two or more, since one frame has no percentiles."""
-    from app.drawing import MOST_VALUES
-    from app.errors import UsageError
+    from shapeshift.app.drawing import MOST_VALUES
+    from shapeshift.app.errors import UsageError
 
     for name in ("frames", "sweep"):
         if not 2 <= getattr(options, name) <= MOST_VALUES:
@@ -134,7 +134,7 @@ def check_counts(options) -> None:
 
 def check_result_path(path: Path) -> None:
     """Refuses, before minutes of work, a file that cannot be written or that is not a result."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     if path.is_dir():
         raise UsageError(f"{path} is a folder; name the JSON file that the result goes to.")
@@ -153,7 +153,7 @@ def is_result(path: Path) -> bool:
 
 
 def write_json(path: Path, result: dict) -> None:
-    from runtime_models.whole_file import write_whole
+    from shapeshift.runtime_models.files.whole_file import write_whole
 
     write_whole(path, (json.dumps(result, indent=1, allow_nan=False) + "\n").encode())
 

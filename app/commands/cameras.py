@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import POSITIONAL
-from app.paths import full
-from app.terminal import open_console, say, tell_json
+from shapeshift.app.command_line import POSITIONAL
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import open_console, say, tell_json
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class Options:
 
 
 def run(options: Options) -> int:
-    from app.camera_files import camera_reading
-    from app.errors import UsageError
-    from scene.read_cameras import read_camera_list
+    from shapeshift.app.camera_files import camera_reading
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
 
     if options.to and options.out is None:
         raise UsageError("--to wants --out, the file or folder to write.")
@@ -55,8 +55,8 @@ def run(options: Options) -> int:
 
 def write(options: Options, cameras) -> None:
     """Writes the views in the wished form, beside what is there, never over the input."""
-    from app.errors import UsageError
-    from scene.write_cameras import paths_of, write_cameras
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.cameras.write_cameras import paths_of, write_cameras
 
     form = options.to or ("ours" if options.out.suffix else "colmap-bin")
     for path in paths_of(options.out, form):
@@ -82,7 +82,7 @@ def is_part(path: Path, source: Path) -> bool:
 
 def facts_of(cameras) -> dict:
     """What --json prints: our own list, and what is known about the file."""
-    from scene.write_own_cameras import own_rows
+    from shapeshift.scene.cameras.write_own_cameras import own_rows
 
     return {
         "format": cameras.format,

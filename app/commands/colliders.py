@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from app.command_line import POSITIONAL
-from app.paths import full
-from app.terminal import say
+from shapeshift.app.command_line import POSITIONAL
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    from scene.collider import Collider
-    from scene.scene_file import SceneFile
+    from shapeshift.scene.colliders.collider import Collider
+    from shapeshift.scene.document.scene_file import SceneFile
 
 FOLDER = "colliders"  # beside the scene file that is written
 
@@ -32,10 +32,10 @@ class Options:
 
 
 def run(options: Options) -> int:
-    from app.opening import ReadingOptions
-    from app.scene_files import open_scene_file
-    from scene.scene_file import BACKGROUND, HULLS
-    from scene.write_scene_file import write_scene_file
+    from shapeshift.app.opening import ReadingOptions
+    from shapeshift.app.scene_files import open_scene_file
+    from shapeshift.scene.document.scene_file import BACKGROUND, HULLS
+    from shapeshift.scene.document.write_scene_file import write_scene_file
 
     file, models, _ = open_scene_file(options.scene, ReadingOptions())
     paths = paths_of(file, options.out)
@@ -57,8 +57,8 @@ def run(options: Options) -> int:
 
 def paths_of(file: "SceneFile", out: Path) -> dict[str, Path]:
     """Where the collider of each object that asks for one is written."""
-    from app.paths import file_name
-    from scene.scene_file import HULLS
+    from shapeshift.app.paths import file_name
+    from shapeshift.scene.document.scene_file import HULLS
 
     found: dict[str, Path] = {}
     for number, item in enumerate(file.all_items):
@@ -71,8 +71,8 @@ def paths_of(file: "SceneFile", out: Path) -> dict[str, Path]:
 
 def refuse(options: Options, file: "SceneFile", paths: list[Path]) -> None:
     """Before minutes of work.  Raises UsageError."""
-    from app.errors import UsageError
-    from scene.scene_file import ENDING
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.scene_file import ENDING
 
     if not paths:
         raise UsageError(f'no object of {options.scene.name} has "hulls" as its collider.')
@@ -87,9 +87,9 @@ def refuse(options: Options, file: "SceneFile", paths: list[Path]) -> None:
 
 
 def make_one(file: "SceneFile", item, model) -> "Collider":
-    from app.opening import PATIENCE_S, progress_after
-    from scene.collider import Making
-    from scene.collider_files import one_collider
+    from shapeshift.app.opening import PATIENCE_S, progress_after
+    from shapeshift.scene.colliders.collider import Making
+    from shapeshift.scene.colliders.collider_files import one_collider
 
     with progress_after(PATIENCE_S) as told:
         return one_collider(file, item, model, Making(told=told))
@@ -97,8 +97,8 @@ def make_one(file: "SceneFile", item, model) -> "Collider":
 
 def write_one(collider: "Collider", path: Path) -> str:
     """Writes it; in words what it is."""
-    from runtime_models.whole_file import make_folders
-    from scene.collider_pieces import write_collider
+    from shapeshift.runtime_models.files.whole_file import make_folders
+    from shapeshift.scene.colliders.collider_pieces import write_collider
 
     make_folders(path.parent.parent, path.parent.name)
     write_collider(collider.hulls, collider.mesh, path)
@@ -108,7 +108,7 @@ def write_one(collider: "Collider", path: Path) -> str:
 
 def naming(file: "SceneFile", name: str, path: Path) -> "SceneFile":
     """The file with that path as the collider of an object."""
-    from scene import edits
+    from shapeshift.scene.document import edits
 
     try:
         text = Path(os.path.relpath(path, file.folder)).as_posix()

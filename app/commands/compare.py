@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from app.command_line import EXPERT, POSITIONAL, SIZE
-from app.opening import ReadingOptions
-from app.paths import full
-from app.terminal import open_console, say, tell_json
+from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import open_console, say, tell_json
 
 VIEWS = 8  # of the orbit where no cameras are given
 DEFAULT_SIZE = (640, 360)
@@ -58,7 +58,7 @@ class Compared:
 
     def scores(self) -> dict:
         """PSNR in dB ("equal" where no pixel differs), SSIM, and the largest difference."""
-        from scene.metrics import psnr, ssim
+        from shapeshift.scene.metrics import psnr, ssim
 
         db = psnr(self.a, self.b)
         largest = float(np.abs(self.a - self.b).max())
@@ -69,8 +69,8 @@ class Compared:
 
 
 def run(options: Options) -> int:
-    from app.commands.compare_sides import PictureSide, SceneSide, open_side
-    from app.errors import UsageError
+    from shapeshift.app.commands.compare_sides import PictureSide, SceneSide, open_side
+    from shapeshift.app.errors import UsageError
 
     if options.view:
         return run_viewer(options)
@@ -97,10 +97,10 @@ def run(options: Options) -> int:
 
 def run_viewer(options: Options) -> int:
     """The same two in a window."""
-    from app.commands.compare_sides import split_stop
-    from app.errors import UsageError
-    from app.viewer import desktop
-    from scene.scene_file import is_scene_file
+    from shapeshift.app.commands.compare_sides import split_stop
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.viewer import desktop
+    from shapeshift.scene.document.scene_file import is_scene_file
 
     shared = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}
     path, at = split_stop(options.a)
@@ -111,8 +111,8 @@ def run_viewer(options: Options) -> int:
 
 def picture_pairs(a, b) -> Iterator[Compared]:
     """Pictures of two folders; BadFile where two have not one size."""
-    from app.commands.compare_sides import match_pictures, read_picture
-    from runtime_models.model import BadFile
+    from shapeshift.app.commands.compare_sides import match_pictures, read_picture
+    from shapeshift.runtime_models.model import BadFile
 
     pairs, how = match_pictures(a, b)
     say(f"{len(pairs)} pictures, {how}")
@@ -128,11 +128,11 @@ def picture_pairs(a, b) -> Iterator[Compared]:
 
 def choose_views(options: Options, a) -> list:
     """Views in A's own coordinates."""
-    from app.camera_files import camera_reading
-    from app.drawing import parse_size
-    from scene.camera_list import moved
-    from scene.framing import orbit_path
-    from scene.read_cameras import read_camera_list
+    from shapeshift.app.camera_files import camera_reading
+    from shapeshift.app.drawing import parse_size
+    from shapeshift.scene.cameras.camera_list import moved
+    from shapeshift.scene.cameras.framing import orbit_path
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
 
     size = parse_size(options.size) if options.size else None
     if options.cameras is not None:
@@ -143,11 +143,11 @@ def choose_views(options: Options, a) -> list:
 
 def drawn_pairs(options: Options, a, b) -> Iterator[Compared]:
     """Both from every view; B may be pictures, which are in the order of the views."""
-    from app.commands.compare_sides import PictureSide, read_picture
-    from app.drawing import open_renderer
-    from renderer.renderer import Renderer
-    from runtime_models.model import BadFile
-    from scene.camera_list import moved
+    from shapeshift.app.commands.compare_sides import PictureSide, read_picture
+    from shapeshift.app.drawing import open_renderer
+    from shapeshift.renderer.renderer import Renderer
+    from shapeshift.runtime_models.model import BadFile
+    from shapeshift.scene.cameras.camera_list import moved
 
     views = choose_views(options, a)
     files = b.files if isinstance(b, PictureSide) else None
@@ -188,7 +188,7 @@ def artist(renderer, side, background: tuple[float, float, float]):
 
 def score(compared: Iterator[Compared], names: tuple[str, str], options: Options) -> dict:
     """What is printed; the sheets are written on the way."""
-    from app.progress import working
+    from shapeshift.app.progress import working
 
     rows, kept = [], []
     with working("comparing") as tell:
@@ -214,15 +214,15 @@ def score(compared: Iterator[Compared], names: tuple[str, str], options: Options
 
 def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options) -> int:
     """A sheet and a difference picture a view; returns by how much differences are amplified."""
-    from app.commands.compare_sheet import (
+    from shapeshift.app.commands.compare_sheet import (
         amplification,
         difference_picture,
         scale_text,
         sheet,
         written,
     )
-    from app.drawing import make_folder, save_png
-    from app.errors import UsageError
+    from shapeshift.app.drawing import make_folder, save_png
+    from shapeshift.app.errors import UsageError
 
     paths = [
         (options.out / f"{pair.name}_sheet.png", options.out / f"{pair.name}_difference.png")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime_models.plain_text import one_line
+from shapeshift.runtime_models.files.plain_text import one_line
 
 AMPLIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200)
 BRIGHT = 0.8  # what the 99.9th percentile of an amplified difference may reach
@@ -27,7 +27,7 @@ def written(picture: np.ndarray, text: str) -> np.ndarray:
     """The picture with a line in its upper left corner."""
     from PIL import Image, ImageDraw
 
-    from renderer.letters import drawable, letters
+    from shapeshift.renderer.debug.letters import drawable, letters
 
     image = Image.fromarray((np.clip(np.nan_to_num(picture), 0, 1) * 255 + 0.5).astype(np.uint8))
     draw = ImageDraw.Draw(image)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.opening import ReadingOptions
-from app.paths import plain
-from app.subject import Subject, open_subject
-from runtime_models.model import BadFile
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import plain
+from shapeshift.app.subject import Subject, open_subject
+from shapeshift.runtime_models.model import BadFile
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 SCENE_MARKS = ("scene.json", "meta.json", "lod-meta.json")  # folders of these hold no photographs
@@ -58,8 +58,8 @@ def pictures_in(path: Path) -> tuple[Path, ...]:
         return (path,) if path.suffix.lower() in PICTURES else ()
     if not path.is_dir() or any((path / mark).exists() for mark in SCENE_MARKS):
         return ()
-    from runtime_models.read_layers import layer_files
-    from runtime_models.read_output_folder import newest_cloud
+    from shapeshift.runtime_models.splats.layers.read_layers import layer_files
+    from shapeshift.runtime_models.splats.read_output_folder import newest_cloud
 
     if layer_files(path) or newest_cloud(path) is not None:
         return ()
@@ -87,6 +87,6 @@ def match_pictures(a: PictureSide, b: PictureSide) -> tuple[list[tuple[str, Path
 
 def read_picture(path: Path) -> np.ndarray:
     """(H, W, 3) float32 display sRGB 0..1; what is see-through lies over black.  Raises BadFile."""
-    from scene.photo import read_pixels
+    from shapeshift.scene.captures.photo import read_pixels
 
     return read_pixels(path)[0]

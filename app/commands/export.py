@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
-from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
-from app.paths import full
-from app.program import program
-from app.terminal import say
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, Opt
+from shapeshift.app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
+from shapeshift.app.paths import full
+from shapeshift.app.program import program
+from shapeshift.app.terminal import say
 
 PACKAGE = ".shift"
 
@@ -57,10 +57,10 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.commands.exported import Look, check_output, export, is_folder
-    from app.errors import UsageError
-    from runtime_models.evaluate import follows_eye
-    from runtime_models.write_plain import writer_of
+    from shapeshift.app.commands.exported import Look, check_output, export, is_folder
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.evaluate import follows_eye
+    from shapeshift.runtime_models.splats.write_plain import writer_of
 
     scenes = choose_scenes(options)
     if not 0 <= options.sh_degree <= 3:
@@ -102,8 +102,8 @@ def run(options: Options) -> int:
 
 def choose_scenes(options: Options) -> tuple[Path, ...]:
     """The scenes that are exported, or of which objects are.  Raises UsageError."""
-    from app.errors import UsageError
-    from scene.scene_file import is_scene_file
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.scene_file import is_scene_file
 
     scenes = options.scenes
     if not scenes:
@@ -122,11 +122,11 @@ def open_scene(path: Path, options: Options):
     """The Subject of a file, of a scene file the chosen objects alone.  Raises UsageError."""
     from dataclasses import replace
 
-    from app.commands.exported import check_output
-    from app.errors import UsageError
-    from app.subject import Subject, open_subject
-    from scene.scene import Scene
-    from scene.scene_file import HULLS, is_scene_file
+    from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.subject import Subject, open_subject
+    from shapeshift.scene.document.scene_file import HULLS, is_scene_file
+    from shapeshift.scene.scene import Scene
 
     if not is_scene_file(path):
         return Subject.of(open_model(path, options))
@@ -154,9 +154,9 @@ def parts_of(path: Path, subject, position, options: Options) -> list:
     """What of a scene is written; position (3,) metres is where its zero is put."""
     from dataclasses import replace
 
-    from app.subject import moved_object
-    from scene.pose import Pose
-    from scene.scene import IDENTITY
+    from shapeshift.app.subject import moved_object
+    from shapeshift.scene.pose import Pose
+    from shapeshift.scene.scene import IDENTITY
 
     if not subject.file:
         return [make_part(path, subject.scene.objects[0].model, position, options)]
@@ -175,7 +175,7 @@ def parse_eye(text: str) -> tuple[float, float, float] | None:
     """Three numbers of a text.  Raises UsageError."""
     from math import isfinite
 
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     if not text:
         return None
@@ -192,12 +192,12 @@ def make_part(path: Path, model, position, options: Options, known=None):
     """What the options say about one model, which stands at position (3,) in metres: its x, its
     regions, what of it is written.  known: the object of a scene file, which has an x already.
     """
-    from app.commands.exported import Part
-    from app.errors import UsageError
-    from scene.framing import default_view
-    from scene.pose import Pose
-    from scene.read_selector import read_selector
-    from scene.scene import IDENTITY, SceneObject
+    from shapeshift.app.commands.exported import Part
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.cameras.framing import default_view
+    from shapeshift.scene.pose import Pose
+    from shapeshift.scene.scene import IDENTITY, SceneObject
+    from shapeshift.scene.selectors.read_selector import read_selector
 
     x = known.x if known else choose_x(options.x, model)
     eye = default_view(model, (640, 360)).world_from_eye
@@ -216,7 +216,7 @@ def make_part(path: Path, model, position, options: Options, known=None):
 
 def choose_x(text: str, model):
     """The Control of one model.  Raises UsageError."""
-    from app.subject import control_of_text, pace_of
+    from shapeshift.app.subject import control_of_text, pace_of
 
     if not text:
         return min((stop.x for stop in model.stops), default=0.0)
@@ -225,7 +225,7 @@ def choose_x(text: str, model):
 
 def with_x(text: str) -> str:
     """A selector of --only in the form that has a control value, which means nothing here."""
-    from scene.read_selector import FORMS
+    from shapeshift.scene.selectors.read_selector import FORMS
 
     kind, *parts = text.split(":")
     if kind not in FORMS:
@@ -238,7 +238,7 @@ def with_x(text: str) -> str:
 
 def told_x(parts: list) -> str:
     """x of what was written, with the stop's name where it is one."""
-    from runtime_models.stop_weights import told_control
+    from shapeshift.runtime_models.stop_weights import told_control
 
     thing = parts[0].thing
     if len({part.thing.x for part in parts}) > 1:
@@ -251,9 +251,9 @@ def export_package(options: Options, opened: list) -> int:
     """Writes a model of anchors and networks whole; nothing else can become one."""
     import numpy as np
 
-    from app.errors import UsageError
-    from runtime_models.model import AnchorModel
-    from runtime_models.write_package import write_package
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.model import AnchorModel
+    from shapeshift.runtime_models.package.write_package import write_package
 
     asked = {
         "--x": options.x, "--select": options.select, "--only": options.only,
@@ -273,8 +273,8 @@ def export_package(options: Options, opened: list) -> int:
             f"{what} cannot become a package: it is anchors and five networks, which "
             f"`{program()} train` makes of photos; write .ply, .spz or .glb."
         )
-    from app.pace import with_pace
-    from runtime_models.refit_encoding import refit_encoding
+    from shapeshift.app.pace import with_pace
+    from shapeshift.runtime_models.package.refit_encoding import refit_encoding
 
     model = models[0] if options.encoding == "kept" else refit_encoding(models[0])
     model = with_pace(model) if options.pace else model

@@ -7,22 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
-from app.errors import UsageError
-from renderer.false_colors import mixed_colors, shade_of
-from renderer.palette import palette_colors
-from runtime_models.bake import ColorAt, Recolor, bake
-from runtime_models.evaluate import follows_eye
-from runtime_models.model import Finding, SplatLayers
-from runtime_models.package_files import MANIFEST
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.read_streamed import TREE
-from runtime_models.sog_files import META
-from runtime_models.stop_weights import Controls
-from runtime_models.write_plain import cut, merged, placed, told_lost, writer_of
-from scene.control import control_of, covered
-from scene.framing import default_view
-from scene.scene import SceneObject
-from scene.selector import Selector
+from shapeshift.app.errors import UsageError
+from shapeshift.renderer.colors.false_colors import mixed_colors, shade_of
+from shapeshift.renderer.colors.palette import palette_colors
+from shapeshift.runtime_models.bake import ColorAt, Recolor, bake
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import Finding, SplatLayers
+from shapeshift.runtime_models.package.package_files import MANIFEST
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.sog.read_streamed import TREE
+from shapeshift.runtime_models.splats.sog.sog_files import META
+from shapeshift.runtime_models.splats.write_plain import cut, merged, placed, told_lost, writer_of
+from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.control import control_of, covered
+from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.selectors.selector import Selector
 
 ANY_SIZE = (640, 360)  # of the view whose eye is asked for
 

@@ -5,9 +5,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
-from app.command_line import SIZE
-from app.program import program
-from app.terminal import say, tell_json
+from shapeshift.app.command_line import SIZE
+from shapeshift.app.program import program
+from shapeshift.app.terminal import say, tell_json
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
 TOUCH = "touch.png"
@@ -34,12 +34,18 @@ class Options:
 
 
 def run(options: Options) -> int:
-    from app.commands.bench import check_counts, check_result_path, measure, print_table, write_json
-    from app.drawing import make_folder, open_renderer, parse_size
-    from app.errors import UsageError
-    from app.measure import Measure
-    from app.opening import ReadingOptions
-    from app.subject import open_subject
+    from shapeshift.app.commands.bench import (
+        check_counts,
+        check_result_path,
+        measure,
+        print_table,
+        write_json,
+    )
+    from shapeshift.app.drawing import make_folder, open_renderer, parse_size
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.measure import Measure
+    from shapeshift.app.opening import ReadingOptions
+    from shapeshift.app.subject import open_subject
 
     size = parse_size(options.size)
     check_counts(options)
@@ -66,15 +72,15 @@ def run(options: Options) -> int:
 
 def behind(subject) -> tuple[float, float, float]:
     """The background: what the scene names, else the viewer's."""
-    from scene.framing import default_background
+    from shapeshift.scene.cameras.framing import default_background
 
     return BACKGROUND if subject.file else default_background(subject.models[0], BACKGROUND)
 
 
 def play_touch(renderer, ctx, size: tuple[int, int], out: Path) -> dict | None:
     """The touch scene in motion; None, and why, where its bodies cannot be made here."""
-    from app.commands.touch_film import film
-    from runtime_models.model import BadFile
+    from shapeshift.app.commands.touch_film import film
+    from shapeshift.runtime_models.model import BadFile
 
     try:
         return film(renderer, ctx, size, out / TOUCH)
@@ -95,7 +101,7 @@ def draw_sheet(renderer, subject, size: tuple[int, int], out: Path) -> None:
     """
     import numpy as np
 
-    from app.drawing import save_png
+    from shapeshift.app.drawing import save_png
 
     stops = list(subject.stops)
     controls = sorted(stops + [(a + b) / 2 for a, b in pairwise(stops)])
@@ -119,8 +125,8 @@ def picture_name(view: int, x: float | None) -> str:
 
 def check_ours(paths: list[Path]) -> None:
     """Pictures of an earlier run are replaced, anybody else's files are not."""
-    from app.drawing import is_our_png
-    from app.errors import UsageError
+    from shapeshift.app.drawing import is_our_png
+    from shapeshift.app.errors import UsageError
 
     for path in paths:
         if path.exists() and not (path.is_file() and is_our_png(path)):
@@ -131,7 +137,7 @@ def viewpoints(subject, size: tuple[int, int]) -> list:
     """The first look at a scene, and from TURN to the left and right of it."""
     import numpy as np
 
-    from scene.pose import Pose
+    from shapeshift.scene.pose import Pose
 
     first, (centre, _) = subject.view(size), subject.bounds()
     views = [first]

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from app.command_line import POSITIONAL
-from app.opening import ReadingOptions, open_model
-from app.terminal import open_console, tell_json
+from shapeshift.app.command_line import POSITIONAL
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.terminal import open_console, tell_json
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.scene_files import describe_scene, open_scene_file
-    from runtime_models.read_scene import describe
-    from scene.scene_file import is_scene_file
+    from shapeshift.app.scene_files import describe_scene, open_scene_file
+    from shapeshift.runtime_models.read_scene import describe
+    from shapeshift.scene.document.scene_file import is_scene_file
 
     if is_scene_file(options.scene):
         file, models, _ = open_scene_file(options.scene, options)

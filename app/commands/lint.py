@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-from app.command_line import POSITIONAL
-from app.opening import PATIENCE_S, ReadingOptions, progress_after
-from app.scene_files import open_scene_file
-from app.terminal import open_console, tell_json
-from runtime_models.model import BadFile
+from shapeshift.app.command_line import POSITIONAL
+from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after
+from shapeshift.app.scene_files import open_scene_file
+from shapeshift.app.terminal import open_console, tell_json
+from shapeshift.runtime_models.model import BadFile
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ def examine(options: Options) -> dict:
     """The findings of a scene and the numbers that they rest on.  Raises BadFile, UsageError."""
     from dataclasses import replace
 
-    from scene.scene_file import is_scene_file
+    from shapeshift.scene.document.scene_file import is_scene_file
 
     if is_scene_file(options.scene):
         return examine_objects(options)
 
-    from runtime_models.lint_whole import fill_ratio, sample_of
-    from runtime_models.read_scene import describe, read_model
+    from shapeshift.runtime_models.lint.lint_whole import fill_ratio, sample_of
+    from shapeshift.runtime_models.read_scene import describe, read_model
 
     with progress_after(PATIENCE_S) as told:
         model = read_model(options.scene, replace(options.reading(), told=told))
@@ -72,8 +72,8 @@ def examine(options: Options) -> dict:
 
 def uneven(model, file: str) -> tuple:
     """A finding where a package's slider jumps between two stops: measured on small pictures."""
-    from renderer.pace import EVEN_ENOUGH, largest_step
-    from runtime_models.model import AnchorModel, Finding
+    from shapeshift.renderer.pace import EVEN_ENOUGH, largest_step
+    from shapeshift.runtime_models.model import AnchorModel, Finding
 
     if not isinstance(model, AnchorModel) or len(model.stops) < 2:
         return ()
@@ -89,10 +89,10 @@ def uneven(model, file: str) -> tuple:
 
 def examine_objects(options: Options) -> dict:
     """The same of a scene file and all that it names: models, collider meshes, reactions."""
-    from runtime_models.lint_whole import fill_ratio
-    from runtime_models.read_scene import files_of
-    from scene.read_mesh import read_mesh
-    from scene.scene_file import FORMAT, HULLS, machine_of
+    from shapeshift.runtime_models.lint.lint_whole import fill_ratio
+    from shapeshift.runtime_models.read_scene import files_of
+    from shapeshift.scene.colliders.read_mesh import read_mesh
+    from shapeshift.scene.document.scene_file import FORMAT, HULLS, machine_of
 
     file, models, scene = open_scene_file(options.scene, options, tell=False)
     meshes = {item.collider: item for item in file.all_items if item.collider not in (None, HULLS)}
@@ -131,10 +131,10 @@ def sample_of_scene(scene):
     """A Sample of what shows, where it stands, each object at its x; None where nothing does."""
     import numpy as np
 
-    from runtime_models.evaluate import evaluate
-    from runtime_models.lint_whole import sample_of
-    from scene.control import control_of
-    from scene.framing import default_view
+    from shapeshift.runtime_models.evaluate import evaluate
+    from shapeshift.runtime_models.lint.lint_whole import sample_of
+    from shapeshift.scene.cameras.framing import default_view
+    from shapeshift.scene.control import control_of
 
     parts = []
     for thing in scene.objects:
@@ -157,8 +157,8 @@ def extent_of(sample) -> list[float]:
 
 def splats_of(model):
     """What the model shows at its first stop, seen from where a viewer would start."""
-    from runtime_models.evaluate import evaluate
-    from scene.framing import default_view
+    from shapeshift.runtime_models.evaluate import evaluate
+    from shapeshift.scene.cameras.framing import default_view
 
     eye = default_view(model, (640, 360)).world_from_eye.position
     return evaluate(model, model.stops[0].x, eye)

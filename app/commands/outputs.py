@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.commands.png16 import MOST, write_png16, write_whole
-from app.commands.render import LEGEND
+from shapeshift.app.commands.png16 import MOST, write_png16, write_whole
+from shapeshift.app.commands.render import LEGEND
 
 if TYPE_CHECKING:
-    from renderer.renderer import Renderer
-    from renderer.surface import Surface
+    from shapeshift.renderer.renderer import Renderer
+    from shapeshift.renderer.surface import Surface
 
 FARTHER = MOST  # what a depth picture says of all that is too far for it
 MEANINGS = {
@@ -32,8 +32,8 @@ def draw_outputs(
     output: str, metres_per_step: float,
 ) -> None:  # fmt: skip
     """A .png and a .npy of each scene from its view, two eyes side by side, and one legend."""
-    from app.progress import tracked
-    from scene.stereo import stereo_pair
+    from shapeshift.app.progress import tracked
+    from shapeshift.scene.stereo import stereo_pair
 
     legend = {"output": output, "meaning": MEANINGS[output]}
     if output == "depth":

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from runtime_models.plain_text import name_line
+from shapeshift.runtime_models.files.plain_text import name_line
 
 Rows = list[tuple[str, tuple[float, float, float]]]
 TEXT = (235, 235, 235)
@@ -15,7 +15,7 @@ def with_legend(picture: np.ndarray, rows: Rows) -> np.ndarray:
         return picture
     from PIL import Image, ImageDraw
 
-    from renderer.letters import drawable, letters
+    from shapeshift.renderer.debug.letters import drawable, letters
 
     image = Image.fromarray((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
     draw = ImageDraw.Draw(image)

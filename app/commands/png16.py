@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.drawing import SOFTWARE
-from runtime_models.whole_file import write_whole
+from shapeshift.app.drawing import SOFTWARE
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 MARK = b"\x89PNG\r\n\x1a\n"
 MOST = 65535

@@ -6,10 +6,10 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
-from app.opening import ReadingOptions, open_model
-from app.paths import full
-from app.terminal import say
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LEGEND = "legend.json"  # of --output
@@ -81,18 +81,18 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.charts.budget import read_budget
-    from app.charts.budget_chart import Drawn, settings_for
-    from app.commands.outputs import draw_outputs
-    from app.drawing import (
+    from shapeshift.app.charts.budget import read_budget
+    from shapeshift.app.charts.budget_chart import Drawn, settings_for
+    from shapeshift.app.commands.outputs import draw_outputs
+    from shapeshift.app.drawing import (
         MOST_VALUES,
         make_folder,
         open_renderer,
         parse_size,
         split_controls,
     )
-    from app.errors import UsageError
-    from scene.scene_file import is_scene_file
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.scene_file import is_scene_file
 
     controls = split_controls(options.x) or [None]
     size = parse_size(options.size) if options.size else None
@@ -146,8 +146,8 @@ class Opened:
 
 def open_one(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     """A scene of one model, with the parts of --select."""
-    from app.subject import Subject
-    from scene.scene import Scene
+    from shapeshift.app.subject import Subject
+    from shapeshift.scene.scene import Scene
 
     model = open_model(options.scene, options)
     subject = Subject.of(model, 0.0)
@@ -170,7 +170,7 @@ def subject_at(subject, control: float | str | None):
 
 def label_of(control: float | str | None, x=None) -> str:
     """A control in the name of a picture; x: the Control of all objects, where that is known."""
-    from app.paths import file_name
+    from shapeshift.app.paths import file_name
 
     if isinstance(x, float | int):
         return f"x{x:.3f}"
@@ -184,8 +184,8 @@ def label_of(control: float | str | None, x=None) -> str:
 
 def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
     """The objects of a scene file, each where and as the file says."""
-    from app.errors import UsageError
-    from app.subject import open_subject
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.subject import open_subject
 
     if options.select:
         raise UsageError("--select is for one model; a scene file has selectors for each object.")
@@ -196,7 +196,7 @@ def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Ope
 
 def check_one_of(options: Options, budget) -> None:
     """A budget chooses the limits; who gives them has chosen already."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     given = [name for name in LIMITS if getattr(options, name) != getattr(Options, name)]
     if budget and given:
@@ -206,7 +206,7 @@ def check_one_of(options: Options, budget) -> None:
 
 def check_output(options: Options) -> None:
     """Numbers have neither a legend drawn over them nor a budget."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     for name in ("debug", "target_ms"):
         if options.output != "picture" and getattr(options, name) != getattr(Options, name):
@@ -218,15 +218,15 @@ def check_output(options: Options) -> None:
 
 def unit_of(options: Options, subject, views: list) -> float:
     """Metres a step of a depth picture."""
-    from app.commands.outputs import choose_unit
+    from shapeshift.app.commands.outputs import choose_unit
 
     return options.depth_unit or choose_unit(*subject.bounds(), views)
 
 
 def choose_settings(options: Options):
     """The RenderSettings of the options; UsageError names what is out of range."""
-    from app.errors import UsageError
-    from renderer.settings import RenderSettings
+    from shapeshift.app.errors import UsageError
+    from shapeshift.renderer.settings import RenderSettings
 
     try:
         names = ("debug", "stereo_colors", *LIMITS)
@@ -239,7 +239,7 @@ def choose_cameras(options: Options, size: tuple[int, int] | None):
     """The CameraList of the files that --camera names, in their own world; None: views around the
     scene.  `size` None leaves the pixels to the file.
     """
-    from app.camera_files import named_cameras
+    from shapeshift.app.camera_files import named_cameras
 
     if options.camera in AROUND:
         return None
@@ -256,8 +256,8 @@ def choose_paths(
 
     Raises UsageError where one is there.
     """
-    from app.drawing import MOST_VALUES
-    from app.errors import UsageError
+    from shapeshift.app.drawing import MOST_VALUES
+    from shapeshift.app.errors import UsageError
 
     views = views or (options.frames if options.camera == "orbit" else 1)
     count = len(labels) * views
@@ -275,7 +275,7 @@ def choose_paths(
 
 def own_views(options: Options, subject, size: tuple[int, int] | None) -> list:
     """The views around the scene: as many as --frames on the orbit, else the one from the front."""
-    from scene.framing import orbit_path
+    from shapeshift.scene.cameras.framing import orbit_path
 
     size = size or (640, 360)
     if options.camera == "front" or options.frames == 1:
@@ -285,8 +285,8 @@ def own_views(options: Options, subject, size: tuple[int, int] | None) -> list:
 
 def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:
     """The selectors that the texts of --select stand for; a lens looks along the view."""
-    from app.errors import UsageError
-    from scene.read_selector import read_selector
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.selectors.read_selector import read_selector
 
     try:
         return tuple(read_selector(text, model.stops, view.world_from_eye) for text in texts)
@@ -298,11 +298,11 @@ def draw_all(renderer, scenes: list, views: list, paths: list[Path], eye_distanc
     """A picture of each scene from its view; two eyes side by side where they are apart."""
     import numpy as np
 
-    from app.commands.picture_legend import with_legend
-    from app.drawing import save_png
-    from app.progress import tracked
-    from renderer.debug import debug_legend
-    from scene.stereo import stereo_pair
+    from shapeshift.app.commands.picture_legend import with_legend
+    from shapeshift.app.drawing import save_png
+    from shapeshift.app.progress import tracked
+    from shapeshift.renderer.debug.debug import debug_legend
+    from shapeshift.scene.stereo import stereo_pair
 
     work = list(zip(scenes, views, paths, strict=True))
     for scene, view, path in tracked(work, "drawing"):

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
-from app.paths import full
-from app.terminal import say
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 
 RESULT = "run.jsonl"
 HZ = 90
@@ -44,10 +44,10 @@ class Options:
 
 
 def run(options: Options) -> int:
-    from app.drawing import make_folder, parse_size
-    from app.errors import UsageError
-    from scene.read_scene_file import read_scene_file
-    from scene.read_script import read_script
+    from shapeshift.app.drawing import make_folder, parse_size
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.read_scene_file import read_scene_file
+    from shapeshift.scene.world.read_script import read_script
 
     size = parse_size(options.size)
     if options.pictures < 0:
@@ -80,7 +80,7 @@ def run(options: Options) -> int:
 
 def refuse_model(path: Path) -> None:
     """Raises UsageError for a scene that is no file of objects, and would be read as none."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     if path.exists() and path.suffix.lower() != ".json":
         raise UsageError(
@@ -91,13 +91,13 @@ def refuse_model(path: Path) -> None:
 
 def make_simulation(file, acts: tuple, x: str = ""):
     """The scene with its models, bodies and physics.  Raises BadFile, UsageError."""
-    from app.opening import PATIENCE_S, progress_after, sentence
-    from app.scene_files import file_at, tell_findings
-    from runtime_models.plain_splats import Reading
-    from scene.collider_files import colliders_of
-    from scene.scene_file import read_models
-    from scene.simulation import Simulation
-    from scene.world import World
+    from shapeshift.app.opening import PATIENCE_S, progress_after, sentence
+    from shapeshift.app.scene_files import file_at, tell_findings
+    from shapeshift.runtime_models.splats.plain_splats import Reading
+    from shapeshift.scene.colliders.collider_files import colliders_of
+    from shapeshift.scene.document.scene_file import read_models
+    from shapeshift.scene.world.simulation import Simulation
+    from shapeshift.scene.world.world import World
 
     with progress_after(PATIENCE_S) as shown:
         models = read_models(file, Reading(told=shown))
@@ -112,7 +112,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
 
 def refuse_taken(paths: list[Path], options: Options) -> None:
     """Nothing is replaced unasked, and an input never."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     inputs = [path.resolve() for path in (options.scene, options.script) if path]
     for path in paths:
@@ -127,7 +127,7 @@ def tell(simulation, steps: int, path: Path, options: Options):
 
     Lines are whole at every moment: who stops it keeps what was told until then.
     """
-    from runtime_models.whole_file import open_lines
+    from shapeshift.runtime_models.files.whole_file import open_lines
 
     world = simulation.world
     with open_lines(path) as out:
@@ -144,7 +144,7 @@ def tell(simulation, steps: int, path: Path, options: Options):
 
 def shown(told, steps: int):
     """The same steps, with a bar of how many are done."""
-    from app.progress import progress_bar
+    from shapeshift.app.progress import progress_bar
 
     with progress_bar() as bar:
         task = bar.add_task("simulating", total=steps)
@@ -161,8 +161,8 @@ def draw_run(told, simulation, file, size: tuple[int, int], options: Options) ->
     """A picture of the scene as it stands every --pictures steps."""
     from dataclasses import replace
 
-    from app.drawing import open_renderer, save_png
-    from scene.scene_file import first_view
+    from shapeshift.app.drawing import open_renderer, save_png
+    from shapeshift.scene.document.scene_file import first_view
 
     view = first_view(file, simulation.world.drawn(), size)
     with open_renderer(options.context, options.drawing) as (renderer, _):

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import EXPERT, POSITIONAL, SIZE, Opt
-from app.opening import ReadingOptions
-from app.paths import full
-from app.terminal import open_console, say
+from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE, Opt
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import open_console, say
 
 FAILED = 1  # exit code: a case went past its bound
 
@@ -47,10 +47,10 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.drawing import make_folder, open_renderer, parse_size
-    from app.stability_cases.stage import Stage
-    from app.stability_cases.table import open_table
-    from app.subject import open_subject
+    from shapeshift.app.drawing import make_folder, open_renderer, parse_size
+    from shapeshift.app.stability_cases.stage import Stage
+    from shapeshift.app.stability_cases.table import open_table
+    from shapeshift.app.subject import open_subject
 
     size = parse_size(options.size)
     names = choose_cases(options)
@@ -78,8 +78,8 @@ def run(options: Options) -> int:
 
 def choose_cases(options: Options) -> list[str]:
     """The cases asked for, in the table's order; refuses numbers and names that cannot be."""
-    from app.errors import UsageError
-    from app.stability_cases.table import CASES
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.stability_cases.table import CASES
 
     for name, least, most in (("steps", 6, 1000), ("rounds", 2, 1000)):
         if not least <= getattr(options, name) <= most:
@@ -93,7 +93,7 @@ def choose_cases(options: Options) -> list[str]:
 
 def subject(options: Options, renderer, scene) -> str:
     """What the rows are about: rows of another scene, size or drawing do not belong with them."""
-    from app.measure import processor
+    from shapeshift.app.measure import processor
 
     backends = ", ".join(renderer.backends.values())
     return (
@@ -103,7 +103,7 @@ def subject(options: Options, renderer, scene) -> str:
 
 
 def command_line() -> str:
-    from app.commands.bench import command_line as typed
+    from shapeshift.app.commands.bench import command_line as typed
 
     return typed()
 
@@ -111,8 +111,8 @@ def command_line() -> str:
 def perform(stage, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
 
-    from app.progress import working
-    from app.stability_cases.table import CASES, save_panels
+    from shapeshift.app.progress import working
+    from shapeshift.app.stability_cases.table import CASES, save_panels
 
     console = open_console()
     with working("starting") as tell:

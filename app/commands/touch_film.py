@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from app.commands.simulate import make_simulation
-from app.drawing import save_png
-from app.measure import WARM_UP, percentiles
-from renderer.renderer import Renderer
-from scene.read_scene_file import read_scene_file
-from scene.read_script import read_script
-from scene.scene_file import first_view
+from shapeshift.app.commands.simulate import make_simulation
+from shapeshift.app.drawing import save_png
+from shapeshift.app.measure import WARM_UP, percentiles
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from shapeshift.scene.document.scene_file import first_view
+from shapeshift.scene.world.read_script import read_script
 
 ASSETS = Path(__file__).resolve().parents[2] / "assets"
 SCENE, SCRIPT = ASSETS / "touch.scene.json", ASSETS / "touch.jsonl"

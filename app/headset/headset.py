@@ -9,9 +9,9 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
-from app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
-from app.opening import ReadingOptions
-from app.terminal import say
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.terminal import say
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 NO_HEADSET = 4  # exit code
@@ -71,7 +71,7 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     """0 after a session; NO_HEADSET, or the viewer's code, without one."""
-    from vr.instance import Lost, NoHeadset
+    from shapeshift.vr.openxr.instance import Lost, NoHeadset
 
     check(options)
     try:
@@ -82,7 +82,7 @@ def run(options: Options) -> int:
 
 def check(options: Options) -> None:
     """UsageError, one sentence, for what makes no sense."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     if not 0.1 <= options.eye_part <= 2:
         raise UsageError(f"--eye-part is {options.eye_part:g}, expected 0.1 to 2.")
@@ -108,17 +108,17 @@ def check(options: Options) -> None:
 
 def wear(options: Options) -> int:
     """The session from its door to its end.  Raises NoHeadset, Lost."""
-    from app.cli import has_display
-    from app.drawing import make_folder
-    from app.headset.headset_report import Report
-    from app.headset.mirror import open_mirror
-    from app.headset.pacing import FLOOR_DB, Pacing
-    from app.headset.wearing import Eyes, Wearing
-    from app.headset.worn_scene import open_worn
-    from renderer.renderer import Renderer
-    from vr.instance import Instance, Lost
-    from vr.locomotion import Rules
-    from vr.session import Session
+    from shapeshift.app.cli import has_display
+    from shapeshift.app.drawing import make_folder
+    from shapeshift.app.headset.headset_report import Report
+    from shapeshift.app.headset.mirror import open_mirror
+    from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
+    from shapeshift.app.headset.wearing import Eyes, Wearing
+    from shapeshift.app.headset.worn_scene import open_worn
+    from shapeshift.renderer.renderer import Renderer
+    from shapeshift.vr.locomotion.locomotion import Rules
+    from shapeshift.vr.openxr.instance import Instance, Lost
+    from shapeshift.vr.openxr.session import Session
 
     with Instance() as instance:
         scene = open_worn(options.scene or DEMO, options, options.x)
@@ -193,12 +193,12 @@ def describe(instance, session) -> dict:
 
 def without_headset(reason: str, options: Options) -> int:
     """Says why, and opens the viewer, unless nobody looks: a measured run, or no display."""
-    from app.cli import has_display
+    from shapeshift.app.cli import has_display
 
     say(f"shapeshift vr: {reason}")
     if options.frames or options.report or not has_display():
         return NO_HEADSET
-    from app.viewer import desktop
+    from shapeshift.app.viewer import desktop
 
     say("Opening the scene in a window instead.")
     reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}

@@ -6,18 +6,18 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from app.drawing import save_png
-from app.paths import full
-from app.terminal import say
-from runtime_models.whole_file import open_lines, write_whole
-from scene.json_fields import control_row
-from scene.pose import Pose
-from vr.carried import panel_row
-from vr.frame import SIDES, Frame, Hand
-from vr.swapchain import read
+from shapeshift.app.drawing import save_png
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
+from shapeshift.runtime_models.files.whole_file import open_lines, write_whole
+from shapeshift.scene.json.json_fields import control_row
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import SIDES, Frame, Hand
+from shapeshift.vr.openxr.swapchain import read
+from shapeshift.vr.panel.carried import panel_row
 
 if TYPE_CHECKING:
-    from app.headset.wearing import Wearing
+    from shapeshift.app.headset.wearing import Wearing
 
 DECIMALS = 6
 

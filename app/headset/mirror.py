@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import glfw
 import moderngl
 
-from renderer.context import NEEDED, NoContext, open_context
-from vr.shown import Shown, middle
+from shapeshift.renderer.gl.context import NEEDED, NoContext, open_context
+from shapeshift.vr.shown import Shown, middle
 
 TITLE = "Shapeshift in the headset"
 SIZE = (960, 720)

@@ -8,14 +8,14 @@ from statistics import median
 
 import numpy as np
 
-from app.charts.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
-from app.charts.quick_chart import QUICK, QuickChart, QuickRow
-from app.terminal import say
-from renderer.renderer import Renderer
-from renderer.resolution import Resolution
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View
-from scene.scene import Scene
+from shapeshift.app.charts.budget import EXACT, FLOOR_DB, Choice, choose, least_scale
+from shapeshift.app.charts.quick_chart import QUICK, QuickChart, QuickRow
+from shapeshift.app.terminal import say
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.resolution import Resolution
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene
 
 AUTO = "auto"
 FIXED = {  # quality of the panel -> row of the quick chart that it always is

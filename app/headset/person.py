@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from scene.pose import Pose
-from scene.world import World
-from vr.frame import Frame, Pulse
-from vr.locomotion import RULES, Comfort, Rules, Travel, move
-from vr.stance import standing_before, underfoot
-from vr.standing import Standing
-from vr.teleport import ground_of
-from vr.touching import Touched, Touching, at_rest, feel, follow, touch
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.world import World
+from shapeshift.vr.frame import Frame, Pulse
+from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, move
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import standing_before, underfoot
+from shapeshift.vr.locomotion.teleport import ground_of
+from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
 
 class Person:

@@ -5,29 +5,29 @@ from collections.abc import Sequence
 
 import moderngl
 
-from app.headset.headset_report import Report
-from app.headset.mirror import Mirror, NoMirror
-from app.headset.notices import Late, late_card
-from app.headset.pacing import Pacing, StereoChart
-from app.headset.person import Person
-from app.headset.worn_panel import WornPanel
-from app.headset.worn_scene import WornScene
-from renderer.renderer import Renderer
-from renderer.settings import FrameStats
-from scene.pose import View
-from vr.card import Card
-from vr.drawn import Drawn, drawn_of
-from vr.floor import REST, Floor, Grid, clearness
-from vr.frame import Frame
-from vr.glove import Capsule
-from vr.hints import hints
-from vr.locomotion import RULES, Rules
-from vr.outline import BY_HAND, BY_RAY, Outlines, outline
-from vr.overlay import Overlay
-from vr.session import Session
-from vr.stance import underfoot
-from vr.standing import Standing
-from vr.touching import strongest
+from shapeshift.app.headset.headset_report import Report
+from shapeshift.app.headset.mirror import Mirror, NoMirror
+from shapeshift.app.headset.notices import Late, late_card
+from shapeshift.app.headset.pacing import Pacing, StereoChart
+from shapeshift.app.headset.person import Person
+from shapeshift.app.headset.worn_panel import WornPanel
+from shapeshift.app.headset.worn_scene import WornScene
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats
+from shapeshift.scene.pose import View
+from shapeshift.vr.card import Card
+from shapeshift.vr.drawn import Drawn, drawn_of
+from shapeshift.vr.floor import REST, Floor, Grid, clearness
+from shapeshift.vr.frame import Frame
+from shapeshift.vr.glove import Capsule
+from shapeshift.vr.hints import hints
+from shapeshift.vr.locomotion.locomotion import RULES, Rules
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import underfoot
+from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
+from shapeshift.vr.overlay import Overlay
+from shapeshift.vr.touching import strongest
 
 LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
 

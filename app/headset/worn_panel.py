@@ -3,12 +3,13 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from scene.follow import put_back
-from scene.scene_file import named_stops
-from scene.world import World
-from vr.carried import Carried, carry
-from vr.frame import Frame
-from vr.panel_state import (
+from shapeshift.scene.document.scene_file import named_stops
+from shapeshift.scene.world.follow import put_back
+from shapeshift.scene.world.world import World
+from shapeshift.vr.frame import Frame
+from shapeshift.vr.locomotion.stance import resized
+from shapeshift.vr.panel.carried import Carried, carry
+from shapeshift.vr.panel.panel_state import (
     Exit,
     Facts,
     Pulse,
@@ -21,10 +22,9 @@ from vr.panel_state import (
     Slider,
     Wish,
 )
-from vr.stance import resized
 
 if TYPE_CHECKING:
-    from app.headset.wearing import Wearing
+    from shapeshift.app.headset.wearing import Wearing
 
 HINT = "menu button or palm up: open, close    stick: slide"
 

@@ -5,16 +5,21 @@ from pathlib import Path
 
 import numpy as np
 
-from app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
-from app.scene_files import file_at, open_scene_file
-from app.subject import control_of_text, pace_of
-from app.terminal import say
-from runtime_models.model import Model
-from scene.collider_files import colliders_of
-from scene.framing import default_background, default_view, frame_points, scene_points
-from scene.pose import Pose
-from scene.scene_file import SceneFile, SceneItem, first_view, is_scene_file
-from scene.world import World
+from shapeshift.app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
+from shapeshift.app.scene_files import file_at, open_scene_file
+from shapeshift.app.subject import control_of_text, pace_of
+from shapeshift.app.terminal import say
+from shapeshift.runtime_models.model import Model
+from shapeshift.scene.cameras.framing import (
+    default_background,
+    default_view,
+    frame_points,
+    scene_points,
+)
+from shapeshift.scene.colliders.collider_files import colliders_of
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem, first_view, is_scene_file
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.world import World
 
 HZ = 90  # steps of the physics a second
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB, behind objects: as in the window

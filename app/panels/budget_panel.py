@@ -2,9 +2,9 @@
 
 from imgui_bundle import imgui
 
-from app.panels.panel_rows import labelled_slider, tip
-from app.viewer.dial import Dial
-from app.viewer.stage import Stage
+from shapeshift.app.panels.panel_rows import labelled_slider, tip
+from shapeshift.app.viewer.dial import Dial
+from shapeshift.app.viewer.stage import Stage
 
 MS_RANGE = (2.0, 200.0)
 DB_RANGE = (20.0, 80.0)

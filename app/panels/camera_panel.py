@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import button_row, choice, tip
-from app.viewer.sections import Section
-from app.viewer.stepping import picture_box
-from runtime_models.model import BadFile
-from scene.camera_list import CameraList, moved
-from scene.pose import View
-from scene.write_cameras import COLMAP_FORMS, FORMS, write_cameras
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import button_row, choice, tip
+from shapeshift.app.viewer.sections import Section
+from shapeshift.app.viewer.stepping import picture_box
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.camera_list import CameraList, moved
+from shapeshift.scene.cameras.write_cameras import COLMAP_FORMS, FORMS, write_cameras
+from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.viewer import Viewer
 
 Vec = imgui.ImVec2
 SIDES = {

@@ -8,7 +8,7 @@ import functools
 
 from imgui_bundle import imgui
 
-from runtime_models.plain_text import one_line, several_lines
+from shapeshift.runtime_models.files.plain_text import one_line, several_lines
 
 EDITED = ("input_text", "input_text_multiline", "input_text_with_hint")  # what somebody types
 WITH_LINES = ("text", "calc_text_size", "set_tooltip", "set_item_tooltip")  # may have several

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.commands.exported import Look, Part, export
-from app.errors import UsageError
-from app.panels.panel_rows import choice, number, tip
-from app.paths import file_name
-from app.viewer.sections import Section
-from runtime_models.evaluate import follows_eye
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.write_plain import WRITERS, writer_of
+from shapeshift.app.commands.exported import Look, Part, export
+from shapeshift.app.errors import UsageError
+from shapeshift.app.panels.panel_rows import choice, number, tip
+from shapeshift.app.paths import file_name
+from shapeshift.app.viewer.sections import Section
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.write_plain import WRITERS, writer_of
 
 if TYPE_CHECKING:
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.viewer import Viewer
 
 EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
 DEGREES = ("colours: one from all sides", *(f"colours: SH degree {n}" for n in (1, 2, 3)))
@@ -154,7 +154,7 @@ class ExportPanel:
 
 def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
     """An empty file named after the scene and x; never one that is there."""
-    from app.drawing import make_folder
+    from shapeshift.app.drawing import make_folder
 
     make_folder(folder)
     thing = parts[0].thing

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import tip
-from app.panels.theme import Box
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import tip
+from shapeshift.app.panels.theme import Box
 
 Vec = imgui.ImVec2
 Row = tuple[str, str]  # key, what it does

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.theme import Box
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.theme import Box
 
 Vec = imgui.ImVec2
 Row = tuple[str, tuple[float, float, float]]  # text, display sRGB

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from app.panels.panel_rows import choice, tip
-from app.viewer.stage import AS_FILED, Stage
-from renderer.palette import PALETTES
-from renderer.settings import DEBUG_VIEWS
+from shapeshift.app.panels.panel_rows import choice, tip
+from shapeshift.app.viewer.stage import AS_FILED, Stage
+from shapeshift.renderer.colors.palette import PALETTES
+from shapeshift.renderer.settings import DEBUG_VIEWS
 
 DEBUG_NAMES = {
     "": "picture",

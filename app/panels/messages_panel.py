@@ -2,10 +2,10 @@
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import tip
-from app.panels.theme import Box
-from app.viewer.messages import Messages
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import tip
+from shapeshift.app.panels.theme import Box
+from shapeshift.app.viewer.messages import Messages
 
 Vec = imgui.ImVec2
 WIDEST = 560.0  # logical pixels; longer sentences wrap

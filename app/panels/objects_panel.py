@@ -5,16 +5,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import button_row, choice, number, right_aligned, slider, tip
-from app.viewer.arrange import place, stands_elsewhere
-from app.viewer.gizmo import MOVE, TURN
-from scene import edits
-from scene.pose import Pose
-from scene.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import button_row, choice, number, right_aligned, slider, tip
+from shapeshift.app.viewer.arrange import place, stands_elsewhere
+from shapeshift.app.viewer.gizmo import MOVE, TURN
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
+from shapeshift.scene.pose import Pose
 
 if TYPE_CHECKING:
-    from app.viewer.objects import Objects
+    from shapeshift.app.viewer.objects import Objects
 
 Vec = imgui.ImVec2
 MOST_ROWS = 8  # of the list that are seen at once

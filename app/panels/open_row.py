@@ -5,9 +5,9 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from app.panels.empty_panel import CHOICES
-from app.panels.panel_rows import tip
-from app.viewer.recent import RecentFiles
+from shapeshift.app.panels.empty_panel import CHOICES
+from shapeshift.app.panels.panel_rows import tip
+from shapeshift.app.viewer.recent import RecentFiles
 
 Vec = imgui.ImVec2
 POPUP = "recent files"

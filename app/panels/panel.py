@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import section, tip
-from app.panels.theme import Box
-from app.viewer.layout import Layout
-from app.viewer.sections import Section
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import section, tip
+from shapeshift.app.panels.theme import Box
+from shapeshift.app.viewer.layout import Layout
+from shapeshift.app.viewer.sections import Section
 
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
+from shapeshift.app.panels import theme
 
 Vec = imgui.ImVec2
 TIP_WIDTH = 300.0  # logical pixels; longer explanations wrap

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from imgui_bundle import imgui, portable_file_dialogs
 
-from app.panels.panel_rows import tip
-from app.panels.question_box import answer_row, question_box
-from app.paths import plain
+from shapeshift.app.panels.panel_rows import tip
+from shapeshift.app.panels.question_box import answer_row, question_box
+from shapeshift.app.paths import plain
 
 Vec = imgui.ImVec2
 LONGEST_PATH = 1000  # letters

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.budget_panel import draw_budget
-from app.panels.panel_rows import ms_text, number, right_aligned, rows, subsection, tip
-from app.panels.quality_panel import draw_quality
-from app.viewer.dial import Dial
-from app.viewer.readings import Readings
-from app.viewer.stage import Stage
-from renderer.settings import CULL_REASONS, FrameStats
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.budget_panel import draw_budget
+from shapeshift.app.panels.panel_rows import ms_text, number, right_aligned, rows, subsection, tip
+from shapeshift.app.panels.quality_panel import draw_quality
+from shapeshift.app.viewer.dial import Dial
+from shapeshift.app.viewer.readings import Readings
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.renderer.settings import CULL_REASONS, FrameStats
 
 Vec = imgui.ImVec2
 

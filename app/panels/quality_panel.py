@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from app.charts.comparison import exact, is_exact, shortcuts
-from app.panels.panel_rows import (
+from shapeshift.app.charts.comparison import exact, is_exact, shortcuts
+from shapeshift.app.panels.panel_rows import (
     choice,
     db_text,
     labelled_slider,
@@ -15,9 +15,9 @@ from app.panels.panel_rows import (
     subsection,
     tip,
 )
-from app.viewer.readings import Readings
-from app.viewer.stage import Stage
-from renderer.settings import ORDERS, TARGETS, RenderSettings
+from shapeshift.app.viewer.readings import Readings
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.renderer.settings import ORDERS, TARGETS, RenderSettings
 
 MAX_LAMBDA = 512.0  # pixels; the slider's end means no limit
 FAR_RADII = 12.0  # scene radii; the distance slider's end means no limit

@@ -3,11 +3,11 @@
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import button_row, choice, right_aligned, slider, tip
-from app.panels.slider import track
-from app.viewer.regions import KINDS, Region
-from app.viewer.stage import Stage
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import button_row, choice, right_aligned, slider, tip
+from shapeshift.app.panels.slider import track
+from shapeshift.app.viewer.regions import KINDS, Region
+from shapeshift.app.viewer.stage import Stage
 
 Vec = imgui.ImVec2
 LARGEST = 2.0  # scene radii, of a size

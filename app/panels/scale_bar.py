@@ -3,11 +3,11 @@
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.theme import Box
-from renderer.palette import legend_opacity, palette_colors, thermal_blend
-from renderer.ticks import nice_ticks, tick_text
-from scene.scene import Scene
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.theme import Box
+from shapeshift.renderer.colors.palette import legend_opacity, palette_colors, thermal_blend
+from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
+from shapeshift.scene.scene import Scene
 
 Vec = imgui.ImVec2
 WIDTH = 16.0  # logical pixels, of the colours

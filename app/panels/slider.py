@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import tip
-from app.panels.stops_panel import pace_button
-from app.panels.theme import Box
-from app.viewer.arrange import go_to_stop, steer_by_hand
-from app.viewer.stage import Stage
-from app.viewer.track import Grip, Track, half_ways, read_x
-from runtime_models.model import Stop
-from scene.control import SNAP
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import tip
+from shapeshift.app.panels.stops_panel import pace_button
+from shapeshift.app.panels.theme import Box
+from shapeshift.app.viewer.arrange import go_to_stop, steer_by_hand
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.track import Grip, Track, half_ways, read_x
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.control import SNAP
 
 Vec = imgui.ImVec2
 ROW = 46.0  # logical pixels

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from imgui_bundle import imgui
 
-from app.opening import sentence
-from app.panels import theme
-from app.panels.panel_rows import number, tip
-from app.panels.theme import Box
-from app.viewer.stage import Stage
+from shapeshift.app.opening import sentence
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import number, tip
+from shapeshift.app.panels.theme import Box
+from shapeshift.app.viewer.stage import Stage
 
 Vec = imgui.ImVec2
 GAP = "   \u00b7   "

@@ -2,11 +2,11 @@
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import choice, slider, tip
-from app.viewer.arrange import go_to_stop
-from app.viewer.stage import Stage
-from scene.control import EASES, MODES, Sweep
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import choice, slider, tip
+from shapeshift.app.viewer.arrange import go_to_stop
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.scene.control import EASES, MODES, Sweep
 
 Vec = imgui.ImVec2
 LONGEST_LEG_S = 20.0

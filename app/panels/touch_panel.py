@@ -4,14 +4,14 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.panels.panel_rows import button_row, tip
-from scene.reactions import TwoAxes
-from scene.scene_file import named_stops
-from scene.thing import Thing
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.panel_rows import button_row, tip
+from shapeshift.scene.document.scene_file import named_stops
+from shapeshift.scene.world.reactions import TwoAxes
+from shapeshift.scene.world.rigid_object import Thing
 
 if TYPE_CHECKING:
-    from app.viewer.touch import Touch
+    from shapeshift.app.viewer.touch import Touch
 
 Vec = imgui.ImVec2
 PAD, KNOB = 120.0, 9.0  # logical pixels: a pad's height, and half of its knob

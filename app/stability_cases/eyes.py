@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.stability_cases.finding import (
+from shapeshift.app.stability_cases.finding import (
     Finding,
     Panel,
     Result,
@@ -13,12 +13,12 @@ from app.stability_cases.finding import (
     clean,
     decibels,
 )
-from app.stability_cases.scenes import alone, front, glossy, splats
-from app.stability_cases.stage import Stage, difference, turned, turned_about
-from renderer import eye_colors
-from scene.framing import distances_from
-from scene.pose import View
-from scene.stereo import PUPILS_M, eyes_apart, stereo_pair
+from shapeshift.app.stability_cases.scenes import alone, front, glossy, splats
+from shapeshift.app.stability_cases.stage import Stage, difference, turned, turned_about
+from shapeshift.renderer.colors import eye_colors
+from shapeshift.scene.cameras.framing import distances_from
+from shapeshift.scene.pose import View
+from shapeshift.scene.stereo import PUPILS_M, eyes_apart, stereo_pair
 
 DEPTHS = (0.5, 1.0, 3.0, 10.0, 100.0)  # metres
 CANTED = (2.0, 5.0, 10.0)  # degrees between the eyes: each then wants an order of its own

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.stability_cases.finding import Finding, Result, at_most, clean, not_here
-from app.stability_cases.scenes import front, shell, small_model
-from app.stability_cases.stage import EMPTY, Stage
-from scene.scene import Scene, SceneObject
+from shapeshift.app.stability_cases.finding import Finding, Result, at_most, clean, not_here
+from shapeshift.app.stability_cases.scenes import front, shell, small_model
+from shapeshift.app.stability_cases.stage import EMPTY, Stage
+from shapeshift.scene.scene import Scene, SceneObject
 
 STATUS = Path("/proc/self/statm")
 SETTLED = 0.5  # of the rounds: by then libraries are loaded and pools have their size

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.stability_cases.finding import (
+from shapeshift.app.stability_cases.finding import (
     Finding,
     Panel,
     Result,
@@ -15,9 +15,9 @@ from app.stability_cases.finding import (
     decibels,
     not_here,
 )
-from app.stability_cases.stage import Stage, difference, turned, turned_about
-from renderer.pace import EVEN_ENOUGH
-from runtime_models.evaluate import follows_eye
+from shapeshift.app.stability_cases.stage import Stage, difference, turned, turned_about
+from shapeshift.renderer.pace import EVEN_ENOUGH
+from shapeshift.runtime_models.evaluate import follows_eye
 
 LONGEST_STEP = 0.01  # of x
 LUMA = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709

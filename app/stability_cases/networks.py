@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.stability_cases.finding import (
+from shapeshift.app.stability_cases.finding import (
     Panel,
     Result,
     at_least,
@@ -13,10 +13,10 @@ from app.stability_cases.finding import (
     clean,
     decibels,
 )
-from app.stability_cases.places import ORACLE_DB
-from app.stability_cases.scenes import alone, front, small_model
-from app.stability_cases.stage import Stage, difference
-from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
+from shapeshift.app.stability_cases.places import ORACLE_DB
+from shapeshift.app.stability_cases.scenes import alone, front, small_model
+from shapeshift.app.stability_cases.stage import Stage, difference
+from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 
 OUTSIDE = (-0.1, -1e-3, 1.001, 1.1, 1e30, np.inf, -np.inf, np.nan)  # of 0..1, both sides
 

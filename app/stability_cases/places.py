@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.stability_cases.finding import (
+from shapeshift.app.stability_cases.finding import (
     Panel,
     Result,
     at_least,
@@ -13,10 +13,10 @@ from app.stability_cases.finding import (
     clean,
     decibels,
 )
-from app.stability_cases.scenes import alone, around, front, shell, splats, turns
-from app.stability_cases.stage import Stage, difference, moved, turned, turned_about
-from scene.pose import Pose, View, look_at, perspective
-from scene.scene import IDENTITY
+from shapeshift.app.stability_cases.scenes import alone, around, front, shell, splats, turns
+from shapeshift.app.stability_cases.stage import Stage, difference, moved, turned, turned_about
+from shapeshift.scene.pose import Pose, View, look_at, perspective
+from shapeshift.scene.scene import IDENTITY
 
 FAR_OFF = np.array([5e6, -5e6, 5e6])  # metres: geocentric coordinates are that large
 NEAREST, FARTHEST = 1e-2, 1e6  # metres

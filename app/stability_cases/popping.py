@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.stability_cases.finding import (
+from shapeshift.app.stability_cases.finding import (
     Panel,
     Result,
     at_least,
@@ -14,11 +14,11 @@ from app.stability_cases.finding import (
     decibels,
     not_here,
 )
-from app.stability_cases.motion import KEPT, STALE_YAW, WAS_OLD, is_old
-from app.stability_cases.scenes import alone, front, splats
-from app.stability_cases.stage import Stage, difference, turned
-from scene.pose import View, perspective
-from scene.scene import Scene
+from shapeshift.app.stability_cases.motion import KEPT, STALE_YAW, WAS_OLD, is_old
+from shapeshift.app.stability_cases.scenes import alone, front, splats
+from shapeshift.app.stability_cases.stage import Stage, difference, turned
+from shapeshift.scene.pose import View, perspective
+from shapeshift.scene.scene import Scene
 
 WIDE = 1.92  # radians, 110 degrees across: what was in front stays in view over most of a turn
 TURN = 90.0  # degrees

@@ -4,10 +4,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from runtime_models.model import AnchorModel, ControlEncoding, Mlp, Model, SplatLayers, Stop
-from runtime_models.spherical_harmonics import C0
-from scene.pose import Pose, View, perspective
-from scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.model import (
+    AnchorModel,
+    ControlEncoding,
+    Mlp,
+    Model,
+    SplatLayers,
+    Stop,
+)
+from shapeshift.scene.pose import Pose, View, perspective
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 
 ONLY = (Stop("only", 0.0),)
 

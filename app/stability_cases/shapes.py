@@ -2,18 +2,11 @@
 
 import numpy as np
 
-from app.stability_cases.finding import (
-    Panel,
-    Result,
-    at_least,
-    at_most,
-    clean,
-    decibels,
-)
-from app.stability_cases.places import ORACLE_DB, SMALL, compared
-from app.stability_cases.scenes import alone, faint_layers, front, shell, splats, turns
-from app.stability_cases.stage import Stage, difference
-from scene.scene import Scene, SceneObject
+from shapeshift.app.stability_cases.finding import Panel, Result, at_least, at_most, clean, decibels
+from shapeshift.app.stability_cases.places import ORACLE_DB, SMALL, compared
+from shapeshift.app.stability_cases.scenes import alone, faint_layers, front, shell, splats, turns
+from shapeshift.app.stability_cases.stage import Stage, difference
+from shapeshift.scene.scene import Scene, SceneObject
 
 LONG = 1e4  # times as long as thick
 FLOATS_AT_LIMITS = (

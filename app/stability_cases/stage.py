@@ -7,13 +7,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.stability_cases.finding import Panel
-from app.subject import Subject
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import FrameStats, RenderSettings
-from scene.pose import Pose, View
-from scene.scene import IDENTITY, Scene
+from shapeshift.app.stability_cases.finding import Panel
+from shapeshift.app.subject import Subject
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import IDENTITY, Scene
 
 EMPTY = Scene(())
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from app.drawing import save_png
-from app.errors import UsageError
-from app.stability_cases import eyes, life, motion, networks, places, popping, shapes
-from app.stability_cases.finding import Finding, Panel
-from runtime_models.plain_text import one_line
-from runtime_models.whole_file import write_whole
+from shapeshift.app.drawing import save_png
+from shapeshift.app.errors import UsageError
+from shapeshift.app.stability_cases import eyes, life, motion, networks, places, popping, shapes
+from shapeshift.app.stability_cases.finding import Finding, Panel
+from shapeshift.runtime_models.files.plain_text import one_line
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 CASES = {
     "sweep": motion.sweep,

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from app.command_line import EXPERT, SIZE
-from app.paths import full
-from app.terminal import say
+from shapeshift.app.command_line import EXPERT, SIZE
+from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 20 minutes of a core
@@ -40,8 +40,8 @@ class Options:
 
 
 def run(options: Options) -> int:
-    from app.drawing import parse_size
-    from app.training import train
+    from shapeshift.app.drawing import parse_size
+    from shapeshift.app.training import train
 
     size = parse_size(options.size)
     folder = options.out / "capture"
@@ -71,8 +71,8 @@ def run(options: Options) -> int:
 
 def publish(package: Path, target: Path) -> None:
     """The finished package to where it is wanted, whole or not at all."""
-    from app.errors import UsageError
-    from runtime_models.whole_file import write_whole
+    from shapeshift.app.errors import UsageError
+    from shapeshift.runtime_models.files.whole_file import write_whole
 
     data = package.read_bytes()
     if len(data) > MOST_BYTES:
@@ -86,7 +86,7 @@ def publish(package: Path, target: Path) -> None:
 
 def made_before(folder: Path, recipe: dict) -> bool:
     """Whether a finished capture made by the same recipe lies in the folder."""
-    from scene.read_capture import read_capture
+    from shapeshift.scene.captures.read_capture import read_capture
 
     if not (folder / "transforms.json").is_file():
         return False
@@ -94,8 +94,8 @@ def made_before(folder: Path, recipe: dict) -> bool:
 
 
 def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
-    from app.progress import progress_bar
-    from training.synthetic.workshop import make_workshop
+    from shapeshift.app.progress import progress_bar
+    from shapeshift.training.synthetic.workshop import make_workshop
 
     processes = options.processes or min(os.cpu_count() or 1, 8)
     with progress_bar(transient=False) as progress:

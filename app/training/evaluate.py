@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from app.command_line import EXPERT, MODALITY, POSITIONAL
-from app.opening import ReadingOptions, open_model
-from app.terminal import open_console, say, tell_json
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.terminal import open_console, say, tell_json
 
 if TYPE_CHECKING:
-    from scene.capture import Capture
+    from shapeshift.scene.captures.capture import Capture
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,16 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from app.commands.bench import write_json
-    from app.errors import UsageError
-    from app.paths import full
-    from app.progress import working
-    from rasterizer.device import open_device
-    from scene.read_capture import read_capture
-    from scene.scene_file import is_scene_file
-    from training.evaluate import evaluate_model, report
-    from training.rig import rig_of, with_found
-    from training.vgg_distance import VggDistance
+    from shapeshift.app.commands.bench import write_json
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.paths import full
+    from shapeshift.app.progress import working
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.scene.document.scene_file import is_scene_file
+    from shapeshift.training.calibration.extrinsics import rig_of, with_found
+    from shapeshift.training.evaluation.evaluate import evaluate_model, report
+    from shapeshift.training.evaluation.vgg_distance import VggDistance
 
     started = time.perf_counter()
     if is_scene_file(options.scene):
@@ -97,7 +97,7 @@ def trained_downscale(provenance: dict) -> int | None:
 
 def only(capture: "Capture", name: str) -> "Capture":
     """The capture with one of its modalities.  Raises UsageError."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     stops = tuple(stop for stop in capture.stops if stop.name == name)
     if not stops:

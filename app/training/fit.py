@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from app.command_line import EXPERT, MODALITY, POSITIONAL
-from app.terminal import open_console, tell_json
-from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
+from shapeshift.app.terminal import open_console, tell_json
+from shapeshift.app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
-    from training.fit import Need
-    from training.need import Measured, Verdict
+    from shapeshift.training.fit.ablation import Measured, Verdict
+    from shapeshift.training.fit.fit import Need
 
 
 @dataclass(frozen=True)
@@ -63,23 +63,23 @@ TRIAL = 600  # steps
 
 def defaults() -> dict[str, str]:
     """What --help says of options that are left to the preset."""
-    from app.training.train_options import preset_defaults
+    from shapeshift.app.training.train_options import preset_defaults
 
     return preset_defaults() | {"seconds": "no limit, --iterations decides"}
 
 
 def run(options: Options) -> int:
-    from app.commands.bench import write_json
-    from app.errors import UsageError
-    from app.pace import with_pace
-    from app.paths import full
-    from app.progress import progress_bar
-    from app.training.train import calibrated, say, settings_of
-    from rasterizer.device import open_device
-    from runtime_models.write_package import refuse_foreign, write_package
-    from scene.read_capture import read_capture
-    from training.fit import Fit
-    from training.rig import with_found
+    from shapeshift.app.commands.bench import write_json
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.pace import with_pace
+    from shapeshift.app.paths import full
+    from shapeshift.app.progress import progress_bar
+    from shapeshift.app.training.train import calibrated, say, settings_of
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.fit.fit import Fit
 
     if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
         raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")

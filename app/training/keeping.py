@@ -6,11 +6,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.errors import UsageError
-from app.paths import full
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import full
 
 if TYPE_CHECKING:
-    from training.train import Trainer
+    from shapeshift.training.train import Trainer
 
 LESS = "fewer --anchors and --max-anchors, or a larger --downscale, need less"
 
@@ -32,7 +32,7 @@ def memory_errors() -> tuple[type[Exception], ...]:
     """What says that memory is full: the device's or this process's."""
     import pyopencl
 
-    from rasterizer.device import NoMemory
+    from shapeshift.rasterizer.device import NoMemory
 
     return NoMemory, pyopencl.MemoryError, MemoryError
 
@@ -65,9 +65,9 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
     Raises UsageError where that cannot be; then both lie in a folder of the system's for temporary
     files, if there is room.
     """
-    from app.training.train import say
-    from runtime_models.write_package import write_package
-    from training.checkpoint import write_checkpoint
+    from shapeshift.app.training.train import say
+    from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.training.checkpoint import write_checkpoint
 
     if trainer.mend():
         say("the picture was lost in the last steps; what is kept is the last good state")
@@ -90,8 +90,8 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
 
 def last_of(checkpoint: Path) -> str:
     """What a run that could not be saved can go on from, in words."""
-    from runtime_models.model import BadFile
-    from training.checkpoint import read_checkpoint
+    from shapeshift.runtime_models.model import BadFile
+    from shapeshift.training.checkpoint import read_checkpoint
 
     try:
         notes = read_checkpoint(checkpoint)[1]
@@ -102,7 +102,7 @@ def last_of(checkpoint: Path) -> str:
 
 def save_on_the_way(trainer: "Trainer", checkpoint: Path) -> str:
     """Writes the checkpoint; in words why not, where the disk is full: training goes on."""
-    from training.checkpoint import write_checkpoint
+    from shapeshift.training.checkpoint import write_checkpoint
 
     try:
         write_checkpoint(checkpoint, *trainer.checkpoint())

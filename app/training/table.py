@@ -5,16 +5,16 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from app.command_line import EXPERT, MODALITY, POSITIONAL
-from app.paths import full
-from app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
-from app.training.train import INTERRUPTED, say
-from app.training.train import Options as TrainOptions
-from app.training.train_options import PhotoOptions, SizeOptions
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
+from shapeshift.app.paths import full
+from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
+from shapeshift.app.training.train import INTERRUPTED, say
+from shapeshift.app.training.train import Options as TrainOptions
+from shapeshift.app.training.train_options import PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
-    from scene.capture import Capture
-    from training.vgg_distance import VggDistance
+    from shapeshift.scene.captures.capture import Capture
+    from shapeshift.training.evaluation.vgg_distance import VggDistance
 
 NO_VGG = "no VGG distance: --vgg names no file"
 PLACES = {
@@ -69,18 +69,18 @@ class Options(PhotoOptions, SizeOptions, MethodOptions):
 
 def defaults() -> dict[str, str]:
     """What --help says of options that are left to the preset."""
-    from app.training.train_options import preset_defaults
+    from shapeshift.app.training.train_options import preset_defaults
 
     return preset_defaults()
 
 
 def run(options: Options) -> int:
-    from app.charts.chart_rows import RowsFile
-    from app.errors import UsageError
-    from rasterizer.device import open_device
-    from scene.read_capture import read_capture
-    from training.rig import with_found
-    from training.vgg_distance import VggDistance
+    from shapeshift.app.charts.chart_rows import RowsFile
+    from shapeshift.app.errors import UsageError
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.evaluation.vgg_distance import VggDistance
 
     if options.seconds is None and options.iterations is None:
         raise UsageError("a comparison needs a budget: give --seconds or --iterations.")
@@ -120,9 +120,9 @@ def run(options: Options) -> int:
 
 def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
     """What would come to light after the training, now.  Raises BadFile."""
-    from runtime_models.model import BadFile
-    from training.photos import choose_downscale
-    from training.vgg_distance import refuse_small
+    from shapeshift.runtime_models.model import BadFile
+    from shapeshift.training.evaluation.vgg_distance import refuse_small
+    from shapeshift.training.photos import choose_downscale
 
     factor = options.downscale or choose_downscale(capture.photos)
     for stop in capture.stops:
@@ -139,8 +139,8 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
 
 def offset_of(device, capture: "Capture", options: Options) -> str:
     """TrainSettings.rig of what --calibrate finds, once for all methods: it is kept in --out."""
-    from app.charts.chart_rows import write_text
-    from app.training.train import calibrated, settings_of
+    from shapeshift.app.charts.chart_rows import write_text
+    from shapeshift.app.training.train import calibrated, settings_of
 
     if options.calibrate is None:
         return ""
@@ -158,10 +158,15 @@ def train_method(
 
     rig: of TrainSettings, what the capture's cameras were moved by.
     """
-    from app.training.train import describe, settings_of, train
-    from app.training.train_baselines import Run, plain_settings, train_separate, train_splats
-    from runtime_models.write_package import refuse_foreign, write_package
-    from training.train import Trainer
+    from shapeshift.app.training.train import describe, settings_of, train
+    from shapeshift.app.training.train_baselines import (
+        Run,
+        plain_settings,
+        train_separate,
+        train_splats,
+    )
+    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
+    from shapeshift.training.train import Trainer
 
     asked, out = train_options(method, options), options.out / PLACES[method]
     if method == "splats":
@@ -183,12 +188,15 @@ def train_method(
 
 def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
     """A Run for each modality: the files of `splats` as spz, trained when those were."""
-    from app.errors import UsageError
-    from app.training.train_baselines import Run
-    from runtime_models.formats import read_plain
-    from runtime_models.plain_splats import Reading
-    from runtime_models.write_layer_list import layer_name, write_layer_list
-    from runtime_models.write_spz import write_spz
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.training.train_baselines import Run
+    from shapeshift.runtime_models.splats.formats import read_plain
+    from shapeshift.runtime_models.splats.layers.write_layer_list import (
+        layer_name,
+        write_layer_list,
+    )
+    from shapeshift.runtime_models.splats.plain_splats import Reading
+    from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 
     layers, runs, reading = [], {}, Reading(allow_huge=True)
     for number, stop in enumerate(capture.stops):
@@ -220,11 +228,11 @@ def rows_of(
     method: str, device, capture: "Capture", options: Options, runs: dict, distance
 ) -> list[Row]:
     """The rows of a method: its files, read back from disk, on the held-out photos."""
-    from runtime_models.plain_splats import Reading
-    from runtime_models.read_scene import read_model
-    from training.evaluate import bytes_on_disk, evaluate_model
-    from training.photos import choose_downscale
-    from training.plain import one_modality
+    from shapeshift.runtime_models.read_scene import read_model
+    from shapeshift.runtime_models.splats.plain_splats import Reading
+    from shapeshift.training.baselines.plain import one_modality
+    from shapeshift.training.evaluation.evaluate import bytes_on_disk, evaluate_model
+    from shapeshift.training.photos import choose_downscale
 
     factor = options.downscale or choose_downscale(capture.photos)
     kind, reading, rows = VggRow if distance else Row, Reading(allow_huge=True), []
@@ -256,13 +264,13 @@ def command_line(options: Options) -> str:
 
 
 def machine_line(device) -> str:
-    from app.measure import processor
+    from shapeshift.app.measure import processor
 
     return f"{processor()}, {os.cpu_count()} cores; {device.platform}: {device.name}"
 
 
 def capture_line(capture: "Capture", options: Options, distance: "VggDistance | None") -> str:
-    from training.photos import choose_downscale
+    from shapeshift.training.photos import choose_downscale
 
     factor = options.downscale or choose_downscale(capture.photos)
     each = []

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.terminal import open_console
+from shapeshift.app.terminal import open_console
 
 MEAN = "mean"  # the modality of the row that sums a method up
 NAMES = {
@@ -37,7 +37,7 @@ class VggRow(Row):
 
 def mean_row(rows: list[Row], runs: list) -> Row:
     """What a method gives on average, and what it takes in all."""
-    from training.evaluate import bytes_on_disk
+    from shapeshift.training.evaluation.evaluate import bytes_on_disk
 
     def mean(name: str, places: int) -> float:
         return round(sum(getattr(row, name) for row in rows) / len(rows), places)
@@ -56,7 +56,7 @@ def finish(rows: list[Row], out: Path, head: list[str]) -> None:
     """table.md, and the same on standard error."""
     from rich.table import Table
 
-    from app.charts.chart_rows import write_text
+    from shapeshift.app.charts.chart_rows import write_text
 
     columns, lines = cells(rows)
     shown = Table(*columns)

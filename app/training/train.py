@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from app.command_line import EXPERT, MODALITY, POSITIONAL, Opt
-from app.paths import full
-from app.program import program
-from app.terminal import say
-from app.training.train_options import (
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, Opt
+from shapeshift.app.paths import full
+from shapeshift.app.program import program
+from shapeshift.app.terminal import say
+from shapeshift.app.training.train_options import (
     ModelOptions,
     PhotoOptions,
     SizeOptions,
@@ -22,10 +22,10 @@ from app.training.train_options import (
 )
 
 if TYPE_CHECKING:
-    from scene.capture import Capture
-    from training.plain import PlainTrainer
-    from training.settings import TrainSettings
-    from training.train import Trainer
+    from shapeshift.scene.captures.capture import Capture
+    from shapeshift.training.baselines.plain import PlainTrainer
+    from shapeshift.training.settings import TrainSettings
+    from shapeshift.training.train import Trainer
 
 INTERRUPTED = 130  # exit code
 SAVE_EVERY = 60.0  # seconds between checkpoints
@@ -168,20 +168,25 @@ def defaults() -> dict[str, str]:
 
 
 def run(options: Options) -> int:
-    from app.pace import pace_package
-    from app.progress import working
-    from app.training.keeping import kept_when_memory_ends, memory_for_training, refuse_place, save
-    from rasterizer.device import open_device
-    from runtime_models.write_package import refuse_foreign
-    from scene.read_capture import read_capture
-    from training.checkpoint import checkpoint_path, read_checkpoint
-    from training.rig import with_found
-    from training.suspects import hopeless, report, suspects
-    from training.train import Trainer
+    from shapeshift.app.pace import pace_package
+    from shapeshift.app.progress import working
+    from shapeshift.app.training.keeping import (
+        kept_when_memory_ends,
+        memory_for_training,
+        refuse_place,
+        save,
+    )
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.calibration.outlier_views import hopeless, report, suspects
+    from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.train import Trainer
 
     refuse_calibrating(options)
     if options.model == "splats" or options.separate:
-        from app.training.train_baselines import run_baseline
+        from shapeshift.app.training.train_baselines import run_baseline
 
         return run_baseline(options)
     refuse_plain_options(options)
@@ -215,7 +220,7 @@ def run(options: Options) -> int:
 
 def refuse_calibrating(options: Options) -> None:
     """Raises UsageError where --calibrate would do nothing, or could not be kept."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     if options.calibrate is None:
         return
@@ -232,9 +237,9 @@ def calibrated(
     device, capture: "Capture", settings: "TrainSettings", modality: str
 ) -> "TrainSettings":
     """The settings with the offset of a modality's cameras, which is looked for now."""
-    from app.progress import progress_bar
-    from training.rig import noted
-    from training.rig_search import calibrate
+    from shapeshift.app.progress import progress_bar
+    from shapeshift.training.calibration.calibrate import calibrate
+    from shapeshift.training.calibration.extrinsics import noted
 
     say(f"looking for the offset of the cameras of {modality} ...")
     with progress_bar() as bar:
@@ -254,7 +259,7 @@ def calibrated(
 
 def refuse_plain_options(options: Options) -> None:
     """Raises UsageError for what only plain splats have."""
-    from app.errors import UsageError
+    from shapeshift.app.errors import UsageError
 
     for name in ("sh_degree", "splats", "max_splats"):
         if getattr(options, name) is not None:
@@ -299,8 +304,8 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
     """
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
-    from app.progress import progress_bar
-    from app.training.keeping import save_on_the_way
+    from shapeshift.app.progress import progress_bar
+    from shapeshift.app.training.keeping import save_on_the_way
 
     columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
     look, saved = 1 / LOOKS, time.monotonic()
@@ -336,7 +341,7 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
 
 def what_next(options: Options, steps: int, seconds: float, interrupted: bool) -> list[str]:
     """The last lines: how to train on where that was little, and how to look at the scene."""
-    from training.settings import preset
+    from shapeshift.training.settings import preset
 
     again = [program(), "train", shlex.quote(full(options.capture))]
     out = shlex.quote(full(options.out))

@@ -4,9 +4,9 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.errors import UsageError
-from app.paths import full
-from app.training.train import (
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import full
+from shapeshift.app.training.train import (
     INTERRUPTED,
     Options,
     calibrated,
@@ -18,10 +18,10 @@ from app.training.train import (
 )
 
 if TYPE_CHECKING:
-    from scene.capture import Capture
-    from training.plain import PlainTrainer
-    from training.plain_settings import PlainSettings
-    from training.settings import TrainSettings
+    from shapeshift.scene.captures.capture import Capture
+    from shapeshift.training.baselines.plain import PlainTrainer
+    from shapeshift.training.baselines.plain_settings import PlainSettings
+    from shapeshift.training.settings import TrainSettings
 
 # Options that say where and how long, or how photos are read: they go for every kind of model.
 COMMON = {"capture", "out", "model", "separate", "resume", "preset", "device", "downscale", "masks",
@@ -55,9 +55,9 @@ class Outcome:
 
 
 def run_baseline(options: Options) -> int:
-    from rasterizer.device import open_device
-    from scene.read_capture import read_capture
-    from training.rig import with_found
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.training.calibration.extrinsics import with_found
 
     if options.resume:
         raise UsageError(
@@ -80,7 +80,7 @@ def run_baseline(options: Options) -> int:
 
 def plain_settings(options: Options) -> "PlainSettings":
     """The settings of plain splats, out of the options.  Raises UsageError."""
-    from training.plain_settings import PlainSettings
+    from shapeshift.training.baselines.plain_settings import PlainSettings
 
     names = {f.name for f in fields(PlainSettings)}
     asked = {f.name: getattr(options, f.name) for f in fields(options)}
@@ -103,7 +103,7 @@ def share_of(
     settings: "TrainSettings | PlainSettings", capture: "Capture"
 ) -> "TrainSettings | PlainSettings":
     """The settings of one modality's model: its share of the budget, photos as small as all are."""
-    from training.photos import choose_downscale
+    from shapeshift.training.photos import choose_downscale
 
     count = len(capture.stops)
     steps, seconds = settings.iterations, settings.seconds
@@ -117,8 +117,12 @@ def share_of(
 
 def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Path) -> Outcome:
     """Plain splats of every modality into the folder `out`: a PLY each and layers.json."""
-    from runtime_models.write_layer_list import layer_name, refuse_other_folder, write_layer_list
-    from training.plain import PlainTrainer, one_modality
+    from shapeshift.runtime_models.splats.layers.write_layer_list import (
+        layer_name,
+        refuse_other_folder,
+        write_layer_list,
+    )
+    from shapeshift.training.baselines.plain import PlainTrainer, one_modality
 
     refuse_other_folder(out)  # now, not after the training
     settings, parts = share_of(settings, capture), each_modality(capture, one_modality)
@@ -139,10 +143,10 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
 
 def train_separate(device, capture: "Capture", settings: "TrainSettings", out: Path) -> Outcome:
     """An anchor model of every modality into the folder `out`: a package each."""
-    from runtime_models.write_layer_list import layer_name
-    from runtime_models.write_package import refuse_foreign, write_package
-    from training.plain import one_modality
-    from training.train import Trainer
+    from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
+    from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name
+    from shapeshift.training.baselines.plain import one_modality
+    from shapeshift.training.train import Trainer
 
     if out.is_file() or out.suffix == ".shift":
         raise UsageError(f"{out}: --separate writes several packages; name a folder for them.")

@@ -7,10 +7,10 @@ stand in the reverse order of --help.
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from app.command_line import EXPERT
+from shapeshift.app.command_line import EXPERT
 
 if TYPE_CHECKING:
-    from training.settings import TrainSettings
+    from shapeshift.training.settings import TrainSettings
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
 # What a checkpoint was trained with that does not say it: these were the defaults once.
@@ -78,8 +78,8 @@ PLAIN = ("sh_degree", "splats", "max_splats")  # options of --model splats
 
 def preset_defaults() -> dict[str, str]:
     """The numbers of the preset fast, with that of paper where it is another, by option."""
-    from training.plain_settings import PlainSettings
-    from training.settings import preset
+    from shapeshift.training.baselines.plain_settings import PlainSettings
+    from shapeshift.training.settings import preset
 
     fast, paper, plain = preset("fast").as_dict(), preset("paper").as_dict(), PlainSettings()
     told = {name: in_words(value) for name, value in fast.items() if name not in DECIDED}
@@ -101,10 +101,10 @@ def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":
 
     Raises UsageError, also when a resumed run is asked for anything but another budget.
     """
-    from app.errors import UsageError
-    from app.paths import plain
-    from training.initial import SOURCES
-    from training.settings import TrainSettings, preset
+    from shapeshift.app.errors import UsageError
+    from shapeshift.app.paths import plain
+    from shapeshift.training.first_anchors.initial import SOURCES
+    from shapeshift.training.settings import TrainSettings, preset
 
     names = {f.name for f in fields(TrainSettings)} - {"preset"}
     asked = {n: getattr(options, n) for n in names & {f.name for f in fields(options)}}

@@ -4,18 +4,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.camera_files import camera_reading
-from app.opening import open_model
-from app.panels.path_box import PathBox
-from app.viewer.arrange import edit, undo
-from app.viewer.files import take_over
-from app.viewer.opened import Found, Opener, Told, read_files
-from runtime_models.model import BadFile
-from scene import edits
-from scene.scene_file import is_scene_file
+from shapeshift.app.camera_files import camera_reading
+from shapeshift.app.opening import open_model
+from shapeshift.app.panels.path_box import PathBox
+from shapeshift.app.viewer.arrange import edit, undo
+from shapeshift.app.viewer.files import take_over
+from shapeshift.app.viewer.opened import Found, Opener, Told, read_files
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import is_scene_file
 
 if TYPE_CHECKING:
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.viewer import Viewer
 
 
 class Adding:

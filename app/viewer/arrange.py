@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.viewer.document import key_of
-from app.viewer.track import next_stop, stepped
-from runtime_models.model import BadFile
-from runtime_models.stop_weights import Control
-from scene import edits
-from scene.control import Sweep
-from scene.edits import Change, History
-from scene.pose import Pose
-from scene.scene import SceneObject
-from scene.scene_file import SceneFile, SceneItem, labelled, object_of
+from shapeshift.app.viewer.document import key_of
+from shapeshift.app.viewer.track import next_stop, stepped
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.control import Sweep
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.edits import Change, History
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled, object_of
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import SceneObject
 
 if TYPE_CHECKING:
-    from app.viewer.opened import Source
-    from app.viewer.stage import Stage
+    from shapeshift.app.viewer.opened import Source
+    from shapeshift.app.viewer.stage import Stage
 
 LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
 MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told

@@ -8,16 +8,16 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
-from app.opening import sentence
-from app.viewer.document import Document, ModelKey, key_of
-from app.viewer.opened import Told
-from runtime_models.model import BadFile, Model
-from scene.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
+from shapeshift.app.opening import sentence
+from shapeshift.app.viewer.document import Document, ModelKey, key_of
+from shapeshift.app.viewer.opened import Told
+from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
 
 if TYPE_CHECKING:
-    from app.viewer.viewer import Viewer
-    from scene.collider import Collider
-    from scene.world import World
+    from shapeshift.app.viewer.viewer import Viewer
+    from shapeshift.scene.colliders.collider import Collider
+    from shapeshift.scene.world.world import World
 
 PATIENCE_S = 3.0  # longest wait at the end for a collider that is being made
 HZ = 90  # steps of the physics a second
@@ -103,8 +103,8 @@ class Bodies:
     def _to_world(
         self, file: SceneFile, document: Document, colliders: Mapping[str, "Collider"]
     ) -> None:
-        from scene.follow import follow
-        from scene.world import World
+        from shapeshift.scene.world.follow import follow
+        from shapeshift.scene.world.world import World
 
         models, ground = document.models_by_name(), (file.floor_y, file.gravity_m_s2)
         if self.world is None or self._ground != ground:  # a floor is no thing that comes or goes
@@ -168,8 +168,8 @@ def make(
     file: SceneFile, item: SceneItem, model: Model, told: Told
 ) -> "tuple[Collider | None, str]":
     """The collider, or None and why there is none."""
-    from scene.collider import Making
-    from scene.collider_files import one_collider
+    from shapeshift.scene.colliders.collider import Making
+    from shapeshift.scene.colliders.collider_files import one_collider
 
     try:
         return one_collider(file, item, model, Making(told=told)), ""

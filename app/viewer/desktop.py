@@ -6,25 +6,25 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from app.camera_files import camera_reading
-from app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
-from app.drawing import parse_size
-from app.errors import UsageError
-from app.opening import ReadingOptions
-from app.paths import DEMO, TOUCH, config_folder, plain
-from app.viewer.files import first_look, named_cameras, opened_scene
-from app.viewer.opened import read_files
-from app.viewer.own_files import OwnFiles
-from app.viewer.refine import Refiner, attach_refiner
-from app.viewer.settings import Settings
-from app.viewer.split import splitting
-from app.viewer.stage import Stage
-from app.viewer.viewer import Viewer
-from app.viewer.window import Window
-from app.viewer.wipe import comparing
-from renderer.renderer import Renderer
-from scene.read_selector import read_selector
-from scene.selector import Selector
+from shapeshift.app.camera_files import camera_reading
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
+from shapeshift.app.drawing import parse_size
+from shapeshift.app.errors import UsageError
+from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import DEMO, TOUCH, config_folder, plain
+from shapeshift.app.viewer.files import first_look, named_cameras, opened_scene
+from shapeshift.app.viewer.opened import read_files
+from shapeshift.app.viewer.own_files import OwnFiles
+from shapeshift.app.viewer.refine import Refiner, attach_refiner
+from shapeshift.app.viewer.settings import Settings
+from shapeshift.app.viewer.split import splitting
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.viewer import Viewer
+from shapeshift.app.viewer.window import Window
+from shapeshift.app.viewer.wipe import comparing
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.selectors.read_selector import read_selector
+from shapeshift.scene.selectors.selector import Selector
 
 WINDOW_SIZE = "1280x720"  # of the window, pixels at a text size of 1
 

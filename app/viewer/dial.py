@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.charts.budget import Choice, choose, least_scale
-from app.charts.quick_chart import QuickChart, QuickRow
-from renderer.renderer import Renderer
-from renderer.resolution import Resolution
-from renderer.settings import RenderSettings
-from scene.pose import View
-from scene.scene import Scene
+from shapeshift.app.charts.budget import Choice, choose, least_scale
+from shapeshift.app.charts.quick_chart import QuickChart, QuickRow
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.resolution import Resolution
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
 
 STEP_S = 0.04  # of measuring between two frames of the window; one measured frame at least
 LEAST_SCALE = 0.5  # while moving, where no chart says how far down the floor allows

@@ -4,15 +4,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from app.paths import file_name
-from app.viewer.opened import Source
-from runtime_models.model import Model, Stop
-from scene import edits
-from scene.edits import History
-from scene.scene import Scene
-from scene.scene_file import ENDING, HULLS, SceneFile, SceneItem
-from scene.selector import Lens
-from scene.write_scene_file import moved
+from shapeshift.app.paths import file_name
+from shapeshift.app.viewer.opened import Source
+from shapeshift.runtime_models.model import Model, Stop
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.edits import History
+from shapeshift.scene.document.scene_file import ENDING, HULLS, SceneFile, SceneItem
+from shapeshift.scene.document.write_scene_file import moved
+from shapeshift.scene.scene import Scene
+from shapeshift.scene.selectors.selector import Lens
 
 ModelKey = tuple  # what makes two objects have the same model: path, mode, up, flip
 

@@ -5,32 +5,32 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.camera_files import camera_reading, in_scene
-from app.opening import sentence
-from app.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
-from app.panels.open_row import OpenRow
-from app.panels.path_box import PathBox
-from app.panels.theme import Box
-from app.paths import DEMO, TOUCH, config_folder
-from app.scene_files import file_at
-from app.subject import placed
-from app.viewer.controls import Camera
-from app.viewer.document import Document, document_from, document_of
-from app.viewer.first_look import FirstLook
-from app.viewer.opened import Found, Opener, ReadModel, read_files
-from app.viewer.recent import RecentFiles
-from app.viewer.scene_objects import scene_of
-from app.viewer.window import Drop, Event, KeyDown
-from runtime_models.model import BadFile
-from scene import edits
-from scene.framing import common_side
-from scene.read_cameras import read_camera_list
-from scene.scene import Scene
-from scene.scene_file import scene_of as scene_of_file
+from shapeshift.app.camera_files import camera_reading, in_scene
+from shapeshift.app.opening import sentence
+from shapeshift.app.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
+from shapeshift.app.panels.open_row import OpenRow
+from shapeshift.app.panels.path_box import PathBox
+from shapeshift.app.panels.theme import Box
+from shapeshift.app.paths import DEMO, TOUCH, config_folder
+from shapeshift.app.scene_files import file_at
+from shapeshift.app.subject import placed
+from shapeshift.app.viewer.controls import Camera
+from shapeshift.app.viewer.document import Document, document_from, document_of
+from shapeshift.app.viewer.first_look import FirstLook
+from shapeshift.app.viewer.opened import Found, Opener, ReadModel, read_files
+from shapeshift.app.viewer.recent import RecentFiles
+from shapeshift.app.viewer.scene_objects import scene_of
+from shapeshift.app.viewer.window import Drop, Event, KeyDown
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.framing import common_side
+from shapeshift.scene.cameras.read_cameras import read_camera_list
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import scene_of as scene_of_file
+from shapeshift.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from app.viewer.desktop import Options
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.desktop import Options
+    from shapeshift.app.viewer.viewer import Viewer
 
 MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scene.framing import default_view, framing_view
-from scene.pose import View, perspective
-from scene.scene import Scene
-from scene.scene_file import SceneFile, first_view
+from shapeshift.scene.cameras.framing import default_view, framing_view
+from shapeshift.scene.document.scene_file import SceneFile, first_view
+from shapeshift.scene.pose import View, perspective
+from shapeshift.scene.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,17 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui, imguizmo
 
-from app.panels import theme
-from app.viewer.arrange import place
-from app.viewer.outlines import moved, on_screen
-from app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release
-from scene.framing import MIN_OPACITY, PERCENTILES, model_points
-from scene.pose import Pose, View
-from scene.scene import SceneObject
-from scene.scene_file import FAR_M
+from shapeshift.app.panels import theme
+from shapeshift.app.viewer.arrange import place
+from shapeshift.app.viewer.outlines import moved, on_screen
+from shapeshift.app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release
+from shapeshift.scene.cameras.framing import MIN_OPACITY, PERCENTILES, model_points
+from shapeshift.scene.document.scene_file import FAR_M
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import SceneObject
 
 if TYPE_CHECKING:
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.viewer import Viewer
 
 Matrix16 = imguizmo.im_guizmo.Matrix16
 Vec = imgui.ImVec2

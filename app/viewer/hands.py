@@ -5,14 +5,24 @@ from typing import TYPE_CHECKING
 import glfw
 import numpy as np
 
-from app.panels.camera_panel import keep_view, move_camera, step_to_camera
-from app.viewer.arrange import step_stop, step_x
-from app.viewer.controls import FAST, SLOW, Push
-from app.viewer.window import DoubleClick, Drag, Drop, Event, KeyDown, Press, Release, Wheel, Window
-from scene.pick import Hit
+from shapeshift.app.panels.camera_panel import keep_view, move_camera, step_to_camera
+from shapeshift.app.viewer.arrange import step_stop, step_x
+from shapeshift.app.viewer.controls import FAST, SLOW, Push
+from shapeshift.app.viewer.window import (
+    DoubleClick,
+    Drag,
+    Drop,
+    Event,
+    KeyDown,
+    Press,
+    Release,
+    Wheel,
+    Window,
+)
+from shapeshift.scene.pick import Hit
 
 if TYPE_CHECKING:
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.viewer import Viewer
 
 VIEWS = {  # of the numeric keypad, as Blender has them; the second with Ctrl
     glfw.KEY_KP_1: ("front", "back"),

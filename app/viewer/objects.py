@@ -7,23 +7,30 @@ import glfw
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels.objects_panel import draw_objects
-from app.viewer.adding import Adding
-from app.viewer.arrange import as_it_stands, copy_offset, edit, record_regions, redo, undo
-from app.viewer.gizmo import Gizmo, attach_gizmo
-from app.viewer.hands import point_at
-from app.viewer.saving import Saving, unsaved
-from app.viewer.sections import Section
-from app.viewer.window import CLICK_PIXELS, Drag, Drop, Event, KeyDown, Press, Release
-from runtime_models.model import BadFile
-from scene import edits
-from scene.framing import model_points
-from scene.pose import Pose
-from scene.scene_file import SceneFile, SceneItem
+from shapeshift.app.panels.objects_panel import draw_objects
+from shapeshift.app.viewer.adding import Adding
+from shapeshift.app.viewer.arrange import (
+    as_it_stands,
+    copy_offset,
+    edit,
+    record_regions,
+    redo,
+    undo,
+)
+from shapeshift.app.viewer.gizmo import Gizmo, attach_gizmo
+from shapeshift.app.viewer.hands import point_at
+from shapeshift.app.viewer.saving import Saving, unsaved
+from shapeshift.app.viewer.sections import Section
+from shapeshift.app.viewer.window import CLICK_PIXELS, Drag, Drop, Event, KeyDown, Press, Release
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.framing import model_points
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem
+from shapeshift.scene.pose import Pose
 
 if TYPE_CHECKING:
-    from app.viewer.stage import Stage
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.stage import Stage
+    from shapeshift.app.viewer.viewer import Viewer
 
 KEYS = (
     ("click", "choose a thing"),
@@ -172,7 +179,7 @@ class Objects:
     def edit(
         self, change: Callable[..., SceneFile], *values: object, what: str, together: str = ""
     ) -> bool:
-        """Does an edit of scene/edits.py; False, and a word on it, where it cannot be done."""
+        """Does an edit of scene/document/edits.py; where it cannot be done False, and says why."""
         stage = self.stage
         try:
             edit(stage, change(stage.document.file, *values), what, together)

@@ -7,18 +7,24 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from app.opening import PATIENCE_S, progress_after
-from app.scene_files import tell_findings
-from runtime_models.model import BadFile, Model
-from runtime_models.package_files import MANIFEST
-from runtime_models.plain_splats import Reading
-from runtime_models.read_output_folder import newest_cloud
-from runtime_models.read_scene import describe
-from scene.camera_list import CameraList, CameraReading
-from scene.colmap_tables import TABLES, find_model
-from scene.read_cameras import SPLITS, find_cameras, find_floor, is_cameras, read_camera_list
-from scene.read_scene_file import read_scene_file
-from scene.scene_file import SceneFile, is_scene_file, read_models
+from shapeshift.app.opening import PATIENCE_S, progress_after
+from shapeshift.app.scene_files import tell_findings
+from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.runtime_models.package.package_files import MANIFEST
+from shapeshift.runtime_models.read_scene import describe
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.runtime_models.splats.read_output_folder import newest_cloud
+from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
+from shapeshift.scene.cameras.read_cameras import (
+    SPLITS,
+    find_cameras,
+    find_floor,
+    is_cameras,
+    read_camera_list,
+)
+from shapeshift.scene.captures.colmap_tables import TABLES, find_model
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from shapeshift.scene.document.scene_file import SceneFile, is_scene_file, read_models
 
 Told = Callable[[str, float], None]  # what is being done, part done 0..1
 ReadModel = Callable[[Path, Told | None], Model]

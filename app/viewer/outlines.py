@@ -3,11 +3,11 @@
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.viewer.regions import Region, Regions
-from scene.pick import anchor_places
-from scene.pose import View
-from scene.scene import Scene
+from shapeshift.app.panels import theme
+from shapeshift.app.viewer.regions import Region, Regions
+from shapeshift.scene.pick import anchor_places
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
 
 Vec = imgui.ImVec2
 ROUND = 48  # segments of a circle

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from runtime_models.whole_file import write_whole
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 FILE = "saved.json"
 MOST = 200  # files that are remembered

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.drawing import make_folder, save_png
+from shapeshift.app.drawing import make_folder, save_png
 
 
 def write_png(picture: np.ndarray, path: Path) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import median
 
-from renderer.settings import FrameStats
+from shapeshift.renderer.settings import FrameStats
 
 SECOND = 1.0  # how far back the meter looks
 FEWEST = 5  # frames that the median is taken of, even where they are older than a second

@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from runtime_models.whole_file import write_whole
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 MOST = 10
 LARGEST = 1 << 20  # bytes; a list of ten paths is never so long

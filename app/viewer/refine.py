@@ -5,12 +5,12 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from app.opening import ReadingOptions, open_model
-from app.viewer.opened import Source
-from app.viewer.stage import Stage
-from runtime_models.model import BadFile, Model, SplatLayers
-from runtime_models.read_scene import describe
-from runtime_models.read_streamed import is_streamed, levels
+from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.viewer.opened import Source
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.runtime_models.model import BadFile, Model, SplatLayers
+from shapeshift.runtime_models.read_scene import describe
+from shapeshift.runtime_models.splats.sog.read_streamed import is_streamed, levels
 
 POLL_S = 0.05  # how often a waiting reader looks whether it is still wanted
 PATIENCE_S = 5.0  # longest wait at the end for a level that is being read

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from runtime_models.stop_weights import Control
-from scene.pick import anchor_places
-from scene.pose import View
-from scene.scene import SceneObject
-from scene.selector import Box, HalfSpace, Lens, Painted, Selector, Sphere
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.pick import anchor_places
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Selector, Sphere
 
 KINDS = ("box", "sphere", "half-space", "lens", "painted")
 FIRST_SIZE = 0.25  # of the scene's radius: half a box's side, a sphere's radius

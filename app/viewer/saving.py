@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
-from app.panels.question_box import answer_row, question_box
-from app.paths import is_bundled, plain
-from app.viewer.document import beside, stamp_of, with_regions
-from app.viewer.own_files import OwnFiles
-from scene.scene_file import ENDING, FAR_M, SceneFile
-from scene.write_scene_file import write_scene_file
+from shapeshift.app.panels.question_box import answer_row, question_box
+from shapeshift.app.paths import is_bundled, plain
+from shapeshift.app.viewer.document import beside, stamp_of, with_regions
+from shapeshift.app.viewer.own_files import OwnFiles
+from shapeshift.scene.document.scene_file import ENDING, FAR_M, SceneFile
+from shapeshift.scene.document.write_scene_file import write_scene_file
 
 if TYPE_CHECKING:
-    from app.viewer.stage import Stage
-    from app.viewer.viewer import Viewer
+    from shapeshift.app.viewer.stage import Stage
+    from shapeshift.app.viewer.viewer import Viewer
 
 Vec = imgui.ImVec2
 OVER = "Over it"  # writes over the file that was opened

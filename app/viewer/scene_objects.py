@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.viewer.document import first_stop
-from app.viewer.opened import Source
-from runtime_models.model import Model
-from scene.edits import free_name
-from scene.pose import Pose
-from scene.scene import IDENTITY, Scene, SceneObject
+from shapeshift.app.viewer.document import first_stop
+from shapeshift.app.viewer.opened import Source
+from shapeshift.runtime_models.model import Model
+from shapeshift.scene.document.edits import free_name
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 
 
 def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:

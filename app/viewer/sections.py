@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from app.viewer.layout import Box
+from shapeshift.app.viewer.layout import Box
 
 if TYPE_CHECKING:
-    from app.viewer.shown import Wish
-    from app.viewer.window import Event
+    from shapeshift.app.viewer.shown import Wish
+    from shapeshift.app.viewer.window import Event
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from runtime_models.whole_file import write_whole
+from shapeshift.runtime_models.files.whole_file import write_whole
 
 FILE = "settings.json"
 LARGEST = 1 << 16  # bytes; a few numbers are never so long

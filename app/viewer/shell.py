@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import glfw
 
-from app.panels.keys_sheet import Row, draw_keys
-from app.panels.messages_panel import draw_messages
-from app.panels.panel import PanelActions
-from app.panels.theme import Box
-from app.viewer.messages import Messages
-from app.viewer.settings import Settings, other_text_size
-from app.viewer.window import Event, KeyDown, Window
+from shapeshift.app.panels.keys_sheet import Row, draw_keys
+from shapeshift.app.panels.messages_panel import draw_messages
+from shapeshift.app.panels.panel import PanelActions
+from shapeshift.app.panels.theme import Box
+from shapeshift.app.viewer.messages import Messages
+from shapeshift.app.viewer.settings import Settings, other_text_size
+from shapeshift.app.viewer.window import Event, KeyDown, Window
 
 LARGER, SMALLER, AS_AT_FIRST = ("+", "="), ("-",), ("0",)  # with Ctrl
 

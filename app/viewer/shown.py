@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import moderngl
 
-from app.charts.comparison import Comparison, is_exact, measure_error, same_picture
-from app.viewer.readings import Readings
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from scene.pose import View
-from scene.scene import Scene
+from shapeshift.app.charts.comparison import Comparison, is_exact, measure_error, same_picture
+from shapeshift.app.viewer.readings import Readings
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
 
 STALE_S = 1.0  # between two measurements of the error of a kept order: each draws a frame more
 

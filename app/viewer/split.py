@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 import glfw
 
-from app.panels import theme
-from app.viewer.layout import Box
-from app.viewer.messages import Messages
-from app.viewer.shown import Wish
-from app.viewer.split_state import SplitState, told
-from app.viewer.two_pictures import TwoPictures
-from app.viewer.window import Event, KeyDown, Window
-from renderer.renderer import Renderer
-from runtime_models.model import BadFile
+from shapeshift.app.panels import theme
+from shapeshift.app.viewer.layout import Box
+from shapeshift.app.viewer.messages import Messages
+from shapeshift.app.viewer.shown import Wish
+from shapeshift.app.viewer.split_state import SplitState, told
+from shapeshift.app.viewer.two_pictures import TwoPictures
+from shapeshift.app.viewer.window import Event, KeyDown, Window
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import BadFile
 
 if TYPE_CHECKING:
-    from app.viewer.sections import Hooks
-    from app.viewer.stage import Stage
+    from shapeshift.app.viewer.sections import Hooks
+    from shapeshift.app.viewer.stage import Stage
 
 KEYS = (
     ("C", "another stop right of a line, on and off"),

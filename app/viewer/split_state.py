@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from app.viewer.regions import farthest_stop
-from runtime_models.model import Stop
-from scene.scene import Scene
+from shapeshift.app.viewer.regions import farthest_stop
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from app.viewer.stage import Stage
+    from shapeshift.app.viewer.stage import Stage
 
 ON_STOP = 1e-3
 

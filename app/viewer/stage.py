@@ -7,34 +7,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.viewer.arrange import record_regions, steer
-from app.viewer.bodies import Bodies
-from app.viewer.document import Document, document_from
-from app.viewer.first_look import FirstLook
-from app.viewer.messages import Messages
-from app.viewer.opened import Source
-from app.viewer.regions import Regions
-from app.viewer.scene_objects import origin_of, scene_of, stood_as, with_palette
-from app.viewer.split_state import SplitState
-from app.viewer.track import Grip
-from renderer.settings import DEBUG_VIEWS, RenderSettings
-from runtime_models.model import Finding, Model, Stop
-from runtime_models.stop_weights import Control
-from scene import edits
-from scene.control import SHIFT_S, Shift, Sweep
-from scene.framing import (
+from shapeshift.app.viewer.arrange import record_regions, steer
+from shapeshift.app.viewer.bodies import Bodies
+from shapeshift.app.viewer.document import Document, document_from
+from shapeshift.app.viewer.first_look import FirstLook
+from shapeshift.app.viewer.messages import Messages
+from shapeshift.app.viewer.opened import Source
+from shapeshift.app.viewer.regions import Regions
+from shapeshift.app.viewer.scene_objects import origin_of, scene_of, stood_as, with_palette
+from shapeshift.app.viewer.split_state import SplitState
+from shapeshift.app.viewer.track import Grip
+from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
+from shapeshift.runtime_models.model import Finding, Model, Stop
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.cameras.framing import (
     default_background,
     fit_points,
     frame_points,
     scene_points,
 )
-from scene.pick import Hit, Picker
-from scene.pose import Pose, View, perspective
-from scene.scene import Scene, SceneObject
-from scene.scene_file import SceneItem, named_stops
+from shapeshift.scene.control import SHIFT_S, Shift, Sweep
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import SceneItem, named_stops
+from shapeshift.scene.pick import Hit, Picker
+from shapeshift.scene.pose import Pose, View, perspective
+from shapeshift.scene.scene import Scene, SceneObject
 
 if TYPE_CHECKING:
-    from scene.world import World
+    from shapeshift.scene.world.world import World
 
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
 AS_FILED = ""  # the palette that the scene's own stops name

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.viewer.controls import Box
-from scene.camera_list import CameraList
-from scene.camera_path import slerp
-from scene.control import ease
-from scene.pose import Pose, View
+from shapeshift.app.viewer.controls import Box
+from shapeshift.scene.cameras.camera_list import CameraList
+from shapeshift.scene.cameras.camera_path import slerp
+from shapeshift.scene.control import ease
+from shapeshift.scene.pose import Pose, View
 
 FLIGHT_S = 0.4  # from one camera to the next
 LONGEST_NAME = 40  # letters in the status line

@@ -5,23 +5,32 @@ from typing import TYPE_CHECKING
 
 import glfw
 
-from app.panels.touch_panel import draw_touch
-from app.paths import is_bundled
-from app.viewer.arrange import steer
-from app.viewer.hands import is_painting
-from app.viewer.sections import Section
-from app.viewer.touch_marks import Flash, Label, Marks
-from app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release, Wheel
-from runtime_models.stop_weights import Control
-from scene.follow import put_back
-from scene.mouse_hand import MouseHand, moved, pose, pushed, ray, rolled, take, turned
-from scene.pose import View
-from scene.record import Record
-from scene.thing import middle_of
-from scene.world import World
+from shapeshift.app.panels.touch_panel import draw_touch
+from shapeshift.app.paths import is_bundled
+from shapeshift.app.viewer.arrange import steer
+from shapeshift.app.viewer.hands import is_painting
+from shapeshift.app.viewer.sections import Section
+from shapeshift.app.viewer.touch_marks import Flash, Label, Marks
+from shapeshift.app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release, Wheel
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.pose import View
+from shapeshift.scene.world.follow import put_back
+from shapeshift.scene.world.mouse_hand import (
+    MouseHand,
+    moved,
+    pose,
+    pushed,
+    ray,
+    rolled,
+    take,
+    turned,
+)
+from shapeshift.scene.world.record import Record
+from shapeshift.scene.world.rigid_object import middle_of
+from shapeshift.scene.world.world import World
 
 if TYPE_CHECKING:
-    from app.viewer.desktop import Viewer
+    from shapeshift.app.viewer.desktop import Viewer
 
 HAND = "mouse"
 HOW, HOW_S = "Drag a thing. X shoots. T stops.", 9.0  # said once, for so many seconds

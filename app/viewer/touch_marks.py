@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.viewer.outlines import pixels
-from app.viewer.shown import Wish
-from renderer.gpu import Gpu
-from renderer.lines import Lines, Wire
-from scene.collider import Collider
-from scene.collider_edges import hull_edges, mesh_edges
-from scene.mouse_hand import pose
-from scene.pose import View
-from scene.scene_file import BACKGROUND
-from scene.thing import Thing, middle_of
+from shapeshift.app.panels import theme
+from shapeshift.app.viewer.outlines import pixels
+from shapeshift.app.viewer.shown import Wish
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.lines import Lines, Wire
+from shapeshift.scene.colliders.collider import Collider
+from shapeshift.scene.colliders.collider_edges import hull_edges, mesh_edges
+from shapeshift.scene.document.scene_file import BACKGROUND
+from shapeshift.scene.pose import View
+from shapeshift.scene.world.mouse_hand import pose
+from shapeshift.scene.world.rigid_object import Thing, middle_of
 
 if TYPE_CHECKING:
-    from app.viewer.touch import Touch
+    from shapeshift.app.viewer.touch import Touch
 
 Vec = imgui.ImVec2
 LABEL_S, FLASH_S = 1.8, 0.4  # how long they are seen

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from runtime_models.model import Stop
-from scene.control import SNAP, snap
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.control import SNAP, snap
 
 STEP = 0.01  # of x: one press of an arrow key
 SAME_X = 1e-6  # nearer than this to a stop is on it

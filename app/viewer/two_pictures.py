@@ -7,13 +7,13 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from app.panels import theme
-from app.viewer.readings import Readings
-from app.viewer.shown import Shown, Wish
-from app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release, Window
-from renderer.gpu import Gpu
-from renderer.renderer import Renderer
-from renderer.resolve import Resolve
+from shapeshift.app.panels import theme
+from shapeshift.app.viewer.readings import Readings
+from shapeshift.app.viewer.shown import Shown, Wish
+from shapeshift.app.viewer.window import DoubleClick, Drag, Event, KeyDown, Press, Release, Window
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.resolve import Resolve
+from shapeshift.renderer.renderer import Renderer
 
 Vec = imgui.ImVec2
 Rgb = tuple[float, float, float]

@@ -6,45 +6,45 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.panels.camera_panel import KeptViews, attach_cameras
-from app.panels.export_panel import attach_export
-from app.panels.legend_panel import draw_legend
-from app.panels.look_panel import draw_look
-from app.panels.panel import draw_panel
-from app.panels.performance_panel import draw_performance
-from app.panels.regions_panel import draw_regions
-from app.panels.scale_bar import draw_scale_bar
-from app.panels.slider import draw_slider_bar
-from app.panels.status_line import draw_status
-from app.panels.stops_panel import draw_stops
-from app.paths import WorkFolders
-from app.viewer.bodies import attach_bodies
-from app.viewer.controls import EVERYTHING, FIRST, SMOOTH_S
-from app.viewer.dial import FLOOR_DB, TARGET_MS, Dial
-from app.viewer.files import Files, first_camera
-from app.viewer.framed import Framed
-from app.viewer.hands import is_erasing, is_painting, push, take
-from app.viewer.layout import Layout, lay_out
-from app.viewer.objects import attach_objects
-from app.viewer.outlines import draw_brush, draw_outlines
-from app.viewer.own_files import OwnFiles
-from app.viewer.pictures import write_numbered_png, write_png
-from app.viewer.readings import Readings
-from app.viewer.sections import Hooks, Section
-from app.viewer.settings import Settings
-from app.viewer.shell import Shell
-from app.viewer.shown import Shown, Wish
-from app.viewer.stage import Stage
-from app.viewer.stepping import Steps
-from app.viewer.touch import attach_touch
-from app.viewer.window import Event, Window
-from renderer.context import describe
-from renderer.debug import debug_legend
-from renderer.renderer import Renderer
-from scene.pose import View
+from shapeshift.app.panels.camera_panel import KeptViews, attach_cameras
+from shapeshift.app.panels.export_panel import attach_export
+from shapeshift.app.panels.legend_panel import draw_legend
+from shapeshift.app.panels.look_panel import draw_look
+from shapeshift.app.panels.panel import draw_panel
+from shapeshift.app.panels.performance_panel import draw_performance
+from shapeshift.app.panels.regions_panel import draw_regions
+from shapeshift.app.panels.scale_bar import draw_scale_bar
+from shapeshift.app.panels.slider import draw_slider_bar
+from shapeshift.app.panels.status_line import draw_status
+from shapeshift.app.panels.stops_panel import draw_stops
+from shapeshift.app.paths import WorkFolders
+from shapeshift.app.viewer.bodies import attach_bodies
+from shapeshift.app.viewer.controls import EVERYTHING, FIRST, SMOOTH_S
+from shapeshift.app.viewer.dial import FLOOR_DB, TARGET_MS, Dial
+from shapeshift.app.viewer.files import Files, first_camera
+from shapeshift.app.viewer.framed import Framed
+from shapeshift.app.viewer.hands import is_erasing, is_painting, push, take
+from shapeshift.app.viewer.layout import Layout, lay_out
+from shapeshift.app.viewer.objects import attach_objects
+from shapeshift.app.viewer.outlines import draw_brush, draw_outlines
+from shapeshift.app.viewer.own_files import OwnFiles
+from shapeshift.app.viewer.pictures import write_numbered_png, write_png
+from shapeshift.app.viewer.readings import Readings
+from shapeshift.app.viewer.sections import Hooks, Section
+from shapeshift.app.viewer.settings import Settings
+from shapeshift.app.viewer.shell import Shell
+from shapeshift.app.viewer.shown import Shown, Wish
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.stepping import Steps
+from shapeshift.app.viewer.touch import attach_touch
+from shapeshift.app.viewer.window import Event, Window
+from shapeshift.renderer.debug.debug import debug_legend
+from shapeshift.renderer.gl.context import describe
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.pose import View
 
 if TYPE_CHECKING:
-    from app.viewer.desktop import Options
+    from shapeshift.app.viewer.desktop import Options
 
 WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
 SLEEP_S = 0.5  # longest wait for input while nothing moves

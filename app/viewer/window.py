@@ -11,14 +11,14 @@ from imgui_bundle import imgui
 from moderngl_window.context.glfw import Window as GlfwWindow
 from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
 
-from app.panels import theme
-from app.panels.clean_texts import clean_texts
-from app.paths import plain
-from app.program import program
-from app.viewer.monitor import grow_window, monitor_height
-from app.viewer.settings import default_text_size
-from renderer.context import NoContext
-from runtime_models.plain_text import one_line
+from shapeshift.app.panels import theme
+from shapeshift.app.panels.clean_texts import clean_texts
+from shapeshift.app.paths import plain
+from shapeshift.app.program import program
+from shapeshift.app.viewer.monitor import grow_window, monitor_height
+from shapeshift.app.viewer.settings import default_text_size
+from shapeshift.renderer.gl.context import NoContext
+from shapeshift.runtime_models.files.plain_text import one_line
 
 BUTTONS = {0: "left", 1: "right", 2: "middle"}
 DOUBLE_CLICK_S = 0.3

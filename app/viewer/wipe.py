@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 import glfw
 import numpy as np
 
-from app.charts.comparison import MOST_DB, Comparison
-from app.commands.compare_sides import SceneSide, open_side
-from app.errors import UsageError
-from app.panels import theme
-from app.program import program
-from app.viewer.shown import Wish, picture_key
-from app.viewer.two_pictures import TwoPictures
-from app.viewer.window import Event, KeyDown
-from renderer.renderer import Renderer
-from scene.camera_list import moved
-from scene.metrics import psnr
-from scene.scene import Scene
+from shapeshift.app.charts.comparison import MOST_DB, Comparison
+from shapeshift.app.commands.compare_sides import SceneSide, open_side
+from shapeshift.app.errors import UsageError
+from shapeshift.app.panels import theme
+from shapeshift.app.program import program
+from shapeshift.app.viewer.shown import Wish, picture_key
+from shapeshift.app.viewer.two_pictures import TwoPictures
+from shapeshift.app.viewer.window import Event, KeyDown
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.cameras.camera_list import moved
+from shapeshift.scene.metrics import psnr
+from shapeshift.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from app.viewer.desktop import Options, Viewer
+    from shapeshift.app.viewer.desktop import Options, Viewer
 
 KEYS = (
     (", .", "move the line of the wipe"),

@@ -20,11 +20,11 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from app.charts.chart_rows import RowsFile, write_text  # noqa: E402
-from app.training.table import Options, run  # noqa: E402
-from app.training.table_rows import Row, VggRow  # noqa: E402
-from training.plain_settings import PlainSettings  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
+from shapeshift.app.charts.chart_rows import RowsFile, write_text  # noqa: E402
+from shapeshift.app.training.table import Options, run  # noqa: E402
+from shapeshift.app.training.table_rows import Row, VggRow  # noqa: E402
+from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
+from shapeshift.training.settings import TrainSettings  # noqa: E402
 
 KNOWN = ("balls", "workshop")
 METHODS = ("joint", "separate", "splats", "spz")
@@ -91,11 +91,11 @@ def made(name: str, work: Path) -> Path:
     folder = work / "captures" / name
     if not (folder / "transforms.json").is_file():
         if name == "balls":
-            from training.synthetic.balls import make_balls
+            from shapeshift.training.synthetic.balls import make_balls
 
             make_balls(folder)
         else:
-            from training.synthetic.workshop import make_workshop
+            from shapeshift.training.synthetic.workshop import make_workshop
 
             make_workshop(folder)
     return folder

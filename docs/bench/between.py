@@ -7,8 +7,8 @@ balls whose modalities are photographed from the same places.  A way is a row of
 settings of training that it changes; the last ones are about modalities that are not treated alike.
 Every way of a capture has the same photos, first anchors,
 seed and budget.  A row whose `where` is a stop has the mean PSNR over its held-out photos; a row
-"A to B" has the figures of training/midpoints.py over `--views` of them, and in `sweep` what the
-case of that name of `launch.py stability` says of the first one: "holds", or what fails.
+"A to B" has the figures of training/evaluation/midpoints.py over `--views` of them, and in `sweep`
+what the case of that name of `launch.py stability` says of the first one: "holds", or what fails.
 """
 
 import argparse
@@ -24,19 +24,19 @@ sys.path[:0] = [str(HERE.parents[1])]
 
 from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
 
-from app.stability_cases.motion import Span  # noqa: E402
-from rasterizer.device import open_device  # noqa: E402
-from runtime_models.model import BadFile  # noqa: E402
-from scene.capture import Capture  # noqa: E402
-from scene.pose import View  # noqa: E402
-from training.midpoints import (  # noqa: E402
+from shapeshift.app.stability_cases.motion import Span  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.runtime_models.model import BadFile  # noqa: E402
+from shapeshift.scene.captures.capture import Capture  # noqa: E402
+from shapeshift.scene.pose import View  # noqa: E402
+from shapeshift.training.evaluation.midpoints import (  # noqa: E402
     Frequencies,
     Midpoints,
     between,
     draw_in_training,
 )
-from training.photos import BLACK  # noqa: E402
-from training.train import Trainer  # noqa: E402
+from shapeshift.training.photos import BLACK  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
 
 FREQUENCIES = "frequencies"
 EVEN = {"encoding": "even", "growth": "gradient"}

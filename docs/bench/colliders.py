@@ -21,11 +21,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
-from runtime_models.evaluate import Evaluator  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from scene.collider import Collider, Making, collider_of_splats, hulls_volume  # noqa: E402
-from scene.collider_wrap import volume  # noqa: E402
-from scene.stitch_mesh import is_watertight  # noqa: E402
+from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.scene.colliders.collider import Collider, Making, collider_of_splats, hulls_volume  # noqa: E402
+from shapeshift.scene.colliders.collider_wrap import volume  # noqa: E402
+from shapeshift.scene.colliders.stitch_mesh import is_watertight  # noqa: E402
 
 FIELDS = (
     "capture", "splats", "hulls", "faces", "watertight", "wrap_s", "pieces_s", "outside_percent",

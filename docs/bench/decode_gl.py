@@ -23,14 +23,14 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from splat_scenes import random_model  # noqa: E402
 
-from rasterizer.device import NoDevice  # noqa: E402
-from renderer.buffers import Arena  # noqa: E402
-from renderer.context import open_context  # noqa: E402
-from renderer.decode import MLPS, Decoder  # noqa: E402
-from renderer.gpu import Gpu  # noqa: E402
-from runtime_models.evaluate import BATCH, Evaluator, directions, open_session  # noqa: E402
-from runtime_models.model import AnchorModel  # noqa: E402
-from runtime_models.write_onnx import write_onnx  # noqa: E402
+from shapeshift.rasterizer.device import NoDevice  # noqa: E402
+from shapeshift.renderer.gl.buffers import Arena  # noqa: E402
+from shapeshift.renderer.gl.context import open_context  # noqa: E402
+from shapeshift.renderer.gl.decode import MLPS, Decoder  # noqa: E402
+from shapeshift.renderer.gl.gpu import Gpu  # noqa: E402
+from shapeshift.runtime_models.evaluate import BATCH, Evaluator, directions, open_session  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
+from shapeshift.runtime_models.package.write_onnx import write_onnx  # noqa: E402
 
 LIMITS = {"onnxruntime": 1.2, "gl": 15.0}  # times the floor
 RUNS = 7
@@ -108,7 +108,7 @@ def rows_of(gpu: Gpu, anchors: int) -> list[tuple]:
         with Arena(gpu, [model.splat_count]) as arena, Decoder(gpu, arena, [model], mlps) as made:
             add(f"quads, {mlps}", LIMITS[mlps], decoding(made.geometry, made.color, gpu.ctx.finish))
     try:
-        from renderer.tiles import TilesDrawing
+        from shapeshift.renderer.tiles.tiles import TilesDrawing
 
         drawing = TilesDrawing()
     except NoDevice as reason:

@@ -12,13 +12,13 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
-from app.drawing import save_png  # noqa: E402
-from app.stability_cases.stage import turned_about  # noqa: E402
-from renderer.renderer import Renderer  # noqa: E402
-from renderer.settings import RenderSettings  # noqa: E402
-from runtime_models.read_package import read_package  # noqa: E402
-from scene.framing import default_view  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.app.drawing import save_png  # noqa: E402
+from shapeshift.app.stability_cases.stage import turned_about  # noqa: E402
+from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.renderer.settings import RenderSettings  # noqa: E402
+from shapeshift.runtime_models.package.read_package import read_package  # noqa: E402
+from shapeshift.scene.cameras.framing import default_view  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 SIZE = (300, 200)
 DEGREES = (0.0, 28.0, -35.0)  # around the middle of the bench

@@ -21,13 +21,13 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from rasterizer.device import open_device  # noqa: E402
-from scene.capture import Capture  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
-from training.evaluate import evaluate_model  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
-from training.synthetic.balls import make_balls  # noqa: E402
-from training.train import Trainer  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.scene.captures.capture import Capture  # noqa: E402
+from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
+from shapeshift.training.evaluation.evaluate import evaluate_model  # noqa: E402
+from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.synthetic.balls import make_balls  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = (
     "capture", "start", "views", "share", "seed", "steps", "seconds", "anchors", "modality",

@@ -20,15 +20,20 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from app.commands.exported import Look, Part, bake_part, export  # noqa: E402
-from renderer.renderer import Renderer  # noqa: E402
-from runtime_models.model import SplatLayers, Stop  # noqa: E402
-from runtime_models.plain_splats import PlainSplats  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from runtime_models.write_plain import WRITERS  # noqa: E402
-from scene.framing import default_background, frame_points, model_points, orbit_path  # noqa: E402
-from scene.metrics import psnr  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.app.commands.exported import Look, Part, bake_part, export  # noqa: E402
+from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.runtime_models.model import SplatLayers, Stop  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats  # noqa: E402
+from shapeshift.runtime_models.splats.write_plain import WRITERS  # noqa: E402
+from shapeshift.scene.cameras.framing import (  # noqa: E402
+    default_background,
+    frame_points,
+    model_points,
+    orbit_path,
+)
+from shapeshift.scene.metrics import psnr  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 DEMO = HERE.parents[1] / "assets" / "workshop.shift"
 SIZE = (480, 320)

@@ -23,10 +23,10 @@ sys.path[:0] = [str(HERE.parents[1])]
 
 from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
 
-from rasterizer.device import open_device  # noqa: E402
-from rasterizer.project import LEAST_ALPHA  # noqa: E402
-from runtime_models.write_package import package_files, zip_files  # noqa: E402
-from training.train import Trainer  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.rasterizer.project import LEAST_ALPHA  # noqa: E402
+from shapeshift.runtime_models.package.write_package import package_files, zip_files  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
 
 WAYS = {
     "none": {"growth": "gradient", "grow": False},

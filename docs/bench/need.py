@@ -15,11 +15,11 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from rasterizer.device import open_device  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
-from training.fit import Fit, Need  # noqa: E402
-from training.need import Measured  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
+from shapeshift.training.fit.ablation import Measured  # noqa: E402
+from shapeshift.training.fit.fit import Fit, Need  # noqa: E402
+from shapeshift.training.settings import TrainSettings  # noqa: E402
 
 COLUMNS = (
     "capture,part,verdict,modality,change_db,change_error,total_db,total_error,bytes,decode_ms,"

@@ -26,15 +26,15 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from app.charts.chart_stage import Walk, arc  # noqa: E402
-from renderer.context import NoContext, open_context  # noqa: E402
-from renderer.renderer import Renderer  # noqa: E402
-from runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from scene.framing import default_view, frame_points, model_points  # noqa: E402
-from scene.metrics import psnr  # noqa: E402
-from scene.pose import Pose, View  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.app.charts.chart_stage import Walk, arc  # noqa: E402
+from shapeshift.renderer.gl.context import NoContext, open_context  # noqa: E402
+from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.scene.cameras.framing import default_view, frame_points, model_points  # noqa: E402
+from shapeshift.scene.metrics import psnr  # noqa: E402
+from shapeshift.scene.pose import Pose, View  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 COUNTS = (3, 5, 10, 20)
 CHANGES = ("eye", "poses", "x of one")
@@ -161,7 +161,7 @@ def main() -> int:
             gl = ctx.info["GL_RENDERER"]
         for name, model in models.items():
             rows += measure(name, model, drawing, ctx, options)
-    from rasterizer.device import open_device
+    from shapeshift.rasterizer.device import open_device
 
     words = f"python docs/bench/objects.py {options.leg.name} --frames {options.frames}"
     words += f" --out {options.out.name}" if options.out else ""

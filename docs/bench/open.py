@@ -40,8 +40,8 @@ SIZES = ((100_000, 0), (100_000, 3), (1_000_000, 0), (1_000_000, 3))  # splats, 
 
 
 def ours(path: Path) -> list[np.ndarray]:
-    from runtime_models.model import SplatLayers
-    from runtime_models.read_scene import read_model
+    from shapeshift.runtime_models.model import SplatLayers
+    from shapeshift.runtime_models.read_scene import read_model
 
     model = read_model(path)
     arrays = [value for value in vars(model).values() if isinstance(value, np.ndarray)]
@@ -159,7 +159,7 @@ def child(*arguments: object) -> object:
 
 def measure(path: Path) -> list[dict]:
     """The rows of one file."""
-    from runtime_models.read_scene import describe, read_model
+    from shapeshift.runtime_models.read_scene import describe, read_model
 
     facts = describe(read_model(path), path)
     size, splats, rows = path.stat().st_size, facts["splats"], []
@@ -181,7 +181,7 @@ def measure(path: Path) -> list[dict]:
 
 def splats_of(count: int, degree: int):
     """Splats of any kind: what they show does not matter here."""
-    from runtime_models.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
     rng, wide = np.random.default_rng(0), (degree + 1) ** 2
     wxyz = rng.standard_normal((count, 4), np.float32)
@@ -196,8 +196,8 @@ def splats_of(count: int, degree: int):
 
 def made_files(folder: Path):
     """Writes one file after the other; each is gone before the next."""
-    from runtime_models.write_plain import WRITERS
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+    from shapeshift.runtime_models.splats.write_plain import WRITERS
 
     for count, degree in SIZES:
         path = folder / f"{count // 1000}k_sh{degree}.ply"

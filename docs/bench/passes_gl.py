@@ -23,21 +23,21 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from splat_scenes import random_model, shell  # noqa: E402
 
-from rasterizer.device import open_device  # noqa: E402
-from renderer import layout  # noqa: E402
-from renderer.buffers import Arena, bind  # noqa: E402
-from renderer.context import open_context  # noqa: E402
-from renderer.gpu import Gpu, groups_for  # noqa: E402
-from renderer.project import Projector  # noqa: E402
-from renderer.quads import QuadsDrawing  # noqa: E402
-from renderer.renderer import Renderer  # noqa: E402
-from renderer.settings import RenderSettings  # noqa: E402
-from renderer.sort import Sorter, quantize  # noqa: E402
-from renderer.splat import Splatter  # noqa: E402
-from renderer.tiles import TilesDrawing  # noqa: E402
-from runtime_models.evaluate import Evaluator, directions, evaluate  # noqa: E402
-from scene.pose import View, look_at  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.renderer import layout  # noqa: E402
+from shapeshift.renderer.gl.buffers import Arena, bind  # noqa: E402
+from shapeshift.renderer.gl.context import open_context  # noqa: E402
+from shapeshift.renderer.gl.gpu import Gpu, groups_for  # noqa: E402
+from shapeshift.renderer.gl.project import Projector  # noqa: E402
+from shapeshift.renderer.gl.quads import QuadsDrawing  # noqa: E402
+from shapeshift.renderer.gl.sort import Sorter, quantize  # noqa: E402
+from shapeshift.renderer.gl.splat import Splatter  # noqa: E402
+from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.renderer.settings import RenderSettings  # noqa: E402
+from shapeshift.renderer.tiles.tiles import TilesDrawing  # noqa: E402
+from shapeshift.runtime_models.evaluate import Evaluator, directions, evaluate  # noqa: E402
+from shapeshift.scene.pose import View, look_at  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 SIZE = (1280, 720)
 EYES = [View(look_at((x, 0.3, 4.5), (x, 0, 0)), (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)

@@ -25,16 +25,16 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
 from peer_pages.browser import NPM_PACKAGES, CannotRun, browser_frames  # noqa: E402
 
-from app.drawing import save_png  # noqa: E402
-from renderer.reference import reference_image  # noqa: E402
-from renderer.renderer import Renderer  # noqa: E402
-from runtime_models.plain_splats import PlainSplats  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from runtime_models.write_ply import write_ply  # noqa: E402
-from scene.framing import fit_distance, frame_points, view_from  # noqa: E402
-from scene.metrics import psnr  # noqa: E402
-from scene.pose import View  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.app.drawing import save_png  # noqa: E402
+from shapeshift.renderer.reference.reference import reference_image  # noqa: E402
+from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats  # noqa: E402
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply  # noqa: E402
+from shapeshift.scene.cameras.framing import fit_distance, frame_points, view_from  # noqa: E402
+from shapeshift.scene.metrics import psnr  # noqa: E402
+from shapeshift.scene.pose import View  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 SCALE = 4.0  # of the scene: some viewers cut what is nearer than 0.3
 FOV_Y_DEGREES = 45.0

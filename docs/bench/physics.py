@@ -25,7 +25,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from physics_things import PLATE, at, box, cup, lowest, run, table  # noqa: E402
 
-from scene.physics import Physics  # noqa: E402
+from shapeshift.scene.world.physics import Physics  # noqa: E402
 
 FIELDS = ("figure", "case", "value", "unit", "limit", "holds")
 COSTS = {5: 0.5, 20: 1.0, 100: 8.0}  # objects: ms, mean

@@ -24,15 +24,15 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from rasterizer.device import open_device  # noqa: E402
-from runtime_models.model import BadFile  # noqa: E402
-from scene.capture import Capture  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
-from scene.read_points import read_points  # noqa: E402
-from training.initial import SOURCES  # noqa: E402
-from training.photos import choose_downscale, load_photos  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
-from training.train import Trainer  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.runtime_models.model import BadFile  # noqa: E402
+from shapeshift.scene.captures.capture import Capture  # noqa: E402
+from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
+from shapeshift.scene.captures.read_points import read_points  # noqa: E402
+from shapeshift.training.first_anchors.initial import SOURCES  # noqa: E402
+from shapeshift.training.photos import choose_downscale, load_photos  # noqa: E402
+from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.train import Trainer  # noqa: E402
 
 COLUMNS = (
     "capture", "points", "seed", "modality", "psnr_db", "first_db", "seconds", "first_anchors",
@@ -45,10 +45,10 @@ SCAN_NOISE = 0.002  # metres
 
 def workshop(folder: Path) -> tuple[Path, np.ndarray]:
     """The demo's bench with depth photos, and points of a scan of it, closed and opened."""
-    from scene.write_capture import write_capture
-    from training.synthetic.balls import DEPTH_UNIT, save_depth
-    from training.synthetic.tracer import depth_under, surface_points
-    from training.synthetic.workshop import dome, make_workshop, place
+    from shapeshift.scene.captures.write_capture import write_capture
+    from shapeshift.training.synthetic.balls import DEPTH_UNIT, save_depth
+    from shapeshift.training.synthetic.tracer import depth_under, surface_points
+    from shapeshift.training.synthetic.workshop import dome, make_workshop, place
 
     capture, photos = make_workshop(folder, **WORKSHOP, processes=1), []
     for photo in capture.photos:

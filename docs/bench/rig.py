@@ -18,13 +18,13 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from app.measure import processor  # noqa: E402
-from rasterizer.device import open_device  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
-from training.rig import moved_by, offset_capture, told  # noqa: E402
-from training.rig_search import STAGES, STEPS, search, shape_for  # noqa: E402
-from training.settings import TrainSettings  # noqa: E402
-from training.synthetic.workshop import make_workshop  # noqa: E402
+from shapeshift.app.measure import processor  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
+from shapeshift.training.calibration.calibrate import STAGES, STEPS, search, shape_for  # noqa: E402
+from shapeshift.training.calibration.extrinsics import moved_by, offset_capture, told  # noqa: E402
+from shapeshift.training.settings import TrainSettings  # noqa: E402
+from shapeshift.training.synthetic.workshop import make_workshop  # noqa: E402
 
 MODALITY = "Thermal"
 PLANTED = (  # degrees about x, y, z of the camera, and millimetres along them

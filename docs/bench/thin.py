@@ -4,7 +4,8 @@
 
 Each scene is drawn whole and with a part of its splats from views around it; the rows are the mean
 PSNR (dB of the mean squared error over all views) against the whole one.  "thin" is what
-runtime_models/thin.py does; "even" draws along the Z-curve with chances by a weight.
+runtime_models/splats/operations/prune_by_importance.py does; "even"
+draws along the Z-curve with chances by a weight.
 """
 
 import argparse
@@ -19,14 +20,18 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from app.drawing import open_renderer  # noqa: E402
-from runtime_models.model import SplatLayers  # noqa: E402
-from runtime_models.morton import morton_order  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from runtime_models.thin import evenly, largest, prominence  # noqa: E402
-from scene.framing import frame_points, model_points, orbit_path  # noqa: E402
-from scene.metrics import psnr  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.app.drawing import open_renderer  # noqa: E402
+from shapeshift.runtime_models.model import SplatLayers  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.runtime_models.splats.operations.morton import morton_order  # noqa: E402
+from shapeshift.runtime_models.splats.operations.prune_by_importance import (  # noqa: E402
+    evenly,
+    largest,
+    prominence,
+)
+from shapeshift.scene.cameras.framing import frame_points, model_points, orbit_path  # noqa: E402
+from shapeshift.scene.metrics import psnr  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 SIZE = (640, 360)
 VIEWS = 8

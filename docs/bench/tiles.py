@@ -24,23 +24,23 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
 from peers import make_views  # noqa: E402
 
-from rasterizer.bin import bin_tiles, sort_order  # noqa: E402
-from rasterizer.device import Device, open_device  # noqa: E402
-from rasterizer.pack import pack  # noqa: E402
-from rasterizer.project import Projected, grid_of  # noqa: E402
-from rasterizer.project_arena import SortFrames, project_arena  # noqa: E402
-from rasterizer.raster import rasterize_rgba_views  # noqa: E402
-from rasterizer.shade_sh import shade_sh, upload_sh  # noqa: E402
-from renderer.reference import reference_image  # noqa: E402
-from renderer.settings import RenderSettings  # noqa: E402
-from renderer.tiles import camera_of  # noqa: E402
-from runtime_models.evaluate import Evaluator  # noqa: E402
-from runtime_models.model import SplatLayers, Stop  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from scene.framing import frame_points  # noqa: E402
-from scene.metrics import psnr  # noqa: E402
-from scene.pose import Pose, View  # noqa: E402
-from scene.scene import Scene, SceneObject  # noqa: E402
+from shapeshift.rasterizer.bin import bin_tiles, sort_order  # noqa: E402
+from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
+from shapeshift.rasterizer.pack import pack  # noqa: E402
+from shapeshift.rasterizer.project import Projected, grid_of  # noqa: E402
+from shapeshift.rasterizer.project_arena import SortFrames, project_arena  # noqa: E402
+from shapeshift.rasterizer.raster import rasterize_rgba_views  # noqa: E402
+from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh  # noqa: E402
+from shapeshift.renderer.reference.reference import reference_image  # noqa: E402
+from shapeshift.renderer.settings import RenderSettings  # noqa: E402
+from shapeshift.renderer.tiles.tiles import camera_of  # noqa: E402
+from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
+from shapeshift.runtime_models.model import SplatLayers, Stop  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.scene.cameras.framing import frame_points  # noqa: E402
+from shapeshift.scene.metrics import psnr  # noqa: E402
+from shapeshift.scene.pose import Pose, View  # noqa: E402
+from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 
 SIZES = ((640, 360), (1280, 720))
 ORACLE_SIZE = (256, 144)

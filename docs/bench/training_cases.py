@@ -16,13 +16,13 @@ import numpy as np
 import pyopencl
 from PIL import Image
 
-from rasterizer.device import open_device
-from runtime_models.read_scene import read_model
-from scene.capture import Capture, Photo
-from scene.photo import load_photo
-from scene.write_capture import write_capture
-from training.rig import moved_by, offset_view
-from training.train import Trainer
+from shapeshift.rasterizer.device import open_device
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.photo import load_photo
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.training.calibration.extrinsics import moved_by, offset_view
+from shapeshift.training.train import Trainer
 
 REFUSED, FAULT, INTERRUPTED = 2, 3, 130  # exit codes
 POOR = 3.0  # dB below the untouched capture, of the modality that loses most

@@ -20,14 +20,14 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from rasterizer.device import Device, open_device  # noqa: E402
-from scene.pose import View, look_at, perspective  # noqa: E402
-from training.density import Evidence  # noqa: E402
-from training.losses import ImageLoss  # noqa: E402
-from training.memory import step_memory  # noqa: E402
-from training.networks import HeadLayout, initial_weights, padded  # noqa: E402
-from training.optimizer import Adam  # noqa: E402
-from training.step import Step  # noqa: E402
+from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
+from shapeshift.scene.pose import View, look_at, perspective  # noqa: E402
+from shapeshift.training.density.density import Evidence  # noqa: E402
+from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
+from shapeshift.training.heads.optimizer import Adam  # noqa: E402
+from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
+from shapeshift.training.memory import step_memory  # noqa: E402
+from shapeshift.training.step import Step  # noqa: E402
 
 PASSES = (
     "heads", "activate", "project", "bin", "rasterize", "loss", "rasterize backward",

@@ -27,18 +27,18 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE)]
 
 from training_cases import CASES, Case, Outcome  # noqa: E402
 
-from app.cli import main as launch  # noqa: E402
-from rasterizer.device import open_device  # noqa: E402
-from runtime_models.read_scene import read_model  # noqa: E402
-from scene.capture import Capture  # noqa: E402
-from scene.photo import load_photo  # noqa: E402
-from scene.read_capture import read_capture  # noqa: E402
-from scene.write_capture import write_capture  # noqa: E402
-from training.evaluate import Painter, stop_for  # noqa: E402
-from training.metrics import psnr  # noqa: E402
-from training.photos import BLACK, load_photos  # noqa: E402
-from training.schedule import choose_background  # noqa: E402
-from training.synthetic.balls import make_balls  # noqa: E402
+from shapeshift.app.cli import main as launch  # noqa: E402
+from shapeshift.rasterizer.device import open_device  # noqa: E402
+from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
+from shapeshift.scene.captures.capture import Capture  # noqa: E402
+from shapeshift.scene.captures.photo import load_photo  # noqa: E402
+from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
+from shapeshift.scene.captures.write_capture import write_capture  # noqa: E402
+from shapeshift.training.evaluation.evaluate import Painter, stop_for  # noqa: E402
+from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
+from shapeshift.training.photos import BLACK, load_photos  # noqa: E402
+from shapeshift.training.schedule import choose_background  # noqa: E402
+from shapeshift.training.synthetic.balls import make_balls  # noqa: E402
 
 HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
 ANCHORS = ("--anchors", "1000", "--max-anchors", "2000")

@@ -13,12 +13,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scene.capture import Capture
-from scene.read_capture import read_capture
-from training.photos import LoadedPhoto, choose_downscale, load_photos
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
-from training.synthetic.workshop import make_workshop
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.synthetic.workshop import make_workshop
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-// lines: ends of line segments over a picture; see renderer/lines.py.
+// lines: ends of line segments over a picture; see renderer/gl/lines.py.
 in vec3 place;  // metres, object frame
 uniform mat4 clip_from_object;
 

@@ -1,5 +1,5 @@
 // pair: one triangle a splat around its two ellipses, those of the left and of the right view, in a
-// grid of pixels where the two lie close to each other; see renderer/pair.py.
+// grid of pixels where the two lie close to each other; see renderer/gl/stereo_pair.py.
 #include "common/record.glsl"
 #include "common/triangle.glsl"
 

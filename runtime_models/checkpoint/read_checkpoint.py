@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.memory import Account
-from runtime_models.model import BadFile, Finding
-from runtime_models.npy import read_array
-from runtime_models.plain_splats import RawSplats, Reading, empty_splats
-from runtime_models.read_points_ply import splats_of_points
-from runtime_models.read_torch import INDEX, read_tensors
-from runtime_models.spherical_harmonics import C0, COEFFICIENTS
-from runtime_models.zip_files import member_names, opened_zip
+from shapeshift.runtime_models.checkpoint.read_torch import INDEX, read_tensors
+from shapeshift.runtime_models.colors.spherical_harmonics import C0, COEFFICIENTS
+from shapeshift.runtime_models.files.memory import Account
+from shapeshift.runtime_models.files.npy import read_array
+from shapeshift.runtime_models.files.zip_files import member_names, opened_zip
+from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.ply.read_points_ply import splats_of_points
 
 PARTS = {  # what each array is called, by gsplat, by nerfstudio, by others
     "means": ("means", "means3d", "xyz"),

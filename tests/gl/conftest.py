@@ -7,11 +7,11 @@ import moderngl
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
-from renderer.context import NoContext, open_context
-from renderer.gpu import Gpu
-from renderer.renderer import Renderer
-from runtime_models.model import (
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.renderer.gl.context import NoContext, open_context
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
     AnchorModel,
@@ -20,7 +20,7 @@ from runtime_models.model import (
     SplatLayers,
     Stop,
 )
-from scene.pose import View, look_at
+from shapeshift.scene.pose import View, look_at
 
 STOPS = (Stop("first", 0.0), Stop("second", 1.0))
 

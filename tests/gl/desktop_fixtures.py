@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from desktop_stand import PlainRenderer, read_stub, run_frames
 
-from app.viewer.desktop import Options, Viewer
-from app.viewer.stage import Stage
-from app.viewer.window import Window
+from shapeshift.app.viewer.desktop import Options, Viewer
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.window import Window
 
 
 @pytest.fixture(scope="module")

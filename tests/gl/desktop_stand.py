@@ -6,8 +6,8 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
-from renderer.settings import FrameStats, RenderSettings
-from runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.renderer.settings import FrameStats, RenderSettings
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 
 STOPS = (
     Stop("photo", 0.0),

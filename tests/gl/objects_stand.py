@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
 
-from app.viewer.desktop import Options, Viewer
-from app.viewer.files import opened_scene
-from app.viewer.opened import Found, Source, read_files
-from app.viewer.outlines import pixels
-from app.viewer.stage import Stage
-from app.viewer.touch import Touch
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.write_ply import write_ply
-from scene.camera_list import CameraReading
+from shapeshift.app.viewer.desktop import Options, Viewer
+from shapeshift.app.viewer.files import opened_scene
+from shapeshift.app.viewer.opened import Found, Source, read_files
+from shapeshift.app.viewer.outlines import pixels
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.touch import Touch
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.cameras.camera_list import CameraReading
 
 TOUCH = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 NAMES = ["background", "cube", "ball", "ring", "plate"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from renderer.renderer import Renderer
+from shapeshift.renderer.renderer import Renderer
 from tests.test_antialiased import CASES, check_eyes, check_frame
 
 

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from renderer import buffers, layout
-from renderer.buffers import Arena, fitting_splats
-from renderer.decode import Decoder
-from renderer.gpu import Gpu, groups_for
-from renderer.limits import TooLarge
-from renderer.project import Projector
-from renderer.settings import RenderSettings
-from renderer.sort import Sorter
-from renderer.splat import Splatter
-from runtime_models.rotation import covariance
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl import buffers
+from shapeshift.renderer.gl.buffers import Arena, fitting_splats
+from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.gl.project import Projector
+from shapeshift.renderer.gl.sort import Sorter
+from shapeshift.renderer.gl.splat import Splatter
+from shapeshift.renderer.limits import TooLarge
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.rotation import covariance
 from tests.gl.conftest import f32, make_layers, make_model, make_view, read
 
 BLOCK = layout.WORKGROUP

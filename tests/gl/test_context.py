@@ -9,8 +9,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from renderer.context import KINDS, NoContext, describe, is_software, open_context
-from renderer.timing import PassTimer
+from shapeshift.renderer.gl.context import KINDS, NoContext, describe, is_software, open_context
+from shapeshift.renderer.timing import PassTimer
 
 ROOT = Path(__file__).resolve().parents[2]
 TRIPLE = """#version 430

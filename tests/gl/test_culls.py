@@ -6,16 +6,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from renderer import layout
-from renderer.buffers import Arena
-from renderer.gpu import Gpu
-from renderer.project import Projector
-from renderer.reference import gate_object, reference_counts, reference_image, reference_reasons
-from renderer.renderer import Renderer
-from renderer.settings import CULL_REASONS, RenderSettings
-from runtime_models.evaluate import evaluate
-from scene.pose import Pose, View
-from scene.scene import Scene
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.project import Projector
+from shapeshift.renderer.reference.reference import (
+    gate_object,
+    reference_counts,
+    reference_image,
+    reference_reasons,
+)
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene
 from tests.gl.conftest import read
 from tests.models import make_random_model
 from tests.splat_scenes import (

@@ -5,22 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.classify import classify
-from renderer.debug import (
+from shapeshift.renderer.debug.classify import classify
+from shapeshift.renderer.debug.debug import (
     DEBUG_NAMES,
     REASON_COLORS,
     debug_legend,
     object_color,
     object_poses,
 )
-from renderer.debug_map import fit, heading
-from renderer.reference import gate_object, reference_reasons
-from renderer.renderer import Renderer
-from renderer.settings import CULL_REASONS, RenderSettings
-from runtime_models.evaluate import evaluate
-from runtime_models.rotation import covariance
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.debug.debug_map import fit, heading
+from shapeshift.renderer.reference.reference import gate_object, reference_reasons
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.rotation import covariance
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.gl.test_culls import FRONT, LIMITS, SCENES, row_of
 from tests.splat_scenes import (
     alone,

@@ -8,14 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from renderer import buffers, layout
-from renderer.buffers import Arena
-from renderer.decode import Decoder
-from renderer.gpu import Gpu
-from renderer.networks import ACTIVATIONS, pack_mlp
-from runtime_models.evaluate import Evaluator
-from runtime_models.model import AnchorModel, Mlp, SplatLayers
-from runtime_models.rotation import covariance
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl import buffers
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.networks import ACTIVATIONS, pack_mlp
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import AnchorModel, Mlp, SplatLayers
+from shapeshift.runtime_models.rotation import covariance
 from tests.gl.conftest import f32, make_layers, make_mlp, make_model, read
 
 EYE = np.array([0.3, -0.2, 2.0])

@@ -9,10 +9,10 @@ import pytest
 from desktop_stand import read_stub, run_frames, until_opened
 from PIL import Image
 
-from app.viewer import hands
-from app.viewer.stage import Stage
-from app.viewer.window import DoubleClick, Drag, Drop, KeyDown, Wheel
-from renderer.settings import RenderSettings
+from shapeshift.app.viewer import hands
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.window import DoubleClick, Drag, Drop, KeyDown, Wheel
+from shapeshift.renderer.settings import RenderSettings
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 

@@ -10,10 +10,10 @@ from camera_files import NAMES, assert_same, cameras
 from desktop_stand import run_frames, until_opened
 from widgets import Widgets
 
-from app.viewer.recent import RecentFiles
-from app.viewer.window import Drag, Drop, KeyDown, Wheel
-from scene.read_cameras import read_camera_list
-from scene.write_cameras import write_cameras
+from shapeshift.app.viewer.recent import RecentFiles
+from shapeshift.app.viewer.window import Drag, Drop, KeyDown, Wheel
+from shapeshift.scene.cameras.read_cameras import read_camera_list
+from shapeshift.scene.cameras.write_cameras import write_cameras
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 

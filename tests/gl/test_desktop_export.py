@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from desktop_stand import ball, run_frames
 
-from app.panels.export_panel import EVERYTHING, REGIONS, attach_export
-from runtime_models.formats import read_plain
+from shapeshift.app.panels.export_panel import EVERYTHING, REGIONS, attach_export
+from shapeshift.runtime_models.splats.formats import read_plain
 from tests.writers import EACH_WRITER
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
@@ -96,7 +96,7 @@ def test_what_goes_wrong_is_in_the_box_and_leaves_nothing(viewer, panel, monkeyp
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("app.panels.export_panel.export", full)
+    monkeypatch.setattr("shapeshift.app.panels.export_panel.export", full)
     panel.start()
     finish(viewer, panel)
     assert "No space left" in viewer.stage.problem and not exported(viewer)
@@ -111,7 +111,9 @@ def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
     from threading import Event
 
     go = Event()
-    monkeypatch.setattr("app.panels.export_panel.export", lambda *_: go.wait(20) and ball())
+    monkeypatch.setattr(
+        "shapeshift.app.panels.export_panel.export", lambda *_: go.wait(20) and ball()
+    )
     panel.start()
     run_frames(viewer, 3)
     assert panel.running and panel.poll()

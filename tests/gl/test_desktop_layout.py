@@ -9,13 +9,13 @@ from desktop_stand import run_frames
 from real_hands import RealHands
 from widgets import Widgets
 
-from app.panels.camera_panel import move_camera
-from app.viewer import monitor
-from app.viewer.framed import SETTLED_S
-from app.viewer.settings import Settings
-from app.viewer.split import splitting
-from app.viewer.window import Drag
-from renderer.renderer import Renderer
+from shapeshift.app.panels.camera_panel import move_camera
+from shapeshift.app.viewer import monitor
+from shapeshift.app.viewer.framed import SETTLED_S
+from shapeshift.app.viewer.settings import Settings
+from shapeshift.app.viewer.split import splitting
+from shapeshift.app.viewer.window import Drag
+from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 SIZES = [(800, 600), (1280, 720), (3840, 2160)]
@@ -186,13 +186,10 @@ def test_settings_that_cannot_be_kept_are_said_once(any_size, display, tmp_path)
 
 def test_no_slider_of_the_panel_lies_over_its_number(any_size, monkeypatch):
     """The line of text ends above the bar with the knob."""
-    import app.panels.panel
-    import app.panels.performance_panel
-    import app.panels.quality_panel
-    from app.panels import panel_rows
+    from shapeshift.app.panels import panel, panel_rows, performance_panel, quality_panel
 
-    monkeypatch.setattr(app.panels.panel, "section", lambda *_, **__: True)
-    for module in (app.panels.performance_panel, app.panels.quality_panel):
+    monkeypatch.setattr(panel, "section", lambda *_, **__: True)
+    for module in (performance_panel, quality_panel):
         monkeypatch.setattr(module, "subsection", lambda *_, **__: True)
     lines: list[float] = []
     labels, plain = [], panel_rows.imgui.text_unformatted

@@ -10,12 +10,12 @@ from sog_scenes import write_folder
 from test_desktop_program import start
 from test_streamed import random_sog, rewrite, write_streamed
 
-from app.viewer.desktop import Options, Viewer
-from app.viewer.opened import Source
-from app.viewer.refine import Refiner, attach_refiner
-from app.viewer.scene_objects import scene_of
-from app.viewer.stage import Stage
-from renderer.renderer import Renderer
+from shapeshift.app.viewer.desktop import Options, Viewer
+from shapeshift.app.viewer.opened import Source
+from shapeshift.app.viewer.refine import Refiner, attach_refiner
+from shapeshift.app.viewer.scene_objects import scene_of
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures display and window
 LEVELS = (400, 90, 20)

@@ -6,10 +6,10 @@ import pytest
 from desktop_stand import ball, run_frames
 from imgui_bundle import imgui
 
-from app.panels.clean_texts import clean_texts, cleaning, maker
-from runtime_models.model import Stop
-from runtime_models.plain_text import UNSAFE
-from scene.scene import Scene
+from shapeshift.app.panels.clean_texts import clean_texts, cleaning, maker
+from shapeshift.runtime_models.files.plain_text import UNSAFE
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.scene import Scene
 
 pytest_plugins = ["desktop_fixtures"]
 NAMES = ("\x1b[2J\u202egnp.exe", "a\ud800\x00b\nnew line", "%s%n%s%n", "n" * 50_000, "##x###y")

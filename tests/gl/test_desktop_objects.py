@@ -21,15 +21,15 @@ from objects_stand import (
     viewer_is_over,
 )
 
-from app.viewer.arrange import place, steer
-from app.viewer.gizmo import MOVE, OFF, TURN
-from app.viewer.opened import Found, Source
-from app.viewer.window import Drop
-from runtime_models.model import BadFile
-from runtime_models.plain_splats import PlainSplats
-from runtime_models.write_ply import write_ply
-from scene import edits
-from scene.pose import Pose
+from shapeshift.app.viewer.arrange import place, steer
+from shapeshift.app.viewer.gizmo import MOVE, OFF, TURN
+from shapeshift.app.viewer.opened import Found, Source
+from shapeshift.app.viewer.window import Drop
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.document import edits
+from shapeshift.scene.pose import Pose
 
 pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window; touch_viewer, splats_viewer
 

@@ -7,13 +7,10 @@ from objects_stand import names
 from real_hands import RealHands
 from widgets import Widgets
 
-import app.panels.objects_panel
-import app.panels.panel
-import app.panels.performance_panel
-import app.panels.quality_panel
-from app.panels.keys_sheet import GROUPS, spread
-from app.panels.path_box import can_browse
-from app.paths import TOUCH
+from shapeshift.app.panels import panel, performance_panel, quality_panel
+from shapeshift.app.panels.keys_sheet import GROUPS, spread
+from shapeshift.app.panels.path_box import can_browse
+from shapeshift.app.paths import TOUCH
 
 pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window, viewer; touch_viewer
 
@@ -27,8 +24,8 @@ def unfolded(monkeypatch):
         seen.append(name)
         return True
 
-    monkeypatch.setattr(app.panels.panel, "section", opened)
-    for module in (app.panels.performance_panel, app.panels.quality_panel):
+    monkeypatch.setattr(panel, "section", opened)
+    for module in (performance_panel, quality_panel):
         monkeypatch.setattr(module, "subsection", opened)
     return seen
 
@@ -49,7 +46,7 @@ def test_everything_in_the_panel_explains_itself(touch_viewer, unfolded, monkeyp
 
 def test_first_comes_what_a_first_visitor_needs(viewer, unfolded):
     run_frames(viewer, 1)
-    sections = [name for name in unfolded if name in app.panels.panel.ORDER]
+    sections = [name for name in unfolded if name in panel.ORDER]
     assert sections == ["Stops", "Look", "Camera", "Objects", "Regions", "Export", "Performance"]
     inside = unfolded[unfolded.index("Performance") + 1 :]
     assert [n for n in inside if n in ("Budget", "Quality", "Passes", "Counts", "Machine")] == [
@@ -59,7 +56,7 @@ def test_first_comes_what_a_first_visitor_needs(viewer, unfolded):
 
 def test_things_come_second_where_there_are_several(touch_viewer, unfolded):
     run_frames(touch_viewer, 1)
-    sections = [name for name in unfolded if name in app.panels.panel.ORDER]
+    sections = [name for name in unfolded if name in panel.ORDER]
     assert sections[:3] == ["Touch", "Objects", "Stops"]
 
 
@@ -119,8 +116,8 @@ def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     import inspect
     import re
 
-    from app.viewer import hands, objects, shell, split, touch, two_pictures
-    from app.viewer import window as window_module
+    from shapeshift.app.viewer import hands, objects, shell, split, touch, two_pictures
+    from shapeshift.app.viewer import window as window_module
 
     told = " ".join(key for rows in GROUPS.values() for key, _ in rows)
     more = (touch.KEYS, objects.KEYS, split.KEYS)

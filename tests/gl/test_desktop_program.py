@@ -13,9 +13,9 @@ from PIL import Image
 from Xlib import Xatom
 from Xlib.display import Display
 
-from app.viewer.window import Window
-from renderer.context import NoContext
-from scene.pose import look_at
+from shapeshift.app.viewer.window import Window
+from shapeshift.renderer.gl.context import NoContext
+from shapeshift.scene.pose import look_at
 
 pytest_plugins = ["desktop_fixtures"]  # its fixture display
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,7 +26,7 @@ def start(display: str | None, *arguments, code: str | None = None) -> subproces
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     if display:
         environment["DISPLAY"] = display
-    program = ["-c", code] if code else ["-m", "app.cli"]
+    program = ["-c", code] if code else ["-m", "shapeshift"]
     return subprocess.run(
         [sys.executable, *program, *map(str, arguments)],
         env=environment,
@@ -46,8 +46,8 @@ def assert_one_sentence(done, code: int, *words: str) -> None:
 
 @pytest.fixture(scope="module")
 def scene_file(tmp_path_factory) -> Path:
-    from runtime_models.plain_splats import PlainSplats
-    from runtime_models.write_ply import write_ply
+    from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+    from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
     path = tmp_path_factory.mktemp("scene") / "ball.ply"
     b = ball()
@@ -164,7 +164,8 @@ def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_fi
 
 def test_no_context_is_the_error_of_the_window(monkeypatch):
     monkeypatch.setattr(
-        "app.viewer.window.GlfwWindow", lambda **_: (_ for _ in ()).throw(ValueError("no"))
+        "shapeshift.app.viewer.window.GlfwWindow",
+        lambda **_: (_ for _ in ()).throw(ValueError("no")),
     )
     with pytest.raises(NoContext, match=r"no window with OpenGL 4.3 could be opened \(no\)"):
         Window("a", (10, 10))

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from desktop_stand import run_frames, until_opened
 
-from app.charts.comparison import REST_S
-from app.viewer.window import Drag, KeyDown, Press, Release
-from renderer.settings import DEBUG_VIEWS, RenderSettings
+from shapeshift.app.charts.comparison import REST_S
+from shapeshift.app.viewer.window import Drag, KeyDown, Press, Release
+from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 
@@ -84,7 +84,7 @@ def test_the_dial_measures_between_frames_and_chooses(viewer):
 
 
 def test_opening_another_scene_forgets_what_was_measured(viewer, tmp_path):
-    from app.viewer.window import Drop
+    from shapeshift.app.viewer.window import Drop
 
     scene = tmp_path / "one.shift"
     scene.write_bytes(b"scene")

@@ -10,12 +10,12 @@ from objects_stand import CTRL, NAMES, SHIFT, TOUCH, button, key, mouse, names
 from real_hands import RealHands
 from widgets import Widgets
 
-from app.viewer.arrange import steer
-from app.viewer.document import stamp_of
-from app.viewer.opened import read_files
-from scene import edits
-from scene.camera_list import CameraReading
-from scene.read_scene_file import read_scene_file
+from shapeshift.app.viewer.arrange import steer
+from shapeshift.app.viewer.document import stamp_of
+from shapeshift.app.viewer.opened import read_files
+from shapeshift.scene.cameras.camera_list import CameraReading
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.read_scene_file import read_scene_file
 
 pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window; touch_viewer, splats_viewer
 

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
 
-from app.panels.touch_panel import pad_object, pad_of, side_names
-from app.viewer.bodies import made_of
-from app.viewer.desktop import Options, Viewer
-from app.viewer.document import Document
-from app.viewer.opened import Source
-from app.viewer.stage import Stage
-from app.viewer.touch import HAND
-from app.viewer.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
-from scene.collider import Collider, box_around
-from scene.edits import History
-from scene.reactions import Reaction, State, TwoAxes
-from scene.scene_file import FirstView, SceneFile, SceneItem, scene_of
-from scene.world import World
+from shapeshift.app.panels.touch_panel import pad_object, pad_of, side_names
+from shapeshift.app.viewer.bodies import made_of
+from shapeshift.app.viewer.desktop import Options, Viewer
+from shapeshift.app.viewer.document import Document
+from shapeshift.app.viewer.opened import Source
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.touch import HAND
+from shapeshift.app.viewer.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
+from shapeshift.scene.colliders.collider import Collider, box_around
+from shapeshift.scene.document.edits import History
+from shapeshift.scene.document.scene_file import FirstView, SceneFile, SceneItem, scene_of
+from shapeshift.scene.world.reactions import Reaction, State, TwoAxes
+from shapeshift.scene.world.world import World
 
 pytest.importorskip("rapier3d")
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window

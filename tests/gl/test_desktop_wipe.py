@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from desktop_stand import ball, run_frames
 
-from app.commands.compare_sides import SceneSide
-from app.subject import Subject
-from app.viewer.desktop import Options, Viewer
-from app.viewer.stage import Stage
-from app.viewer.window import Drag, KeyDown, Press, Release
-from app.viewer.wipe import KEYS, Wipe
-from renderer.renderer import Renderer
+from shapeshift.app.commands.compare_sides import SceneSide
+from shapeshift.app.subject import Subject
+from shapeshift.app.viewer.desktop import Options, Viewer
+from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.viewer.window import Drag, KeyDown, Press, Release
+from shapeshift.app.viewer.wipe import KEYS, Wipe
+from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
 
@@ -93,10 +93,11 @@ def test_it_can_be_switched_off(stand):
 
 
 def test_at_rest_the_likeness_is_told_once(stand, monkeypatch):
-    import app.charts.comparison
 
     viewer, wipe, _ = stand
-    monkeypatch.setattr(app.charts.comparison, "REST_S", 0.0)
+    from shapeshift.app.charts import comparison
+
+    monkeypatch.setattr(comparison, "REST_S", 0.0)
     viewer.stage.set_x(0, 0.5)
     run_frames(viewer, 4)
     assert wipe.status().startswith("A to B ") and wipe.status().endswith(" dB")

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rasterizer.device import NoDevice
-from renderer.limits import TooLarge
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.resample import bilinear
-from renderer.settings import DEBUG_VIEWS, RenderSettings
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.renderer.limits import TooLarge
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.resample import bilinear
+from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 from tests.splat_scenes import front_view, psnr_db, stereo_views, two_objects
 
 

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 from splat_scenes import alone, front_view, random_layers, random_model, stereo_views, two_objects
 
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from runtime_models.model import SplatLayers, Stop
-from scene.scene import Scene
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.scene.scene import Scene
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (200, 150)

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.buffers import Arena
-from renderer.false_colors import Heat, Shade, mixed_colors, split_colors
-from renderer.heat import Heater
-from renderer.palette import palette_colors
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from scene.scene import Scene, SceneObject
-from scene.stereo import stereo_pair
+from shapeshift.renderer.colors.false_colors import Heat, Shade, mixed_colors, split_colors
+from shapeshift.renderer.colors.heat import Heater
+from shapeshift.renderer.colors.palette import palette_colors
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.stereo import stereo_pair
 from tests.gl.conftest import read
 from tests.splat_scenes import psnr_db
 from tests.test_heat import BEHIND, CASES, STOPS, VIEW, decoded, model, random_layers, scene_of

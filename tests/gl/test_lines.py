@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from renderer.lines import Lines, Wire
-from scene.pose import Pose, View
+from shapeshift.renderer.gl.lines import Lines, Wire
+from shapeshift.scene.pose import Pose, View
 
 SIZE = (64, 48)
 RED = (1.0, 0.0, 0.0, 1.0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from renderer.renderer import Renderer
+from shapeshift.renderer.renderer import Renderer
 from tests.test_one_sort import (  # noqa: F401  collected here with this module's renderer
     test_a_hidden_object_takes_no_part,
     test_an_object_that_moves_through_another_is_sorted_anew_in_every_frame,

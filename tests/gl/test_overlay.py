@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from vr_hands import HEAD, OPEN, a_frame, eyes, hand_at, pixel_of
 
-from runtime_models.model import Stop
-from scene.pose import Pose
-from vr.carried import Carried, carry, panel_row
-from vr.drawn import FINE as FINE_INK
-from vr.drawn import WRONG, Drawn, arc, drawn_of
-from vr.frame import LOST
-from vr.glove import LIT, Capsule
-from vr.locomotion import Comfort
-from vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
-from vr.panel_layout import knob_place, lay_out
-from vr.panel_picture import ACCENT, SURFACE, TEXT
-from vr.panel_place import play_point
-from vr.panel_state import Facts, Slider
-from vr.standing import Standing
-from vr.teleport import Arc
-from vr.touching import Touched
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.drawn import FINE as FINE_INK
+from shapeshift.vr.drawn import WRONG, Drawn, arc, drawn_of
+from shapeshift.vr.frame import LOST
+from shapeshift.vr.glove import LIT, Capsule
+from shapeshift.vr.locomotion.locomotion import Comfort
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.teleport import Arc
+from shapeshift.vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
+from shapeshift.vr.panel.carried import Carried, carry, panel_row
+from shapeshift.vr.panel.panel_layout import knob_place, lay_out
+from shapeshift.vr.panel.panel_picture import ACCENT, SURFACE, TEXT
+from shapeshift.vr.panel.panel_place import play_point
+from shapeshift.vr.panel.panel_state import Facts, Slider
+from shapeshift.vr.touching import Touched
 
 SIZE = (500, 450)
 EYES = eyes(SIZE)
@@ -265,7 +265,7 @@ def test_the_box_around_it_cuts_nothing_off(overlay, target, monkeypatch, seed):
     cases += [Drawn(lines=(part,), vignette=0.6) for part in parts]
     cases += [Drawn(hands=parts[:4], lines=parts[4:]), replace(only_panel(shown()), vignette=0.5)]
     boxed = [picture(overlay, target, drawn) for drawn in cases]
-    monkeypatch.setattr("vr.overlay.box_of", lambda *_: (0, 0, *SIZE))
+    monkeypatch.setattr("shapeshift.vr.overlay.box_of", lambda *_: (0, 0, *SIZE))
     for drawn, cut in zip(cases, boxed, strict=True):
         np.testing.assert_array_equal(cut, picture(overlay, target, drawn))
 

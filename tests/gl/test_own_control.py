@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer import layout
-from renderer.buffers import Arena
-from renderer.decode import Decoder
-from renderer.gpu import Gpu
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from runtime_models.evaluate import directions
-from runtime_models.model import AnchorModel, ControlEncoding, Stop
-from runtime_models.rotation import covariance, normalize
-from scene.scene import Scene
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.evaluate import directions
+from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, Stop
+from shapeshift.runtime_models.rotation import covariance, normalize
+from shapeshift.scene.scene import Scene
 from tests.gl.conftest import make_layers, make_mlp, make_model, read
 from tests.models import psi_of, run_in_numpy
 from tests.splat_scenes import psnr_db

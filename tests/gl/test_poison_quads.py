@@ -5,8 +5,8 @@ import pytest
 from poison_judge import judge
 from splat_scenes import alone, front_view, random_layers
 
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
 
 SEEDS = 300
 MANY = 8000

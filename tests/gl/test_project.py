@@ -1,20 +1,20 @@
-"""project against the float64 projection of renderer/reference.py; every gate at its threshold."""
+"""project against the float64 of renderer/reference/reference.py; each gate at its threshold."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from renderer import layout
-from renderer.buffers import Arena
-from renderer.gpu import Gpu
-from renderer.project import Projector
-from renderer.reference import gate_object
-from renderer.settings import RenderSettings
-from runtime_models.evaluate import evaluate
-from runtime_models.model import Splats
-from scene.pose import Pose, View
-from scene.scene import SceneObject
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.project import Projector
+from shapeshift.renderer.reference.reference import gate_object
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import Splats
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import SceneObject
 from tests.gl.conftest import f32, make_layers, make_view, read
 
 BLOCK = layout.WORKGROUP

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from scene.pose import Pose, View
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import Pose, View
 from tests.frames import draw
 from tests.splat_scenes import (
     alone,
@@ -79,7 +79,7 @@ def test_one_draw_is_two(ctx, monkeypatch, name, apart, leaning):
         drawing = renderer._drawing
         if drawing._pair is None:
             pytest.skip("a GPU draws the views one after the other")
-        monkeypatch.setattr("renderer.pair.MOST_ASIDE", 1e9)
+        monkeypatch.setattr("shapeshift.renderer.gl.stereo_pair.MOST_ASIDE", 1e9)
         shifts = []
         keep = drawing._pair.draw
         monkeypatch.setattr(drawing._pair, "draw", lambda *a: shifts.append(a[2]) or keep(*a))
@@ -132,7 +132,7 @@ def test_a_moving_head_allocates_once_and_a_narrow_driver_draws_twice(ctx, monke
         pair = renderer._drawing._pair
         if pair is None:
             pytest.skip("a GPU draws the views one after the other")
-        monkeypatch.setattr("renderer.pair.MOST_ASIDE", 1e9)
+        monkeypatch.setattr("shapeshift.renderer.gl.stereo_pair.MOST_ASIDE", 1e9)
         renderer.update(scene)
         renderer.draw(at(0.6))
         made = renderer._drawing.allocations
@@ -162,7 +162,7 @@ def test_views_one_by_one_are_views_at_once(renderer, monkeypatch, order, key_bi
     """As on a driver whose storage blocks do not hold the records of two views."""
     scene, views = two_objects(3000), stereo_views((96, 80))
     at_once = draw(renderer, scene, views, order=order, key_bits=key_bits)
-    monkeypatch.setattr("renderer.buffers.Arena.holds_views", lambda arena, n: n == 1)
+    monkeypatch.setattr("shapeshift.renderer.gl.buffers.Arena.holds_views", lambda arena, n: n == 1)
     one_by_one = draw(renderer, scene, views, order=order, key_bits=key_bits)
     for a, b in zip(at_once, one_by_one, strict=True):
         if key_bits == 32 and renderer._drawing._pair is None:

@@ -16,18 +16,18 @@ from splat_scenes import (
     two_objects,
 )
 
-from rasterizer.device import NoDevice
-from renderer.context import is_software
-from renderer.palette import thermal_blend
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.resolve import Resolve
-from renderer.settings import RenderSettings
-from runtime_models.model import BadFile, SplatLayers, Stop
-from runtime_models.read_scene import read_model
-from scene.framing import default_view
-from scene.pose import Pose, View, look_at
-from scene.scene import Scene, SceneObject
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.renderer.colors.palette import thermal_blend
+from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.resolve import Resolve
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.pose import Pose, View, look_at
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.models import without_control
 
 DRAWINGS = ("quads", "tiles")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.models import make_random_model
 from tests.splat_scenes import psnr_db
 from tests.test_scaffold_drawing import CASES, TURNED, made, seen_from

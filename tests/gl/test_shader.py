@@ -4,7 +4,8 @@ import re
 
 import pytest
 
-from renderer import layout, shader
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl import shader
 
 FILES = sorted(p.name for p in shader.SHADERS.iterdir() if p.suffix in (".comp", ".vert", ".frag"))
 COMPUTE = [name for name in FILES if name.endswith(".comp")]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from renderer import layout
-from renderer.buffers import Arena
-from renderer.sort import Sorter, quantize, stable_order
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.sort import Sorter, quantize, stable_order
 from tests.gl.conftest import read
 
 BLOCK = layout.WORKGROUP

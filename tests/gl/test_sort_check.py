@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from renderer import shader, sort_check
-from renderer.gpu import Gpu
-from renderer.renderer import Renderer
-from renderer.sort import Sorter
-from renderer.sort_check import FAILED, checked_sorter, first_wrong
+from shapeshift.renderer.gl import shader, sort_check
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.sort import Sorter
+from shapeshift.renderer.gl.sort_check import FAILED, checked_sorter, first_wrong
+from shapeshift.renderer.renderer import Renderer
 from tests.gl.conftest import make_layers, make_view
 from tests.splat_scenes import alone
 

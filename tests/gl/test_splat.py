@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.buffers import Arena
-from renderer.decode import Decoder
-from renderer.gpu import Gpu
-from renderer.palette import apply_palette, lay_heat, palette_colors
-from renderer.project import Projector
-from renderer.reference import reference_image
-from renderer.resolve import Resolve
-from renderer.settings import RenderSettings
-from renderer.sort import Sorter
-from renderer.splat import Splatter
-from runtime_models.model import SplatLayers
-from scene.pose import Pose, View
-from scene.scene import Scene, SceneObject
+from shapeshift.renderer.colors.palette import apply_palette, lay_heat, palette_colors
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.project import Projector
+from shapeshift.renderer.gl.resolve import Resolve
+from shapeshift.renderer.gl.sort import Sorter
+from shapeshift.renderer.gl.splat import Splatter
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.gl.conftest import STOPS, f32, make_layers, make_model, make_view, psnr_db, read
 
 FRONT = View(Pose(np.zeros(3), np.array([1.0, 0, 0, 0])), (-1, 1, -1, 1), 0.1, 100, (64, 64))

@@ -4,9 +4,9 @@ import pytest
 from splat_scenes import random_layers
 from stability_stage import failures, make_stage
 
-from app.drawing import open_renderer
-from app.stability_cases.table import CASES
-from renderer.renderer import Renderer
+from shapeshift.app.drawing import open_renderer
+from shapeshift.app.stability_cases.table import CASES
+from shapeshift.renderer.renderer import Renderer
 
 
 def reopen():

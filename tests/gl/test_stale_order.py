@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from scene.pose import View, look_at
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.scene.pose import View, look_at
 from tests.splat_scenes import psnr_db, two_objects
 
 

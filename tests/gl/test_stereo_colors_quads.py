@@ -2,7 +2,7 @@
 
 import pytest
 
-from renderer.renderer import Renderer
+from shapeshift.renderer.renderer import Renderer
 from tests.test_stereo_colors import (  # noqa: F401  collected here with this module's renderer
     test_a_trained_leg_in_both_eyes,
     test_at_rest_nothing_is_computed_again,

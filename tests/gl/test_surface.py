@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.reference import reference_image
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from renderer.surface_reference import reference_surface
-from runtime_models.read_scene import read_model
-from scene.pose import View
-from scene.scene import Scene
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.renderer.reference.surface_reference import reference_surface
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
 from tests.scaffold_scenes import random_raw, write_run
 from tests.splat_scenes import (
     alone,

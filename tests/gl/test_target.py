@@ -7,14 +7,14 @@ import moderngl
 import numpy as np
 import pytest
 
-import renderer.target as target_module
-from renderer.gpu import Gpu
-from renderer.renderer import Renderer
-from renderer.settings import RenderSettings
-from renderer.target import MOST_UNIT, choose_target
-from runtime_models.model import SplatLayers, Stop
-from runtime_models.spherical_harmonics import C0
-from scene.scene import Scene, SceneObject
+import shapeshift.renderer.gl.target as target_module
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.target import MOST_UNIT, choose_target
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.model import SplatLayers, Stop
+from shapeshift.scene.scene import Scene, SceneObject
 from tests.frames import draw
 from tests.splat_scenes import (
     alone,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from renderer.renderer import Renderer
+from shapeshift.renderer.renderer import Renderer
 from tests.test_turned_objects import (  # noqa: F401  collected here with this module's renderer
     test_a_turned_object_is_the_object_from_a_turned_eye,
     test_an_object_that_turns_is_coloured_anew_in_every_frame,

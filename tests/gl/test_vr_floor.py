@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from vr_hands import HEAD, eyes, pixel_of
 
-from scene.pose import Pose
-from vr.floor import REST, Floor, Grid, clearness, spacing_of
-from vr.standing import Standing
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.floor import REST, Floor, Grid, clearness, spacing_of
+from shapeshift.vr.locomotion.play_space import Standing
 
 SIZE = (500, 450)
 EYES = eyes(SIZE)

@@ -4,8 +4,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from vr.shown import WHOLE, Shown, middle
-from vr.swapchain import FORMATS, choose_format, read
+from shapeshift.vr.openxr.swapchain import FORMATS, choose_format, read
+from shapeshift.vr.shown import WHOLE, Shown, middle
 
 SIZE = (64, 48)
 GL_SRGB8_ALPHA8, GL_FRAMEBUFFER_SRGB = 0x8C43, 0x8DB9

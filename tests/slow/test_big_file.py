@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 from ply_files import names_of
 
-from rasterizer.device import NoDevice, open_device
-from renderer.buffers import fitting_splats
-from renderer.context import NoContext, open_context
-from renderer.gpu import Gpu
-from renderer.limits import TooLarge
-from renderer.renderer import Renderer
-from runtime_models.model import SplatLayers
-from runtime_models.plain_splats import Reading
-from runtime_models.read_scene import read_model
-from runtime_models.thin import thin
-from scene.framing import default_view
-from scene.scene import Scene, SceneObject
+from shapeshift.rasterizer.device import NoDevice, open_device
+from shapeshift.renderer.gl.buffers import fitting_splats
+from shapeshift.renderer.gl.context import NoContext, open_context
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.limits import TooLarge
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.operations.prune_by_importance import thin
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.scene.cameras.framing import default_view
+from shapeshift.scene.scene import Scene, SceneObject
 
 COUNT = 8_660_000
 DISK, MEMORY = 3 << 30, 9 << 30  # bytes

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from rasterizer.device import open_device
-from scene.read_capture import read_capture
-from training.fit import Fit
-from training.need import DROPPED, KEPT, PARTS, SHAPE
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.training.fit.ablation import DROPPED, KEPT, PARTS, SHAPE
+from shapeshift.training.fit.fit import Fit
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 pytestmark = pytest.mark.slow

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from splat_scenes import alone, shell
 
-from rasterizer.device import NoDevice
-from renderer.context import NoContext, open_context
-from renderer.renderer import Renderer
-from renderer.timing import PassTimer
-from scene.pose import View, look_at, perspective
+from shapeshift.rasterizer.device import NoDevice
+from shapeshift.renderer.gl.context import NoContext, open_context
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.timing import PassTimer
+from shapeshift.scene.pose import View, look_at, perspective
 
 SPLATS, SIZE, FRAMES = 400_000, (1280, 720), 6
 # What stands for "the draw pass": a driver finds the pixels of its quads inside it, tiles before.

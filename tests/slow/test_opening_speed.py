@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from ply_files import some_splats
 
-from runtime_models.read_scene import read_model
-from runtime_models.write_ply import write_ply
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 
 SPLATS, TURNS = 1_000_000, 9
 

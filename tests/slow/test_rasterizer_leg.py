@@ -10,13 +10,13 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rasterizer_scenes import arena, as_double, device, psnr
 
-from rasterizer.bin import bin_tiles
-from rasterizer.project import Camera
-from rasterizer.project_arena import project_arena
-from rasterizer.raster import rasterize_rgba
-from rasterizer.reference import project_reference, rasterize_reference
-from runtime_models.evaluate import evaluate
-from runtime_models.read_scene import read_model
+from shapeshift.rasterizer.bin import bin_tiles
+from shapeshift.rasterizer.project import Camera
+from shapeshift.rasterizer.project_arena import project_arena
+from shapeshift.rasterizer.raster import rasterize_rgba
+from shapeshift.rasterizer.reference import project_reference, rasterize_reference
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.read_scene import read_model
 
 pytestmark = pytest.mark.slow
 SIZE = (640, 360)

@@ -3,12 +3,18 @@
 import numpy as np
 import pytest
 
-from rasterizer.device import open_device
-from scene.capture import Capture
-from training.rig import moved_by, noted, offset_capture, told, with_found
-from training.rig_search import STAGES, STEPS, search, shape_for
-from training.settings import TrainSettings
-from training.synthetic.workshop import make_workshop
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.calibration.calibrate import STAGES, STEPS, search, shape_for
+from shapeshift.training.calibration.extrinsics import (
+    moved_by,
+    noted,
+    offset_capture,
+    told,
+    with_found,
+)
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.workshop import make_workshop
 
 pytestmark = pytest.mark.slow
 

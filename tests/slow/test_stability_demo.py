@@ -22,7 +22,16 @@ DEMO = ROOT / "assets" / "workshop.shift"
 )
 def test_the_demo_holds(options, tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "app.cli", "stability", DEMO, "--out", tmp_path, *options],
+        [
+            sys.executable,
+            "-m",
+            "shapeshift",
+            "stability",
+            DEMO,
+            "--out",
+            tmp_path,
+            *options,
+        ],
         capture_output=True,
         text=True,
         cwd=ROOT,

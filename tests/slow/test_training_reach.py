@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from rasterizer.device import open_device
-from scene.read_capture import read_capture
-from training.settings import TrainSettings
-from training.synthetic.balls import make_balls
-from training.train import Trainer
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
 
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 pytestmark = pytest.mark.slow

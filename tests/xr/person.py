@@ -6,10 +6,10 @@ import numpy as np
 from remote import Controller, Remote
 from xr_stand import Program
 
-from scene.pose import Pose
-from vr.frame import Hand
-from vr.glove import fingertip
-from vr.standing import Standing
+from shapeshift.scene.pose import Pose
+from shapeshift.vr.frame import Hand
+from shapeshift.vr.glove import fingertip
+from shapeshift.vr.locomotion.play_space import Standing
 
 TRIES = 8  # of a swing whose frames have to be even
 EVEN = 5  # frames of it: longer than the physics looks back at a throw

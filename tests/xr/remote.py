@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scene.pose import Pose
+from shapeshift.scene.pose import Pose
 
 MARK = b"mndrmt3\0"
 EYE = "<4f7f4x"  # left, right, up, down in radians; the eye's pose in the head

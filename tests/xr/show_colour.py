@@ -15,9 +15,9 @@ PATCHES = ((0, 0, 0), (10, 20, 30), (128, 128, 128), (255, 128, 0), (255, 255, 2
 
 def main(pixels: str, frames: int) -> None:
     sys.path.insert(0, str(ROOT))
-    from renderer.context import open_context
-    from vr.instance import Instance
-    from vr.session import Session
+    from shapeshift.renderer.gl.context import open_context
+    from shapeshift.vr.openxr.instance import Instance
+    from shapeshift.vr.openxr.session import Session
 
     with (
         open_context("egl") as ctx,

@@ -13,10 +13,10 @@ FRAMES = 10
 
 def main(kind: str) -> None:
     sys.path.insert(0, str(ROOT))
-    from renderer.context import open_context
-    from vr import spaces
-    from vr.instance import Instance
-    from vr.session import Session
+    from shapeshift.renderer.gl.context import open_context
+    from shapeshift.vr.openxr import spaces
+    from shapeshift.vr.openxr.instance import Instance
+    from shapeshift.vr.openxr.session import Session
 
     spaces.KINDS = spaces.KINDS[spaces.KINDS.index(kind) :]
     with (

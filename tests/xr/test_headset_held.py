@@ -7,7 +7,7 @@ import pytest
 from person import Person, place
 from xr_stand import Stand
 
-from scene.pose import Pose
+from shapeshift.scene.pose import Pose
 
 CUBE_TOP_M, HELD_AT_M = 0.05, 0.2  # over its middle; over the table
 HOLD_LAG_M = 0.005

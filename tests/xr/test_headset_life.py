@@ -9,7 +9,7 @@ from remote import EYE_DEGREES, EYES_APART_M
 from validation import complaints, switched_on
 from xr_stand import start_program
 
-from scene.pose import Pose
+from shapeshift.scene.pose import Pose
 
 WHOLE_LIFE = [
     "IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED",

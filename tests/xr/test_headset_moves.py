@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from person import pose_of
 
-from vr.stance import heading
-from vr.standing import Standing
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import heading
 
 
 def standing(line: dict) -> Standing:

@@ -7,8 +7,8 @@ from PIL import Image
 from test_headset_life import WHOLE_LIFE
 from test_headset_pictures import SIZE, pixel_of
 
-from scene.pose import Pose, View
-from vr.frame import SIDES
+from shapeshift.scene.pose import Pose, View
+from shapeshift.vr.frame import SIDES
 
 BEFORE = 0.03  # metres from the panel, where a finger is close and does not press
 CARRIES, FREE = (-0.05, 1.2, -0.45), (0.25, 1.25, -0.25)  # metres of the room

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.headset.worn_scene import BACKGROUND
-from renderer.reference import reference_image
-from scene.pose import Pose, View
-from scene.read_scene_file import read_scene_file
-from scene.scene import Scene
-from scene.scene_file import read_models, scene_of
-from vr.frame import SIDES
-from vr.standing import Standing
+from shapeshift.app.headset.worn_scene import BACKGROUND
+from shapeshift.renderer.reference.reference import reference_image
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from shapeshift.scene.document.scene_file import read_models, scene_of
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene
+from shapeshift.vr.frame import SIDES
+from shapeshift.vr.locomotion.play_space import Standing
 
 SCENE = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 SIZE = (320, 240)  # of an eye, as the null compositor recommends

@@ -9,7 +9,7 @@ from test_headset_panel import CARRIES, FREE, direction, in_front, open_panel
 from test_headset_touch import CUBE_TOP_M, events, heading_deg
 from xr_stand import Stand
 
-from scene.pose import Pose
+from shapeshift.scene.pose import Pose
 
 NO_HEADSET = 4  # exit code
 

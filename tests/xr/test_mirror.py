@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.headset.mirror import SIZE
+from shapeshift.app.headset.mirror import SIZE
 
 PROGRAM = Path(__file__).with_name("look_at_mirror.py")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vr.spaces import EYE_HEIGHT_M, KINDS
+from shapeshift.vr.openxr.spaces import EYE_HEIGHT_M, KINDS
 
 PROGRAM = Path(__file__).with_name("tell_room.py")
 STANDS_M = 1.6  # where Monado's remote head is until a script moves it, above STAGE's floor

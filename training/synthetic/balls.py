@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from runtime_models.model import Stop
-from runtime_models.whole_file import make_folders, whole_file
-from scene.capture import Capture, Photo
-from scene.pose import View, look_at
-from scene.write_capture import write_capture
-from training.synthetic.solids import Ball, Box, Disc
-from training.synthetic.tracer import (
+from shapeshift.runtime_models.files.whole_file import make_folders, whole_file
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.scene.pose import View, look_at
+from shapeshift.training.synthetic.solids import Ball, Box, Disc
+from shapeshift.training.synthetic.tracer import (
     Light,
     Place,
     Solid,

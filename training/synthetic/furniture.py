@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from training.synthetic.pipework import AMBIENT, drip_stain
-from training.synthetic.placing import (
+from shapeshift.training.synthetic.pipework import AMBIENT, drip_stain
+from shapeshift.training.synthetic.placing import (
     bar,
     box,
     bump,
@@ -16,7 +16,7 @@ from training.synthetic.placing import (
     run_of_pipe,
     turned,
 )
-from training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.tracer import Solid, Surface
 
 BENCH = (0.64, 0.03, 0.38)  # metres, half sizes of the top
 CABINET = (-0.40, 0.165, 0.04)  # metres, its centre

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from training.synthetic.placing import bar, box, disc, mix, noise, ring
-from training.synthetic.solids import Box
-from training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.placing import bar, box, disc, mix, noise, ring
+from shapeshift.training.synthetic.solids import Box
+from shapeshift.training.synthetic.tracer import Solid, Surface
 
 SHELL = 0.088  # metres, radius of the housing
 STATOR = (0.050, 0.079)  # metres, inner and outer radius of the iron

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from training.synthetic.solids import length
-from training.synthetic.tracer import Hits, Place
+from shapeshift.training.synthetic.solids import length
+from shapeshift.training.synthetic.tracer import Hits, Place
 
 FAR = 0.15  # metres; more free space than this makes no difference
 STEPS = ((0.012, 0.3), (0.03, 0.3), (0.07, 0.25), (0.14, 0.15))  # metres above, weight

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from training.synthetic.placing import (
+from shapeshift.training.synthetic.placing import (
     ALONG,
     ball,
     bar,
@@ -15,7 +15,7 @@ from training.synthetic.placing import (
     ring,
     run_of_pipe,
 )
-from training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.tracer import Solid, Surface
 
 LINE_Y, LINE_Z = 0.19, -0.2  # metres; the axis of the line
 PIPE = 0.024  # metres, radius

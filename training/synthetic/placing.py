@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from training.synthetic.openness import corner_weight
-from training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring
-from training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.openness import corner_weight
+from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring
+from shapeshift.training.synthetic.tracer import Solid, Surface
 
 # world_from_local rotations that lay a shape's own +Y along a world axis
 ALONG = {

@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.plain_splats import PlainSplats, Reading
-from runtime_models.read_scene import read_model
-from runtime_models.whole_file import write_whole
-from runtime_models.write_spz import write_spz
-from scene.collider import Making, collider_of_model
-from scene.collider_pieces import write_collider
-from scene.reactions import Reaction, State, TwoAxes
-from scene.scene_file import FirstView, SceneFile, SceneItem
-from scene.selector import Box
-from scene.write_scene_file import write_scene_file
+from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.splats.spz.write_spz import write_spz
+from shapeshift.scene.colliders.collider import Making, collider_of_model
+from shapeshift.scene.colliders.collider_pieces import write_collider
+from shapeshift.scene.document.scene_file import FirstView, SceneFile, SceneItem
+from shapeshift.scene.document.write_scene_file import write_scene_file
+from shapeshift.scene.selectors.selector import Box
+from shapeshift.scene.world.reactions import Reaction, State, TwoAxes
 
 Paint = Callable[[np.ndarray, np.ndarray], np.ndarray]  # places (N, 3), noise (N,) -> sRGB (N, 3)
 SH0 = 0.28209479177387814  # colour = 0.5 + SH0 * coefficient

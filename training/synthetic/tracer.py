@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scene.pose import View
-from training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, dot, unit
+from shapeshift.scene.pose import View
+from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, dot, unit
 
 Pattern = Callable[[np.ndarray], np.ndarray]  # local points (n, 3) metres -> (n, 3) or (n,)
 NEAREST = 1e-4  # metres; a hit nearer than this is the surface the ray starts on

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from runtime_models.model import Stop
-from runtime_models.whole_file import make_folders
-from scene.capture import Capture, Photo
-from scene.pose import View, look_at
-from scene.write_capture import write_capture
-from training.synthetic.balls import save_png
-from training.synthetic.furniture import (
+from shapeshift.runtime_models.files.whole_file import make_folders
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.write_capture import write_capture
+from shapeshift.scene.pose import View, look_at
+from shapeshift.training.synthetic.balls import save_png
+from shapeshift.training.synthetic.furniture import (
     CABINET,
     MOTOR,
     base_plate,
@@ -28,11 +28,11 @@ from training.synthetic.furniture import (
     mug,
     tools,
 )
-from training.synthetic.motor import motor
-from training.synthetic.openness import Clearance
-from training.synthetic.pipework import pipework
-from training.synthetic.placing import frame, inside
-from training.synthetic.tracer import (
+from shapeshift.training.synthetic.motor import motor
+from shapeshift.training.synthetic.openness import Clearance
+from shapeshift.training.synthetic.pipework import pipework
+from shapeshift.training.synthetic.placing import frame, inside
+from shapeshift.training.synthetic.tracer import (
     Light,
     Place,
     look,

@@ -1,0 +1,68 @@
+"""Whether the views of a frame get colours of their own: settings.stereo_colors."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.color_slope import color_slope
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+# Shared colours are reckoned to be this good or better, dB.  Measured on captures with harmonics
+# and on networks they were 5 to 14 dB better over the pixels that are covered (docs/vr.md); the 8
+# bits of a headset's pictures cost 58.9 dB.
+SHARED_DB = 55.0
+NEAREST = 1.0  # percent of the splats: how far these are is how near the object is
+SAMPLE = 4096  # splats or anchors that tell
+
+
+@dataclass(frozen=True)
+class Look:
+    """What of a model tells how much two eyes differ in its colours."""
+
+    places: np.ndarray  # (n, 3) metres, object frame: a sample of its splats or anchors
+    slope: float  # color_slope; infinite where more than colours follows the eye
+
+    @staticmethod
+    def of(model: Model) -> "Look":
+        places = model.means[model.opacity > 0] if isinstance(model, SplatLayers) else model.anchors
+        step = max(-(-len(places) // SAMPLE), 1)
+        slope = math.inf if follows_eye(model) else color_slope(model)
+        return Look(np.array(places[::step], np.float64), slope)
+
+    def shared_db(self, eyes: np.ndarray) -> float:
+        """PSNR, dB, that colours for the middle of the eyes (E, 3), object frame, have at least.
+
+        A splat d away is seen from the middle at an angle of apart / d beside an eye's own.
+        """
+        middle = eyes.mean(axis=0)
+        apart = float(np.linalg.norm(eyes - middle, axis=1).max())
+        if not (apart > 0 and self.slope > 0 and len(self.places)):
+            return math.inf
+        away = np.percentile(np.linalg.norm(self.places - middle, axis=1), NEAREST)
+        return 20 * math.log10(max(away / (self.slope * apart), 1e-30))
+
+
+def shared_is_enough(scene: Scene, looks: list[Look], views: list[View]) -> bool:
+    """Whether nobody sees that colours are those of the middle of the eyes; a look an object."""
+    eyes_world = np.array([view.world_from_eye.position for view in views])
+    for thing, look in zip(scene.objects, looks, strict=True):
+        if thing.visible:
+            object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+            eyes = eyes_world @ object_from_world[:3, :3].T + object_from_world[:3, 3]
+            if not look.shared_db(eyes) >= SHARED_DB:
+                return False
+    return True
+
+
+def drawn_together(scene: Scene, views: int, own_colors: bool) -> list[slice]:
+    """Which views of a frame are decoded and drawn at once: all of them, but one by one where each
+    eye is to see its own splats of a model whose shape follows the eye.
+    """
+    follows = any(thing.visible and follows_eye(thing.model) for thing in scene.objects)
+    if own_colors and follows:
+        return [slice(i, i + 1) for i in range(views)]
+    return [slice(0, views)]

@@ -1,0 +1,171 @@
+"""Palettes of thermal stops, and how much of a palette the control value asks for."""
+
+from functools import cache
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.stop_weights import Controls, StopBlend
+from shapeshift.scene.scene import Scene
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
+STEPS = 256
+
+# (place in 0..1, display sRGB): what a thermal camera shows, cold to hot; luminance only grows
+IRONBOW = (
+    (0.00, (0.00, 0.00, 0.04)),
+    (0.15, (0.13, 0.00, 0.42)),
+    (0.30, (0.45, 0.00, 0.60)),
+    (0.45, (0.73, 0.12, 0.55)),
+    (0.60, (0.91, 0.34, 0.20)),
+    (0.75, (0.98, 0.60, 0.05)),
+    (0.90, (1.00, 0.87, 0.33)),
+    (1.00, (1.00, 1.00, 0.96)),
+)
+# blue to red through green, smooth at its ends: many distinct hues, luminance highest in the middle
+TURBO = (
+    (0.00, (0.18, 0.07, 0.25)),
+    (0.12, (0.27, 0.37, 0.86)),
+    (0.28, (0.16, 0.70, 0.96)),
+    (0.42, (0.13, 0.93, 0.66)),
+    (0.55, (0.55, 0.99, 0.29)),
+    (0.68, (0.90, 0.85, 0.21)),
+    (0.80, (0.98, 0.56, 0.16)),
+    (0.90, (0.85, 0.26, 0.05)),
+    (1.00, (0.48, 0.02, 0.01)),
+)
+
+
+@cache
+def palette_colors(name: str) -> np.ndarray:
+    """(256, 3) float32 display sRGB of a palette, read only; BadFile for an unknown name."""
+    if name not in PALETTES:
+        known = ", ".join(PALETTES)
+        raise BadFile(f"there is no palette {name!r}; a thermal stop may name one of: {known}.")
+    colors = PALETTES[name]().astype(np.float32)
+    colors.flags.writeable = False
+    return colors
+
+
+def thermal_blend(scene: Scene) -> tuple[str, float, Stop | None]:
+    """(palette name, weight 0..1, stop) of the visible object that is nearest to a thermal stop, or
+    has a selector that is: what a legend tells.
+
+    The weight is 1 at a thermal stop and falls to 0 at the next stop that is not thermal.
+    Name "" (the stop's colours are final) and weight 0: nothing to do.
+    """
+    best: tuple[str, float, Stop | None] = ("", 0.0, None)
+    for thing in scene.objects:
+        for x in (thing.x, *(selector.x for selector in thing.selectors)) if thing.visible else ():
+            weights, stop = thermal_weights(thing.model.blend, x)
+            if stop is not None and weights[0] > best[1]:
+                best = (stop.palette, float(weights[0]), stop)
+    return best
+
+
+def thermal_weights(blend: StopBlend, controls: Controls) -> tuple[np.ndarray, Stop | None]:
+    """(n,) 0..1: how much of a palette each of n controls asks for; and the thermal stop that is
+    nearest to most of them, None where no stop is thermal.
+    """
+    rows = np.atleast_2d(blend.weights(controls))  # (n, S)
+    thermal = [s for s, stop in enumerate(blend.stops) if stop.kind == "thermal"]
+    if not thermal or not len(rows):
+        return np.zeros(len(rows)), None
+    nearest = thermal[int(np.argmax(rows[:, thermal].sum(axis=0)))]
+    return np.minimum(rows[:, thermal].sum(axis=1), 1.0), blend.stops[nearest]
+
+
+def legend_opacity(weight: float) -> float:
+    """How much of a thermal stop's legend is seen at its weight: all from one half on."""
+    return min(2 * weight, 1.0)
+
+
+def apply_palette(rgba: np.ndarray, name: str) -> np.ndarray:
+    """Premultiplied (H, W, 4) with palette[luminance] for its colour; same shape.
+
+    The palette colours what is there, not the background: colour is divided by alpha first.
+    """
+    alpha = rgba[..., 3]
+    false = through_palette((rgba[..., :3] @ LUMINANCE) / np.maximum(alpha, 1e-6), name)
+    shown = [false * alpha[..., None], alpha[..., None]]
+    return np.concatenate(shown, axis=-1).astype(rgba.dtype)
+
+
+def lay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
+    """Premultiplied (H, W, 4) and the heat beside it, (H, W, 2) value and weight, both times alpha:
+    with the palette's colour of the value, as much as the weight; as (H, W, 4).
+    """
+    value, weight = heat[..., 0], heat[..., 1]
+    false = through_palette(value / np.maximum(weight, 1e-6), name)
+    out = rgba.copy()
+    out[..., :3] += false * weight[..., None]
+    return out
+
+
+def through_palette(values: np.ndarray, name: str) -> np.ndarray:
+    """(..., 3) display sRGB of values (...), held to 0..1; NaN stays."""
+    place = np.clip(values, 0, 1) * (STEPS - 1)
+    return np.stack(
+        [np.interp(place, np.arange(STEPS), c) for c in palette_colors(name).T], axis=-1
+    )
+
+
+def _gray() -> np.ndarray:
+    return np.repeat(np.linspace(0, 1, STEPS)[:, None], 3, axis=1)
+
+
+def _through(points: tuple) -> np.ndarray:
+    """(256, 3) through control points by monotone cubics: no overshoot, no visible corner."""
+    place = np.array([p for p, _ in points])
+    color = np.array([c for _, c in points])
+    step = np.diff(place)[:, None]
+    rise = np.diff(color, axis=0) / step
+    same_sign = rise[:-1] * rise[1:] > 0
+    total = np.where(same_sign, rise[:-1] + rise[1:], 1.0)
+    inner = np.where(same_sign, 2 * rise[:-1] * rise[1:] / total, 0.0)  # harmonic mean
+    slope = np.concatenate([rise[:1], inner, rise[-1:]])
+    at = np.linspace(0, 1, STEPS)
+    i = np.clip(np.searchsorted(place, at, side="right") - 1, 0, len(place) - 2)
+    t = ((at - place[i]) / step[i, 0])[:, None]
+    curve = (
+        (1 + 2 * t) * (1 - t) ** 2 * color[i]
+        + t * (1 - t) ** 2 * step[i] * slope[i]
+        + t**2 * (3 - 2 * t) * color[i + 1]
+        + t**2 * (t - 1) * step[i] * slope[i + 1]
+    )
+    return np.clip(curve, 0, 1)
+
+
+def _perceptual() -> np.ndarray:
+    """Equal steps of Oklab lightness from dark violet to pale yellow: equal steps look equal."""
+    t = np.linspace(0, 1, STEPS)
+    lightness = 0.16 + 0.80 * t
+    hue = np.radians(-75 + 185 * t)  # violet, red, orange, yellow
+    chroma = 0.03 + 0.16 * np.sin(np.pi * (0.08 + 0.84 * t))
+    oklab = np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], axis=1)
+    return np.clip(_srgb_from_oklab(oklab), 0, 1)
+
+
+def _srgb_from_oklab(oklab: np.ndarray) -> np.ndarray:
+    """(N, 3) display sRGB; the two matrices of B. Ottosson, "A perceptual color space" (2020)."""
+    lms_from_lab = [
+        [1, 0.3963377774, 0.2158037573],
+        [1, -0.1055613458, -0.0638541728],
+        [1, -0.0894841775, -1.2914855480],
+    ]
+    rgb_from_lms = [
+        [4.0767416621, -3.3077115913, 0.2309699292],
+        [-1.2684380046, 2.6097574011, -0.3413193965],
+        [-0.0041960863, -0.7034186147, 1.7076147010],
+    ]
+    linear = (oklab @ np.transpose(lms_from_lab)) ** 3 @ np.transpose(rgb_from_lms)
+    linear = np.clip(linear, 0, 1)
+    return np.where(linear > 0.0031308, 1.055 * linear ** (1 / 2.4) - 0.055, 12.92 * linear)
+
+
+PALETTES = {
+    "gray": _gray,
+    "ironbow": lambda: _through(IRONBOW),
+    "turbo": lambda: _through(TURBO),
+    "perceptual": _perceptual,
+}

@@ -1,0 +1,232 @@
+"""Debug pictures of a frame: culls, birdseye, overdraw, depth, object (settings.debug).
+
+The drawings give what they hold (splat_points), take other colours (write_colors) and count
+fragments (overdraw); everything else is numpy on the CPU, the same for quads and tiles.
+"""
+
+import colorsys
+from typing import Protocol
+
+import numpy as np
+
+from shapeshift.renderer import layout
+from shapeshift.renderer.debug.classify import Points, classify, eye_places, runs
+from shapeshift.renderer.debug.debug_map import birdseye
+from shapeshift.renderer.debug.points import dim, dot_size, paint_points
+from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
+from shapeshift.runtime_models.model import Model, is_antialiased
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+REASON_COLORS = {
+    "drawn": (0.30, 0.86, 0.36),
+    "opacity": (0.36, 0.17, 0.17),
+    "distance": (0.72, 0.36, 1.00),
+    "frustum": (0.50, 0.50, 0.50),
+    "size": (0.25, 0.50, 1.00),
+    "footprint": (0.14, 0.36, 0.36),
+    "faded": (0.40, 0.34, 0.12),
+}
+REASON_TEXTS = {
+    "drawn": "drawn",
+    "opacity": "too faint",
+    "distance": "too far",
+    "frustum": "outside the view",
+    "size": "too large",
+    "footprint": "too small",
+    "faded": "faded away",
+}
+# Ramps from 0 to 1, display sRGB: dark to bright in equal steps for the eye.
+HEAT = np.float32(
+    [[0, 0, 0.02], [0.26, 0.04, 0.41], [0.58, 0.15, 0.40], [0.87, 0.32, 0.23], [0.99, 0.65, 0.04],
+     [0.99, 1.0, 0.64]]
+)  # fmt: skip
+DISTANT = np.float32(
+    [[0.27, 0.0, 0.33], [0.23, 0.32, 0.55], [0.13, 0.57, 0.55], [0.37, 0.79, 0.38],
+     [0.99, 0.91, 0.14]]
+)  # fmt: skip
+LEGEND_STEPS = 5  # rows that stand for a ramp
+DEBUG_NAMES = tuple(name for name in DEBUG_VIEWS if name)
+MOST_LABELS = 24  # rows of a legend
+RECOLORED = ("depth", "object")  # drawn with other colours than the scene's
+
+
+class Drawing(Protocol):
+    """What debug pictures need of QuadsDrawing and TilesDrawing."""
+
+    def splat_points(self) -> Points: ...
+    def write_colors(self, color: np.ndarray) -> None: ...
+    def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray: ...
+    def image(self, i: int) -> np.ndarray: ...
+
+
+def prepare_debug(drawing: Drawing, views: list[View], scene: Scene, name: str) -> bool:
+    """Before the draw: other colours for depth and object; True where the scene's are gone."""
+    if name not in RECOLORED or not scene.splat_count:
+        return False
+    drawing.write_colors(splat_colors(drawing.splat_points(), views[0], scene, name))
+    return True
+
+
+def splat_colors(points: Points, view: View, scene: Scene, name: str) -> np.ndarray:
+    """(N, 3) float32: depth as a part of the farthest one, or the object's colour."""
+    depth = -eye_places(points, object_poses(scene), view.eye_from_world())[2]
+    if name == "depth":
+        part = np.clip(np.nan_to_num(depth / farthest_depth(depth)), 0, 1)
+        return np.repeat(part[:, None], 3, axis=1)
+    colors = np.empty((len(depth), 3), np.float32)
+    ranks = [label_ranks(thing.model)[1] for thing in scene.objects]
+    counts = [len(parts) for parts in object_parts(scene)]
+    firsts = np.cumsum([0, *counts])
+    for i, start, end in runs(points[1], len(scene.objects)):
+        # Its near side bright and its far side dark, or an object would be a flat shape.
+        mine = np.nan_to_num(depth[start:end])
+        near, far = np.percentile(mine, [2, 98])
+        shade = 1 - 0.75 * np.clip((mine - near) / max(far - near, 1e-6), 0, 1)
+        table = np.array([object_color(k) for k in range(firsts[i], firsts[i] + counts[i])])
+        colors[start:end] = shade[:, None] * table[ranks[i]]
+    return colors
+
+
+def farthest_depth(depth: np.ndarray) -> np.float32:
+    """By which depths in metres are divided; a power of two, so that nothing is rounded."""
+    known = depth[np.abs(depth) < layout.HUGE]  # NaN is not
+    return np.float32(2.0 ** np.ceil(np.log2(max(float(known.max(initial=0)), 1e-6))))
+
+
+def debug_image(
+    drawing: Drawing, i: int, view: View, scene: Scene, settings: RenderSettings
+) -> tuple[np.ndarray, dict[str, float]]:
+    """After the draw: (H, W, 3) float32 display sRGB, row 0 on top, of view i as it was drawn;
+    and what its legend tells: counts, metres, the largest number.
+    """
+    rgba = drawing.image(i)
+    if not scene.splat_count:
+        return np.ascontiguousarray(rgba[..., :3]), {}
+    if settings.debug == "overdraw":
+        number = drawing.overdraw(i, view, settings)
+        largest = float(number.max(initial=0))
+        return ramp(HEAT, np.sqrt(number / max(largest, 1))), {"largest": largest}
+    if settings.debug == "object":
+        return np.ascontiguousarray(rgba[..., :3]), object_counts(scene)
+    points, poses = drawing.splat_points(), object_poses(scene)
+    if settings.debug == "depth":
+        return depth_picture(rgba, -eye_places(points, poses, view.eye_from_world())[2])
+    antialiased = tuple(is_antialiased(thing.model) for thing in scene.objects)
+    reason, pixel, depth = classify(points, poses, view, settings, antialiased)
+    numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
+    told = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
+    colors = np.float32([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)])
+    if settings.debug == "birdseye":
+        picture, metres = birdseye(points, poses, reason, colors, view, settings)
+        return picture, told | {"metres": metres}
+    picture = dim(rgba[..., :3])
+    seen = (depth > view.near) & np.isfinite(pixel).all(axis=0)
+    unit = dot_size(view.size)
+    # What is too large or too small lies on top: it is why somebody looks.
+    for names, dot in (((3, 1), unit), ((0, 2), unit), ((5, 6), unit + 1), ((4,), unit + 1)):
+        paint_points(picture, pixel, depth, reason, colors, seen & np.isin(reason, names), dot)
+    return picture, told
+
+
+def depth_picture(rgba: np.ndarray, depth: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
+    """Blended depth over coverage, near bright, between the 1st and 99th hundredth of it."""
+    coverage = rgba[..., 3]
+    scale = farthest_depth(depth)
+    metres = rgba[..., 0] / np.maximum(coverage, np.float32(1e-6)) * scale
+    solid = metres[coverage > 0.5]
+    near, far = np.percentile(solid, [1, 99]) if solid.size else (0.0, float(scale))
+    part = (metres - near) / max(far - near, 1e-6)
+    picture = ramp(DISTANT, 1 - part) * np.minimum(coverage, 1)[..., None]
+    return picture, {"nearest": float(near), "farthest": float(far)}
+
+
+def debug_legend(
+    name: str, stats: FrameStats | None = None
+) -> list[tuple[str, tuple[float, float, float]]]:
+    """Rows (text, display sRGB) for the legend of a debug picture; stats add the numbers."""
+    told = stats.debug if stats is not None else {}
+    if name in ("culls", "birdseye"):
+        rows = [
+            (f"{text}: {int(told[reason]):,}" if reason in told else text, REASON_COLORS[reason])
+            for reason, text in REASON_TEXTS.items()
+        ]
+        across = [(f"{told['metres']:.3g} m across", (1.0, 1.0, 1.0))] if "metres" in told else []
+        return rows + across
+    if name == "object":
+        texts = [f"{key}: {int(n):,}" for key, n in told.items()]
+        return [(text, object_color(i)) for i, text in enumerate(texts)]
+    if name not in ("depth", "overdraw"):
+        return []
+    steps = np.linspace(0, 1, LEGEND_STEPS)
+    if name == "depth":
+        near, far = told.get("nearest", 0.0), told.get("farthest", 1.0)
+        texts = [f"{near + s * (far - near):.3g} m" for s in steps]
+        colors = ramp(DISTANT, 1 - steps)
+    else:
+        largest = told.get("largest", 0.0)
+        texts = [f"{s * s * largest:,.0f} splats" for s in steps]
+        texts[-1] += " (largest)"
+        colors = ramp(HEAT, steps)
+    return [(text, tuple(map(float, c))) for text, c in zip(texts, colors, strict=True)]
+
+
+def ramp(table: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Colours (..., 3) float32 of values 0..1 along a table (K, 3)."""
+    at = np.clip(np.nan_to_num(value), 0, 1) * (len(table) - 1)
+    low = np.minimum(at.astype(int), len(table) - 2)
+    part = (at - low)[..., None].astype(np.float32)
+    return table[low] * (1 - part) + table[low + 1] * part
+
+
+def opaque(picture: np.ndarray) -> np.ndarray:
+    """(H, W, 4) of (H, W, 3): covers whatever it is presented over."""
+    return np.concatenate([picture, np.ones_like(picture[..., :1])], axis=2)
+
+
+def object_poses(scene: Scene) -> np.ndarray:
+    """(O, 4, 4) world_from_object, NaN where hidden."""
+    nowhere = np.full((4, 4), np.nan)
+    poses = [o.world_from_object.matrix() if o.visible else nowhere for o in scene.objects]
+    return np.reshape(poses, (-1, 4, 4))
+
+
+def object_counts(scene: Scene) -> dict[str, float]:
+    """Splats of each part of each object by its name; equal names get a number."""
+    counts: dict[str, float] = {}
+    for i, (thing, parts) in enumerate(zip(scene.objects, object_parts(scene), strict=True)):
+        for label, count in parts:
+            name = thing.name if label is None else f"{thing.name}, label {label}"
+            counts[name if name not in counts else f"{name} {i + 1}"] = float(count)
+    return counts
+
+
+def object_parts(scene: Scene) -> list[list[tuple[int | None, int]]]:
+    """For each object (label, splats) of its commonest labels; one (None, all) without labels."""
+    parts = []
+    for thing in scene.objects:
+        labels, ranks = label_ranks(thing.model)
+        counts = np.bincount(np.ravel(ranks), minlength=len(labels)).tolist()
+        alone = [(None, thing.model.splat_count)]
+        parts.append(alone if not labels else list(zip(labels, counts, strict=True)))
+    return parts
+
+
+def label_ranks(model: Model) -> tuple[list[int], np.ndarray | int]:
+    """The labels in order, the commonest first, MOST_LABELS at most; and each splat's place there.
+
+    What has a rarer label counts to the last one.  ([], 0) for a model without labels.
+    """
+    labels = getattr(model, "labels", None)
+    if labels is None:
+        return [], 0
+    found, which, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    ranks = np.empty(len(found), np.intp)
+    ranks[order] = np.minimum(np.arange(len(found)), MOST_LABELS - 1)
+    return found[order[:MOST_LABELS]].tolist(), ranks[which]
+
+
+def object_color(i: int) -> tuple[float, float, float]:
+    """Hues a golden section apart: neighbours in the list are far apart in colour."""
+    return colorsys.hsv_to_rgb((0.08 + i * 0.61803398875) % 1.0, 0.65, 1.0)

@@ -1,0 +1,197 @@
+"""The GPU copy of a scene: one arena for all objects, so that one sort is right.
+
+The life of the passes, in the order of the calls:
+
+    gpu = Gpu(ctx)                                   # renderer/gl/gpu.py
+    projector, splatter = Projector(gpu), Splatter(gpu, "rgba16f")
+    sorter, resolve = Sorter(gpu, "gl" or "numpy"), Resolve(gpu)
+    arena = Arena(gpu, [m.splat_count for m in models])     # again when the composition changes
+    decoder = Decoder(gpu, arena, models, "gl" or "onnxruntime")
+    decoder.geometry(i, x)                           # when the control value of object i changed
+    decoder.color(i, x, eye_object)                  # then, and when the eye moved
+    arena.place(world_from_objects)                  # (4, 4) each, NaN hides; any time
+    projector.project(arena, views, settings, sort_from_world)    # one or two views at once
+    # with colours an eye: arena.color_set(v, len(views)) and decoder.color for each eye before
+    sorter.sort(arena, settings.key_bits)
+    for i, view in enumerate(views):
+        splatter.draw(arena, i, view.size, settings.min_alpha)
+        projector.counts(arena, i)                   # waits for the GPU: {drawn, opacity, ...}
+    resolve.draw(splatter.texture(i), framebuffer, background, palette, weight)
+    splatter.image(i)                                # (H, W, 4) float32
+
+Every class has release() and works with `with`; nothing is allocated after the constructors
+(Splatter: after the first frame of a size).
+"""
+
+import moderngl
+import numpy as np
+
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.limits import too_many
+
+STAGED_SPLATS = 1 << 20  # decoded at a time; bounds the staging buffer to 46 MB
+STAGED_FLOATS = 11  # mean or offset 3, scale 3, rotation 4, opacity 1
+PARTS = {"offset": 3, "scale": 3, "rotation": 4, "opacity": 1}
+
+
+def bind(**buffers: moderngl.Buffer) -> None:
+    """Binds storage buffers by the names of layout.SLOTS, in lower case."""
+    for name, buffer in buffers.items():
+        buffer.bind_to_storage_buffer(layout.SLOTS[name.upper()])
+
+
+def fitting_splats(gpu: Gpu) -> int:
+    """How many splats an arena may have on this driver."""
+    return min(gpu.max_block // (16 * layout.RECORD_VECS), gpu.max_groups * layout.WORKGROUP)
+
+
+def limit_of(gpu: Gpu) -> str:
+    """Which of the driver's limits makes fitting_splats what it is."""
+    row = 16 * layout.RECORD_VECS
+    if gpu.max_block // row <= gpu.max_groups * layout.WORKGROUP:
+        limit = f"GL_MAX_SHADER_STORAGE_BLOCK_SIZE is {gpu.max_block:,} bytes"
+        return f"{limit}, a splat takes {row} of one buffer"
+    return f"GL_MAX_COMPUTE_WORK_GROUP_COUNT is {gpu.max_groups:,} groups of {layout.WORKGROUP}"
+
+
+class Arena:
+    """The splats of all objects, and what a frame makes of them."""
+
+    def __init__(
+        self, gpu: Gpu, counts: list[int], antialiased: tuple[bool, ...] | None = None
+    ) -> None:
+        """Room for objects of so many splats; antialiased: one an object, None: no object is."""
+        self.count = sum(counts)
+        if not self.count <= fitting_splats(gpu):
+            raise too_many(self.count, fitting_splats(gpu), limit_of(gpu), "tiles")
+        self.gpu = gpu
+        self.antialiased = antialiased or (False,) * len(counts)
+        self.starts = [0, *np.cumsum(counts, dtype=int).tolist()]  # rows of object i: [i], [i + 1]
+        n = self.count
+        self.mean_opacity = gpu.reserve(16 * n)
+        self.covariance = gpu.reserve(16 * layout.COVARIANCE_VECS * n)
+        self.colors = [gpu.reserve(16 * n)]  # for all views, or one a view
+        self.color, self.set = self.colors[0], 0  # that decoding writes into
+        self.records = gpu.reserve(16 * layout.RECORD_VECS * n)
+        self.keys, self.keys_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
+        self.order, self.order_spare = gpu.reserve(4 * n), gpu.reserve(4 * n)
+        sort_groups = groups_for(n, layout.WORKGROUP * layout.SORT_BLOCKS)
+        self.histogram = gpu.reserve(4 * layout.RADIX * sort_groups)
+        self.counts = gpu.reserve(4 * layout.COUNTS_SIZE)
+        self.command = gpu.upload(np.array([0, 1, 0, 0, 0], np.uint32))
+        fit = min(STAGED_SPLATS, gpu.max_block // (4 * STAGED_FLOATS))
+        self.staged = min(max(counts, default=0), fit)
+        self.staging = gpu.reserve(4 * STAGED_FLOATS * self.staged)
+        self.world_from_object = np.tile(np.eye(4), (len(counts), 1, 1))  # (O, 4, 4)
+        self._pack = gpu.compute("pack.comp")
+        self._heats: dict[int, moderngl.Buffer] = {}  # set -> what is beside its colours
+
+    def heat_of(self, which: int) -> moderngl.Buffer:
+        """What thermal stops have in a set of colours; made, all zero, when first asked for."""
+        if which not in self._heats:
+            self._heats[which] = self.gpu.reserve(16 * self.count, "heat")
+        return self._heats[which]
+
+    @property
+    def heat(self) -> moderngl.Buffer:
+        """That of the set which decoding writes into."""
+        return self.heat_of(self.set)
+
+    def clear_heat(self, i: int) -> None:
+        """Object i has none, where there is any at all."""
+        rows = self.starts[i + 1] - self.starts[i]
+        if self.set in self._heats and rows:
+            self.heat.write(bytes(16 * rows), offset=16 * self.starts[i])
+
+    def color_set(self, which: int, count: int) -> None:
+        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
+        or one a view.
+        """
+        for buffer in self.colors[count:]:
+            buffer.release()
+        self.colors = self.colors[:count]
+        for gone in [kept for kept in self._heats if kept >= count]:
+            self._heats.pop(gone).release()
+        while len(self.colors) < count:
+            self.colors.append(self.gpu.reserve(16 * self.count, "colours of another eye"))
+        self.color, self.set = self.colors[which], which
+
+    def holds_views(self, views: int) -> bool:
+        """Whether the records of so many views at once fit this driver's storage blocks."""
+        return 16 * layout.RECORD_VECS * self.count * views <= self.gpu.max_block
+
+    def make_room(self, views: int) -> None:
+        """Records of so many views from now on; what they held is gone when they had to grow."""
+        size = 16 * layout.RECORD_VECS * self.count * views
+        if size > self.records.size:
+            self.records.release()
+            self.records = self.gpu.reserve(size, "records of two views")
+
+    def place(self, world_from_objects: list[np.ndarray] | np.ndarray) -> None:
+        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+        self.world_from_object[:] = np.reshape(world_from_objects, (-1, 4, 4))
+
+    def staging_at(self, part: str) -> int:
+        """The float of the staging buffer where a part ("offset", "scale", ...) begins."""
+        before = list(PARTS)[: list(PARTS).index(part)]
+        return sum(PARTS[name] for name in before) * self.staged
+
+    def pack_staged(
+        self, start: int, count: int, anchors: moderngl.Buffer | None = None, first: int = 0
+    ) -> None:
+        """Turns `count` staged splats into rows start... of the arena: R S S^T R^T (paper eq. 1).
+
+        With `anchors` (vec4 each; w = splats an anchor) staged means are offsets to be added to
+        them; `first` is the anchor of the first staged splat.
+        """
+        if not count:
+            return
+        bind(mean_opacity=self.mean_opacity, covariance=self.covariance, staging=self.staging)
+        bind(anchors=anchors or self.staging)
+        groups = groups_for(count, layout.WORKGROUP)
+        sizes = {"count": count, "start": start, "capacity": self.staged, "first_anchor": first}
+        self.gpu.run(self._pack, groups, **sizes, is_offset=anchors is not None)
+
+    def write_geometry(
+        self, i: int, means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray
+    ) -> None:
+        """Uploads object i as an Evaluator gives it: (n, 3) m, (n, 3) m, (n, 4), (n,)."""
+        start, end = self._rows(i, means, "means")
+        for first in range(start, end, max(self.staged, 1)):
+            part = slice(first - start, min(first - start + self.staged, end - start))
+            arrays = (means[part], scales[part], wxyz[part], opacity[part])
+            for name, array in zip(PARTS, arrays, strict=True):
+                rows = np.ascontiguousarray(array, np.float32)
+                self.staging.write(rows, offset=4 * self.staging_at(name))
+            self.pack_staged(first, part.stop - part.start)
+
+    def write_color(self, i: int, color: np.ndarray) -> None:
+        """Uploads the colours (n, 3) of object i."""
+        start, end = self._rows(i, color, "colours")
+        rows = np.zeros((end - start, 4), np.float32)
+        rows[:, :3] = color
+        if end > start:
+            self.color.write(rows, offset=16 * start)
+
+    def _rows(self, i: int, array: np.ndarray, what: str) -> tuple[int, int]:
+        start, end = self.starts[i], self.starts[i + 1]
+        if len(array) != end - start:
+            raise ValueError(f"object {i} has {end - start} splats, but {len(array)} {what} came.")
+        return start, end
+
+    def release(self) -> None:
+        for buffer in (
+            self.mean_opacity, self.covariance, *self.colors, self.records,
+            self.keys, self.keys_spare, self.order, self.order_spare, self.histogram, self.counts,
+            self.command, self.staging,
+        ):  # fmt: skip
+            buffer.release()
+        for buffer in self._heats.values():
+            buffer.release()
+
+    def __enter__(self) -> "Arena":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()

@@ -1,0 +1,148 @@
+"""project: splats -> screen ellipses and keys to sort by; the only culling gate."""
+
+from itertools import pairwise
+
+import numpy as np
+from moderngl import ComputeShader
+
+from shapeshift.renderer import layout
+from shapeshift.renderer.gl.buffers import Arena, bind
+from shapeshift.renderer.gl.gpu import Gpu, groups_for
+from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.scene.pose import View
+
+NO_COUNTS = np.zeros(layout.COUNTS_SIZE, np.uint32)
+NO_COUNTS[layout.COUNTS["NEAREST"]] = layout.CULLED_KEY
+
+
+class Projector:
+    """Writes the records, keys and counts of an arena, for one view or for two at once."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._variant(1, False, RenderSettings())  # a broken shader is told at the start
+
+    def _variant(
+        self, views: int, own_frame: bool, settings: RenderSettings, antialiased: bool = False,
+        own_colors: bool = False,
+    ) -> ComputeShader:  # fmt: skip
+        return self._gpu.compute(
+            "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
+            KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
+            ANTIALIASED=int(antialiased), OWN_COLORS=int(own_colors),
+        )  # fmt: skip
+
+    def project(
+        self,
+        arena: Arena,
+        views: list[View],
+        settings: RenderSettings,
+        sort_from_world: np.ndarray | None = None,
+        keep_outside: bool = False,
+        first_view: int = 0,
+    ) -> None:
+        """Projects all objects with their poses, under the limits of the settings.
+
+        Row v * N + i of arena.records is splat i in view v; arena.keys[i] its depth (or distance,
+        settings.order) in the frame sort_from_world (4, 4), by default the first view's eye.
+        keep_outside: the order is to outlive this frame, or did outlive another: every splat that
+        is not absent has a key, and every record is written; those of culled ones have no area.
+        first_view: number of the first of the views in its frame, where each has its own colours.
+        """
+        if not 1 <= len(views) <= layout.MOST_VIEWS:
+            raise ValueError(f"{len(views)} views came; project takes 1 to {layout.MOST_VIEWS}.")
+        counts = NO_COUNTS.copy()
+        counts[layout.COUNTS["SORTED"]] = arena.count  # from which project subtracts
+        arena.counts.write(counts)
+        if not arena.count:
+            return
+        arena.make_room(len(views))
+        frames = [view.eye_from_world() for view in views]
+        if sort_from_world is not None:
+            frames.append(np.asarray(sort_from_world, np.float64))
+        # In float64 on the CPU: a far world origin must not eat the digits of a near splat.
+        rows = np.stack([frame @ arena.world_from_object for frame in frames], axis=1)
+        rows = np.ascontiguousarray(rows[:, :, :3], np.float32)  # (O, frames, 3, 4)
+        bind(
+            mean_opacity=arena.mean_opacity, covariance=arena.covariance,
+            records=arena.records, keys=arena.keys, counts=arena.counts,
+        )  # fmt: skip
+        mine = arena.colors[first_view:] if len(arena.colors) > 1 else arena.colors
+        bind(color=mine[0])
+        if own_colors := len(views) > 1 < len(mine):
+            bind(second_color=mine[1])
+        programs = {
+            kind: self._variant(len(views), len(frames) > len(views), settings, kind, own_colors)
+            for kind in set(arena.antialiased)
+        }
+        for program in programs.values():
+            set_uniforms(
+                program, keep_outside=keep_outside, tangents=_each(v.tangents for v in views),
+                clamps=_each(jacobian_clamp(v) for v in views),
+                size=_each(v.size for v in views), near=_each(v.near for v in views),
+                **limits(settings),
+            )  # fmt: skip
+            if len(views) > 1:
+                set_uniforms(program, count=arena.count)
+        for i, (first, last) in enumerate(pairwise(arena.starts)):
+            if last > first:
+                program = programs[arena.antialiased[i]]
+                set_uniforms(program, first=first, last=last)
+                program["frames"].write(rows[i])
+                program.run(groups_for(last - first, layout.WORKGROUP))
+        self._gpu.ctx.memory_barrier()
+
+    def counts(self, arena: Arena, i: int = 0) -> dict[str, int]:
+        """Splats of view i at the last projection: drawn, then CULL_REASONS.
+
+        Waits for the GPU.
+        """
+        rows = np.frombuffer(arena.counts.read(), np.uint32)[i * layout.COUNTS_STRIDE :]
+        culled = {name: int(rows[layout.COUNTS[name.upper()]]) for name in CULL_REASONS}
+        return {"drawn": arena.count - sum(culled.values()), **culled}
+
+    def release(self) -> None:
+        """Nothing of its own: programs belong to the Gpu."""
+
+    def __enter__(self) -> "Projector":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.release()
+
+
+def jacobian_clamp(view: View) -> tuple[float, float]:
+    """Largest |x/z| and |y/z| at which the projection's slope is that of the place itself."""
+    x, y = view.widest_tangents()
+    return layout.JACOBIAN_MARGIN * x, layout.JACOBIAN_MARGIN * y
+
+
+def limits(settings: RenderSettings) -> dict[str, object]:
+    """The uniforms that stand for the settings' limits; infinite ones as large floats.
+
+    A ramp of the fade is clamp((limit - value) * slope, 0, 1); without one it is 1 everywhere.
+    """
+    largest = min(settings.max_pixels, layout.HUGE)
+    farthest = min(settings.max_distance, layout.HUGE)
+    ends, slopes = [layout.HUGE, layout.HUGE, -layout.HUGE], [1.0, 1.0, 1.0]
+    for i, limit in enumerate((largest, farthest, settings.min_pixels)):
+        if settings.fade > 0 and 0 < limit < layout.HUGE:
+            ends[i], slopes[i] = limit, min(1 / (settings.fade * limit), layout.HUGE)
+    numbers = {
+        "min_alpha": settings.min_alpha, "low_pass": settings.low_pass, "max_pixels": largest,
+        "max_distance": farthest, "min_pixels": min(settings.min_pixels, layout.HUGE),
+    }  # fmt: skip
+    if settings.fade > 0:
+        numbers |= {"fade_ends": tuple(ends), "fade_slopes": tuple(slopes)}
+    return numbers
+
+
+def set_uniforms(program: ComputeShader, **values: object) -> None:
+    for name, value in values.items():
+        program[name].value = value
+
+
+def _each(values) -> object:
+    """One value a view, as a uniform array wants them: an array of one is a plain uniform."""
+    values = list(values)
+    return values[0] if len(values) == 1 else values

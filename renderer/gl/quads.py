@@ -1,0 +1,273 @@
+"""Draws with GL: compute passes and quads, made for a GPU; software GL runs the same.
+
+Same life as renderer/tiles/tiles.py: allocate, decode what changed, place, draw.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import replace
+from itertools import pairwise
+
+import moderngl
+import numpy as np
+
+from shapeshift.renderer.colors.false_colors import Shade
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.renderer.gl.overdraw import count_overdraw
+from shapeshift.renderer.gl.project import Projector
+from shapeshift.renderer.gl.sort_check import checked_sorter
+from shapeshift.renderer.gl.splat import Splatter
+from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, PairSplatter
+from shapeshift.renderer.gl.surface import draw_surface
+from shapeshift.renderer.gl.target import brightest, choose_target
+from shapeshift.renderer.layout import MOST_VIEWS
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.renderer.sort_policy import Cadence, sort_frames
+from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.timing import PassTimer
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import Model, is_antialiased
+from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.pose import View
+
+SAMPLE = 4096  # splats, for a median
+
+
+class QuadsDrawing:
+    """The arena of all objects in GL buffers, and the passes that draw it."""
+
+    def __init__(self, gpu: Gpu, mlps: str, sort: str) -> None:
+        self._sorter, sort = checked_sorter(gpu, sort)
+        self.backends = {"drawing": "quads", "mlps": mlps, "sort": sort}
+        self._mlps = mlps
+        self.decodes_on_gpu = mlps == "gl"  # says which clock times the decoding
+        self._gpu = gpu
+        self._projector = Projector(gpu)
+        self._splatter = Splatter(gpu)
+        self._pair = PairSplatter(gpu) if is_software(gpu.ctx) else None
+        self.sorts = self.order_age = 0  # of the last frame, see FrameStats
+        self._cadence = Cadence()
+        self._changed = True  # since the last frame: a pose, a control value, the set of objects
+        self._models: list[Model] = []
+        self._most: float | None = None  # brightest colour of these; None: not known yet
+        self._last = 0  # row of the counts of the view drawn last
+        self.draws_heat = False  # beside the colours, from the next frame on
+        self._arena: Arena | None = None
+        self._decoder: Decoder | None = None
+
+    @property
+    def allocations(self) -> int:
+        """How many buffers and textures were ever made."""
+        return self._gpu.allocations
+
+    def allocate(self, models: list[Model]) -> None:
+        """Room for these objects; what was decoded before is gone."""
+        self._release_arena()
+        self._changed = True
+        self._models, self._most = models, None
+        counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
+        self._arena = Arena(self._gpu, counts, antialiased)
+        self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
+        on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
+        self.backends["mlps"] = f"{self._mlps}, Scaffold-GS onnxruntime" if on_cpu else self._mlps
+
+    def decode_geometry(
+        self,
+        i: int,
+        x: Controls,
+        eye_object: np.ndarray | None = None,
+        seen: np.ndarray | None = None,
+    ) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
+
+        eye_object: (3,) in the object's frame, for a model that follows it; seen: (A,) bool, the
+        anchors of such a model that are there, None: all.
+        """
+        self._changed = True
+        self._decoder.geometry(i, x, eye_object, seen)
+
+    def color_set(self, which: int, count: int) -> None:
+        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
+        or one a view.
+        """
+        self._arena.color_set(which, count)
+
+    def decode_color(
+        self,
+        i: int,
+        shade: Shade,
+        eye_object: np.ndarray,
+        seen: np.ndarray | None = None,
+        at_once: bool = False,
+    ) -> None:
+        """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
+
+        seen: (A,) bool, one an anchor: the rest may keep what it has.  at_once: the heat becomes
+        colours of its palettes here.
+        """
+        self._decoder.shade(i, shade, eye_object, seen, at_once)
+
+    def wait_decoded(self) -> None:
+        """Nothing: GL keeps the order of the passes itself."""
+
+    def place(self, world_from_objects: list[np.ndarray]) -> None:
+        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+        poses = np.reshape(world_from_objects, (-1, 4, 4))
+        if not np.array_equal(poses, self._arena.world_from_object, equal_nan=True):
+            self._changed = True
+            self._arena.place(poses)
+
+    def draw(
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
+    ) -> None:
+        """Draws every view; view i is then image(first + i)."""
+        arena = self._arena
+        target, unit = choose_target(self._gpu, settings.target, self._brightest())
+        self._splatter.target, self._splatter.unit = target, unit
+        self.backends["drawing"] = f"quads ({target})"
+        canted = len(sort_frames(views, settings)) > 1
+        if canted:  # an order a view, and room for one: none is kept
+            settings = replace(settings, resort_frames=1, resort_degrees=0.0)
+        plan = self._cadence.plan(views, settings, self._changed, self._median_distance)
+        self._changed = False
+        self.sorts, self.order_age = plan.sorts, plan.age
+        at_once = len(views) <= MOST_VIEWS and arena.holds_views(len(views)) and not canted
+        groups = [views] if at_once else [[view] for view in views]
+        # One order for views that are projected one by one must hold what the first does not see.
+        keep_outside = plan.keep_outside or (len(groups) > 1 and not canted)
+        i = 0
+        for n, group in enumerate(groups):
+            frame = plan.frames[n] if n < plan.sorts else None
+            with timer.time("project"):
+                own = frame is None or canted or len(views) == 1  # its own eye: one frame less
+                sort_from_world = None if own else frame
+                how = (settings, sort_from_world, keep_outside, i)
+                self._projector.project(arena, group, *how)
+            if frame is not None:
+                with timer.time("sort", on_gpu=self._sorter.backend == "gl"):
+                    self._sorter.sort(arena, settings.key_bits)
+            with timer.time("splat"):
+                self._splat(group, first + i, settings)
+            i += len(group)
+        self._last = len(groups[-1]) - 1
+
+    def _splat(self, group: list[View], i: int, settings: RenderSettings) -> None:
+        """Draws views that were projected together, from image i on; two at once where it pays."""
+        arena, shift = self._arena, None
+        alike = len(group) == 2 and group[0].size == group[1].size and arena.count
+        paired = self._pair is not None and alike and not self.draws_heat
+        if paired and settings.low_pass >= LEAST_LOW_PASS:
+            shift = self._pair.shift(arena, group[0].size[0])
+        if shift is not None:
+            pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
+            self._pair.draw(arena, pictures, shift, settings.min_alpha, self._splatter.unit)
+            return
+        for row, view in enumerate(group):
+            heat = None
+            if self.draws_heat:
+                heat = arena.heat_of(min(i + row, len(arena.colors) - 1))
+            self._splatter.draw(arena, i + row, view.size, settings.min_alpha, row, heat)
+
+    @contextmanager
+    def order_set_aside(self) -> Iterator[None]:
+        """Whatever the body does to the order, afterwards it is the one that was in use before."""
+        arena, cadence = self._arena, copy(self._cadence)
+        now = (self.sorts, self.order_age, self._changed)
+        kept = [(buffer, buffer.read()) for buffer in (arena.order, arena.command)]
+        try:
+            yield
+        finally:
+            for buffer, data in kept:
+                buffer.write(data)
+            self._cadence = cadence
+            self.sorts, self.order_age, self._changed = now
+
+    def _median_distance(self, eye_from_world: np.ndarray) -> float:
+        """Metres from an eye to the median splat, from a sample of those that are there."""
+        mean_opacity, owner, _ = (
+            a[:: -(-self._arena.count // SAMPLE)] for a in self.splat_points()
+        )
+        rows = (eye_from_world @ self._arena.world_from_object)[owner, :3]  # (n, 3, 4)
+        places = (rows[..., :3] @ mean_opacity[:, :3, None])[..., 0] + rows[..., 3]
+        distance = np.linalg.norm(places[mean_opacity[:, 3] > 0], axis=1)
+        distance = distance[np.isfinite(distance)]
+        return float(np.median(distance)) if distance.size else 0.0
+
+    def counts(self) -> dict[str, int]:
+        """{drawn, *CULL_REASONS} of the view drawn last."""
+        return self._projector.counts(self._arena, self._last)
+
+    def _brightest(self) -> float:
+        """The largest colour of the scene, found out once."""
+        if self._most is None:
+            self._most = brightest(self._models)
+        return self._most
+
+    def presentable(self, i: int) -> moderngl.Texture:
+        """The image of view i on the GPU, row 0 at the bottom; its colours count in unit_of(i)."""
+        return self._splatter.texture(i)
+
+    def unit_of(self, i: int) -> float:
+        """The display value that 1 in presentable(i) stands for."""
+        return self._splatter.unit_of(i)
+
+    def image(self, i: int) -> np.ndarray:
+        """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
+        return self._splatter.image(i)
+
+    def heat(self, i: int) -> np.ndarray:
+        """(H, W, 2) float32, row 0 on top, of the same view: value and weight, both times alpha."""
+        return self._splatter.image(i, of=1)[..., :2]
+
+    def presentable_heat(self, i: int) -> moderngl.Texture:
+        """What resolve takes beside it, of a frame with heat."""
+        return self._splatter.texture(i, of=1)
+
+    def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
+        arena = self._arena
+        owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
+        rows = [np.frombuffer(b.read(), np.float32) for b in (arena.mean_opacity, arena.covariance)]
+        n = arena.count
+        return rows[0][: 4 * n].reshape(n, 4), owner, rows[1][: 8 * n].reshape(n, 8)
+
+    def write_colors(self, color: np.ndarray) -> None:
+        """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
+        sets = len(self._arena.colors)
+        for which in reversed(range(sets)):
+            self._arena.color_set(which, sets)
+            for i, (start, end) in enumerate(pairwise(self._arena.starts)):
+                self._arena.write_color(i, color[start:end])
+
+    def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
+        """(H, W): how many splats each pixel of a view just drawn blends, for a debug view."""
+        return count_overdraw(self._gpu, self._projector, self._arena, view, settings)
+
+    def surface(self, view: View, settings: RenderSettings) -> Surface:
+        """Depth, normals and coverage from a view; the order and the counts in use stay."""
+        arena = self._arena
+        if not arena.count:
+            return Surface.empty(view.size)
+        with self.order_set_aside():
+            counts = arena.counts.read()
+            self._projector.project(arena, [view], settings)
+            self._sorter.sort(arena, settings.key_bits)
+            made = draw_surface(self._gpu, arena, view, settings)
+            arena.counts.write(counts)
+        return made
+
+    def close(self) -> None:
+        self._release_arena()
+        for part in (self._splatter, self._sorter, self._projector):
+            if part is not None:
+                part.release()
+
+    def _release_arena(self) -> None:
+        for part in (self._decoder, self._arena):
+            if part is not None:
+                part.release()
+        self._decoder = self._arena = None

@@ -1,0 +1,70 @@
+"""What quads blend into: settings.target made into a format, and the unit its colours count in.
+
+GL_RGBA16 holds 0 to 1 in steps of 1/65535: many faint layers add up to 82 dB where half floats, of
+the same bytes, leave 46, since their steps near 1 are 1/2048.  Colours above 1 do not fit; so they
+are divided by the brightest that the scene can have, which blending does not notice, and multiplied
+again on the way out.  GL 4.3 says that every driver draws into it and blends (8.5.1, 17.3.8).
+"""
+
+import logging
+import math
+from functools import cache
+
+import moderngl
+
+from shapeshift.renderer.gl.gpu import Gpu
+from shapeshift.runtime_models.colors.color_range import color_range
+from shapeshift.runtime_models.model import Model
+
+DTYPES = {"rgba8": "f1", "rgba16": "nu2", "rgba16f": "f2", "rgba32f": "f4"}  # moderngl's
+# There 100,000 faint layers and a leg are still 5 to 8 dB better than in half floats; twice that
+# would be the end of it (each doubling costs up to 6 dB).
+MOST_UNIT = 64.0
+
+
+def brightest(models: list[Model]) -> float:
+    """The largest display value of any colour, at least 1; infinite where a colour may be below 0
+    or nothing bounds it.
+    """
+    ranges = [color_range(model) for model in models]
+    if any(least < 0 for least, _ in ranges):
+        return math.inf
+    return max((most for _, most in ranges), default=1.0)
+
+
+def choose_target(gpu: Gpu, wish: str, most: float) -> tuple[str, float]:
+    """(name in DTYPES, unit) for a settings.target and the brightest colour.
+
+    "auto": rgba16 where all colours fit, else half floats, which hold any.
+    """
+    if wish not in ("auto", "rgba16"):
+        return wish, 1.0
+    if not draws_into(gpu, "rgba16"):
+        tell_once(
+            f"this driver ({gpu.ctx.info['GL_RENDERER']}) does not draw into GL_RGBA16, which GL "
+            "4.3 asks for; half floats are blended instead: many faint layers get too dark."
+        )
+        return "rgba16f", 1.0
+    fits = most <= MOST_UNIT
+    if wish == "auto" and not fits:
+        return "rgba16f", 1.0
+    return "rgba16", max(most, 1.0) if fits else 1.0
+
+
+def draws_into(gpu: Gpu, name: str) -> bool:
+    """Whether a picture of that format can be drawn into; asked once of a context."""
+    if name not in gpu.targets:
+        try:
+            made = gpu.target((1, 1), DTYPES[name])
+        except moderngl.Error:  # the framebuffer is not complete
+            gpu.targets[name] = False
+        else:
+            made.color_attachments[0].release()
+            made.release()
+            gpu.targets[name] = True
+    return gpu.targets[name]
+
+
+@cache
+def tell_once(sentence: str) -> None:
+    logging.getLogger("renderer").warning(sentence)

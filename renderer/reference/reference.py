@@ -1,0 +1,288 @@
+"""The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeshift.renderer import layout
+from shapeshift.renderer.colors.false_colors import (
+    BESIDE,
+    SPLATS,
+    FalseColors,
+    Shade,
+    false_colors,
+    mixed_colors,
+    split_colors,
+)
+from shapeshift.renderer.colors.palette import lay_heat
+from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import Model, is_antialiased
+from shapeshift.runtime_models.rotation import normalize, rotation_matrices
+from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.control import control_of
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene, SceneObject
+
+MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
+JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection counts as flat;
+#                        an off-centre view has that of the centred picture that it is a part of
+
+
+@dataclass(frozen=True)
+class Projected:
+    """All splats of an object as a view sees them; rows with a reason may hold anything."""
+
+    reason: np.ndarray  # (N,) uint8: 0 drawn, else 1 + index into CULL_REASONS
+    depth: np.ndarray  # (N,) metres along the view
+    place: np.ndarray  # (N, 3) metres in the world
+    mean_px: np.ndarray  # (N, 2) row 0 on top
+    covariance: np.ndarray  # (N, 2, 2) px^2, low_pass included
+    opacity: np.ndarray  # (N,) after the fade
+    color: np.ndarray  # (N, 3), or (N, 5) with value and weight of the heat
+    mean: np.ndarray  # (N, 3) metres in the camera, OpenCV axes
+    axes: np.ndarray  # (N, 3, 3) metres in the camera: the columns are one sigma long
+
+
+def reference_image(
+    scene: Scene,
+    view: View,
+    settings: RenderSettings | None = None,
+    eye: np.ndarray | None = None,
+    middle: np.ndarray | None = None,
+) -> np.ndarray:
+    """(H, W, 4) float64 premultiplied colour and coverage over nothing, row 0 on top; at a pure
+    thermal stop values.
+
+    eye: (3,) world metres, where colours are looked at from, if not the view's own eye (shared
+    colours of two eyes: the middle of both).  middle: where distances in the order "distance" are
+    measured from, if not `eye` (one order for two eyes: the middle of both).
+    """
+    settings = settings or RenderSettings()
+    eye = view.world_from_eye.position if eye is None else eye
+    middle = eye if middle is None else middle
+    objects, colors = shaded_objects(scene, view, settings, eye)
+    if not objects:
+        return np.zeros((view.size[1], view.size[0], 4))
+    depth, place, *ellipses = (
+        np.concatenate([getattr(o, name)[o.reason == 0] for o in objects])
+        for name in ("depth", "place", "mean_px", "covariance", "opacity", "color")
+    )
+    key = np.linalg.norm(place - middle, axis=1) if settings.order == "distance" else depth
+    order = np.argsort(key, kind="stable")
+    image = blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
+    if colors.way != BESIDE:
+        return image
+    return lay_heat(image[..., [0, 1, 2, 5]], image[..., 3:5], colors.palette)
+
+
+def shaded_objects(
+    scene: Scene, view: View, settings: RenderSettings, eye: np.ndarray
+) -> tuple[list[Projected], FalseColors]:
+    """The visible objects; colours are (N, 3), or (N, 5) with the heat that is drawn beside."""
+    colors = false_colors(scene, [control_of(thing) for thing in scene.objects])
+    found = [
+        gate_object(thing, view, settings, eye, (colors.way, shade))
+        for thing, shade in zip(scene.objects, colors.shades, strict=True)
+        if thing.visible
+    ]
+    return found, colors
+
+
+def reference_reasons(
+    scene: Scene, view: View, settings: RenderSettings | None = None
+) -> np.ndarray:
+    """(N,) uint8 of all splats in the scene's order: 0 drawn, else 1 + index into CULL_REASONS.
+
+    Splats of hidden objects are nowhere: "distance", if not "opacity".
+    """
+    settings = settings or RenderSettings()
+    eye = view.world_from_eye.position
+    parts = [gate_object(o, view, settings, eye).reason for o in scene.objects]
+    return np.concatenate([np.zeros(0, np.uint8), *parts])
+
+
+def reference_counts(
+    scene: Scene, view: View, settings: RenderSettings | None = None
+) -> dict[str, int]:
+    """{drawn, *CULL_REASONS} of `reference_reasons`, as the drawings count them."""
+    numbers = np.bincount(reference_reasons(scene, view, settings), minlength=7)
+    return dict(zip(("drawn", *CULL_REASONS), numbers.tolist(), strict=True))
+
+
+def project_object(
+    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray
+) -> tuple:
+    """depth (M,), mean_px (M, 2), covariance_px (M, 2, 2), opacity (M,), color (M, 3) of what is
+    drawn.
+    """
+    all_ = gate_object(thing, view, settings, eye)
+    names = ("depth", "mean_px", "covariance", "opacity", "color")
+    return tuple(getattr(all_, name)[all_.reason == 0] for name in names)
+
+
+def gate_object(
+    thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray,
+    shading: tuple[str, Shade] | None = None,
+) -> Projected:  # fmt: skip
+    """Projects every splat and finds the first gate that it fails.
+
+    shading: how the scene's heat is shown and what of the object is heat; None: none is.
+    """
+    world_from_object = thing.world_from_object.matrix()
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    camera_from_object = camera_from_world @ world_from_object
+    object_from_world = np.linalg.inv(world_from_object)
+    eye_object = object_from_world[:3, :3] @ eye + object_from_world[:3, 3]
+    splats = evaluate(thing.model, control_of(thing), eye_object)
+    means, scales, wxyz, opacity = (
+        np.asarray(a, np.float64)
+        for a in (splats.means, splats.scales, splats.wxyz, splats.opacity)
+    )
+    color = shaded_color(thing.model, splats.color, eye_object, shading)
+    scales = np.where(np.isfinite(wxyz).all(axis=1)[:, None], scales, np.nan)  # turned nowhere
+    if not thing.visible:
+        means = np.full_like(means, np.nan)
+    with np.errstate(all="ignore"):  # splats that are not finite, or beside or behind the eye
+        mean = means @ camera_from_object[:3, :3].T + camera_from_object[:3, 3]  # metres
+        depth = mean[:, 2]
+        axes = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3) metres
+        most_x, most_y = (t * JACOBIAN_MARGIN for t in view.widest_tangents())
+        x = np.clip(mean[:, 0] / depth, -most_x, most_x)
+        y = np.clip(mean[:, 1] / depth, -most_y, most_y)
+        zero = np.zeros_like(depth)
+        jacobian = np.stack(
+            [
+                np.stack([fx / depth, zero, -fx * x / depth], axis=1),
+                np.stack([zero, fy / depth, -fy * y / depth], axis=1),
+            ],
+            axis=1,
+        )  # (N, 2, 3) pixels per metre
+        half = jacobian @ camera_from_object[:3, :3] @ axes
+        bare = half @ half.transpose(0, 2, 1)
+        covariance = bare + settings.low_pass * np.eye(2)
+        seen = opacity * kept_light(bare, covariance) if is_antialiased(thing.model) else opacity
+        # The arena keeps covariances as float32: what is infinite there is so here.
+        overflow = np.square(axes).sum(axis=2).max(axis=1) > np.finfo(np.float32).max
+        covariance[overflow] = np.inf
+        mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
+        reason, faded = gate(mean, mean_px, covariance, opacity, seen, color, view, settings)
+        place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
+        in_camera = camera_from_object[:3, :3] @ axes
+    return Projected(reason, depth, place, mean_px, covariance, faded, color, mean, in_camera)
+
+
+def shaded_color(
+    model: Model, decoded: np.ndarray, eye: np.ndarray, shading: tuple[str, Shade] | None
+) -> np.ndarray:
+    """(N, 3) colours of splats towards an eye (3,) in the object's frame, or (N, 5) with heat."""
+    way, shade = shading or ("", Shade(0.0))
+
+    def color_at(control: Controls) -> np.ndarray:
+        return evaluate(model, control, eye).color.astype(np.float64)
+
+    if way == BESIDE:
+        return np.concatenate(split_colors(shade, model.splat_count, color_at), axis=1)
+    if way == SPLATS:
+        return mixed_colors(shade, model.splat_count, color_at)
+    return np.asarray(decoded, np.float64)
+
+
+def kept_light(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(N,) sqrt(det / det with the low pass): how much fainter an antialiased splat becomes."""
+    kept = np.sqrt(np.maximum(np.linalg.det(bare), 0) / np.linalg.det(covariance))
+    return np.fmin(kept, 1)  # 1 where the quotient is no number
+
+
+def gate(
+    mean: np.ndarray,
+    mean_px: np.ndarray,
+    covariance: np.ndarray,
+    opacity: np.ndarray,
+    seen: np.ndarray,
+    color: np.ndarray,
+    view: View,
+    settings: RenderSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) reasons and faded opacities; mean (N, 3) metres in the camera, the rest as Projected.
+
+    seen: (N,) opacity on the screen, of antialiased splats less than the model's.
+    """
+    # The kernels get limits as float32: a splat that meets one exactly must meet it here.
+    least, largest, farthest, smallest, near = (
+        float(np.float32(min(limit, layout.HUGE)))
+        for limit in (
+            settings.min_alpha, settings.max_pixels, settings.max_distance, settings.min_pixels,
+            view.near,
+        )
+    )  # fmt: skip
+    distance = np.linalg.norm(mean, axis=1)
+    cut = np.sqrt(np.maximum(2 * np.log(seen / least), 0))  # sigmas to where alpha is `least`
+    extent = cut[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    inside = np.all((mean_px - extent < view.size) & (mean_px + extent > 0), axis=1)
+    shaped = np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(mean_px).all(axis=1)
+    shaped &= opacity / least < np.finfo(np.float32).max  # else the cut is infinite there
+    sigma = largest_axis_px(covariance)
+    flat = np.linalg.det(np.where(shaped[:, None, None], covariance, 0)) <= 0
+    colored = (np.abs(color) <= layout.HALF_MAX).all(axis=1)
+    reach = cut * sigma  # pixels
+    faded = seen * ramp(largest - sigma, settings.fade, settings.max_pixels)
+    faded = faded * ramp(farthest - distance, settings.fade, settings.max_distance)
+    faded = faded * ramp(reach - smallest, settings.fade, settings.min_pixels)
+    passes = {
+        "opacity": np.isfinite(opacity) & (opacity >= least),
+        "distance": distance <= farthest,
+        "frustum": (mean[:, 2] > near) & (inside | ~shaped),
+        "size": shaped & ~flat & colored & (sigma <= largest),
+        "footprint": reach >= smallest,
+        "faded": faded >= least,
+    }
+    failed = np.stack([~passes[name] for name in CULL_REASONS])
+    reason = np.where(failed.any(axis=0), 1 + failed.argmax(axis=0), 0).astype(np.uint8)
+    return reason, faded
+
+
+def ramp(within: np.ndarray, fade: float, limit: float) -> np.ndarray | float:
+    """0 at a limit, 1 from `fade` times the limit within it; 1 where nothing is to fade."""
+    if not (fade > 0 and 0 < limit < layout.HUGE):
+        return 1.0
+    return np.clip(within / (fade * limit), 0, 1)
+
+
+def largest_axis_px(covariance: np.ndarray) -> np.ndarray:
+    """(M,) one sigma along the longer axis of screen ellipses with covariance (M, 2, 2)."""
+    a, b, c = covariance[:, 0, 0], covariance[:, 0, 1], covariance[:, 1, 1]
+    return np.sqrt((a + c) / 2 + np.hypot((a - c) / 2, b))
+
+
+def blend(
+    mean_px: np.ndarray,
+    covariance: np.ndarray,
+    opacity: np.ndarray,
+    color: np.ndarray,
+    size: tuple[int, int],
+    min_alpha: float,
+) -> np.ndarray:
+    """(H, W, C + 1) of colours (N, C): near to far, alpha = min(0.99, opacity exp(-r / 2)),
+    dropped below min_alpha.
+    """
+    width, height = size
+    image, through = np.zeros((height, width, color.shape[1])), np.ones((height, width))
+    inverse = np.linalg.inv(covariance)
+    radius = np.sqrt(np.maximum(2 * np.log(np.maximum(opacity, min_alpha) / min_alpha), 0))
+    extent = radius[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))  # pixels
+    first = np.clip(np.floor(mean_px - extent - 0.5), 0, size).astype(int)
+    after = np.clip(np.ceil(mean_px + extent + 0.5), 0, size).astype(int)
+    for i in np.flatnonzero(np.all(after > first, axis=1)):
+        (x0, y0), (x1, y1) = first[i], after[i]
+        dx = np.arange(x0, x1) + 0.5 - mean_px[i, 0]
+        dy = (np.arange(y0, y1) + 0.5 - mean_px[i, 1])[:, None]
+        (a, b), (_, c) = inverse[i]
+        alpha = np.minimum(
+            MAX_ALPHA, opacity[i] * np.exp(-0.5 * (a * dx * dx + 2 * b * dx * dy + c * dy * dy))
+        )
+        alpha[~(alpha >= min_alpha)] = 0
+        weight = alpha * through[y0:y1, x0:x1]
+        image[y0:y1, x0:x1] += weight[..., None] * color[i]
+        through[y0:y1, x0:x1] -= weight
+    return np.concatenate([image, 1 - through[..., None]], axis=2)

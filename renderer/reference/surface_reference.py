@@ -1,0 +1,64 @@
+"""Depth, normals and coverage in numpy float64: the oracle of `surface` in every drawing."""
+
+import numpy as np
+
+from shapeshift.renderer.reference.reference import MAX_ALPHA, Projected, gate_object
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.renderer.surface import Surface
+from shapeshift.scene.pose import View
+from shapeshift.scene.scene import Scene
+
+REACH = 6.0  # sigmas along the view within which depth is held
+
+
+def reference_surface(scene: Scene, view: View, settings: RenderSettings | None = None) -> Surface:
+    """The Surface of a view, float64: rays through ellipsoids by their inverses."""
+    settings = settings or RenderSettings()
+    eye = view.world_from_eye.position
+    found = [gate_object(o, view, settings, eye) for o in scene.objects if o.visible]
+    width, height = view.size
+    metres, through = np.zeros((height, width)), np.ones((height, width))
+    normal = np.zeros((height, width, 3))
+    _, fx, fy, cx, cy = view.pinhole()
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    rays = np.stack([(x - cx) / fx, (y - cy) / fy, np.ones_like(x)], axis=-1)
+    splats = _drawn(found)
+    key = np.linalg.norm(splats.mean, axis=1) if settings.order == "distance" else splats.depth
+    for i in np.argsort(key, kind="stable"):
+        d = np.stack([x, y], axis=-1) - splats.mean_px[i]
+        r = np.einsum("hwi,ij,hwj->hw", d, np.linalg.inv(splats.covariance[i]), d)
+        alpha = np.minimum(MAX_ALPHA, splats.opacity[i] * np.exp(-r / 2))
+        weight = np.where(alpha >= settings.min_alpha, alpha, 0) * through
+        depth, facing = midpoint(splats.mean[i], splats.axes[i], rays, view.near)
+        metres += weight * depth
+        normal += weight[..., None] * facing
+        through -= weight
+    return Surface(metres, normal, 1 - through)
+
+
+def midpoint(
+    mean: np.ndarray, axes: np.ndarray, rays: np.ndarray, near: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Metres (H, W) where rays (H, W, 3), z = 1, are halfway through; the normal, eye axes."""
+    inverse = axes / np.square(axes).sum(axis=0)  # columns: directions over sigmas
+    inverse = inverse @ inverse.T
+    depth = (rays @ inverse @ mean) / np.einsum("hwi,ij,hwj->hw", rays, inverse, rays)
+    reach = REACH * np.linalg.norm(axes[2])
+    facing = inverse @ mean * [-1, 1, 1]
+    held = np.clip(depth, max(mean[2] - reach, near), mean[2] + reach)
+    return held, facing / np.linalg.norm(facing)
+
+
+def _drawn(found: list[Projected]) -> Projected:
+    """What passes every gate, of all objects."""
+    if not found:
+        return Projected(*(np.zeros((0, *shape)) for shape in SHAPES))
+    rows = [f.reason == 0 for f in found]
+    columns = {
+        name: np.concatenate([getattr(f, name)[row] for f, row in zip(found, rows, strict=True)])
+        for name in Projected.__dataclass_fields__
+    }
+    return Projected(**columns)
+
+
+SHAPES = ((), (), (3,), (2,), (2, 2), (), (3,), (3,), (3, 3))  # of Projected's fields

@@ -1,0 +1,62 @@
+"""Colours of a model at several controls for one eye, kept while neither changes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
+from shapeshift.runtime_models.stop_weights import Controls, same_controls
+
+Part = tuple[int, int]  # set of colours, one of all views or one a view; number in the mixture
+
+
+class ColorMemory:
+    """The last colours of each part that a picture is mixed of.
+
+    Between a photo and a thermal stop the colours of both are decoded.  They stay while x moves
+    between the two and the eye stands still, so that a slider then costs the shapes alone.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        self._evaluator = evaluator
+        self._parts: dict[Part, _Decoded] = {}
+
+    def at(
+        self, part: Part, control: Controls, eye: np.ndarray, seen: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(N, 3) display sRGB towards an eye (3,) in the object's frame; of anchors not `seen` (A,)
+        anything.  Read only, until the next call for this part.
+        """
+        if follows_eye(self._evaluator.model):  # colours of the shapes decoded just now
+            return self._evaluator.color(control, eye, seen)
+        last = self._parts.get(part)
+        same = last is not None and last.is_of(control, eye)
+        if same and last.covers(seen):
+            return last.colors
+        colors = self._evaluator.color(control, eye, seen, None if last is None else last.colors)
+        if same and seen is not None:  # others came into view
+            seen = seen | last.seen
+        self._parts[part] = _Decoded(control, np.array(eye), seen, colors)
+        return colors
+
+    def forget_after(self, which: int, number: int) -> None:
+        """Drops the parts of a set that have a higher number: they are mixed in no more."""
+        for part in [part for part in self._parts if part[0] == which and part[1] > number]:
+            del self._parts[part]
+
+
+@dataclass(frozen=True)
+class _Decoded:
+    """Colours, and what they were decoded for."""
+
+    control: Controls
+    eye: np.ndarray
+    seen: np.ndarray | None  # (A,) bool; None: all
+    colors: np.ndarray
+
+    def is_of(self, control: Controls, eye: np.ndarray) -> bool:
+        return np.array_equal(eye, self.eye) and same_controls(control, self.control)
+
+    def covers(self, seen: np.ndarray | None) -> bool:
+        """Whether all of these anchors have their colours."""
+        return self.seen is None or (seen is not None and not (seen & ~self.seen).any())

@@ -1,0 +1,112 @@
+"""A package (folder or .shift) to a model; everything is checked here, nothing is trusted."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, unlimited
+from shapeshift.runtime_models.files.npy import read_array
+from shapeshift.runtime_models.files.zip_files import opened_zip
+from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, BadFile, Mlp
+from shapeshift.runtime_models.package.feature_codes import decode_features
+from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, open_package
+from shapeshift.runtime_models.package.read_manifest import Manifest, read_manifest
+from shapeshift.runtime_models.package.read_onnx import read_onnx
+from shapeshift.runtime_models.splats.plain_splats import Reading
+
+TYPES = {"positions": ("float32",), "features": ("float32", "float16", "uint8")}
+SHOWN = 60  # bytes of a splat that is decoded
+RANGE = "feature_range"  # there where features are bytes
+
+
+def read_package(path: str | Path, reading: Reading | None = None) -> AnchorModel:
+    """The model of a package.  Raises BadFile with one sentence for every way it can be broken."""
+    path, reading = Path(path), reading or Reading()
+    memory = reading.within(path).memory
+    return read_files(open_package(path, memory), path.name, memory)
+
+
+def read_files(
+    read: Callable[[str], bytes], package: str, memory: Account | None = None
+) -> AnchorModel:
+    """The model out of read(file name) -> bytes, which charges them; `package` is for messages."""
+    memory = memory or unlimited()
+    data = read(MANIFEST)
+    with memory.lend(JSON_A_BYTE * len(data), MANIFEST):
+        manifest = read_manifest(data, f"{package}/{MANIFEST}")
+    where = f"{package}/{ANCHORS}"
+    data = read(ANCHORS)
+    anchors, features = read_anchors(data, manifest.feature_width, where, memory)
+    memory.release(len(data))
+    shown = len(anchors) * manifest.splats_per_anchor
+    memory.charge(SHOWN * shown, f"{shown:,} splats")  # that is what they are for
+    networks = {
+        name: read_network(name, manifest, read(manifest.heads[name].file), memory)
+        for name in HEADS
+    }
+    return AnchorModel(
+        anchors, features, networks, manifest.splats_per_anchor, manifest.encoding,
+        manifest.stops, manifest.provenance, (), manifest.pace, manifest.between_stops,
+    )  # fmt: skip
+
+
+def read_anchors(
+    data: bytes, width: int, where: str, memory: Account | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """positions (A, 3) metres and features (A, F), both float32."""
+    memory = memory or unlimited()
+    arrays = read_arrays(data, where, memory)
+    for name, columns in (("positions", 3), ("features", width)):
+        array = arrays[name]
+        if str(array.dtype) not in TYPES[name]:
+            raise BadFile(f"{where}: {name} is {array.dtype}, expected {' or '.join(TYPES[name])}.")
+        if array.ndim != 2 or array.shape[1] != columns:
+            raise BadFile(f"{where}: {name} has shape {array.shape}, expected (A, {columns}).")
+        if len(array) == 0:
+            raise BadFile(f"{where} holds no anchors: {name} has shape {array.shape}.")
+        with memory.lend(array.size, f"the check of {name}"):
+            bad = ~np.isfinite(array).all(axis=1)  # of bytes: none
+        if bad.any():
+            raise BadFile(
+                f"{where}: {name} has NaN or Inf in {bad.sum()} of {len(array)} rows, "
+                f"first in row {int(bad.argmax())}; export it again."
+            )
+    for name in TYPES:
+        memory.charge(4 * arrays[name].size, f"{len(arrays[name]):,} {name}")
+    positions = np.ascontiguousarray(arrays["positions"], np.float32)
+    features = decode_features(arrays["features"], arrays.get(RANGE), where)
+    memory.release(sum(array.nbytes for array in arrays.values()))
+    if len(positions) != len(features):
+        raise BadFile(f"{where}: {len(positions)} positions but {len(features)} features.")
+    return positions, features
+
+
+def read_arrays(data: bytes, where: str, memory: Account) -> dict[str, np.ndarray]:
+    """The arrays of TYPES, as stored, and RANGE where it is there; never unpickled."""
+    with opened_zip(data, where, memory) as archive:
+        arrays = {name: read_array(archive, name, where, memory) for name in (*TYPES, RANGE)}
+    for name in TYPES:
+        if arrays[name] is None:
+            raise BadFile(f"{where} lacks the array '{name}'; export it again.")
+    return {name: array for name, array in arrays.items() if array is not None}
+
+
+def read_network(name: str, manifest: Manifest, data: bytes, memory: Account) -> Mlp:
+    """One head, of the widths and the activation that the manifest states."""
+    head, k = manifest.heads[name], manifest.splats_per_anchor
+    mlp = read_onnx(data, head.file, head.inputs, memory)
+    memory.release(len(data))
+    widths = {"feature": manifest.feature_width, "control": manifest.encoding.d, "direction": 3}
+    takes, gives = sum(widths[part] for part in head.inputs), k * SIZE_PER_SPLAT[name]
+    if (mlp.width_in, mlp.width_out) != (takes, gives):
+        raise BadFile(
+            f"{head.file} maps {mlp.width_in} to {mlp.width_out} values, the manifest asks for "
+            f"{takes} ({' + '.join(head.inputs)}) to {gives} (k = {k}); export it again."
+        )
+    if mlp.head != head.activation:
+        raise BadFile(
+            f"{head.file} ends in the activation {mlp.head!r}, the manifest says "
+            f"{head.activation!r}; export it again."
+        )
+    return mlp

@@ -1,0 +1,204 @@
+"""glTF 2.0 (.glb, .gltf) with KHR_gaussian_splatting, release candidate of 2026, to plain splats.
+
+Its compression by spz (KHR_gaussian_splatting_compression_spz_2) is read, too.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.splats.gltf.gltf_files import Asset
+from shapeshift.runtime_models.splats.gltf.gltf_nodes import placed_meshes
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, ours_from_file
+from shapeshift.runtime_models.splats.placed_splats import joined, moved
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+
+SPLATS = "KHR_gaussian_splatting"
+SPZ = "KHR_gaussian_splatting_compression_spz_2"
+PREFIX = f"{SPLATS}:"
+ROTATION, SCALE, OPACITY = f"{PREFIX}ROTATION", f"{PREFIX}SCALE", f"{PREFIX}OPACITY"
+FIRST, COLOR = f"{PREFIX}SH_DEGREE_0_COEF_0", "COLOR_0"
+NAME = "glTF"
+# Required extensions that do not touch what is read here: materials are ignored by the extension.
+HARMLESS = (SPLATS, SPZ, "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_")
+ROW = 44  # bytes of a splat beside its harmonics
+
+
+def is_gltf(head: bytes, path: Path) -> bool:
+    """A .glb by its first bytes; a .gltf is JSON like others, so by its ending, too."""
+    plain = path.name.lower().endswith(".gltf") and head.lstrip()[:1] == b"{"
+    return head[:4] == b"glTF" or plain
+
+
+def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
+    """The splats of all nodes of the scene, where these stand.  Raises BadFile."""
+    reading = reading.within(path)
+    asset = Asset(path, reading.memory)
+    for name in asset.item(asset.json, "extensionsRequired", list, []):
+        if not str(name).startswith(HARMLESS):
+            raise asset.refuse(f"it needs the extension {str(name)[:60]}, which is not read here.")
+    placed = [
+        (primitive, matrix)
+        for mesh, matrix in placed_meshes(asset)
+        for primitive in splat_primitives(asset, mesh)
+    ]
+    if not placed:
+        meshes = len(asset.item(asset.json, "meshes", list, []))
+        raise asset.refuse(
+            f"its scene has no Gaussian splats ({meshes} mesh{'es' * (meshes != 1)}, none shown "
+            f"with {SPLATS}); export them with that extension."
+        )
+    parts = []
+    for number, (primitive, matrix) in enumerate(placed):
+        reading.tell(f"reading {path.name}", number / len(placed))
+        parts.append(moved(read_primitive(asset, primitive, reading), matrix))
+    raw = joined(parts, path.name)
+    return replace(raw, front=not asset.in_our_axes)
+
+
+def splat_primitives(asset: Asset, mesh: object) -> list[dict]:
+    """The primitives of a mesh that are splats."""
+    rows = asset.item(asset.entry("meshes", mesh), "primitives", list, [])
+    if not all(isinstance(row, dict) for row in rows):
+        raise asset.refuse(f"mesh {mesh} has a primitive that is no object.")
+    return [row for row in rows if SPLATS in asset.item(row, "extensions", dict, {})]
+
+
+def compressed_view(asset: Asset, primitive: dict) -> int | None:
+    """The buffer view of the spz file that a primitive's splats are in, if they are."""
+    splats = asset.item(primitive["extensions"], SPLATS, dict, {})
+    inner = asset.item(splats, "extensions", dict, {})
+    return asset.item(asset.item(inner, SPZ, dict, {}), "bufferView", int)
+
+
+def read_primitive(asset: Asset, primitive: dict, reading: Reading) -> RawSplats:
+    """The splats of one primitive in its mesh's own axes."""
+    splats = asset.item(primitive["extensions"], SPLATS, dict, {})
+    findings = unusual(asset, splats)
+    view = compressed_view(asset, primitive)
+    if view is not None:
+        raw = read_spz_view(asset, view, "colorSpace" in splats, reading)
+    else:
+        raw = read_attributes(asset, asset.item(primitive, "attributes", dict, {}))
+    if asset.item(splats, "colorSpace", str, "") == "lin_rec709_display":
+        with asset.memory.lend(5 * raw.sh.nbytes, f"colours of {len(raw.means):,} splats"):
+            raw.sh = display_from_linear(raw.sh)
+        what = f"colours of {len(raw.means):,} splats are linear"
+        done = "turned into display colours one by one; where they overlap they blend otherwise"
+        findings.append(Finding(what, len(raw.means), done, file=asset.path.name, repaired=False))
+    raw.findings = (*raw.findings, *findings)
+    return raw
+
+
+def unusual(asset: Asset, splats: dict) -> list[Finding]:
+    """What the extension's object asks for beyond what is drawn here."""
+    known = {
+        "kernel": ("ellipse",),
+        "colorSpace": ("srgb_rec709_display", "lin_rec709_display"),
+        "projection": ("perspective",),
+    }
+    findings = []
+    for name, values in known.items():
+        value = asset.item(splats, name, str, values[0])
+        if value not in values:
+            what = f"{name} is {value[:40]!r}"
+            findings.append(Finding(what, 0, f"drawn as {values[0]}", file=asset.path.name))
+    return findings
+
+
+def read_attributes(asset: Asset, attributes: dict) -> RawSplats:
+    """Splats of a primitive's accessors, also by the names of the extension's drafts."""
+    attributes = {present_name(name): index for name, index in attributes.items()}
+
+    def read(name: str, width: int) -> np.ndarray:
+        if name not in attributes:
+            raise asset.refuse(f"a splat primitive has no {name}; export it again.")
+        array = asset.read(attributes[name], name, width)
+        if len(array) != count:
+            raise asset.refuse(f"{name} has {len(array)} rows, POSITION has {count}.")
+        return array
+
+    if "POSITION" not in attributes:
+        raise asset.refuse("a splat primitive has no POSITION; export it again.")
+    count, draft = asset.count(attributes["POSITION"]), is_draft(attributes)
+    row = ROW + 12 * max(sum("SH_DEGREE_" in name for name in attributes), 1)  # bytes
+    asset.memory.charge(count * row, f"{count:,} splats")
+    means, xyzw, scales = read("POSITION", 3), read(ROTATION, 4), read(SCALE, 3)
+    opacity = read(COLOR, 4)[:, 3:] if draft else read(OPACITY, 1)
+    names = harmonic_names(asset, attributes, draft)
+    sh = np.empty((count, len(names), 3), np.float32)
+    for coefficient, name in enumerate(names):
+        sh[:, coefficient] = (read(name, 4)[:, :3] - 0.5) / C0 if name == COLOR else read(name, 3)
+    return RawSplats(
+        means=np.array(means),  # out of the file: who judges them may write into them
+        scales=np.array(scales),
+        wxyz=xyzw[:, [3, 0, 1, 2]],
+        opacity=np.array(opacity[:, 0]),
+        sh=sh,
+        file=asset.path.name,
+        format=f"{NAME} (draft)" if draft else NAME,
+        log_scales=False,
+        logits=False,
+        up="+Y",
+        memory=asset.memory,
+    )
+
+
+def present_name(name: str) -> str:
+    """An attribute's name as the release candidate has it: drafts wrote _SCALE."""
+    return PREFIX + name[1:] if name.startswith(("_ROTATION", "_SCALE", "_SH_DEGREE_")) else name
+
+
+def is_draft(attributes: dict) -> bool:
+    """Whether colour and opacity are in COLOR_0 alone, as the drafts of 2025 have it."""
+    return COLOR in attributes and not {FIRST, OPACITY} & attributes.keys()
+
+
+def harmonic_names(asset: Asset, attributes: dict, draft: bool) -> list[str]:
+    """The attributes of the spherical harmonics, by degree and order; whole degrees alone."""
+    names: list[str] = [COLOR] if draft else []
+    for degree in range(len(names), 4):
+        row = [f"{PREFIX}SH_DEGREE_{degree}_COEF_{n}" for n in range(2 * degree + 1)]
+        there = sum(name in attributes for name in row)
+        if there not in (0, len(row)) or (there and len(names) < degree**2):
+            raise asset.refuse(f"of its harmonics of degree {degree} or below some are missing.")
+        names += row if there else []
+    if not names:
+        raise asset.refuse(f"a splat primitive has no {FIRST}: no colours.")
+    return names
+
+
+def read_spz_view(asset: Asset, view: int, turned: bool, reading: Reading) -> RawSplats:
+    """Splats of an spz file within a buffer view.
+
+    turned: by the extension's text it is stored half a turn about +Y from the scene (spz is right,
+    up, back; glTF is left, up, front).  Drafts, which name no colour space, are as stored.
+    """
+    from shapeshift.runtime_models.splats.spz.read_spz import read_spz_bytes
+
+    data, _ = asset.view(view)
+    with asset.memory.lend(len(data), "its bytes of spz"):
+        raw = read_spz_bytes(data.tobytes(), asset.path.name, reading)
+    matrix = np.eye(4)
+    matrix[:3, :3] = (HALF_TURN_Y if turned else np.eye(3)) @ ours_from_file(raw.up)
+    metres = replace(raw, scales=np.exp(raw.scales), log_scales=False, up="+Y")
+    return replace(moved(metres, matrix), format=f"{NAME} with {raw.format}")
+
+
+def display_from_linear(sh: np.ndarray) -> np.ndarray:
+    """(N, M, 3) harmonics of display sRGB from such of linear light.
+
+    Exact for the mean colour; what varies with direction is scaled by the curve's slope there.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = np.clip(0.5 + C0 * sh[:, :1], 0, None)  # (N, 1, 3)
+        low = mean <= 0.0031308
+        power = np.maximum(mean, 0.0031308)
+        shown = np.where(low, 12.92 * mean, 1.055 * power ** (1 / 2.4) - 0.055)
+        slope = np.where(low, 12.92, 1.055 / 2.4 * power ** (1 / 2.4 - 1))
+        out = sh * slope
+        out[:, :1] = (shown - 0.5) / C0
+    return out.astype(np.float32)

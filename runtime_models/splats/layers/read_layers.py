@@ -1,0 +1,157 @@
+"""Several plain splat files to one scene with a stop per file."""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
+from shapeshift.runtime_models.splats.formats import read_plain
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
+from shapeshift.runtime_models.stop_names import stems_named
+
+MODES = ("cumulative", "exclusive")
+BLOCK = 1 << 14  # splats at a time: nearly always the first of them tell
+
+
+def layer_files(folder: Path) -> list[Path]:
+    """layer*.ply of a folder, else every .ply, else every .splat, else every .spz and so on;
+    layer2 before layer10.
+    """
+    for pattern in ("layer*.ply", "*.ply", "*.splat", "*.spz", "*.sog", "*.ksplat", "*.glb"):
+        if found := sorted(filter(Path.is_file, folder.glob(pattern)), key=number_aware):
+            return found
+    return []
+
+
+def number_aware(path: Path) -> list[tuple[int, str]]:
+    parts = re.split(r"([0-9]+)", path.name)  # text, digits, text, ...
+    return [(int(part) if i % 2 else 0, part) for i, part in enumerate(parts)]
+
+
+def read_layers(
+    paths: list[Path], reading: Reading | None = None, stops: tuple[Stop, ...] | None = None
+) -> SplatLayers:
+    """One SplatLayers; without `stops` file i of n lies at i / (n - 1) and is called as its file.
+
+    cumulative (or no mode): stop i shows files 0..i; exclusive: file i alone.  Raises BadFile.
+    """
+    reading = reading or Reading()
+    if not paths:
+        raise BadFile("no files were given; at least one file of splats is needed.")
+    paths = [Path(path) for path in paths]
+    last = max(len(paths) - 1, 1)
+    if not stops:
+        names = stems_named([path.stem for path in paths])
+        stops = tuple(Stop(name, i / last, "layer") for i, name in enumerate(names))
+    check_mode(reading.mode)
+    parts = [read_plain(path, reading) for path in paths]
+    return join_layers(parts, stops, reading.mode, [path.name for path in paths])
+
+
+def check_mode(mode: str) -> None:
+    if mode and mode not in MODES:
+        raise BadFile(f"layer mode is {mode!r}, expected one of {list(MODES)}.")
+
+
+def join_layers(
+    parts: list[PlainSplats], stops: tuple[Stop, ...], mode: str, files: list[str]
+) -> SplatLayers:
+    """Part i as the layer of stop i; `files` are what they were read from, for the provenance.
+
+    Takes the parts over: the list is empty afterwards, so that each array goes once it is copied.
+    """
+    counts, last = [len(part.means) for part in parts], len(parts) - 1
+    kinds = sorted({part.format for part in parts})
+    provenance = {"format": " + ".join(kinds), "files": list(files)}
+    if dropped := sum(part.dropped for part in parts):
+        provenance["dropped_rows"] = dropped
+    origin, antialiased = parts[0].origin, any(part.antialiased for part in parts)
+    findings = tuple(finding for part in parts for finding in part.findings)
+    if antialiased and not all(part.antialiased for part in parts):
+        what = "only some of the layers were trained antialiased"
+        findings += (Finding(what, 0, "all are drawn so"),)
+    filed = max(part.sh.shape[1] for part in parts)
+    width = max(used_coefficients(part.sh) for part in parts)  # files of a lower degree get zeros
+    if width < filed:
+        provenance["sh_degree"] = math.isqrt(filed) - 1  # of the files
+    charge_joining(parts, width)
+    pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
+    parts.clear()
+    shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
+    means = [moved(piece.pop("means"), shift) for piece, shift in zip(pieces, shifts, strict=True)]
+    columns = sorted({name for piece in pieces for name in piece["extra"]})
+    labels = [piece.pop("labels") for piece in pieces]
+    return SplatLayers(
+        joined(means, counts),
+        *(joined([p.pop(name) for p in pieces], counts) for name in ("scales", "wxyz", "opacity")),
+        joined([widened(piece.pop("sh"), width) for piece in pieces], counts),
+        np.repeat(np.arange(last + 1, dtype=np.int32), counts),
+        stops,
+        mode or "cumulative",
+        provenance,
+        origin=origin,
+        antialiased=antialiased,
+        labels=joined(labels, counts) if any(x is not None for x in labels) else None,
+        extra={
+            name: joined([piece["extra"].pop(name, None) for piece in pieces], counts)
+            for name in columns
+        },
+        findings=findings,
+    )
+
+
+def charge_joining(parts: list[PlainSplats], width: int) -> None:
+    """For what one scene of several files takes: zeros for harmonics, and an array at a time."""
+    total = sum(len(part.means) for part in parts)
+    parts[0].memory.charge(4 * total, f"{total:,} splats")
+    if len(parts) > 1:
+        for part in parts:
+            more = 12 * (width - part.sh.shape[1]) * len(part.means)
+            part.memory.charge(more, f"harmonics of {len(part.means):,} splats")
+        with parts[0].memory.lend(12 * width * total, f"{total:,} splats in one"):
+            pass  # given back before it is used: that it fits has been seen
+
+
+def moved(means: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """(N, 3) float32 places after a shift (3,) in float64."""
+    return (means + shift).astype(np.float32) if shift.any() else means
+
+
+def used_coefficients(sh: np.ndarray) -> int:
+    """1, 4, 9 or 16: how many of (N, M, 3) there are without the highest bands that are zero in
+    every splat.  They would be shaded at full price, and take 12 bytes a coefficient.
+    """
+    count = sh.shape[1]
+    while count > 1:
+        lower = (math.isqrt(count) - 1) ** 2
+        blocks = range(0, len(sh), BLOCK)
+        if any(sh[first : first + BLOCK, lower:count].any() for first in blocks):
+            return count
+        count = lower
+    return count
+
+
+def widened(sh: np.ndarray, width: int) -> np.ndarray:
+    """(N, width, 3): coefficients of a higher degree are zero; bands above are left out."""
+    more = width - sh.shape[1]
+    if more < 0:
+        return np.ascontiguousarray(sh[:, :width])
+    return np.pad(sh, ((0, 0), (0, more), (0, 0))) if more else sh
+
+
+def joined(arrays: list[np.ndarray | None], counts: list[int]) -> np.ndarray:
+    """One array of the parts, the only part itself; None stands for zeros.  Empties the list."""
+    if len(arrays) == 1:
+        return arrays.pop()
+    known = [array for array in arrays if array is not None]
+    kind = np.result_type(*known)
+    out = np.empty((sum(counts), *known[0].shape[1:]), kind)  # takes memory as it is filled
+    del known
+    first = 0
+    for count in counts:
+        part = arrays.pop(0)
+        out[first : first + count] = 0 if part is None else part
+        first += count
+    return out

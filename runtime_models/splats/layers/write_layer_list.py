@@ -1,0 +1,49 @@
+"""Plain splats of several stops to a folder: a file a stop, and layers.json that joins them."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.package.write_package import describe_stop
+from shapeshift.runtime_models.splats.layers.read_layer_list import FORMAT, LIST
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+
+
+def layer_name(number: int, stop: Stop, ending: str = ".ply") -> str:
+    """The file of a stop: its number, and what of its name any file system takes."""
+    return f"{number}_{re.sub(r'[^A-Za-z0-9_-]', '_', stop.name)[:40]}{ending}"
+
+
+def refuse_other_folder(folder: Path) -> None:
+    """Only a folder of ours, an empty or a new one may be written into.  Raises BadFile."""
+    if folder.is_dir() and ((folder / LIST).is_file() or not any(folder.iterdir())):
+        return
+    if folder.exists() or folder.suffix == ".shift":
+        raise BadFile(
+            f"{folder} cannot take plain splats: wanted is a new folder, or one with {LIST} in it."
+        )
+
+
+def write_layer_list(
+    layers: list[tuple[Stop, PlainSplats]],
+    folder: Path,
+    write: Callable[[PlainSplats, Path], object] = write_ply,
+    ending: str = ".ply",
+) -> int:
+    """Writes every stop's splats and then the list; returns their bytes.  Raises BadFile.
+
+    Each stop shows its own splats alone.  write: makes a file with that ending.
+    """
+    refuse_other_folder(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [layer_name(number, stop, ending) for number, (stop, _) in enumerate(layers)]
+    for name, (_, splats) in zip(names, layers, strict=True):
+        write(splats, folder / name)
+    rows = [describe_stop(s) | {"file": n} for n, (s, _) in zip(names, layers, strict=True)]
+    text = json.dumps({"format": FORMAT, "mode": "exclusive", "stops": rows}, indent=1)
+    write_whole(folder / LIST, text.encode())
+    return sum((folder / name).stat().st_size for name in [*names, LIST])

@@ -1,0 +1,143 @@
+"""Turns plain splats: places, quaternions and spherical harmonics together."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import basis
+from shapeshift.runtime_models.files.blocks import BLOCK, each_block
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import AXES, PlainSplats
+
+HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
+HALF_TURN_Y = np.diag([-1.0, 1.0, -1.0])  # between glTF's axes (left, up, front) and ours
+UPSIDE_DOWN = np.diag([-1.0, -1.0, 1.0])  # about z
+OURS_FROM_UP = {
+    "+Y": np.eye(3),
+    "-Y": HALF_TURN,
+    "+Z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "-Z": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "+X": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+    "-X": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+}  # rotations that bring the named axis to +Y
+
+
+def ours_from_file(up: str, flip: bool = False, front: bool = False) -> np.ndarray:
+    """(3, 3) the turn that brings the file's axis `up` to our +Y.  Raises BadFile.
+
+    front: half a turn about +Y after that; flip: half a turn about z at last.
+    """
+    if up not in AXES:
+        raise BadFile(f"the axis that points up is {up!r}; {', '.join(AXES)} are known.")
+    turned = HALF_TURN_Y @ OURS_FROM_UP[up] if front else OURS_FROM_UP[up]
+    return UPSIDE_DOWN @ turned if flip else turned
+
+
+def turn(splats: PlainSplats, rotation: np.ndarray) -> PlainSplats:
+    """The splats after a rotation (3, 3) of the world about its zero."""
+    if np.array_equal(rotation, np.eye(3)):
+        return splats
+    means, wxyz, sh = splats.means.copy(), splats.wxyz.copy(), splats.sh.copy()
+    turn_rows = turner(rotation, sh.shape[1])
+    each_block(len(means), lambda rows, _: turn_rows(means[rows], wxyz[rows], sh[rows]))
+    origin = tuple(map(float, rotation @ np.array(splats.origin)))
+    return replace(splats, means=means, wxyz=wxyz, sh=sh, origin=origin)
+
+
+def turn_half(splats: PlainSplats) -> PlainSplats:
+    """Half a turn about x, its own inverse: from COLMAP's axes (y down, z forward) and back."""
+    return turn(splats, HALF_TURN)
+
+
+def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
+    """A function that turns, in place, rows of means (n, 3), wxyz (n, 4) and sh (n, count, 3)."""
+    if np.array_equal(rotation, np.eye(3)):
+        return lambda means, wxyz, sh: None
+    if np.array_equal(np.abs(rotation), np.eye(3)):
+        return half_turner(rotation.diagonal(), count)
+    harmonics = turn_harmonics(rotation, count)
+
+    def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+        means[:] = means @ rotation.T
+        wxyz[:] = turn_quaternions(wxyz, rotation)
+        sh[:, 1:] = np.einsum("ij,njc->nic", harmonics[1:, 1:], sh[:, 1:], optimize=True)
+
+    return turn_rows
+
+
+def half_turner(signs: np.ndarray, count: int) -> Callable[..., None]:
+    """turner() of half a turn about the axis whose sign (3,) is +1: nothing but signs.
+
+    A quaternion times that of the half turn is itself in another order, with signs.
+    """
+    axis = 1 + int(signs.argmax())
+    other = [i for i in (1, 2, 3) if i != axis]
+    order = np.array([axis, *(0 if i == axis else 6 - axis - i for i in (1, 2, 3))])
+    quaternion_signs = np.ones(4, np.float32)
+    quaternion_signs[[0, other[0], other[1]]] = -1, *((-1, 1) if axis != 2 else (1, -1))
+    tiled = np.tile(signs.astype(np.float32), 4 * BLOCK)  # of the longest block
+    harmonic_signs = signs_of_harmonics(signs, count)  # (count,)
+    every_channel = np.repeat(harmonic_signs, 3)
+
+    def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+        if means.flags.c_contiguous and 3 * len(means) <= len(tiled):
+            flat = means.reshape(-1)  # one long loop, not one of three for each
+            flat *= tiled[: flat.size]
+        else:
+            means *= tiled[:3]
+        wxyz[:] = wxyz.take(order, axis=1)
+        wxyz *= quaternion_signs
+        if sh.shape[1] == 1:
+            return
+        if sh.flags.c_contiguous:
+            flat = sh.reshape(len(sh), -1)  # one long loop a splat, not many of three
+            flat *= every_channel
+        else:
+            sh *= harmonic_signs[:, None]
+
+    return turn_rows
+
+
+def signs_of_harmonics(signs: np.ndarray, count: int) -> np.ndarray:
+    """(count,) float32: of each basis function after half a turn of the world, itself or minus it.
+
+    Told by its values at directions before and after the turn.
+    """
+    directions = np.random.default_rng(0).normal(size=(8, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    before, after = basis(directions * signs, count), basis(directions, count)
+    return np.sign((before * after).sum(axis=0)).astype(np.float32)
+
+
+def turn_quaternions(wxyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """(N, 4) q * wxyz, q being the rotation (3, 3)."""
+    w, x, y, z = quaternion_of(rotation)
+    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    return (wxyz @ left.T).astype(np.float32)
+
+
+def quaternion_of(rotation: np.ndarray) -> np.ndarray:
+    """(4,) wxyz of a rotation (3, 3): the eigenvector of the largest eigenvalue (Bar-Itzhack)."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    k = np.array(
+        [
+            [a + e + i, h - f, c - g, d - b],
+            [h - f, a - e - i, b + d, c + g],
+            [c - g, b + d, e - a - i, f + h],
+            [d - b, c + g, f + h, i - a - e],
+        ]
+    )
+    return np.linalg.eigh(k)[1][:, -1]
+
+
+def turn_harmonics(rotation: np.ndarray, count: int) -> np.ndarray:
+    """(count, count) float32: coefficients of a function after its world is turned.
+
+    By its meaning, turned(d) = f(R^T d), solved on more directions than there are coefficients:
+    exact, as each band of harmonics is closed under rotation.
+    """
+    directions = np.random.default_rng(0).normal(size=(4 * count + 8, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    before = basis(directions @ rotation, count)  # at R^T d
+    return np.linalg.lstsq(basis(directions, count), before, rcond=None)[0].astype(np.float32)

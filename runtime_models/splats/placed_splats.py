@@ -1,0 +1,109 @@
+"""Splats where the nodes of a scene graph put them, and several sets of them as one."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.rotation import normalize, rotation_matrices
+from shapeshift.runtime_models.splats.operations.rotate_splats import quaternion_of, turn_harmonics
+from shapeshift.runtime_models.splats.plain_splats import RawSplats
+
+EVEN = 1e-5  # how much the scales of a node may differ and still be one
+BLOCK = 1 << 16  # splats at a time whose shapes are decomposed
+MOVING = 96  # bytes a splat beside its harmonics while a matrix moves it
+
+
+def moved(raw: RawSplats, world_from_mesh: np.ndarray) -> RawSplats:
+    """The splats (in metres, not logarithms) after a node's matrix (4, 4), whatever it is.
+
+    Places become float64 where the node lies elsewhere: a far one keeps its millimetres.  Raises
+    BadFile for a matrix that flattens them.
+    """
+    if np.array_equal(world_from_mesh, np.eye(4)):
+        return raw
+    moving = len(raw.means) * (MOVING + 12 * raw.sh.shape[1])
+    with raw.memory.lend(moving, f"moving {len(raw.means):,} splats"):
+        return after(raw, world_from_mesh)
+
+
+@np.errstate(over="ignore", invalid="ignore")  # numbers that are none are for the judge to find
+def after(raw: RawSplats, world_from_mesh: np.ndarray) -> RawSplats:
+    linear, offset = world_from_mesh[:3, :3], world_from_mesh[:3, 3]
+    left, sizes, right = np.linalg.svd(linear)
+    if not sizes[2] > 1e-12 * sizes[0] > 0:
+        raise BadFile(f"{raw.file}: a node squeezes its splats to a plane or to nothing.")
+    turn = left @ right  # the nearest rotation; a reflection where the matrix mirrors
+    raw = replace(raw, means=raw.means @ linear.T + offset)
+    if not np.allclose(turn, np.eye(3), atol=1e-7):
+        harmonics = turn_harmonics(turn, raw.sh.shape[1])
+        sh = np.einsum("ij,njc->nic", harmonics, raw.sh, optimize=True)
+        raw = replace(raw, sh=sh)
+    if sizes[0] - sizes[2] <= EVEN * sizes[0] and np.linalg.det(turn) > 0:
+        w, x, y, z = quaternion_of(turn)
+        times = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+        wxyz = (raw.wxyz @ times.T).astype(np.float32)
+        return replace(raw, scales=raw.scales * np.float32(sizes.mean()), wxyz=wxyz)
+    scales, wxyz = stretched(raw.scales, raw.wxyz, linear)
+    return replace(raw, scales=scales, wxyz=wxyz)
+
+
+def stretched(
+    scales: np.ndarray, wxyz: np.ndarray, linear: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Scales (N, 3) and quaternions (N, 4) of ellipsoids after any linear map (3, 3).
+
+    Sigma' = M C C^T M^T: the singular values and left vectors of M C.
+    """
+    new_scales, new_wxyz = np.empty_like(scales, np.float32), np.empty_like(wxyz, np.float32)
+    for start in range(0, len(scales), BLOCK):
+        part = slice(start, start + BLOCK)
+        axes = rotation_matrices(normalize(wxyz[part].astype(np.float64)))
+        shape = np.nan_to_num(linear @ (axes * scales[part, None, :]), posinf=0, neginf=0)
+        left, sizes, _ = np.linalg.svd(shape)
+        left[np.linalg.det(left) < 0, :, 2] *= -1  # any sign of an axis is the same ellipsoid
+        good = np.isfinite(scales[part]).all(1) & np.isfinite(wxyz[part]).all(1)
+        good &= (wxyz[part] != 0).any(1)
+        new_scales[part] = np.where(good[:, None], sizes, np.nan)
+        new_wxyz[part] = quaternions_of(left)
+    return new_scales, new_wxyz
+
+
+def quaternions_of(matrices: np.ndarray) -> np.ndarray:
+    """(N, 4) wxyz of rotations (N, 3, 3): each component's square is known, take the largest."""
+    m = matrices
+    xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
+    squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz], 1)
+    products = np.empty((len(m), 4, 4))  # 4 q q^T
+    products[:, range(4), range(4)] = squares
+    pairs = {
+        (0, 1): m[:, 2, 1] - m[:, 1, 2], (0, 2): m[:, 0, 2] - m[:, 2, 0],
+        (0, 3): m[:, 1, 0] - m[:, 0, 1], (1, 2): m[:, 0, 1] + m[:, 1, 0],
+        (1, 3): m[:, 0, 2] + m[:, 2, 0], (2, 3): m[:, 1, 2] + m[:, 2, 1],
+    }  # fmt: skip
+    for (i, j), value in pairs.items():
+        products[:, i, j] = products[:, j, i] = value
+    rows = products[np.arange(len(m)), squares.argmax(1)]
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+
+
+def joined(parts: list[RawSplats], file: str) -> RawSplats:
+    """One set of splats of equal codings; those of fewer harmonics get zeros.  Raises BadFile."""
+    if len(parts) == 1:
+        return parts[0]
+    first, count = parts[0], sum(len(part.means) for part in parts)
+    width = max(part.sh.shape[1] for part in parts)
+    first.memory.charge(count * (56 + 24 * width), f"{count:,} splats in one")
+    sh = [np.pad(p.sh, ((0, 0), (0, width - p.sh.shape[1]), (0, 0))) for p in parts]
+    return replace(
+        first,
+        means=np.concatenate([part.means for part in parts]),
+        scales=np.concatenate([part.scales for part in parts]),
+        wxyz=np.concatenate([part.wxyz for part in parts]),
+        opacity=np.concatenate([part.opacity for part in parts]),
+        sh=np.concatenate(sh),
+        file=file,
+        format=" + ".join(sorted({part.format for part in parts})),
+        antialiased=any(part.antialiased for part in parts),
+        findings=tuple(finding for part in parts for finding in part.findings),
+    )

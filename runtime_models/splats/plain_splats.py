@@ -1,0 +1,115 @@
+"""One file of plain splats: how it is wished, as it is written, and as the program takes it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.memory import Account, Memory, unlimited
+from shapeshift.runtime_models.model import Finding
+
+AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
+COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a file or folder is to be read; every reader takes it."""
+
+    mode: str = ""  # how layers add up: cumulative | exclusive; "" = what the files suggest
+    up: str = ""  # the file's axis that points up, one of AXES; "" = what its format says
+    flip: bool = False  # half a turn about z after that: upside down
+    strict: bool = False  # refuse what would be repaired
+    allow_huge: bool = False  # open files that would lay thousands of splats over every pixel
+    most_splats: int = 0  # no more than these, the ones that show most; 0 = all
+    told: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
+    memory_gb: float = 0.0  # that files may take while they are read; 0 = as memory.py has it
+    memory: Memory | Account | None = None  # what they have taken; None: nothing is open yet
+
+    def begun(self) -> "Reading":
+        """The same with an account, for all files of one opening."""
+        return self if self.memory else replace(self, memory=Memory(self.memory_gb))
+
+    def within(self, path: Path, size: int | None = None) -> "Reading":
+        """The same for one file, of `size` bytes where it lies in memory.
+
+        `memory` is an Account then, which its readers charge before they take any.  What is read
+        out of a file that has its account already counts for that one.
+        """
+        return replace(self, memory=self.begun().memory.of(path, size))
+
+    def tell(self, what: str, part: float) -> None:
+        if self.told:
+            self.told(what, part)
+
+
+@dataclass
+class RawSplats:
+    """A file's splats as they are written, in its axes and its coding: not judged, not turned.
+
+    The arrays are the reader's own: whoever judges them may change them in place.
+    """
+
+    means: np.ndarray  # (N, 3) float32, or float64 where the file holds that
+    scales: np.ndarray  # (N, 3) float32, natural logarithms of one sigma, or metres
+    wxyz: np.ndarray  # (N, 4) float32, of any length
+    opacity: np.ndarray  # (N,) float32, logits, or 0..1
+    sh: np.ndarray  # (N, M, 3) float32, M = 1, 4, 9 or 16
+    file: str  # for messages
+    format: str  # "3DGS PLY", "spz v3", ...
+    log_scales: bool = True
+    logits: bool = True
+    up: str = COLMAP_UP  # the axis that points up by the format's convention
+    front: bool = False  # +Z is the front, as glTF has it: half a turn about +Y from ours
+    antialiased: bool = False
+    labels: np.ndarray | None = None  # (N,) int32
+    extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) other columns, as filed
+    findings: tuple[Finding, ...] = ()  # what the reader itself saw
+    memory: Account = field(default_factory=unlimited)  # that its arrays are charged to
+
+    @property
+    def bytes_a_splat(self) -> int:
+        """Of the arrays that every format has."""
+        return 32 + self.means.itemsize * 3 + 12 * self.sh.shape[1]
+
+
+def empty_splats(
+    count: int, coefficients: int, memory: Account, exact: bool = False
+) -> dict[str, np.ndarray]:
+    """The arrays of RawSplats for `count` splats, charged and not filled in yet.
+
+    exact: places are float64.  Raises BadFile.
+    """
+    place = np.dtype(np.float64 if exact else np.float32)
+    memory.charge(count * (3 * place.itemsize + 32 + 12 * coefficients), f"{count:,} splats")
+    return {
+        "means": np.empty((count, 3), place),
+        "scales": np.empty((count, 3), np.float32),
+        "wxyz": np.empty((count, 4), np.float32),
+        "opacity": np.empty(count, np.float32),
+        "sh": np.empty((count, coefficients, 3), np.float32),
+    }
+
+
+@dataclass(frozen=True)
+class PlainSplats:
+    """One file's splats in our axes and units; SplatLayers joins several."""
+
+    means: np.ndarray  # (N, 3) float32 metres, from `origin`
+    scales: np.ndarray  # (N, 3) metres, one sigma
+    wxyz: np.ndarray  # (N, 4) unit
+    opacity: np.ndarray  # (N,) 0..1
+    sh: np.ndarray  # (N, M, 3)
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # float64 metres, our axes
+    antialiased: bool = False
+    labels: np.ndarray | None = None  # (N,) int32
+    extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) each
+    findings: tuple[Finding, ...] = ()
+    format: str = "3DGS PLY"
+    memory: Account = field(default_factory=unlimited, compare=False)  # as of RawSplats
+
+    @property
+    def dropped(self) -> int:
+        """Rows of the file that are not here."""
+        return sum(f.count for f in self.findings if f.done == "dropped")

@@ -1,0 +1,222 @@
+"""INRIA's 3DGS PLY to plain splats, block by block: the file is never in memory as a whole."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import C0, COEFFICIENTS
+from shapeshift.runtime_models.files.blocks import block_of, each_block
+from shapeshift.runtime_models.files.memory import Account
+from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
+from shapeshift.runtime_models.splats.still_frame import still
+
+PLACE = ("x", "y", "z")
+SCALES = ("scale_0", "scale_1", "scale_2")
+QUATERNION = ("rot_0", "rot_1", "rot_2", "rot_3")
+DIRECT = ("f_dc_0", "f_dc_1", "f_dc_2")
+RGB = ("red", "green", "blue")  # where there is no DIRECT
+SHAPES = (*PLACE, "opacity", *SCALES[:2], *QUATERNION)  # without scale_2: discs
+GEOMETRY = (*SHAPES, *DIRECT)
+NORMAL = ("nx", "ny", "nz")  # written by habit, all zero
+FLAT = 1e-3  # a disc's third scale, of the smaller of its two: thinner than any pixel shows
+TEXT = 1 << 20  # bytes of an ASCII file read at a time
+
+
+def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
+    """Splats of a 3DGS PLY of SH degree 0 to 3, binary or ASCII.  Raises BadFile."""
+    header = read_header(path)
+    vertex, begins = header.find("vertex")
+    shades = shades_in(vertex.row.names)
+    vertex.require(SHAPES if shades else GEOMETRY, path.name)
+    said = {name.rstrip(":=").lower(): value.lower() for name, value in sayings(header)}
+    memory = reading.within(path).memory
+    splats = Columns(vertex, harmonics_of(vertex.row.names, path.name), path.name, said, memory)
+    if header.encoding == "ascii":
+        read_text(path, begins, splats, reading)
+    else:
+        read_records(path, begins, splats, reading)
+    return still(splats.raw, 0.0)
+
+
+def shades_in(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The columns of the colours where there are no harmonics."""
+    return () if set(DIRECT) & set(names) or not set(RGB) <= set(names) else RGB
+
+
+def sayings(header: PlyHeader) -> Iterator[tuple[str, str]]:
+    """The header's comments of two words: `antialiased 1`, `SplatRenderMode: mip`."""
+    for comment in header.comments:
+        if len(words := comment.split()) == 2:
+            yield words[0], words[1]
+
+
+def harmonics_of(names: tuple[str, ...], file: str) -> list[str]:
+    """The columns of M x 3 coefficients, all channels of one coefficient together."""
+    rest = [name for name in names if name.startswith("f_rest_")]
+    count = len(rest) // 3 + 1
+    if len(rest) % 3 or count not in COEFFICIENTS:
+        raise BadFile(f"{file} has {len(rest)} f_rest columns, expected 0, 9, 24 or 45.")
+    if set(rest) != {f"f_rest_{i}" for i in range(len(rest))}:
+        raise BadFile(f"{file}: its {len(rest)} f_rest columns are not numbered from 0 on.")
+    # channel-major in the file: all of red, then green, then blue
+    order = [f"f_rest_{c * (count - 1) + j}" for j in range(count - 1) for c in range(3)]
+    return [*DIRECT, *order]
+
+
+class Columns:
+    """The arrays of a file's splats, filled by blocks of its records."""
+
+    def __init__(
+        self, vertex: Element, harmonics: list[str], file: str, said: dict, memory: Account
+    ) -> None:
+        names, kinds, n = vertex.row.names, vertex.row, vertex.count
+        self.row = vertex.row
+        self.count = n
+        self.plain = all(kinds[name] == np.dtype("<f4") for name in names)
+        self.flat = SCALES[2] not in names or said.get("splatrendermode") == "2dgs"
+        scales = SCALES[:2] if self.flat else SCALES
+        exact = any(kinds[axis].itemsize > 4 for axis in PLACE)
+        findings = ()
+        if self.flat:
+            done = f"read as flat splats, {FLAT:g} as thick as wide"
+            findings = (Finding("2D splats, with two scales each", n, done, (), file, False),)
+        self.raw = RawSplats(
+            **empty_splats(n, len(harmonics) // 3, memory, exact),
+            file=file,
+            format="ply",
+            antialiased=said.get("antialiased") == "1" or said.get("splatrendermode") == "mip",
+            findings=findings,
+            memory=memory,
+        )
+        raw = self.raw
+        self.shades = shades_in(names)
+        self.targets = [  # (the columns, the array with a row of them)
+            *([] if self.shades else [(harmonics, raw.sh.reshape(n, -1))]),
+            (PLACE, raw.means),
+            (scales, raw.scales[:, : len(scales)]),
+            (QUATERNION, raw.wxyz),
+            (("opacity",), raw.opacity[:, None]),
+        ]
+        self.places = [  # where they are in a row of floats
+            np.array([kinds.fields[name][1] // 4 for name in columns])
+            for columns, _ in self.targets
+        ]
+        used = {n for columns, _ in self.targets for n in columns} | {SCALES[2], *self.shades}
+        self.kept = [name for name in names if name not in used]
+        memory.charge(n * sum(kinds[name].itemsize for name in self.kept), "its other columns")
+
+    def fill(self, rows: slice, table: np.ndarray) -> None:
+        """Puts records of the file into some rows."""
+        floats = table.view("<f4").reshape(len(table), -1) if self.plain else None
+        for (names, array), places in zip(self.targets, self.places, strict=True):
+            into = array[rows]
+            if floats is None or not into.flags.c_contiguous:
+                for i, name in enumerate(names):
+                    into[:, i] = table[name]
+            else:
+                # 3 times as fast as assigning strided columns; "raise" would go by a copy
+                np.take(floats, places, axis=1, out=into, mode="clip")
+        if self.flat:
+            scales = self.raw.scales[rows]
+            scales[:, 2] = scales[:, :2].min(axis=1) + np.float32(np.log(FLAT))
+        for channel, name in enumerate(self.shades):
+            kind = table.dtype[name]
+            most = np.iinfo(kind).max if kind.kind in "iu" else 1.0
+            self.raw.sh[rows, 0, channel] = (table[name] / np.float32(most) - 0.5) / C0
+        for name in self.kept:
+            self.keep(name, rows, table[name])
+
+    def keep(self, name: str, rows: slice, column: np.ndarray) -> None:
+        """A column that is not of the splats; normals only when one of them is not zero."""
+        extra = self.raw.extra
+        if name in NORMAL and name not in extra and not np.asarray(column != 0).any():
+            return
+        if name not in extra:
+            extra.setdefault(name, np.zeros(self.count, column.dtype.newbyteorder("=")))
+        extra[name][rows] = column
+
+
+def read_records(path: Path, begins: int, splats: Columns, reading: Reading) -> None:
+    """Fills the columns from a binary file, several blocks at once."""
+    size, block = splats.row.itemsize, block_of(splats.row.itemsize)
+
+    @contextmanager
+    def opened() -> Iterator[tuple[BinaryIO, np.ndarray]]:
+        with path.open("rb", buffering=0) as file:
+            yield file, np.empty(block, splats.row)
+
+    def work(rows: slice, own: tuple[BinaryIO, np.ndarray]) -> None:
+        file, table = own[0], own[1][: rows.stop - rows.start]
+        file.seek(begins + rows.start * size)
+        # Not a memoryview of the records: those may have names that it does not know how to read.
+        if read_fully(file, memoryview(table.view(np.uint8))) < table.nbytes:
+            raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
+        splats.fill(rows, table)
+
+    each_block(splats.count, work, teller(path, reading), opened, block)
+
+
+def read_fully(file: BinaryIO, into: memoryview) -> int:
+    """Bytes read; fewer than asked for only at the end of the file."""
+    done = 0
+    while done < len(into) and (more := file.readinto(into[done:])):
+        done += more
+    return done
+
+
+def read_text(path: Path, begins: int, splats: Columns, reading: Reading) -> None:
+    """Fills the columns from an ASCII file."""
+    width, first, pending = len(splats.row), 0, np.empty(0)
+    tell = teller(path, reading)
+    with path.open("rb") as file:
+        file.seek(begins)
+        for values in numbers(file, path.name):
+            pending = np.concatenate([pending, values])
+            count = min(len(pending) // width, splats.count - first)
+            if not count:
+                continue
+            table = np.empty(count, splats.row)
+            part = pending[: count * width].reshape(count, width)
+            with np.errstate(over="ignore", invalid="ignore"):
+                for i, name in enumerate(splats.row.names):
+                    table[name] = part[:, i]
+            splats.fill(slice(first, first + count), table)
+            pending, first = pending[count * width :], first + count
+            tell(first / splats.count)
+            if first == splats.count:
+                return
+    raise BadFile(
+        f"{path.name}: the header promises {splats.count} splats, the file holds {first}; "
+        "it is cut off or its header is wrong."
+    )
+
+
+def numbers(file: BinaryIO, name: str) -> Iterator[np.ndarray]:
+    """The numbers of a text, float64, a part at a time.  Raises BadFile."""
+    rest = b""
+    while block := file.read(TEXT):
+        text = rest + block
+        cut = max(text.rfind(b"\n"), text.rfind(b" "), text.rfind(b"\t")) + 1
+        text, rest = text[:cut].strip(), text[cut:]
+        if len(rest) > TEXT:
+            raise BadFile(f"{name} is an ASCII PLY and has a word of {len(rest)} bytes.")
+        if text:
+            yield parse(text, name)
+    if rest.strip():
+        yield parse(rest.strip(), name)
+
+
+def parse(text: bytes, name: str) -> np.ndarray:
+    try:
+        return np.fromstring(text, sep=" ")
+    except ValueError:
+        raise BadFile(f"{name} is an ASCII PLY and has words that are no numbers.") from None
+
+
+def teller(path: Path, reading: Reading) -> Callable[[float], None]:
+    return lambda part: reading.tell(f"reading {path.name}", part)

@@ -1,0 +1,153 @@
+"""A PLY of points, with or without colours: shown as round splats that reach their neighbours."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.operations.knn_distance import spacing
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
+from shapeshift.runtime_models.splats.ply.read_ply import (
+    DIRECT,
+    GEOMETRY,
+    NORMAL,
+    PLACE,
+    QUATERNION,
+    SCALES,
+    numbers,
+)
+
+COLORS = (  # names that programs give to red, green and blue
+    ("red", "green", "blue"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+    ("r", "g", "b"),
+)
+GRAY = 0.7  # of points without a colour
+SHOWN = 80  # bytes a point of the arrays that it is shown by
+MEASURED = 320  # bytes a point while neighbours are looked for
+SIGMA = 0.25  # of the distance to the neighbours: they touch, strays do not hide the rest
+
+
+def is_points(head: bytes, path: Path) -> bool:
+    """Whether a PLY has points of no size and no rotation; a broken header is for others to say."""
+    if head[:3] != b"ply":
+        return False
+    try:
+        vertex = [e for e in read_header(path).elements if e.name == "vertex" and e.row]
+    except BadFile:
+        return False
+    names = set(vertex[0].row.names or ()) if vertex else set()
+    return set(PLACE) <= names and not names & {*SCALES, *QUATERNION}
+
+
+def read_raw_points_ply(path: Path, reading: Reading) -> RawSplats:
+    """A round opaque splat for each point, binary or ASCII.  Raises BadFile, always if strict."""
+    header = read_header(path)
+    vertex, begins = header.find("vertex")
+    lacking = [name for name in GEOMETRY if name not in vertex.row.names]
+    what = f"a point cloud, no splats: it has no {', '.join(lacking)}"
+    reading = reading.within(path)
+    memory = reading.memory
+    memory.charge(vertex.count * (vertex.row.itemsize + 12), f"{vertex.count:,} points")
+    table = read_records(path, header, vertex, begins)
+    places = np.stack([table[axis] for axis in PLACE], 1)  # (N, 3)
+    raw = splats_of_points(places, None, path.name, reading, what)
+    return replace(raw, sh=colors_of(table), extra=others_of(table), format="PLY of points")
+
+
+def splats_of_points(
+    places: np.ndarray, shades: np.ndarray | None, file: str, reading: Reading, what: str = ""
+) -> RawSplats:
+    """A round opaque splat for each place (N, 3), of the shades (N, 3) 0..1, else gray.
+
+    reading.memory is the file's Account; `what` is what its finding says.  Raises BadFile, always
+    if strict.
+    """
+    what = what or "a point cloud, no splats: it has no scales, rotations or opacities"
+    if reading.strict:
+        raise BadFile(f"{file}: {what}; --strict shows splats only, open it without.")
+    if places.ndim != 2 or places.shape[1] != 3 or not len(places):
+        raise BadFile(f"{file} has points of shape {places.shape!s:.40}, expected (N, 3).")
+    if places.dtype not in (np.float32, np.float64):
+        places = places.astype(np.float64)
+    count, memory = len(places), reading.memory
+    memory.charge(count * SHOWN, f"{count:,} points")
+    reading.tell(f"measuring {file}", 0.5)
+    with memory.lend(count * MEASURED, f"measuring {count:,} points"):
+        size = (SIGMA * spacing(places)).astype(np.float32)
+    done = f"shown as {count:,} points, each as wide as the way to its neighbours"
+    return RawSplats(
+        means=places,
+        scales=np.repeat(size[:, None], 3, axis=1),
+        wxyz=np.tile(np.array([1, 0, 0, 0], np.float32), (count, 1)),
+        opacity=np.ones(count, np.float32),
+        sh=harmonics_of(shades, count),
+        file=file,
+        format="points",
+        log_scales=False,
+        logits=False,
+        findings=(Finding(what, 0, done, file=file),),
+        memory=memory,
+    )
+
+
+def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) -> np.ndarray:
+    """(N,) records of the points.  Raises BadFile."""
+    if header.encoding != "ascii":
+        return np.memmap(path, vertex.row, "r", begins, (vertex.count,))
+    width, table, done = len(vertex.row), np.empty(vertex.count, vertex.row), 0
+    pending = np.empty(0)
+    with path.open("rb") as file:
+        file.seek(begins)
+        for values in numbers(file, path.name):
+            pending = np.concatenate([pending, values])
+            rows = min(len(pending) // width, vertex.count - done)
+            part = pending[: rows * width].reshape(rows, width)
+            with np.errstate(over="ignore", invalid="ignore"):
+                for i, name in enumerate(vertex.row.names):
+                    table[name][done : done + rows] = part[:, i]
+            pending, done = pending[rows * width :], done + rows
+            if done == vertex.count:
+                return table
+    raise BadFile(
+        f"{path.name}: the header promises {vertex.count} points, the file holds {done}; it is cut "
+        "off or its header is wrong."
+    )
+
+
+def colors_of(table: np.ndarray) -> np.ndarray:
+    """(N, 1, 3) float32 harmonics of degree 0: the points' colours, or gray."""
+    shades = shades_of(table)
+    if shades is None and set(DIRECT) <= set(table.dtype.names):
+        return np.stack([table[name] for name in DIRECT], 1, dtype=np.float32)[:, None]
+    return harmonics_of(shades, len(table))
+
+
+def harmonics_of(shades: np.ndarray | None, count: int) -> np.ndarray:
+    """(N, 1, 3) float32 of shades (N, 3) 0..1, or gray."""
+    if shades is None:
+        return np.full((count, 1, 3), (GRAY - 0.5) / C0, np.float32)
+    return ((shades - 0.5) / np.float32(C0))[:, None]
+
+
+def shades_of(table: np.ndarray) -> np.ndarray | None:
+    """(N, 3) float32 red, green and blue, 1 the most that an integer can say; None without."""
+    names = next((three for three in COLORS if set(three) <= set(table.dtype.names)), None)
+    if names is None:
+        return None
+    shades = []
+    for name in names:
+        kind = table.dtype[name]
+        most = np.iinfo(kind).max if kind.kind in "iu" else 1.0
+        shades.append(table[name].astype(np.float32) / np.float32(most))
+    return np.stack(shades, 1)
+
+
+def others_of(table: np.ndarray) -> dict[str, np.ndarray]:
+    """The columns that say neither where a point is nor how it looks."""
+    shown = {*PLACE, *NORMAL, *DIRECT, "alpha", "opacity", *(n for three in COLORS for n in three)}
+    names = [name for name in table.dtype.names if name not in shown]
+    return {name: table[name].astype(table.dtype[name].newbyteorder("=")) for name in names}

@@ -1,0 +1,136 @@
+"""The folder that a training run leaves: its newest cloud, and two clouds of two modalities.
+
+INRIA's 3DGS and what grew from it (2DGS, Mip-Splatting, Scaffold-GS, Gaussian Grouping) save
+point_cloud/iteration_N/point_cloud.ply; ThermalGaussian's MSMG and MFTG save point_cloud_color
+and point_cloud_thermal beside each other, its OMMG a second set of harmonics, t_dc_* and t_rest_*,
+in the one PLY; gsplat saves ply/point_cloud_N.ply.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
+from shapeshift.runtime_models.lint.lint import judge
+from shapeshift.runtime_models.model import BadFile, Model, SplatLayers, Stop
+from shapeshift.runtime_models.splats.formats import formats, read_plain, read_raw
+from shapeshift.runtime_models.splats.layers.read_layers import join_layers
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.stop_names import is_thermal_name
+
+CLOUD = "point_cloud.ply"
+NUMBER = re.compile(r"(?:iteration|point_cloud)_([0-9]{1,18})", re.ASCII)
+PAIR = ("color", "thermal")
+NO_SPLATS = {"input.ply", "points3d.ply"}  # what a run started from: points
+
+
+def newest_cloud(folder: Path) -> Path | None:
+    """The cloud of the largest iteration in a run's folder; None where it is no such folder."""
+    for name in ("point_cloud", "point_cloud_color", "point_cloud_thermal"):
+        if (cloud := newest_of(folder.glob(f"{name}/iteration_*/{CLOUD}"))) is not None:
+            return cloud
+    return newest_of(folder.glob("ply/point_cloud_*.ply"))  # gsplat
+
+
+def newest_of(clouds: Iterable[Path]) -> Path | None:
+    """The one with the largest number in its own name or, as point_cloud.ply, in its folder's."""
+    by_number = {}
+    for cloud in clouds:
+        name = cloud.parent.name if cloud.name == CLOUD else cloud.stem
+        if (found := NUMBER.fullmatch(name)) and cloud.is_file():
+            by_number[int(found[1])] = cloud
+    return by_number[max(by_number)] if by_number else None
+
+
+def thermal_pair(folder: Path) -> tuple[Path, Path] | None:
+    """(colour, thermal) files of a folder that holds one of each, by their names; else None.
+
+    Two clouds of a ThermalGaussian run, two files, or two folders with a run or one file each.
+    """
+    clouds = [newest_of(folder.glob(f"point_cloud_{name}/iteration_*/{CLOUD}")) for name in PAIR]
+    if None not in clouds:
+        return tuple(clouds)
+    names = [ending for form in formats() for ending in form.endings]
+    endings = tuple(name for name in names if name.startswith("."))
+    files = {file.name: file for file in splat_files(folder, endings)}
+    inner = [sub for sub in folder.iterdir() if sub.is_dir()]
+    if not any(is_thermal_name(sub.name) for sub in inner):
+        inner = []
+    folders = {sub.name: file for sub in inner if (file := only_cloud(sub, endings)) is not None}
+    for named in (files, folders):
+        thermal = [name for name in named if is_thermal_name(name)]
+        if len(named) == 2 and len(thermal) == 1:
+            color = next(name for name in named if name != thermal[0])
+            return named[color], named[thermal[0]]
+    return None
+
+
+def splat_files(folder: Path, endings: tuple[str, ...]) -> list[Path]:
+    """Files that have the ending of a format of splats, by name."""
+    found = (f for f in folder.iterdir() if f.name.lower().endswith(endings) and f.is_file())
+    return sorted(file for file in found if file.name.lower() not in NO_SPLATS)
+
+
+def only_cloud(folder: Path, endings: tuple[str, ...]) -> Path | None:
+    """The newest cloud of a run, or the one file of splats that a folder holds."""
+    files = splat_files(folder, endings)
+    return newest_cloud(folder) or (files[0] if len(files) == 1 else None)
+
+
+def read_pair(pair: tuple[Path, Path], folder: Path, reading: Reading) -> SplatLayers:
+    """RGB at x = 0 and Thermal at x = 1, each alone at its stop unless the mode says otherwise."""
+    parts = [read_plain(path, reading) for path in pair]
+    files = [str(path.relative_to(folder)) for path in pair]
+    return join_layers(parts, stops_of_pair(), reading.mode or "exclusive", files)
+
+
+def stops_of_pair() -> tuple[Stop, Stop]:
+    return Stop("RGB", 0.0, "rgb"), Stop("Thermal", 1.0, "thermal")
+
+
+def read_file(path: Path, reading: Reading) -> SplatLayers:
+    """One file of splats: one stop, or two where it holds thermal harmonics, too."""
+    raw = read_raw(path, reading)
+    if "t_dc_0" not in raw.extra:
+        return join_layers([judge(raw, reading)], (Stop(path.stem, 0.0, "layer"),), reading.mode,
+                           [path.name])  # fmt: skip
+    parts = [judge(each, reading) for each in (thermal_twin(raw), raw)][::-1]
+    return join_layers(parts, stops_of_pair(), reading.mode or "exclusive", [path.name])
+
+
+def thermal_twin(raw: RawSplats) -> RawSplats:
+    """The same splats with their thermal harmonics; takes those columns out of `raw`.
+
+    Raises BadFile.
+    """
+    names = [name for name in raw.extra if re.fullmatch(r"t_(dc|rest)_[0-9]+", name)]
+    columns = {name: raw.extra.pop(name) for name in names}
+    rest = len(names) - 3
+    count = rest // 3 + 1
+    wanted = [f"t_dc_{i}" for i in range(3)] + [f"t_rest_{i}" for i in range(rest)]
+    if rest % 3 or count not in COEFFICIENTS or set(wanted) != set(names):
+        raise BadFile(
+            f"{raw.file} has {len(names)} columns t_dc and t_rest; thermal harmonics are 3, 12, "
+            "27 or 48 of them, numbered from 0 on."
+        )
+    raw.memory.charge(len(raw.means) * raw.bytes_a_splat, f"{len(raw.means):,} splats once more")
+    sh = np.empty((len(raw.means), count, 3), np.float32)
+    for i, name in enumerate(wanted):  # t_rest is channel-major, as f_rest is
+        row, channel = (0, i) if i < 3 else (1 + (i - 3) % (count - 1), (i - 3) // (count - 1))
+        sh[:, row, channel] = columns[name]
+    own = {name: getattr(raw, name).copy() for name in ("means", "scales", "wxyz", "opacity")}
+    return replace(raw, **own, sh=sh, findings=())
+
+
+def in_run(model: Model, folder: Path, cloud: Path) -> Model:
+    """The model of a run's newest cloud, its files named from the run's folder."""
+    inside = cloud.parent.relative_to(folder)
+    files = [str(inside / name) for name in model.provenance.get("files", ())]
+    model = replace(model, provenance=model.provenance | {"files": files})
+    if isinstance(model, SplatLayers) and len(model.stops) == 1:
+        name = folder.resolve().name or model.stops[0].name
+        model = replace(model, stops=(replace(model.stops[0], name=name),))
+    return model

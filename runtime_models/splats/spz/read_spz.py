@@ -1,0 +1,162 @@
+"""The .spz format (Niantic), versions 1 to 4: 16 to 64 bytes a splat, compressed; SH 0 to 3."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.blocks import BLOCK
+from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.ply.read_compressed_ply import from_smallest_three
+from shapeshift.runtime_models.splats.spz.spz_file import (
+    ANTIALIASED,
+    REST,
+    SpzHeader,
+    is_spz,
+    unpack_spz,
+)
+
+COLOR_SCALE = 0.15  # of the first coefficient: code / 255 = 0.5 + 0.15 f
+AXES_EXTENSION = 0xADBE0003  # Adobe's: which axes the places are in
+NAMED_AXES = (
+    "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF",
+    "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU",
+)  # fmt: skip
+SMALL = np.float32(0.5**0.5 / 511)  # of a code of the smallest three
+
+
+def has_spz_mark(head: bytes, path: Path) -> bool:
+    """Whether a file is an .spz, by its first bytes."""
+    return is_spz(head)
+
+
+def read_raw_spz(path: Path, reading: Reading) -> RawSplats:
+    """Splats of SH degree 0 to 3.  Raises BadFile."""
+    reading = reading.within(path)
+    with reading.memory.lend(path.stat().st_size, "its bytes"):
+        return read_spz_bytes(path.read_bytes(), path.name, reading)
+
+
+def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
+    """The same of a file in memory; x right, y up, z back, if no extension says otherwise."""
+    memory = reading.within(Path(file), len(data)).memory
+    spz = unpack_spz(data, file, memory)
+    header = spz.header
+    count, there = header.count, REST[header.degree]
+    kept = min(there, REST[3])
+    raw = RawSplats(
+        **empty_splats(count, 1 + kept, memory),
+        file=file,
+        format=f"spz v{header.version}",
+        logits=False,
+        antialiased=bool(header.flags & ANTIALIASED),
+        memory=memory,
+    )
+    streams = zip(header.widths, decoders(raw, header), strict=True)
+    for done, (width, decode) in enumerate(streams):
+        reading.tell(f"reading {file}", done / len(header.widths))
+        for first in range(0, count if width else 0, BLOCK):  # one after the other, as they lie
+            rows = slice(first, min(first + BLOCK, count))
+            stream = spz.take(width * (rows.stop - first))
+            decode(rows, np.frombuffer(stream, np.uint8).reshape(-1, width))
+    findings: list[Finding] = []
+    raw.up = axis_up(spz.extensions(), file, findings)
+    if kept < there:
+        what = f"{there - kept} coefficients of SH degree 4 a splat"
+        done = "left out, degree 3 is drawn"
+        findings.append(Finding(what, 0, done, file=file, repaired=False))
+    raw.findings = tuple(findings)
+    return raw
+
+
+def decoders(raw: RawSplats, header: SpzHeader) -> tuple[Callable[[slice, np.ndarray], None], ...]:
+    """For each of the streams, what fills in some rows from their codes (n, width) uint8."""
+
+    def places(rows: slice, codes: np.ndarray) -> None:
+        raw.means[rows] = unpack_places(codes, header)
+
+    def alphas(rows: slice, codes: np.ndarray) -> None:
+        raw.opacity[rows] = codes[:, 0] / np.float32(255)
+
+    def colors(rows: slice, codes: np.ndarray) -> None:
+        shades = codes / np.float32(255) - np.float32(0.5)
+        np.divide(shades, np.float32(COLOR_SCALE), out=raw.sh[rows, 0])
+
+    def scales(rows: slice, codes: np.ndarray) -> None:
+        raw.scales[rows] = codes / np.float32(16) - np.float32(10)
+
+    def rotations(rows: slice, codes: np.ndarray) -> None:
+        unpack = unpack_first_three if header.version < 3 else unpack_smallest_three
+        unpack(codes, raw.wxyz[rows])
+
+    def harmonics(rows: slice, codes: np.ndarray) -> None:
+        kept = 3 * (raw.sh.shape[1] - 1)  # of degree 4 those up to degree 3
+        values = codes[:, :kept].astype(np.float32)
+        values -= np.float32(128)
+        values *= np.float32(1 / 128)
+        raw.sh[rows].reshape(len(codes), -1)[:, 3:] = values
+
+    return places, alphas, colors, scales, rotations, harmonics
+
+
+def unpack_places(codes: np.ndarray, header: SpzHeader) -> np.ndarray:
+    """(n, 3) float32, exact: 24 bits each, or half floats in version 1."""
+    if header.version == 1:
+        return codes.view("<f2").astype(np.float32)
+    words = np.zeros((len(codes), 3, 4), np.uint8)
+    words[:, :, 1:] = codes.reshape(-1, 3, 3)
+    # The code is on top of its word, with its sign.
+    out = (words.view("<i4")[:, :, 0] >> 8).astype(np.float32)
+    out *= np.float32(0.5**header.fractional_bits)
+    return out
+
+
+def unpack_first_three(codes: np.ndarray, out: np.ndarray) -> None:
+    """out (n, 4) wxyz, unit but for rounding, of x y z."""
+    xyz = codes / np.float32(127.5) - np.float32(1)
+    out[:, 1:] = xyz
+    out[:, 0] = np.sqrt(np.maximum(0, 1 - (xyz * xyz).sum(1)))
+
+
+def unpack_smallest_three(codes: np.ndarray, out: np.ndarray) -> None:
+    """out (n, 4) wxyz: 2 bits for which of x y z w is left out, 1 + 9 bits for each other."""
+    words = codes.view("<u4")[:, 0]
+    small = []
+    for shift in (20, 10, 0):
+        code = words >> np.uint32(shift)
+        value = (code & 511).astype(np.float32) * SMALL
+        small.append(np.where(code & 512, -value, value))
+    xyzw = np.empty_like(out)
+    from_smallest_three(small, words >> 30, xyzw)
+    out[:] = xyzw[:, (3, 0, 1, 2)]
+
+
+def axis_up(extensions: dict[int, bytes], file: str, findings: list[Finding]) -> str:
+    """The file's axis that points up.  Raises BadFile for axes that are a mirror image."""
+    told = extensions.get(AXES_EXTENSION, b"")
+    others = [kind for kind in extensions if kind != AXES_EXTENSION]
+    if others:
+        what = f"extensions {', '.join(f'{kind:#010x}' for kind in others)}"
+        findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
+    number = int.from_bytes(told, "little") if len(told) == 4 else 0
+    if not 1 <= number <= len(NAMED_AXES):
+        return "+Y"
+    axes = NAMED_AXES[number - 1]
+    if not right_handed(axes):
+        raise BadFile(
+            f"{file} has the axes {axes}, a mirror image of ours; write it again with "
+            "RUB, the format's own."
+        )
+    place = next(i for i, letter in enumerate(axes) if letter in "UD")
+    return ("+" if axes[place] == "U" else "-") + "XYZ"[place]
+
+
+def right_handed(axes: str) -> bool:
+    """Whether axes such as RUB (right, up, back) are a right-handed frame."""
+    directions = {"R": (0, 1), "L": (0, -1), "U": (1, 1), "D": (1, -1), "B": (2, 1), "F": (2, -1)}
+    frame = np.zeros((3, 3))
+    for row, letter in enumerate(axes):
+        column, sign = directions[letter]
+        frame[row, column] = sign
+    return np.linalg.det(frame) > 0

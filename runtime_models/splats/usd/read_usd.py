@@ -1,0 +1,193 @@
+"""USD scenes (.usd, .usda, .usdc, .usdz) with ParticleField3DGaussianSplat, of OpenUSD 26.03 on.
+
+Read by the package usd-core, an optional one, in a process of its own (usd_run.py): its C++ ends
+the process on some damaged files.
+"""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
+from shapeshift.runtime_models.files.memory import Account
+from shapeshift.runtime_models.files.npy import read_array
+from shapeshift.runtime_models.files.zip_files import member_names, opened_zip
+from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.placed_splats import joined, moved
+from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
+from shapeshift.runtime_models.splats.usd.usd_run import (
+    HARMONICS,
+    KIND,
+    REFUSED,
+    SECONDS,
+    SECONDS_A_BYTE,
+)
+
+PACKAGE = "usd-core"
+MARKS = (b"#usda", b"PXR-USDC")
+ENDINGS = (".usd", ".usda", ".usdc")
+WAIT = 20  # times the processor time of the reading process, where it cannot be limited itself
+CENTIMETRE = 0.01  # metres a unit, where a stage does not say, by USD's own rule
+GRAY = 0.0  # of a first harmonic that is not there: 0.5
+MOST_DEGREE = 3  # of the harmonics that are drawn
+Read = Callable[[str], np.ndarray | None]
+
+
+def is_usd(head: bytes, path: Path) -> bool:
+    """By the first bytes, or a zip whose first file is USD."""
+    if head[:2] != b"PK":
+        return head.startswith(MARKS)
+    names = member_names(path) if path.is_file() else []
+    return bool(names) and names[0].lower().endswith(ENDINGS)
+
+
+def refuse_without(path: Path) -> None:
+    """BadFile where the package that reads and writes USD is not installed."""
+    if importlib.util.find_spec("pxr") is None:
+        raise BadFile(
+            f"{path.name} is USD, which needs the package {PACKAGE}: {sys.executable} -m pip "
+            f"install {PACKAGE}"
+        )
+
+
+def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
+    """The visible splats of a scene where its prims stand, SH degree 0 to 3.  Raises BadFile."""
+    refuse_without(path)
+    reading = reading.within(path)
+    memory = reading.memory
+    reading.tell(f"reading {path.name}", 0.0)
+    with tempfile.TemporaryDirectory(prefix="shapeshift-", ignore_cleanup_errors=True) as folder:
+        made = Path(folder, "splats.npz")
+        run(path, made, memory)
+        with opened_zip(made, path.name, memory) as archive:
+
+            def read(name: str) -> np.ndarray | None:
+                return read_array(archive, name, path.name, memory)
+
+            told = json.loads(read("told").tobytes())
+            parts = [
+                part_of(read, number, field, told, path, memory)
+                for number, field in enumerate(told["fields"])
+            ]
+    parts = [part for part in parts if part is not None]
+    if not parts:
+        held = f" (it has {', '.join(told['others'])})" if told["others"] else ""
+        raise BadFile(f"{path.name} has no visible {KIND}{held}; export splats of that kind.")
+    return joined(parts, path.name)
+
+
+def run(path: Path, made: Path, memory: Account) -> None:
+    """The process that reads the scene and writes its arrays.  Raises BadFile, whatever becomes of
+    it."""
+    script, size = str(Path(__file__).with_name("usd_run.py")), path.stat().st_size
+    said = made.with_name("said")
+    command = [sys.executable, "-P", script, str(path.resolve()), str(made), str(memory.left)]
+    # Neither plugins nor search paths of whoever opens it, and no threads that reserve memory.
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("PXR_", "USD_", "TF_"))}
+    kept |= {"PXR_WORK_THREAD_LIMIT": "1", "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "1"}
+    with open(said, "wb") as errors:
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors,
+                timeout=WAIT * (SECONDS + SECONDS_A_BYTE * size), env=kept, cwd=made.parent,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise BadFile(f"{path.name} takes longer to read than a scene of its size.") from None
+    if done.returncode == REFUSED:
+        words = said.read_text(errors="replace").strip().splitlines()
+        raise BadFile(f"{path.name}: {words[-1] if words else 'no USD that can be read'}.")
+    if done.returncode or not made.is_file():
+        raise BadFile(
+            f"{path.name}: no USD that can be read, or one that takes more memory than its "
+            f"{size:,} bytes may; --memory allows more."
+        )
+
+
+def part_of(
+    read: Read, number: int, field: dict, told: dict, path: Path, memory: Account
+) -> RawSplats | None:
+    """The splats of one prim in the stage's world; None where it has none."""
+    places = read(f"{number}/positions")
+    if places is None or not len(places):
+        return None
+    count, degree = len(places), field["degree"]
+    sh, findings = harmonics_of(read(f"{number}/{HARMONICS}"), count, degree, path)
+    raw = RawSplats(
+        **empty_splats(count, 1 if sh is None else sh.shape[1], memory),
+        file=path.name,
+        format="USD",
+        log_scales=False,
+        logits=False,
+        up=told["up"],
+        memory=memory,
+    )
+    raw.means[:] = shaped(places, (count, 3), "positions", path)
+    for name, into, unset in (
+        ("scales", raw.scales, 1.0),
+        ("orientations", raw.wxyz, (0.0, 0.0, 0.0, 1.0)),
+        ("opacities", raw.opacity, 1.0),
+    ):
+        array = read(f"{number}/{name}")
+        if array is None or len(array) < count:
+            into[:] = unset
+            what = f"{count:,} splats without {name}"
+            findings.append(Finding(what, count, "each has the usual ones", file=path.name))
+        else:
+            into[:] = shaped(array[:count], into.shape, name, path)
+    raw.wxyz[:] = raw.wxyz[:, [3, 0, 1, 2]]  # a copy first: filed as x y z w
+    raw.sh[:] = GRAY if sh is None else sh
+    raw.findings = (*findings, *unusual(field, told, count, path, first=number == 0))
+    metres = np.diag([told["metres"]] * 3 + [1.0])
+    return moved(raw, metres @ read(f"{number}/matrix"))
+
+
+def shaped(array: np.ndarray, shape: tuple[int, ...], name: str, path: Path) -> np.ndarray:
+    if array.shape != shape:
+        raise BadFile(f"{path.name}: {name} is of shape {array.shape!s:.40}, expected {shape}.")
+    return array
+
+
+def harmonics_of(
+    array: np.ndarray | None, count: int, degree: int, path: Path
+) -> tuple[np.ndarray | None, list[Finding]]:
+    """(N, M, 3) of the flat array, coefficients of a splat together, M at most 16; None for gray.
+
+    One that is too short is left alone, one that is too long is cut, as the schema has it.
+    """
+    if not 0 <= degree <= 16:
+        raise BadFile(f"{path.name} has harmonics of degree {degree}; 0 to 3 are drawn.")
+    size = (degree + 1) ** 2
+    if array is None or len(array) < count * size:
+        what = f"{count:,} splats without colours"
+        return None, [Finding(what, count, "shown in gray", file=path.name)]
+    sh = shaped(array[: count * size], (count * size, 3), "harmonics", path)
+    sh = sh.reshape(count, size, 3)
+    if degree <= MOST_DEGREE:
+        return sh, []
+    what = f"harmonics of degree {degree}"
+    found = Finding(what, 0, f"drawn up to degree {MOST_DEGREE}", file=path.name, repaired=False)
+    return sh[:, : COEFFICIENTS[MOST_DEGREE]], [found]
+
+
+def unusual(field: dict, told: dict, count: int, path: Path, first: bool) -> list[Finding]:
+    """What the scene asks for beyond what is drawn."""
+    found = []
+    if field["moves"]:
+        what = f"{count:,} splats that move in time"
+        found.append(Finding(what, count, "shown still, at their first time", file=path.name,
+                             repaired=False))  # fmt: skip
+    if field["projection"] != "perspective":
+        what = f"projectionModeHint is {field['projection'][:40]!r}"
+        found.append(Finding(what, 0, "drawn in perspective", file=path.name, repaired=False))
+    if first and not told["states metres"]:
+        what = "it does not state metersPerUnit"
+        done = f"a unit is {CENTIMETRE:g} m, as USD has it"
+        found.append(Finding(what, 0, done, file=path.name, repaired=False))
+    return found

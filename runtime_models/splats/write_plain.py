@@ -1,0 +1,109 @@
+"""The formats that plain splats are written in: by ending, with what each can hold."""
+
+import importlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
+from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.splats.layers.read_layers import joined, moved, widened
+from shapeshift.runtime_models.splats.operations.recentre import FINE
+from shapeshift.runtime_models.splats.operations.rotate_splats import turn
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.usd.read_usd import refuse_without
+
+FEW = 4  # columns that are named
+
+
+@dataclass(frozen=True)
+class Writer:
+    name: str
+    ending: str
+    sh_degree: int  # the highest that it holds
+    function: str  # of the module of the same name, with the folder that it is in
+    antialiased: bool = True  # has a place for the flag
+    columns: bool = False  # has a place for labels and other columns
+    far: bool = True  # keeps places far from zero, or refuses them
+    also: tuple[str, ...] = ()  # further endings
+
+    def write(self, splats: PlainSplats, path: Path) -> None:
+        """Atomic; what the format cannot hold is lost."""
+        module = importlib.import_module(f"runtime_models.{self.function}")
+        getattr(module, self.function.rpartition(".")[2])(splats, path)
+
+
+WRITERS = (  # of two endings that fit a name, the longer one stands first
+    Writer("compressed PLY", ".compressed.ply", 3, "write_compressed_ply", far=False),
+    Writer("3DGS PLY", ".ply", 3, "write_ply", columns=True),
+    Writer("spz", ".spz", 3, "write_spz"),
+    Writer("glTF", ".glb", 3, "write_gltf", antialiased=False),
+    Writer(".splat", ".splat", 0, "write_splat", antialiased=False, far=False),
+    Writer("USD", ".usdz", 3, "usd.write_usd", False, also=(".usd", ".usda", ".usdc")),
+)
+
+
+def writer_of(path: Path) -> Writer:
+    """Who writes a file of that name.  Raises BadFile."""
+    for writer in WRITERS:
+        if path.name.lower().endswith((writer.ending, *writer.also)):
+            if writer.name == "USD":
+                refuse_without(path)
+            return writer
+    endings = ", ".join(ending for writer in WRITERS for ending in (writer.ending, *writer.also))
+    raise BadFile(f"{path} has no ending that can be written; known are {endings}.")
+
+
+def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
+    """What the splats have and the format has no place for, beside what its codes round."""
+    findings = []
+    if splats.antialiased and not writer.antialiased:
+        what = "the splats were trained antialiased"
+        done = f"{writer.name} cannot say so; other viewers draw thin ones thicker"
+        findings.append(Finding(what, 0, done, repaired=False))
+    names = [*(["labels"] if splats.labels is not None else []), *splats.extra]
+    if names and not writer.columns:
+        said = ", ".join(names[:FEW]) + (", ..." if len(names) > FEW else "")
+        done = f"left out, {writer.name} has no place for them; .ply has"
+        findings.append(Finding(f"other columns ({said})", 0, done, repaired=False))
+    step = np.spacing(np.float32(np.abs(splats.origin).max()))
+    if not writer.far and step > FINE * np.median(splats.scales.max(axis=1)):
+        what = f"the scene lies far from zero, where float32 has steps of {step:.3g} m"
+        done = f"{writer.name} rounds its places to that; .ply and .glb keep them"
+        findings.append(Finding(what, 0, done, repaired=False))
+    return tuple(findings)
+
+
+def cut(splats: PlainSplats, sh_degree: int) -> PlainSplats:
+    """Without harmonics above a degree: the best of that degree, as they are orthogonal."""
+    return replace(splats, sh=splats.sh[:, : COEFFICIENTS[sh_degree]])
+
+
+def placed(splats: PlainSplats, rotation: np.ndarray, position: np.ndarray) -> PlainSplats:
+    """The splats after a rotation (3, 3) about zero and a shift (3,) in metres, exactly."""
+    turned = turn(splats, rotation)
+    origin = tuple(float(a + b) for a, b in zip(turned.origin, position, strict=True))
+    return replace(turned, origin=origin)
+
+
+def merged(parts: list[PlainSplats]) -> PlainSplats:
+    """One set of splats, from the first part's origin; what a part lacks is zero."""
+    if len(parts) == 1:
+        return parts[0]
+    origin, counts = parts[0].origin, [len(part.means) for part in parts]
+    shifts = [np.subtract(part.origin, origin) for part in parts]  # metres, float64
+    width = max(part.sh.shape[1] for part in parts)
+    columns = sorted({name for part in parts for name in part.extra})
+    labels = [part.labels for part in parts]
+    return PlainSplats(
+        joined([moved(p.means, s) for p, s in zip(parts, shifts, strict=True)], counts),
+        *(joined([getattr(p, n) for p in parts], counts) for n in ("scales", "wxyz", "opacity")),
+        joined([widened(part.sh, width) for part in parts], counts),
+        origin=origin,
+        antialiased=any(part.antialiased for part in parts),
+        labels=joined(labels, counts) if any(x is not None for x in labels) else None,
+        extra={n: joined([part.extra.get(n) for part in parts], counts) for n in columns},
+        findings=tuple(finding for part in parts for finding in part.findings),
+        format="baked",
+    )

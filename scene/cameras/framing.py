@@ -1,0 +1,242 @@
+"""Where to stand: robust bounds of splats, the views that show them, the point under a ray."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.scene.scene import Scene
+
+FOV_Y = 0.8  # radians, vertical
+ELEVATION = 0.3  # radians above the horizon: slightly down
+MARGIN = 1.08  # of the distance at which the bounding sphere just fits
+MIN_OPACITY = 0.1  # fainter splats are mostly floaters; they do not count for the bounds
+PERCENTILES = (2, 98)
+ROUND_ENOUGH = 1.3  # length over depth below which no side is the long one
+OUTLYING = 1.25  # times the distance for 98 % of the splats: more only floaters ask for
+COMMON = 0.5  # mean length of the cameras' directions: of a full circle 0, of a half one 0.64
+FAR_RADII = 200.0
+NEAR_RADII = 0.01
+RAY_POINTS = 24
+RAY_REACH = 0.05  # tangent of the angle up to which a point can be meant by a ray
+SMALLEST_RADIUS, SMALLEST_PART = 1e-30, 1e-9  # metres; of how far from zero the centre is
+FALLBACK_RADIUS = 1.0  # metres, when nothing is there to be framed
+
+
+def frame_points(means: np.ndarray, opacity: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre (3,) and radius in metres of splats with means (N, 3) and opacity (N,).
+
+    The 2nd to 98th percentile of what can be seen: a few far floaters move neither.  With nothing
+    that opaque every finite mean counts; with no mean at all, a metre about the origin.
+    """
+    points = _seen(means, opacity)  # (P, 3)
+    if not len(points):
+        return np.zeros(3), FALLBACK_RADIUS
+    low, high = np.percentile(points, PERCENTILES, axis=0)
+    centre = (low + high) / 2
+    radius = float(np.percentile(np.linalg.norm(points - centre, axis=1), PERCENTILES[1]))
+    # beside its place a smaller one is lost in rounding: the eye would lie in what it looks at
+    least = max(SMALLEST_PART * float(np.abs(centre).max()), SMALLEST_RADIUS)
+    return centre, radius if radius > least else max(FALLBACK_RADIUS, 1000 * least)
+
+
+def _seen(means: np.ndarray, opacity: np.ndarray) -> np.ndarray:
+    """(P, 3) float64 means that count for the bounds."""
+    finite = np.isfinite(means).all(axis=1)
+    seen = finite & (opacity > MIN_OPACITY)  # NaN opacity is not seen
+    return means[seen if seen.any() else finite].astype(np.float64)
+
+
+def fit_distance(radius: float, size: tuple[int, int], fov_y: float = FOV_Y) -> float:
+    """Metres from which a sphere of that radius fits the narrower side of a size (W, H)."""
+    _, right, _, up = perspective(fov_y, size)
+    return MARGIN * radius / float(np.sin(np.arctan(min(right, up))))
+
+
+def fit_points(
+    means: np.ndarray,
+    opacity: np.ndarray,
+    centre: np.ndarray,
+    world_from_eye: np.ndarray,
+    tangents: tuple[float, float, float, float],
+) -> float:
+    """Metres from the centre, seen along the axes of (4, 4), at which the splats fill the picture.
+
+    Tighter than `fit_distance` for what is long or flat.  All splats are in the picture unless the
+    last few would need a much larger distance: those are floaters.
+    """
+    points = _seen(means, opacity)
+    if not len(points):
+        return MARGIN * FALLBACK_RADIUS / min(tangents[1], tangents[3])
+    in_eye = (points - centre) @ world_from_eye[:3, :3]  # (P, 3) right, up, towards the eye
+    half = np.minimum([tangents[1], tangents[3]], [-tangents[0], -tangents[2]])
+    needed = in_eye[:, 2] + np.max(MARGIN * np.abs(in_eye[:, :2]) / half, axis=1)
+    return float(min(needed.max(), OUTLYING * np.percentile(needed, PERCENTILES[1])))
+
+
+def broadside(means: np.ndarray, opacity: np.ndarray) -> float:
+    """Turn about +Y, radians from +Z, from which long content is seen from its long side.
+
+    0 for what is about as deep as it is wide, else in -pi/2..pi/2: the side towards +Z.
+    """
+    points = _seen(means, opacity)[:, [2, 0]]  # (P, 2) z, x
+    if len(points) < 3:
+        return 0.0
+    square, axes = np.linalg.eigh(np.cov(points.T))
+    if not square[1] > ROUND_ENOUGH**2 * square[0]:
+        return 0.0
+    z, x = axes[:, 0]  # the direction in which the content is thinnest
+    return float(np.arctan2(x, z) if z > 0 else np.arctan2(-x, -z))
+
+
+def view_from(
+    eye: np.ndarray,
+    target: np.ndarray,
+    radius: float,
+    size: tuple[int, int],
+    fov_y: float = FOV_Y,
+) -> View:
+    """The view of an eye (3,) on a target (3,), depth range chosen for content of that radius."""
+    near, far = NEAR_RADII * radius, FAR_RADII * radius
+    return View(look_at(eye, target), perspective(fov_y, size), near, far, size)
+
+
+def orbit_path(
+    count: int,
+    centre: np.ndarray,
+    radius: float,
+    size: tuple[int, int],
+    fov_y: float = FOV_Y,
+    elevation: float = ELEVATION,
+    distance: float | None = None,
+    start: float = 0.0,
+) -> list[View]:
+    """`count` views on a level circle about the centre, counter-clockwise seen from above.
+
+    The first is `start` radians from +Z.  The distance in metres is the one that fits the sphere
+    of `radius` unless it is given.
+    """
+    if distance is None:
+        distance = fit_distance(radius, size, fov_y)
+    turn = start + 2 * np.pi * np.arange(count) / max(count, 1)
+    direction = np.stack(
+        [
+            np.sin(turn) * np.cos(elevation),
+            np.full(count, np.sin(elevation)),
+            np.cos(turn) * np.cos(elevation),
+        ],
+        axis=1,
+    )  # (count, 3) unit, from the centre to the eye
+    eyes = np.asarray(centre, np.float64) + distance * direction
+    return [view_from(eye, centre, radius, size, fov_y) for eye in eyes]
+
+
+def model_points(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Points (N, 3) and opacity (N,) that stand for a model without decoding it."""
+    if isinstance(model, SplatLayers):
+        return model.means, model.opacity
+    return model.anchors, np.ones(len(model.anchors), np.float32)
+
+
+def scene_points(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """World points (N, 3) and opacity (N,) of the visible objects of a scene."""
+    means, opacities = [np.zeros((0, 3))], [np.zeros(0)]
+    for item in scene.objects:
+        if item.visible:
+            points, opacity = model_points(item.model)
+            world_from_object = item.world_from_object.matrix()
+            means.append(points @ world_from_object[:3, :3].T + world_from_object[:3, 3])
+            opacities.append(opacity)
+    return np.concatenate(means), np.concatenate(opacities)
+
+
+def distances_from(points: tuple[np.ndarray, np.ndarray], view: View) -> np.ndarray:
+    """(n,) metres from an eye to the splats that are there; points: means (N, 3) and opacities."""
+    means, opacity = points
+    there = means[np.isfinite(means).all(axis=1) & (opacity > 0)]
+    return np.linalg.norm(there - view.world_from_eye.position, axis=1)
+
+
+def common_side(views: Sequence[View]) -> float | None:
+    """The side from which cameras look, radians about +Y from +Z; None where they look from all.
+
+    The mean of their directions over the ground, where it is longer than COMMON: photos of one
+    side of a thing say which side is its front.
+    """
+    ahead = np.array([-view.world_from_eye.matrix()[:3, 2] for view in views]).reshape(-1, 3)
+    level = ahead[:, [0, 2]]  # (V, 2) x, z
+    length = np.linalg.norm(level, axis=1)
+    level = level[length > 1e-6] / length[length > 1e-6, None]
+    if not len(level):
+        return None
+    x, z = -level.mean(axis=0)
+    return float(np.arctan2(x, z)) if np.hypot(x, z) > COMMON else None
+
+
+def framing_view(
+    means: np.ndarray, opacity: np.ndarray, size: tuple[int, int], start: float | None = None
+) -> View:
+    """The view that shows splats whole and slightly from above.
+
+    From `start`, radians about +Y from +Z; where nobody knows, from their long side.
+    """
+    centre, radius = frame_points(means, opacity)
+    start = broadside(means, opacity) if start is None else start
+    view = orbit_path(1, centre, radius, size, start=start)[0]
+    axes = view.world_from_eye.matrix()
+    distance = fit_points(means, opacity, centre, axes, view.tangents)
+    if not distance > NEAR_RADII * radius:  # all in one place
+        distance = fit_distance(radius, size)
+    return orbit_path(1, centre, radius, size, distance=distance, start=start)[0]
+
+
+def default_view(model: Model, size: tuple[int, int]) -> View:
+    """The first look at a model: provenance["view"] where it has one, else `framing_view`.
+
+    provenance["view"] is {"eye": [x, y, z], "target": [x, y, z], "fov_y": radians}, metres in the
+    object frame, fov_y optional.
+    """
+    wished = model.provenance.get("view")
+    if wished:
+        _, radius = frame_points(*model_points(model))
+        eye, target = np.asarray(wished["eye"], float), np.asarray(wished["target"], float)
+        return view_from(eye, target, radius, size, float(wished.get("fov_y", FOV_Y)))
+    return framing_view(*model_points(model), size)
+
+
+def default_background(
+    model: Model, otherwise: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Display sRGB of provenance["background"], what the photos stood before, or `otherwise`."""
+    found = model.provenance.get("background")
+    if not (isinstance(found, list | tuple) and len(found) == 3):
+        return otherwise
+    if not all(isinstance(c, int | float) and 0 <= c <= 1 for c in found):
+        return otherwise
+    return tuple(map(float, found))
+
+
+def point_under(
+    means: np.ndarray,
+    opacity: np.ndarray,
+    origin: np.ndarray,
+    direction: np.ndarray,
+) -> np.ndarray | None:
+    """The point (3,) that a ray meets first in a cloud (N, 3), or None where it meets nothing.
+
+    Of the RAY_POINTS nearest to the ray the first ones give the depth: works for sparse and for
+    dense clouds, and a floater or two before the surface do not win.
+    """
+    ray = np.asarray(direction, np.float64)
+    ray = ray / np.linalg.norm(ray)
+    to_point = means - origin  # (N, 3)
+    depth = to_point @ ray  # (N,) metres
+    off = np.linalg.norm(to_point - depth[:, None] * ray, axis=1)
+    ahead = np.flatnonzero((depth > 0) & (off < depth * RAY_REACH) & (opacity > MIN_OPACITY))
+    if not len(ahead):
+        return None
+    if len(ahead) > RAY_POINTS:
+        ahead = ahead[np.argpartition(off[ahead], RAY_POINTS)[:RAY_POINTS]]
+    first = float(np.percentile(depth[ahead], 15, method="lower"))  # between two is on neither
+    return np.asarray(origin) + first * ray

@@ -1,0 +1,133 @@
+"""transforms.json for its cameras alone: nerfstudio, Blender, ours; photos need not be there."""
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.camera_list import (
+    CameraList,
+    CameraReading,
+    assumed_fov,
+    first_of_each,
+    flipped,
+    is_number,
+    opencv_from_eye,
+    ours_from_world,
+    pinhole_view,
+    pose_matrix,
+    read_name,
+)
+from shapeshift.scene.captures.capture_rules import COLMAP_UP, CaptureWorld, image_size
+from shapeshift.scene.captures.read_transforms import ENDINGS, POSES, gather, opencv_axes
+from shapeshift.scene.pose import View
+
+BLENDER_SIZE = (800, 800)  # of the synthetic NeRF scenes, whose files name no size
+LENS = ("k1", "k2", "k3", "k4", "p1", "p2")
+MARK = "frames"
+
+
+@dataclass
+class Notes:
+    """What is said once about the whole file, though each frame finds it."""
+
+    bent: bool = False
+    unsized: bool = False
+    without_lens: tuple[str, ...] = ()
+
+
+def read_transforms_cameras(files: list[Path], reading: CameraReading) -> CameraList:
+    """The views of one JSON file, or of the train/val/test files of a Blender set.
+
+    Equal views of several modalities come once.  Without --up their world is turned as that of
+    the capture would be (docs/capture.md).  Raises BadFile.
+    """
+    data, entries = gather(tuple(files))
+    where, notes = files[0].name, Notes()
+    frames = [f"{where}, frame {i}" for i in range(len(entries))]
+    cameras = [pose_of(entry, at) for entry, at in zip(entries, frames, strict=True)]
+    if reading.up:
+        turn = ours_from_world(reading)
+    else:
+        up = data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None)
+        turn = flipped(reading) @ CaptureWorld.of(np.array(cameras), (0, 0, 1), up, where).turned(
+            np.eye(4)
+        )
+    views, names = [], []
+    for entry, camera, at in zip(entries, cameras, frames, strict=True):
+        views.append(view_of(entry, turn @ camera, files[0].parent, reading, notes, at))
+        names.append(read_name(entry.get("file_path") or entry.get("file")))
+    kept = first_of_each(views)
+    return CameraList(
+        tuple(views[i] for i in kept),
+        tuple(names[i] for i in kept),
+        "transforms",
+        told(notes, where),
+    )
+
+
+def pose_of(entry: dict, where: str) -> np.ndarray:
+    """(4, 4) camera to world with OpenCV axes, the file's world."""
+    key = next((k for k in POSES if k in entry), None)
+    if key is None:
+        raise BadFile(f"{where} has no pose; give it a 'transform_matrix'.")
+    matrix = pose_matrix(entry[key], f"{where}: '{key}'")
+    return matrix if opencv_axes(entry) else opencv_from_eye(matrix)
+
+
+def view_of(
+    entry: dict, camera: np.ndarray, folder: Path, reading: CameraReading, notes: Notes, where: str
+) -> View:
+    size = size_of(entry, folder, notes)
+    width, height = size
+    if not all(is_number(n) and n >= 1 for n in size):
+        raise BadFile(f"{where}: 'w' and 'h' are {width!r:.20} and {height!r:.20}, not pixels.")
+    fx = focal_of(entry, "fl_x", "camera_angle_x", width, where)
+    fy = focal_of(entry, "fl_y", "camera_angle_y", height, where)
+    if not fx and not fy:
+        fov_y, notes.without_lens = assumed_fov(reading, where.split(",")[0])
+        fy = height / 2 / math.tan(fov_y / 2)
+    centre = (entry.get("cx", width / 2), entry.get("cy", height / 2))
+    bent = any(is_number(entry.get(k)) and entry[k] != 0 for k in LENS)
+    notes.bent |= bent or "FISHEYE" in str(entry.get("camera_model", ""))
+    view = pinhole_view(camera, (fx or fy, fy or fx), centre, size, where)
+    return view.resized(reading.size) if reading.size else view
+
+
+def focal_of(entry: dict, pixels: str, angle: str, side: float, where: str) -> float:
+    """Focal length in pixels, or 0 where neither it nor the angle of view is told."""
+    if pixels in entry:
+        if not (is_number(entry[pixels]) and entry[pixels] > 0):
+            raise BadFile(f"{where}: '{pixels}' is {entry[pixels]!r:.40}; pixels above 0 wanted.")
+        return float(entry[pixels])
+    if angle in entry:
+        if not (is_number(entry[angle]) and 0 < entry[angle] < math.pi):
+            raise BadFile(f"{where}: '{angle}' is {entry[angle]!r:.40}; 0 to pi radians wanted.")
+        return side / 2 / math.tan(entry[angle] / 2)
+    return 0.0
+
+
+def size_of(entry: dict, folder: Path, notes: Notes) -> tuple:
+    """(width, height) as told, else of the photo if it is there, else of Blender's sets."""
+    if "w" in entry and "h" in entry:
+        return entry["w"], entry["h"]
+    file = entry.get("file_path") or entry.get("file")
+    if isinstance(file, str) and "\0" not in file:
+        for ending in ENDINGS:
+            photo = folder / (file + ending)
+            if os.path.isfile(photo):  # unlike Path.is_file it takes any text for a name
+                return image_size(photo, None)
+    notes.unsized = True
+    return BLENDER_SIZE
+
+
+def told(notes: Notes, where: str) -> tuple[str, ...]:
+    out = list(notes.without_lens)
+    if notes.bent:
+        out.append(f"{where}: the lenses' distortion is left out; the views are those of pinholes.")
+    if notes.unsized:
+        out.append(f"{where} names no size; taken is {BLENDER_SIZE[0]}x{BLENDER_SIZE[1]}.")
+    return tuple(out)

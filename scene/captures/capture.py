@@ -1,0 +1,35 @@
+"""Posed photos of one place in several modalities: what training reads."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.pose import View
+
+
+@dataclass(frozen=True)
+class Photo:
+    view: View  # world frame of the program (+Y up), size of the image file
+    path: Path
+    modality: str  # a Stop's name
+    mask: Path | None = None  # white where the photo counts
+    split: str = "train"  # train | test
+    depth: Path | None = None  # metres along the view, of the same field of view
+    depth_unit: float = 0.001  # metres a step, where the depth photo holds integers
+    counts: tuple[float, float] | None = None  # numbers of a grey photo that stand for 0 and 1
+
+
+@dataclass(frozen=True)
+class Capture:
+    folder: Path
+    stops: tuple[Stop, ...]
+    photos: tuple[Photo, ...]
+    points: np.ndarray | None = None  # (P, 3) metres, world frame
+    point_colors: np.ndarray | None = None  # (P, 3) 0..1
+    background: tuple[float, float, float] | None = None  # what lies behind; None = black
+    notes: dict = field(default_factory=dict)
+
+    def of(self, modality: str, split: str) -> list[Photo]:
+        return [p for p in self.photos if p.modality == modality and p.split == split]

@@ -1,0 +1,251 @@
+"""What every reader of captures holds to: rigid poses, up, stops, splits, sizes, background."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
+from shapeshift.runtime_models.stop_names import guess_kind
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.photo import load_photo, open_image
+from shapeshift.scene.json.json_values import number_in, numbers_in, shortened, shown, text_in
+
+ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
+FARTHEST = 1e12  # metres from zero: beyond that no photo was taken
+TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, from the first
+# Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
+# trained elsewhere from the same model then lie where the capture is.
+COLMAP_UP = (0.0, -1.0, 0.0)
+CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they do not agree
+PLAIN_BORDER = 0.5  # share of a photo's border that must have exactly one colour
+
+
+@dataclass(frozen=True)
+class CaptureWorld:
+    """The one turn from a capture's own world to ours, for its cameras and for its points."""
+
+    ours_from_file: np.ndarray  # (4, 4) a rotation
+    up: tuple[float, float, float]  # what points up in the file's world
+
+    @staticmethod
+    def of(
+        world_from_cameras: np.ndarray, otherwise: tuple, up: object, where: str
+    ) -> "CaptureWorld":
+        """`up` if the file gives one, else as the photos (N, 4, 4; OpenCV axes) tell."""
+        up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
+        turn = turn_upright(up, where)
+        return CaptureWorld(turn, tuple(float(c) + 0.0 for c in up))  # + 0.0: never -0.0
+
+    def turned(self, matrix: np.ndarray) -> np.ndarray:
+        return self.ours_from_file @ matrix
+
+    def capture(
+        self,
+        folder: Path,
+        stops: tuple[Stop, ...],
+        photos: list[Photo],
+        points: np.ndarray | None,
+        colors: np.ndarray | None,
+        background: tuple | None,
+        guessed: bool,
+        notes: dict | None = None,
+    ) -> Capture:
+        """The finished capture; `guessed` = nobody said what the modalities are."""
+        notes = {"up_in_file": self.up} | (notes or {})
+        if background is None:
+            background = plain_background(photos)
+            notes["background"] = "found in the photos" if background else "none stated, none found"
+        for stop in stops:
+            if not any(p.modality == stop.name and p.split == "train" for p in photos):
+                raise BadFile(f"{folder}: modality {shown(stop.name)} has no photos to train on")
+        if points is not None:
+            points = (points @ self.ours_from_file[:3, :3].T).astype(np.float32)
+        return Capture(
+            folder,
+            colored_by_palette(stops, photos) if guessed else stops,
+            tuple(photos),
+            points,
+            colors,
+            background,
+            notes,
+        )
+
+
+def rigid(matrix: object, where: str) -> np.ndarray:
+    """(4, 4) float64 world_from_camera, its rotation made exactly orthonormal; or BadFile."""
+    try:
+        m = np.asarray(matrix, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise BadFile(f"{where}: the pose is no matrix of numbers; give 4 rows of 4") from None
+    if m.shape not in ((3, 4), (4, 4)):
+        raise BadFile(f"{where}: the pose has shape {m.shape!s:.40}; give 4 rows of 4 numbers")
+    if not np.isfinite(m).all():
+        raise BadFile(f"{where}: the pose holds NaN or Inf; pose this photo again or drop it")
+    if not np.abs(m[:3, 3]).max() <= FARTHEST:
+        raise BadFile(
+            f"{where}: the pose is beyond {FARTHEST:g} m; pose this photo again or drop it"
+        )
+    rotation = m[:3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):  # 1e300 is no rotation either
+        error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+    if not error <= ORTHONORMAL:
+        raise BadFile(
+            f"{where}: the pose is no rotation (R^T R differs from 1 by {error:.3g}); "
+            "give camera-to-world matrices without scale or shear"
+        )
+    if not np.linalg.det(rotation) > 0:
+        raise BadFile(f"{where}: the pose mirrors the world; flip one axis of its matrix")
+    out = np.eye(4)
+    u, _, vt = np.linalg.svd(rotation)
+    out[:3, :3], out[:3, 3] = u @ vt, m[:3, 3]
+    return out
+
+
+def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarray:
+    """(3,) the world axis nearest to the photos' mean upward direction (OpenCV axes).
+
+    For worlds as COLMAP leaves them this is -Y.  `otherwise` is taken where the photos disagree.
+    """
+    mean = -np.asarray(world_from_cameras)[:, :3, 1].mean(axis=0)
+    if not np.linalg.norm(mean) > CLEAR_UP:
+        return np.asarray(otherwise, np.float64)
+    axis = int(np.argmax(np.abs(mean)))
+    return np.sign(mean[axis]) * np.eye(3)[axis]
+
+
+def turn_upright(up: object, where: str) -> np.ndarray:
+    """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
+    try:
+        up = np.asarray(up, np.float64)
+        length = math.hypot(*up.ravel())
+    except (TypeError, ValueError, OverflowError):
+        up, length = np.zeros(0), 0.0
+    if up.shape != (3,) or not 0 < length < np.inf:
+        raise BadFile(f"{where}: 'up' must be three numbers that are not all zero")
+    x, y, z = up / length
+    out = np.eye(4)
+    if y < -1 + 1e-9:
+        out[:3, :3] = np.diag([1.0, -1.0, -1.0])
+    else:
+        cross = np.array([[0, -x, 0], [x, 0, z], [0, -z, 0]])  # [up x Y]_x
+        out[:3, :3] = np.eye(3) + cross + cross @ cross / (1 + y)
+    return out
+
+
+def spread_stops(names: Iterable[str]) -> tuple[Stop, ...]:
+    """Stops evenly from 0 to 1 in the order of the names; the kind is read from the name."""
+    names = list(names)
+    xs = np.linspace(0, 1, len(names)) if len(names) > 1 else [0.0]
+    return tuple(
+        Stop(name, float(x), guess_kind(name, len(names)))
+        for name, x in zip(names, xs, strict=True)
+    )
+
+
+def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[Stop, ...]:
+    """Thermal stops of grey photos get a palette; false-colour photos keep their own colours."""
+
+    def grey(name: str) -> bool:
+        rgb, _ = load_photo(next(p for p in photos if p.modality == name))
+        return bool((np.ptp(rgb, axis=2) == 0).all())
+
+    return tuple(
+        replace(s, palette="ironbow") if s.kind == "thermal" and grey(s.name) else s for s in stops
+    )
+
+
+def stops_from(listed: object, where: str) -> list[Stop]:
+    """The stops of a list of JSON objects, in its order, every field checked."""
+    if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
+        raise BadFile(f"{where}: 'modalities' must be a list of names or of objects")
+    stops = [stop_from(entry, where) for entry in listed]
+    if len({stop.name for stop in stops}) < len(stops):
+        raise BadFile(f"{where}: two modalities have the same name; rename one")
+    return stops
+
+
+def stop_from(entry: dict, where: str) -> Stop:
+    name = text_in(entry, "name", f"{where}: a modality")
+    if not name:
+        raise BadFile(f"{where}: a modality has no name; give each one a 'name'")
+    whose = f"{where}: modality {shown(name)}"
+    x, kind = number_in(entry, "x", whose), text_in(entry, "kind", whose, "rgb")
+    if not 0 <= x <= 1:
+        raise BadFile(f"{whose} has x = {x:g}; give a number from 0 to 1")
+    if kind not in STOP_KINDS:
+        raise BadFile(f"{whose} is of kind {shown(kind)}; use {', '.join(STOP_KINDS)}")
+    span = numbers_in(entry, "value_range", 2, whose)
+    if span is not None and not span[0] < span[1]:
+        raise BadFile(f"{whose} needs value_range [low, high], not {list(span)}")
+    return Stop(
+        name, x, kind, text_in(entry, "palette", whose), span, text_in(entry, "unit", whose)
+    )
+
+
+def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
+    """Of the modalities that have 'counts': which numbers of a grey photo stand for 0 and 1."""
+    out = {}
+    for entry in listed if isinstance(listed, list) else ():
+        if isinstance(entry, dict) and entry.get("counts") is not None:
+            whose = f"{where}: modality {shown(entry.get('name'))}"
+            low, high = numbers_in(entry, "counts", 2, whose)
+            if not low < high:
+                raise BadFile(f"{whose} needs counts [low, high], not {[low, high]}")
+            out[entry.get("name")] = (low, high)
+    return out
+
+
+def with_counts(photos: list[Photo], counts: dict[str, tuple[float, float]]) -> list[Photo]:
+    return [replace(photo, counts=counts.get(photo.modality)) for photo in photos]
+
+
+def background_from(entry: dict, where: str) -> tuple[float, ...] | None:
+    """The colour 'background', display sRGB; None where none is stated."""
+    color = numbers_in(entry, "background", 3, where)
+    if color is not None and not all(0 <= c <= 1 for c in color):
+        raise BadFile(f"{where}: 'background' is {list(color)}; give three numbers from 0 to 1")
+    return color
+
+
+def split_every_8th(photos: list[Photo]) -> list[Photo]:
+    """Every 8th photo of each modality, by name, becomes a test photo; fewer than 3 all train."""
+    tests = set()
+    for name in {p.modality for p in photos}:
+        mine = sorted(p.path for p in photos if p.modality == name)
+        tests |= set(mine[::TEST_EVERY]) if len(mine) >= 3 else set()
+    return [replace(p, split="test" if p.path in tests else "train") for p in photos]
+
+
+def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
+    """(width, height) from the file's header, which must be what the capture claims."""
+    with open_image(path) as image:
+        size = image.size
+    if claimed is not None and claimed != size:
+        raise BadFile(
+            f"{shortened(path)}: the image has {size[0]}x{size[1]} pixels, the capture says "
+            f"{claimed[0]}x{claimed[1]}; resize the images or scale the intrinsics with them"
+        )
+    return size
+
+
+def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
+    """The one colour that most of the border of (nearly) all photos has exactly, else None.
+
+    Rendered captures have such a border, photographed ones do not.  Looks at up to 8 photos.
+    """
+    found = []
+    for photo in photos[:: max(1, len(photos) // 8)][:8]:
+        rgb, mask = load_photo(photo)
+        if mask is not None:
+            return None
+        border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
+        colors, counts = np.unique(border, axis=0, return_counts=True)
+        if counts.max() >= PLAIN_BORDER * len(border):
+            found.append(tuple(map(float, colors[counts.argmax()])))
+    if not found or Counter(found).most_common(1)[0][1] < min(4, len(photos)):
+        return None
+    return Counter(found).most_common(1)[0][0]

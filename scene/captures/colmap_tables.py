@@ -1,0 +1,214 @@
+"""COLMAP's cameras and images, text or binary; every count is held against the bytes there are."""
+
+import mmap
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.memory import read_text_file
+from shapeshift.runtime_models.model import BadFile
+
+MODELS = ("sparse/0", "sparse", "colmap/sparse/0", ".")  # where a folder may hold its model
+TABLES = ("cameras", "images", "points3D")
+LONGEST_NAME = 4096  # bytes of an image's name
+# name, how many focal lengths, how many parameters; COLMAP's src/colmap/sensor/models.h
+LENSES = {
+    0: ("SIMPLE_PINHOLE", 1, 3), 1: ("PINHOLE", 2, 4), 2: ("SIMPLE_RADIAL", 1, 4),
+    3: ("RADIAL", 1, 5), 4: ("OPENCV", 2, 8), 5: ("OPENCV_FISHEYE", 2, 8),
+    6: ("FULL_OPENCV", 2, 12), 7: ("FOV", 2, 5), 8: ("SIMPLE_RADIAL_FISHEYE", 1, 4),
+    9: ("RADIAL_FISHEYE", 1, 5), 10: ("THIN_PRISM_FISHEYE", 2, 12),
+    11: ("RAD_TAN_THIN_PRISM_FISHEYE", 2, 16), 12: ("SIMPLE_DIVISION", 1, 4),
+    13: ("DIVISION", 2, 5), 14: ("SIMPLE_FISHEYE", 1, 3), 15: ("FISHEYE", 2, 4),
+    16: ("EUCM", 2, 6),
+}  # fmt: skip
+LENS_NUMBERS = {name: number for number, (name, _, _) in LENSES.items()}
+CAMERA, IMAGE = struct.Struct("<IiQQ"), struct.Struct("<I7dI")
+COUNT = struct.Struct("<Q")
+POINT_IN_IMAGE = 24  # bytes
+AGAIN = "copy or export it again"
+
+
+@dataclass(frozen=True)
+class Lens:
+    """One row of COLMAP's table of cameras."""
+
+    model: str
+    size: tuple[int, int]
+    params: tuple[float, ...]
+
+    @property
+    def focal(self) -> tuple[float, float]:
+        return (self.params[0], self.params[_focals(self.model) - 1])
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        first = _focals(self.model)
+        return self.params[first], self.params[first + 1]
+
+    @property
+    def bends(self) -> bool:
+        """Whether it is other than a pinhole: its further numbers say how much."""
+        return "FISHEYE" in self.model or any(self.params[_focals(self.model) + 2 :])
+
+
+@dataclass(frozen=True)
+class Posed:
+    """One row of COLMAP's table of images."""
+
+    number: int
+    name: str
+    wxyz: tuple[float, ...]  # camera from world, OpenCV axes
+    place: tuple[float, ...]  # (3,) of that transform
+    lens: int  # the Lens' number
+
+
+def find_model(folder: Path, tables: tuple[str, ...] = ("images",)) -> tuple[Path, str] | None:
+    """The folder and ending (.bin or .txt) of a COLMAP model in or under `folder`, or None."""
+    for name in MODELS:
+        for ending in (".bin", ".txt"):
+            if all((folder / name / (table + ending)).is_file() for table in tables):
+                return folder / name, ending
+    return None
+
+
+def read_tables(folder: Path, ending: str) -> tuple[dict[int, Lens], list[Posed]]:
+    """Lenses by their number, and the images by theirs.  Raises BadFile."""
+    cameras, images = folder / f"cameras{ending}", folder / f"images{ending}"
+    for path in (cameras, images):
+        if not path.is_file():
+            raise BadFile(f"{path} is missing; cameras and images are needed, both as {ending}.")
+    if ending == ".bin":
+        with mapped(cameras) as lens_bytes, mapped(images) as image_bytes:
+            lenses = cameras_of_bytes(lens_bytes, cameras)
+            posed = images_of_bytes(image_bytes, images)
+    else:
+        lenses, posed = cameras_of_text(cameras), images_of_text(images)
+    if not posed:
+        raise BadFile(f"{images}: the COLMAP model holds no posed image; run the mapper again.")
+    for image in posed:
+        if image.lens not in lenses:
+            raise BadFile(f"{images}: image {image.name} has camera {image.lens}, which is absent.")
+    return lenses, sorted(posed, key=lambda image: image.number)
+
+
+@contextmanager
+def mapped(path: Path) -> Iterator[bytes | mmap.mmap]:
+    """A file's bytes, read as they are needed: the points in images.bin may be a gigabyte."""
+    if not path.stat().st_size:
+        yield b""
+        return
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        yield data
+
+
+def cameras_of_bytes(data: bytes | mmap.mmap, path: Path) -> dict[int, Lens]:
+    count, at = count_of(data, CAMERA.size + 3 * 8, path), COUNT.size
+    lenses = {}
+    for _ in range(count):
+        if at + CAMERA.size > len(data):
+            raise short_of(path, count, "cameras")
+        number, model, width, height = CAMERA.unpack_from(data, at)
+        at += CAMERA.size
+        if model not in LENSES:
+            raise BadFile(f"{path}: camera {number} is of model {model}, which is not known here.")
+        params = LENSES[model][2]
+        if at + 8 * params > len(data):
+            raise short_of(path, count, "cameras")
+        values = struct.unpack_from(f"<{params}d", data, at)
+        at += 8 * params
+        lenses[number] = Lens(LENSES[model][0], (width, height), values)
+    return lenses
+
+
+def images_of_bytes(data: bytes | mmap.mmap, path: Path) -> list[Posed]:
+    count, at = count_of(data, IMAGE.size + 1 + COUNT.size, path), COUNT.size
+    posed = []
+    for _ in range(count):
+        if at + IMAGE.size > len(data):
+            raise short_of(path, count, "images")
+        number, *values, lens = IMAGE.unpack_from(data, at)
+        at += IMAGE.size
+        end = data.find(b"\0", at, at + LONGEST_NAME)
+        if end < 0 or end + 1 + COUNT.size > len(data):
+            raise short_of(path, count, "images")
+        name = data[at:end].decode("utf-8", "replace")
+        points = COUNT.unpack_from(data, end + 1)[0]
+        at = end + 1 + COUNT.size
+        if points > (len(data) - at) // POINT_IN_IMAGE:
+            raise BadFile(f"{path}: image {name} claims {points:,} points; the file ends; {AGAIN}.")
+        at += points * POINT_IN_IMAGE
+        posed.append(Posed(number, name, tuple(values[:4]), tuple(values[4:]), lens))
+    return posed
+
+
+def count_of(data: bytes | mmap.mmap, least: int, path: Path) -> int:
+    """The count that a table begins with, which its bytes must be able to hold."""
+    if len(data) < COUNT.size:
+        raise BadFile(f"{path} has {len(data)} bytes, too few for a table of COLMAP; {AGAIN}.")
+    count = COUNT.unpack_from(data)[0]
+    if count > (len(data) - COUNT.size) // least:
+        raise BadFile(f"{path} claims {count:,} rows, its {len(data):,} bytes hold fewer; {AGAIN}.")
+    return count
+
+
+def cameras_of_text(path: Path) -> dict[int, Lens]:
+    lenses = {}
+    for line, words in enumerate(map(str.split, text_lines(path)), 1):
+        if not words or words[0].startswith("#"):
+            continue
+        values = numbers_of(words[:1] + words[2:], f"{path}, line {line}")
+        model = words[1] if len(words) > 1 else ""
+        if model not in LENS_NUMBERS:
+            raise BadFile(f"{path}, line {line}: {model[:40]!r} is no camera model known here.")
+        params = LENSES[LENS_NUMBERS[model]][2]
+        if len(values) != 3 + params:
+            raise BadFile(f"{path}, line {line}: {model} has {params} numbers after its size.")
+        lenses[int(values[0])] = Lens(model, (int(values[1]), int(values[2])), tuple(values[3:]))
+    return lenses
+
+
+def images_of_text(path: Path) -> list[Posed]:
+    """Two lines an image; the second, of its points, may be empty and is not looked at."""
+    posed, points_next = [], False
+    for line, text in enumerate(text_lines(path), 1):
+        words = text.split(maxsplit=9)
+        if points_next:
+            points_next = False
+        elif words and not words[0].startswith("#"):
+            if len(words) < 10:
+                raise BadFile(f"{path}, line {line}: 9 numbers and a name wanted; {AGAIN}.")
+            values = numbers_of(words[:9], f"{path}, line {line}")
+            number, lens = int(values[0]), int(values[8])
+            posed.append(Posed(number, words[9], tuple(values[1:5]), tuple(values[5:8]), lens))
+            points_next = True
+    return posed
+
+
+def text_lines(path: Path) -> list[str]:
+    text = read_text_file(path)
+    try:
+        return text.decode("utf-8").split("\n")
+    except UnicodeDecodeError:
+        raise BadFile(f"{path} is not text, whatever its name says; {AGAIN}.") from None
+
+
+def numbers_of(words: list[str], where: str) -> list[float]:
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        values = [np.nan]
+    if not np.isfinite(values).all():
+        raise BadFile(f"{where}: what should be numbers is not; {AGAIN}.")
+    return values
+
+
+def _focals(model: str) -> int:
+    return LENSES[LENS_NUMBERS[model]][1]
+
+
+def short_of(path: Path, count: int, what: str) -> BadFile:
+    return BadFile(f"{path} claims {count:,} {what} and ends before the last; {AGAIN}.")

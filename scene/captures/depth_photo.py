@@ -1,0 +1,169 @@
+"""Depth photos: what a frame says of them, and their metres in the size that is asked for."""
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.files.npy import BAD_HEADER
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.captures.photo import (
+    BROKEN,
+    GREY_16,
+    MOST_PIXELS,
+    charge_pixels,
+    open_image,
+    quiet,
+)
+from shapeshift.scene.json.json_values import is_number, shortened, shown, text_in
+
+NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
+UNITS = ("depth_unit", "integer_depth_scale")  # ours; instant-ngp's
+MILLIMETRES = 0.001  # metres a step where nothing is said
+ASPECT = 0.02  # by how much a depth photo may be wider or narrower than its photo
+LOOKED_AT, FEW_POINTS = 3, 30  # photos, points: to tell whether a unit can be right
+OTHER_UNIT = 8  # times: more than this the points of a scene do not lie behind what is seen
+DEPTH = 12  # bytes of memory a number of a .npy
+FARTHEST = 1e6  # metres: beyond that nothing was measured
+
+
+def depth_of(
+    entry: dict, folder: Path, size: tuple[int, int], where: str
+) -> tuple[Path | None, float]:
+    """The depth photo of a frame, if it names one, and metres a step of its integers."""
+    unit = next((entry[key] for key in UNITS if entry.get(key) is not None), MILLIMETRES)
+    if not (is_number(unit) and 0 < unit <= FARTHEST):
+        raise BadFile(f"{where}: '{UNITS[0]}' is {shown(unit)}; metres above 0 are wanted")
+    name = next((text for key in NAMES if (text := text_in(entry, key, where))), "")
+    if not name:
+        return None, float(unit)
+    path = folder / name
+    if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
+        raise BadFile(f"{where}: the depth photo {shortened(path)} is missing; put it there")
+    width, height = depth_size(path)
+    if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
+        raise BadFile(
+            f"{where}: the depth photo has {width}x{height} pixels, the photo {size[0]}x{size[1]}; "
+            "both must show the same field of view"
+        )
+    return path, float(unit)
+
+
+def depth_size(path: Path) -> tuple[int, int]:
+    """(width, height) of a depth photo by its header; BadFile where it is none."""
+    if path.suffix.lower() == ".npy":
+        height, width = _array(path).shape
+        return width, height
+    with open_image(path) as image:
+        if image.mode not in GREY_16:
+            raise BadFile(
+                f"{shortened(path)}: a depth photo is greyscale of 16 bits, or a .npy; this one is "
+                f"{image.mode}"
+            )
+        return image.size
+
+
+def load_depth(photo: Photo, size: tuple[int, int] | None = None) -> np.ndarray:
+    """(H, W) float32 metres along the view of a photo that has depth; 0 where none is known.
+
+    size: (width, height) to have it in; None: as it is.
+    """
+    path = photo.depth
+    if path.suffix.lower() == ".npy":
+        values = _array(path)
+        values = np.array(values, np.float32) * (
+            photo.depth_unit if values.dtype.kind != "f" else 1
+        )
+    else:
+        values = _integers(path, math.prod(photo.view.size))
+        values *= np.float32(photo.depth_unit)
+    known = (values > 0) & (values <= FARTHEST)  # NaN is not
+    values[~known] = 0
+    return values if size is None else at_centres(values, size)
+
+
+def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(H, W) in another size (width, height): what lies at each new pixel's centre.
+
+    Means would put points between a thing and what is behind it.
+    """
+    if size == depth.shape[::-1]:
+        return depth
+    rows, columns = (
+        np.minimum(((np.arange(new) + 0.5) * old / new).astype(int), old - 1)
+        for new, old in zip(size[::-1], depth.shape, strict=True)
+    )
+    return depth[np.ix_(rows, columns)]
+
+
+def refuse_other_units(capture: Capture, where: str) -> None:
+    """Raises BadFile where depth photos are some other unit than the points that they show.
+
+    Looks at a few photos; without points, or where too few lie in the picture, nothing is said.
+    Points may lie behind what a photo shows, so only what no scene explains is refused.
+    """
+    with_depth = [photo for photo in capture.photos if photo.depth is not None]
+    if capture.points is None or not with_depth:
+        return
+    some = with_depth[:: -(-len(with_depth) // LOOKED_AT)]
+    ratios = np.concatenate([_over_points(photo, capture.points) for photo in some])
+    if len(ratios) < FEW_POINTS:
+        return
+    ratio = float(np.median(ratios))
+    if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+        unit = f"{10.0 ** -np.round(np.log10(ratio)):g}"
+        raise BadFile(
+            f"{where}: the depth photos are {ratio:.3g} times as deep as the points that they "
+            f"show; multiply 'depth_unit' (or the numbers of a .npy) by about {unit}"
+        )
+
+
+def _over_points(photo: Photo, points: np.ndarray) -> np.ndarray:
+    """What a depth photo says over how deep the points in the picture lie."""
+    depth, view = load_depth(photo), photo.view
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    x, y, z = (points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]).T
+    ahead = z > view.near
+    x, y, z = x[ahead], y[ahead], z[ahead]
+    height, width = depth.shape
+    across, down = width / view.size[0], height / view.size[1]  # its pixels a pixel of the photo
+    column, row = (fx * x / z + cx) * across, (fy * y / z + cy) * down
+    inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+    seen = depth[row[inside].astype(int), column[inside].astype(int)]
+    return (seen / z[inside])[seen > 0]
+
+
+def _integers(path: Path, most: int) -> np.ndarray:
+    """(H, W) float32 steps of a 16-bit image; 65535 stands for all that is too far.
+
+    most: pixels of the photo that it goes with.
+    """
+    with open_image(path) as image:
+        charge_pixels(path, image.size, most)
+        try:
+            with quiet():
+                image.load()
+        except BROKEN as error:
+            raise BadFile(f"{shortened(path)}: cut off ({error}); copy it again") from None
+        steps = np.array(image, np.float32)
+    steps[steps >= 65535] = 0
+    return steps
+
+
+def _array(path: Path) -> np.ndarray:
+    """A view of the (H, W) numbers of a .npy file: nothing is read yet."""
+    where = shortened(path)
+    try:
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, OSError, OverflowError, EOFError, *BAD_HEADER):
+        raise BadFile(f"{where}: no .npy of plain numbers; save it again") from None
+    if values.ndim != 2 or values.dtype.kind not in "fui" or not 0 < values.size <= MOST_PIXELS:
+        raise BadFile(
+            f"{where}: a depth photo is (H, W) numbers, this is {values.shape!s:.40} of "
+            f"{values.dtype}"
+        )
+    Memory().of(path).charge(DEPTH * values.size, f"{values.size:,} numbers")
+    return values

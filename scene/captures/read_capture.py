@@ -1,0 +1,59 @@
+"""Any capture that we understand -> Capture, in our world: which reader a path is for."""
+
+import shlex
+from pathlib import Path
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.colmap_tables import find_model
+from shapeshift.scene.captures.read_colmap import read_colmap
+from shapeshift.scene.captures.read_transforms import read_transforms
+
+TABLES = ("transforms.json", "transforms_multimodal.json", "cameras.json")
+SPLITS = ("train", "val", "test")  # of transforms_{split}.json
+PICTURES = {".png", ".jpg", ".jpeg"}
+
+
+def read_capture(path: Path) -> Capture:
+    """Reads a folder, or one of its JSON files.  Raises BadFile in one sentence.
+
+    Folders: COLMAP's (sparse/0 and images/), or with transforms.json, transforms_multimodal.json,
+    cameras.json, or transforms_train.json and transforms_test.json (docs/capture.md).
+    """
+    path = Path(path)
+    if path.is_file() and path.suffix.lower() == ".json":
+        return read_transforms(path)
+    if not path.is_dir():
+        found = "is no capture" if path.exists() else "does not exist"
+        raise BadFile(f"{path}: {found}; give a folder of posed photos or its transforms.json")
+    for name in TABLES:
+        if (path / name).is_file():
+            return read_transforms(path / name)
+    splits = [path / f"transforms_{s}.json" for s in SPLITS]
+    if splits[0].is_file():
+        return read_transforms(*(s for s in splits if s.is_file()))
+    if find_model(path) is not None:
+        return read_colmap(path)
+    if any(p.suffix.lower() in PICTURES for p in path.rglob("*")):
+        raise BadFile(f"{path}: photos without poses; {how_to_pose(path)}.")
+    raise BadFile(f"{path}: neither photos nor poses in this folder; see docs/capture.md")
+
+
+def has_poses(folder: Path) -> bool:
+    """Whether a folder is one of those that `read_capture` knows."""
+    names = (*TABLES, f"transforms_{SPLITS[0]}.json")
+    return any((folder / name).is_file() for name in names) or find_model(folder) is not None
+
+
+def how_to_pose(photos: Path) -> str:
+    """What to do with a folder of photos: name the one above it, or make a model of them there."""
+    above = photos.absolute().parent
+    if has_poses(above):
+        return f"the poses lie in the folder above, name that: {above}"
+    inside = photos / "images"
+    folder, images = (photos, inside) if inside.is_dir() else (photos, photos)
+    if photos.name == "images":  # photos of a capture lie in its folder images
+        folder = above
+    words = ["colmap", "automatic_reconstructor", "--workspace_path", str(folder)]
+    command = shlex.join([*words, "--image_path", str(images)])
+    return f"run structure from motion first, for example `{command}`, and name {folder} then"

@@ -1,0 +1,46 @@
+"""The colliders that a scene file asks for: from mesh files or from the splats."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.scene.colliders.collider import (
+    Collider,
+    Making,
+    Told,
+    collider_of_mesh,
+    collider_of_model,
+)
+from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
+
+BACKGROUND_FACES = 10_000  # it stays where it is: the physics looks only at those near a body
+
+
+def colliders_of(
+    file: SceneFile, models: Mapping[str, Model], told: Told | None = None
+) -> dict[str, Collider]:
+    """The collider of each object that has one, by its name; kept in the user's cache.
+
+    Raises BadFile that names the object.
+    """
+    making, made, out = Making(told=told), {}, {}
+    for item in file.all_items:
+        if item.collider is not None:
+            x = item.x if item.collider == HULLS else 0
+            key = (item.collider, id(models[item.name]), x, item.name == BACKGROUND)
+            if key not in made:
+                made[key] = one_collider(file, item, models[item.name], making)
+            out[item.name] = made[key]
+    return out
+
+
+def one_collider(file: SceneFile, item: SceneItem, model: Model, making: Making) -> Collider:
+    """The object's collider; the background's is a mesh of more faces that leaves rooms open."""
+    if item.name == BACKGROUND:
+        making = replace(making, hollow=True, faces=BACKGROUND_FACES)
+    try:
+        if item.collider == HULLS:
+            return collider_of_model(model, item.x, making)
+        return collider_of_mesh(file.path(item.collider), making)
+    except BadFile as error:
+        raise BadFile(f"object '{item.name}': 'collider': {error}") from None

@@ -1,0 +1,263 @@
+"""Edits of a scene file as a person makes them: pure, each gives another SceneFile, so that every
+one can be undone.  Items that an edit does not touch stay the very same objects.
+"""
+
+import math
+import re
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
+from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
+from shapeshift.scene.pose import Pose
+
+LONGEST_NAME = 100  # letters, as the reader takes them
+MOST_OBJECTS = 1000  # as the reader takes them
+DECIMALS, FINER = 6, 9  # of metres and of a quaternion: hands are no finer, files are short
+MOST_STEPS = 500  # that can be undone
+MOST_BYTES = 256 << 20  # of what the steps keep beside the file: painted regions of large scenes
+
+
+def find(file: SceneFile, name: str) -> SceneItem | None:
+    """The object or background of that name."""
+    return next((item for item in file.all_items if item.name == name), None)
+
+
+def free_name(taken: set[str], wanted: str) -> str:
+    """The wanted name, with the next free number behind it where it is taken."""
+    taken = taken | {BACKGROUND}
+    wanted = " ".join(wanted.split())[:LONGEST_NAME] or "object"
+    if wanted not in taken:
+        return wanted
+    stem = re.sub(r" \d+$", "", wanted)[: LONGEST_NAME - 5]
+    return next(f"{stem} {n}" for n in range(2, len(taken) + 3) if f"{stem} {n}" not in taken)
+
+
+def add(file: SceneFile, item: SceneItem) -> SceneFile:
+    """With one object more, the last, under a free name.  ValueError where there is no room."""
+    if len(file.items) >= MOST_OBJECTS:
+        raise ValueError(f"There are {len(file.items)} objects, the most a scene file has.")
+    names = {other.name for other in file.all_items}
+    item = replace(item, name=free_name(names, item.name))
+    return replace(file, items=(*file.items, item))
+
+
+def duplicate(file: SceneFile, name: str, by: tuple[float, float, float]) -> SceneFile:
+    """With a copy right behind the object, moved by metres; the background's is an object."""
+    item = wanted(file, name)
+    position = tuple(a + b for a, b in zip(item.position, by, strict=True))
+    file = add(file, replace(item, position=position))
+    if item.name == BACKGROUND:
+        return file
+    at = file.items.index(item) + 1  # the first that is equal is the object itself
+    return replace(file, items=(*file.items[:at], file.items[-1], *file.items[at:-1]))
+
+
+def remove(file: SceneFile, name: str) -> SceneFile:
+    """Without an object or the background."""
+    item = wanted(file, name)
+    if item is file.background:
+        return replace(file, background=None)
+    return replace(file, items=tuple(other for other in file.items if other is not item))
+
+
+def hide(file: SceneFile, name: str, hidden: bool = True) -> SceneFile:
+    return change(file, name, visible=not hidden)
+
+
+def place(file: SceneFile, name: str, pose: Pose) -> SceneFile:
+    """With the object elsewhere.  ValueError for a place that the physics does not reach."""
+    position = tuple(round(float(metres), DECIMALS) for metres in pose.position)
+    if not all(-FAR_M <= metres <= FAR_M for metres in position):
+        raise ValueError(f"'{name}' would stand farther away than {FAR_M:g} m.")
+    wxyz = tuple(round(float(n), FINER) for n in pose.wxyz)
+    return change(file, name, position=position, wxyz=wxyz)
+
+
+def set_x(file: SceneFile, name: str, x: Control) -> SceneFile:
+    """With the object's x at the start.  ValueError beyond 0 to 1."""
+    check_control(x, f"object '{name}'")
+    return change(file, name, x=x if isinstance(x, StopWeights) else float(x))
+
+
+def rename(file: SceneFile, before: str, after: str) -> SceneFile:
+    """With another name.  ValueError, one sentence, for one that the file cannot have."""
+    after = " ".join(after.split())
+    if wanted(file, before) is file.background:
+        raise ValueError(f"The background is always called '{BACKGROUND}'.")
+    if not 0 < len(after) <= LONGEST_NAME or not after.isprintable():
+        raise ValueError(f"A name has 1 to {LONGEST_NAME} letters on one line.")
+    if after == before:
+        return file
+    if after == BACKGROUND:
+        raise ValueError(f"'{BACKGROUND}' is taken for the background alone; choose another name.")
+    if find(file, after) is not None:
+        raise ValueError(f"'{after}' is taken; choose another name.")
+    return change(file, before, name=after)
+
+
+def change(file: SceneFile, name: str, /, **values: object) -> SceneFile:
+    """With other values of an object's fields; the same file where nothing is different."""
+    before = wanted(file, name)
+    if all(getattr(before, field) == value for field, value in values.items()):
+        return file
+    after = replace(before, **values)
+    if before is file.background:
+        return replace(file, background=after)
+    return replace(file, items=tuple(after if item is before else item for item in file.items))
+
+
+def ground(file: SceneFile, floor_y: float | None) -> SceneFile:
+    """With an endless floor at that height, metres, or without one."""
+    if floor_y is not None:
+        if not -FAR_M <= floor_y <= FAR_M:
+            raise ValueError(f"A floor lies within {FAR_M:g} m.")
+        floor_y = round(float(floor_y), DECIMALS)
+    return file if floor_y == file.floor_y else replace(file, floor_y=floor_y)
+
+
+def look_from(file: SceneFile, eye: np.ndarray, target: np.ndarray, fov_y: float) -> SceneFile:
+    """With the first look from eye (3,) to target (3,).  ValueError for one straight up or down."""
+    view = FirstView(*(tuple(round(float(n), DECIMALS) for n in p) for p in (eye, target)), fov_y)
+    if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
+        raise ValueError("The first look goes not straight up or down; tilt it a little.")
+    return file if view == file.view else replace(file, view=view)
+
+
+def wanted(file: SceneFile, name: str) -> SceneItem:
+    """The item of that name; ValueError where there is none."""
+    item = find(file, name)
+    if item is None:
+        raise ValueError(f"There is no object '{name}' any more.")
+    return item
+
+
+@dataclass(frozen=True)
+class Change:
+    """What became of one object from one file to another; None: it is not there."""
+
+    before: SceneItem | None
+    after: SceneItem | None
+
+    @property
+    def fields(self) -> set[str]:
+        """Names of what is different, of an object that is in both."""
+        if self.before is None or self.after is None:
+            return set()
+        names = (field.name for field in fields(SceneItem))
+        return {name for name in names if getattr(self.before, name) != getattr(self.after, name)}
+
+
+def changes(before: SceneFile, after: SceneFile) -> list[Change]:
+    """What an edit, or undoing it, did; an object that was renamed is one change, not two."""
+    old = {item.name: item for item in before.all_items}
+    new = {item.name: item for item in after.all_items}
+    gone = [item for name, item in old.items() if name not in new]
+    come = [item for name, item in new.items() if name not in old]
+    out = []
+    if len(gone) == len(come) == 1 and Change(gone[0], come[0]).fields - {"x"} == {"name"}:
+        out, gone, come = [Change(gone[0], come[0])], [], []
+    out += [Change(item, None) for item in gone]
+    out += [
+        Change(old[name], item)
+        for name, item in new.items()
+        if name in old and item is not old[name] and Change(old[name], item).fields
+    ]
+    return out + [Change(None, item) for item in come]
+
+
+def with_x_of(file: SceneFile, other: SceneFile) -> SceneFile:
+    """The file with each object's x as it is in the other: a look, which no undoing changes."""
+    now = {item.name: item for item in other.all_items}
+    pairs = ((change.before, change.after) for change in changes(other, file))
+    now |= {after.name: before for before, after in pairs if before and after}  # renamed
+
+    def looked(item: SceneItem) -> SceneItem:
+        """With the x of now; the very object of the other file where that says the same."""
+        known = now.get(item.name, item)
+        moved = item if item.x == known.x else replace(item, x=known.x)
+        return known if moved == known else moved
+
+    items = tuple(looked(item) for item in file.items)
+    background = looked(file.background) if file.background else None
+    if items == file.items and background == file.background:
+        return file
+    return replace(file, items=items, background=background)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A file, and in words the edit that led to it."""
+
+    file: SceneFile
+    what: str = ""
+    together: str = ""  # edits in a row with the same word are one step: a drag
+    regions: tuple = ()  # edited beside the file, until it is saved
+    bytes: int = 0  # that this step alone keeps
+
+
+@dataclass(frozen=True)
+class History:
+    """What the file was, is, and was before something was undone."""
+
+    steps: tuple[Step, ...]
+    at: int = 0  # the step that holds now
+
+    @staticmethod
+    def of(file: SceneFile, regions: tuple = ()) -> "History":
+        return History((Step(file, regions=regions),))
+
+    @property
+    def file(self) -> SceneFile:
+        return self.steps[self.at].file
+
+    @property
+    def regions(self) -> tuple:
+        return self.steps[self.at].regions
+
+    @property
+    def undoes(self) -> str:
+        """The edit that `undo` takes back; "" where there is none."""
+        return self.steps[self.at].what if self.at else ""
+
+    @property
+    def redoes(self) -> str:
+        return self.steps[self.at + 1].what if self.at + 1 < len(self.steps) else ""
+
+    def take(
+        self, file: SceneFile, what: str, together: str = "", regions: tuple | None = None,
+        more_bytes: int = 0,
+    ) -> "History":  # fmt: skip
+        """After another edit of the file or of the regions; what had been undone is forgotten."""
+        regions = self.regions if regions is None else regions
+        if file is self.file and regions == self.regions:
+            return self
+        now = self.steps[self.at]
+        keep = self.at if together and now.together == together else self.at + 1
+        steps = (*self.steps[:keep], Step(file, what, together, regions, more_bytes))
+        steps = steps[-MOST_STEPS - 1 :]
+        while len(steps) > 2 and sum(step.bytes for step in steps) > MOST_BYTES:
+            steps = steps[1:]
+        return History(steps, len(steps) - 1)
+
+    def amend(self, file: SceneFile, regions: tuple | None = None) -> "History":
+        """What holds now is another, but no edit of its own: a slider has moved."""
+        regions = self.regions if regions is None else regions
+        if file is self.file and regions == self.regions:
+            return self
+        now = replace(self.steps[self.at], file=file, regions=regions)
+        return replace(self, steps=(*self.steps[: self.at], now, *self.steps[self.at + 1 :]))
+
+    def rest(self) -> "History":
+        """The hand has let go: the next edit is a step of its own."""
+        if not self.steps[self.at].together:
+            return self
+        rested = replace(self.steps[self.at], together="")
+        return replace(self, steps=(*self.steps[: self.at], rested, *self.steps[self.at + 1 :]))
+
+    def undo(self) -> "History":
+        return replace(self.rest(), at=max(self.at - 1, 0))
+
+    def redo(self) -> "History":
+        return replace(self.rest(), at=min(self.at + 1, len(self.steps) - 1))

@@ -1,0 +1,112 @@
+"""Makes a living world match an edited scene file: what was not edited goes on as it was."""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+
+from shapeshift.runtime_models.model import Model
+from shapeshift.scene.document.scene_file import (
+    SceneFile,
+    SceneItem,
+    labelled,
+    machine_of,
+    object_of,
+)
+from shapeshift.scene.world.reactions import start
+from shapeshift.scene.world.rigid_object import Thing
+from shapeshift.scene.world.world import World
+
+BODY = ("model", "mode", "up", "flip", "collider", "static", "mass_kg", "friction", "restitution")
+ANSWERS = ("states", "ring", "reactions")
+
+
+def follow(world: World, file: SceneFile, models: Mapping[str, Model], colliders: Mapping) -> None:
+    """Objects come, go, change and take another order or name as the file says.
+
+    Only what differs from the item that the world knows is touched: a body that has fallen stays
+    where it lies until its own pose is edited.  Raises BadFile, with the world half changed, for
+    what `read_models` and the world would have refused.
+    """
+    wanted = {item.name: item for item in file.all_items}
+    rename(world, wanted)
+    for name in [name for name in world.things if name not in wanted]:
+        world.remove(name)
+    for label, item in labelled(file):
+        if item.name not in world.things:
+            world.add(item, models[item.name], colliders.get(item.name), label)
+        else:
+            change(world, item, models[item.name], colliders.get(item.name))
+        thing = world.things[item.name]
+        if thing.drawn.label != label:
+            world.things[item.name] = replace(thing, drawn=replace(thing.drawn, label=label))
+    world.things = {name: world.things[name] for name in wanted}
+
+
+def rename(world: World, wanted: Mapping[str, SceneItem]) -> None:
+    """An object that is gone and one that is new, alike but for the name, are the same."""
+    gone = [name for name in world.things if name not in wanted]
+    for item in [item for name, item in wanted.items() if name not in world.things]:
+        same = [n for n in gone if changed(world.things[n].item, item) == {"name"}]
+        if same:
+            gone.remove(same[0])
+            thing = world.things.pop(same[0])
+            drawn = replace(thing.drawn, name=item.name)
+            world.things[item.name] = replace(thing, item=item, drawn=drawn)
+            if thing.body is not None:
+                world.names[thing.body] = item.name
+
+
+def change(world: World, item: SceneItem, model: Model, collider) -> None:
+    """One object becomes what its item says now."""
+    new = changed(world.things[item.name].item, item)
+    if not new:
+        return
+    label = world.things[item.name].drawn.label
+    if new & set(BODY):
+        stand_in(world, world.things[item.name], item, model, collider)
+    if new & {"selectors"}:
+        drawn = object_of(item, world.things[item.name].drawn.model, label)
+        world.things[item.name] = replace(world.things[item.name], drawn=drawn)
+    if new & set(ANSWERS):
+        thing = world.things[item.name]
+        machine = machine_of(item, model)
+        standing = start(machine, thing.standing.x)
+        world.things[item.name] = replace(thing, machine=machine, standing=standing)
+    if new & {"position", "wxyz"}:
+        world.place(item.name, item.pose)
+    if "x" in new:
+        world.control(item.name, item.x)
+    if "visible" in new:
+        world.show(item.name, item.visible)
+    world.things[item.name] = replace(world.things[item.name], item=item)
+
+
+def stand_in(world: World, old: Thing, item: SceneItem, model: Model, collider) -> None:
+    """Another body and model for an object, where it stands now and at its x of now."""
+    world.remove(item.name)
+    world.add(item, model, collider, old.drawn.label)
+    world.place(item.name, old.pose)
+    world.control(item.name, old.standing.x)
+
+
+def changed(before: SceneItem, after: SceneItem) -> set[str]:
+    """Names of the fields that differ; selectors and the like count as others unless the same."""
+    if before is after:
+        return set()
+    names = set()
+    for field in fields(SceneItem):
+        a, b = getattr(before, field.name), getattr(after, field.name)
+        plain = field.name not in ("selectors", "reactions")  # whose weights have no one truth
+        if not (a is b or (plain and a == b) or (not plain and not a and not b)):
+            names.add(field.name)
+    return names
+
+
+def put_back(world: World) -> None:
+    """Everything where its item says, at rest, at its first x; hands are empty."""
+    for hand in list(world.holds):
+        world.release(hand)
+    for name, thing in world.things.items():
+        world.place(name, thing.item.pose)
+        fresh = start(thing.machine, thing.item.x)
+        world.things[name] = replace(world.things[name], standing=fresh)
+    world.impulses = {}

@@ -1,0 +1,403 @@
+"""How things fall, rest, collide and are held: the one class behind which the engine hides.
+
+The engine is Rapier (Apache-2.0, pinned).  World metres, +Y up.  It computes in float32.  The same
+calls in the same order give the same bits, in every process on one kind of machine.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from shapeshift.runtime_models.model import Finding
+from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.contacts import Contact, Tally, any_near, velocities
+from shapeshift.scene.world.grab import (
+    WITH_HAND,
+    Hold,
+    carry,
+    hold_from_json,
+    hold_to_json,
+    lag,
+    lead_hands,
+    take_hold,
+    throw,
+)
+from shapeshift.scene.world.physics_rules import (
+    MOST_SPEED,
+    engine,
+    more_substeps,
+    new_world,
+    stopped_bodies,
+)
+from shapeshift.scene.world.physics_shapes import (
+    LEAST_EXTENT,
+    MOST_FRICTION,
+    checked_number,
+    checked_point,
+    checked_pose,
+    clamped_mass,
+    hulls_shape,
+    isometry,
+    mesh_shape,
+    pose_of,
+)
+from shapeshift.scene.world.physics_state import hash_of, pack, unpack
+
+FLOOR = 0  # the id of the floor; every other id counts from 1
+MOST_REACH = 2e4  # metres along a ray
+
+
+class Physics:
+    """A world of static things and bodies, stepped by 1 / hz seconds.
+
+    Bad input is refused with a ValueError before it reaches the engine.  What was changed on the
+    way in (a mass out of range) is told in `findings`.  Raises BadFile where there is no engine.
+    """
+
+    def __init__(
+        self,
+        gravity_m_s2: float = 9.81,
+        floor_y: float | None = None,
+        hz: float = 90,
+        substeps: int = 4,
+    ) -> None:
+        rapier = engine()
+        gravity = checked_number(gravity_m_s2, "the gravity in m/s2", -100, 100)
+        self.hz = checked_number(hz, "the steps a second", 10, 1000)
+        self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
+        self.findings: list[Finding] = []
+        self._handles: dict[int, object] = {}  # id: the engine's handle of a rigid body
+        self._ids: dict[object, int] = {}  # the engine's handle of a collider: id
+        self._masses: dict[int, float] = {}  # kg, of bodies alone
+        self._meshes: set[int] = set()  # statics that are triangle meshes
+        self._holds: dict[int, Hold] = {}
+        self._next_id, self._next_grab = FLOOR + 1, 1
+        self._world = new_world(gravity)
+        self._events = rapier.ChannelEventCollector()
+        self._attach()
+        if floor_y is not None:
+            self._add_floor(float(checked_point((0, floor_y, 0), "the floor")[1]))
+
+    def _attach(self) -> None:
+        """Connects what a snapshot does not hold.  One thread: two are slower at these sizes."""
+        self._world.set_num_threads(1)
+        self._world.event_handler = self._events
+        self._queries_stale = True
+
+    # ---- what is in the world
+
+    def _add_floor(self, floor_y: float) -> None:
+        from rapier3d import RigidBody, SharedShape
+
+        at = isometry(Pose(np.array([0.0, floor_y, 0.0]), np.array([1.0, 0, 0, 0])))
+        shape = SharedShape.halfspace((0.0, 1.0, 0.0))
+        self._insert(FLOOR, RigidBody.fixed(position=at), shape, None, 0.6, 0.0)
+
+    def add_static(
+        self,
+        shape: TriangleMesh | Sequence[np.ndarray],
+        pose: Pose,
+        friction: float = 0.6,
+        restitution: float = 0.0,
+    ) -> int:
+        """A thing that never moves: a mesh (an open one gets a back), or hulls (V, 3) metres."""
+        from rapier3d import RigidBody
+
+        at = isometry(checked_pose(pose, "a static thing"))
+        if isinstance(shape, TriangleMesh):
+            engine_shape, findings = mesh_shape(shape)
+            self.findings += findings
+        else:
+            engine_shape = hulls_shape(shape)
+        return self._insert(
+            self._take_id(), RigidBody.fixed(position=at), engine_shape, None, friction, restitution
+        )
+
+    def add_body(
+        self,
+        hulls: Sequence[np.ndarray],
+        pose: Pose,
+        mass_kg: float,
+        friction: float = 0.6,
+        restitution: float = 0.0,
+    ) -> int:
+        """A thing that moves, made of convex pieces (V, 3) metres, object frame.
+
+        A mass outside 0.05 to 5 kg is clamped and told in `findings`.
+        """
+        from rapier3d import RigidBody
+
+        at = isometry(checked_pose(pose, "a body"))
+        shape = hulls_shape(hulls)
+        mass, finding = clamped_mass(mass_kg)
+        body = RigidBody.dynamic(position=at, ccd_enabled=True)
+        number = self._insert(self._take_id(), body, shape, mass, friction, restitution)
+        self._masses[number] = mass
+        self.findings += [finding] if finding else []
+        return number
+
+    def _take_id(self) -> int:
+        self._next_id += 1
+        return self._next_id - 1
+
+    def _insert(
+        self,
+        number: int,
+        body: object,
+        shape: object,
+        mass: float | None,
+        friction: float,
+        restitution: float,
+    ) -> int:
+        from rapier3d import ActiveEvents, Collider
+
+        collider = Collider.new(shape)
+        collider = collider.friction(checked_number(friction, "a friction", 0, MOST_FRICTION))
+        collider = collider.restitution(checked_number(restitution, "a restitution", 0, 1))
+        if mass is not None:
+            collider = collider.mass(mass).active_events(ActiveEvents.CONTACT_FORCE_EVENTS)
+            collider = collider.contact_force_event_threshold(0.0)
+        handle = self._world.add_body(body, [collider])
+        self._handles[number] = handle
+        self._note_collider(number)
+        self._queries_stale = True
+        return number
+
+    def _note_collider(self, number: int) -> None:
+        from rapier3d import ShapeType
+
+        collider = self._collider(number)
+        self._ids[collider] = number
+        if self._world.colliders[collider].shape.shape_type == ShapeType.TRIMESH:
+            self._meshes.add(number)
+
+    def remove(self, number: int) -> None:
+        """Takes a thing out; hands that held it are empty, and what lay on it falls."""
+        handle = self._handle(number)
+        for grab in [g for g, hold in self._holds.items() if hold.body == number]:
+            self._let_go(grab)
+        del self._ids[self._collider(number)], self._handles[number]
+        self._world.remove_body(handle)
+        self._masses.pop(number, None)
+        self._meshes.discard(number)
+        self._world.wake_up_all()
+        self._queries_stale = True
+
+    def place(self, number: int, pose: Pose) -> None:
+        """Puts a thing somewhere else, at rest: undo, reset and the gizmo."""
+        body = self._world.rigid_bodies[self._handle(number)]
+        body.position = isometry(checked_pose(pose, f"thing {number}"))
+        if number in self._masses:
+            body.linvel = body.angvel = (0.0, 0.0, 0.0)
+        self._world.wake_up_all()
+        self._queries_stale = True
+
+    def set_velocity(self, number: int, linear: object, angular: object = (0, 0, 0)) -> None:
+        """(3,) m/s of the centre of mass and (3,) rad/s, world axes."""
+        body = self._body(number)
+        line = checked_point(linear, f"the velocity of body {number}")
+        turn = checked_point(angular, f"the turning of body {number}")
+        body.linvel, body.angvel = tuple(map(float, line)), tuple(map(float, turn))
+        body.wake_up(True)
+
+    # ---- what it tells
+
+    def ids(self) -> tuple[int, ...]:
+        """Every thing, the floor too, in the order they came."""
+        return tuple(self._handles)
+
+    def bodies(self) -> tuple[int, ...]:
+        """The things that move."""
+        return tuple(self._masses)
+
+    def pose(self, number: int) -> Pose:
+        """world_from_object, exactly what the engine holds."""
+        return pose_of(self._world.rigid_bodies[self._handle(number)].position)
+
+    def velocity(self, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """(3,) m/s of the centre of mass and (3,) rad/s, world axes."""
+        body = self._world.rigid_bodies[self._handle(number)]
+        v, w = body.linvel, body.angvel
+        return np.array([v.x, v.y, v.z]), np.array([w.x, w.y, w.z])
+
+    def mass(self, number: int) -> float:
+        """kg, as clamped."""
+        self._body(number)
+        return self._masses[number]
+
+    def sleeps(self, number: int) -> bool:
+        """Whether a body has come to rest and costs nothing."""
+        return self._body(number).is_sleeping
+
+    def cast_ray(self, origin: object, direction: object) -> tuple[int, float] | None:
+        """The nearest thing along a ray and its distance in metres; 0 from inside of one."""
+        from rapier3d import Ray
+
+        start = checked_point(origin, "the origin of a ray")
+        along = np.asarray(direction, np.float64)
+        length = math.hypot(*along) if along.shape == (3,) else 0.0
+        if not 0 < length < math.inf:
+            raise ValueError(f"a ray has the direction {direction}; 3 numbers, not 0, are wanted.")
+        ray = Ray(tuple(map(float, start)), tuple(map(float, along / length)))
+        hit = self._queries().cast_ray(ray, MOST_REACH, True)
+        return (self._ids[hit[0]], hit[1]) if hit else None
+
+    def nearest(self, point: object, within: float) -> tuple[int, float] | None:
+        """The body nearest to a hand and its distance, at most `within` metres; 0 inside."""
+        from rapier3d import QueryFilter
+
+        at = checked_point(point, "the place of a hand")
+        reach = checked_number(within, "a hand's reach in metres", 0, MOST_REACH)
+        found = self._queries().project_point(
+            tuple(map(float, at)), True, QueryFilter.only_dynamic(), reach + LEAST_EXTENT
+        )
+        if found is None:
+            return None
+        p = found[1].point
+        distance = 0.0 if found[1].is_inside else math.dist(at, (p.x, p.y, p.z))
+        return (self._ids[found[0]], distance) if distance <= reach else None
+
+    def _queries(self) -> object:
+        if self._queries_stale:
+            self._world.update_query_pipeline()
+            self._queries_stale = False
+        return self._world.query_pipeline
+
+    def _handle(self, number: int) -> object:
+        if number not in self._handles:
+            raise ValueError(f"there is no thing {number}; it was removed, or never added.")
+        return self._handles[number]
+
+    def _collider(self, number: int) -> object:
+        return self._world.rigid_bodies[self._handles[number]].colliders[0]  # each has one
+
+    def _body(self, number: int) -> object:
+        handle = self._handle(number)
+        if number not in self._masses:
+            raise ValueError(f"thing {number} is static; only a body moves.")
+        return self._world.rigid_bodies[handle]
+
+    # ---- time
+
+    def step(self) -> list[Contact]:
+        """One step of 1 / hz seconds; every pair that touched in it, once, by ids."""
+        bodies = {number: self._body(number) for number in self._masses}
+        held = {hold.body for hold in self._holds.values()}
+        free = {n: (self._masses[n], body) for n, body in bodies.items() if n not in held}
+        speeds = velocities(bodies)
+        at_meshes = [(self._collider(a), self._collider(b)) for a in held for b in self._meshes]
+        substeps = self.substeps * more_substeps(speeds, any_near(self._world, at_meshes))
+        rules = self._world.integration_parameters
+        rules.dt = 1 / self.hz / substeps
+        starts = [
+            (hold, self._world.rigid_bodies[hold.hand].position) for hold in self._holds.values()
+        ]
+        tally = Tally(self._world, self._ids, -self._world.gravity.y)
+        for k in range(substeps):
+            lead_hands(self._world, starts, (k + 1) / substeps)
+            rules.contact_clustering = not any_near(self._world, at_meshes)
+            self._world.step()
+            events = self._events.drain_contact_force_events()
+            if events:
+                tally.gather(events, speeds, free)
+            speeds = velocities(bodies)
+        for hold in self._holds.values():
+            hold.trail.append(hold.target)
+        self.findings += stopped_bodies(self._world, self._handles)
+        self._queries_stale = True
+        return tally.contacts()
+
+    # ---- hands
+
+    def grab(self, number: int, hand_pose: Pose, point: object) -> int:
+        """A hand takes hold of a body at a point (3,) of the world; two hands may hold one body."""
+        body = self._body(number)
+        hand = checked_pose(hand_pose, "a hand")
+        at = checked_point(point, "the point of a grab")
+        hold = take_hold(self._world, number, self._handles[number], hand, at)
+        self._holds[self._next_grab] = hold
+        body.wake_up(True)
+        self._next_grab += 1
+        return self._next_grab - 1
+
+    def held(self, grab: int) -> int | None:
+        """The body that a grab holds; None when it is over."""
+        return self._holds[grab].body if grab in self._holds else None
+
+    def move_hand(self, grab: int, pose: Pose | None) -> None:
+        """Where the hand shall be after the next step; None: it is lost, and drops what it held."""
+        hold = self._hold(grab)
+        if pose is None:
+            self._let_go(grab)
+            return
+        hold.target = checked_pose(pose, "a hand")
+        self._world.rigid_bodies[self._handles[hold.body]].wake_up(True)
+
+    def carry(self, grab: int, moved: np.ndarray) -> None:
+        """A hand jumps by (4, 4) now_from_before, rigid, with what it holds and who else does."""
+        body = self._hold(grab).body
+        holds = [(h, self._hand(h)) for h in self._holds.values() if h.body == body]
+        carry(holds, self._body(body), moved)
+        self._queries_stale = True
+
+    def release(self, grab: int) -> None:
+        """Lets go: the body flies on with its hand's velocity, unless something kept it back."""
+        hold = self._hold(grab)
+        body = self._world.rigid_bodies[self._handles[hold.body]]
+        with_hand = lag(hold, self._world.rigid_bodies[hold.hand], body) <= WITH_HAND
+        self._let_go(grab)
+        if with_hand and all(other.body != hold.body for other in self._holds.values()):
+            throw(hold, body, self.hz, MOST_SPEED)
+
+    def _let_go(self, grab: int) -> None:
+        hold = self._holds.pop(grab)
+        self._world.impulse_joints.remove(hold.joint)
+        self._world.remove_body(hold.hand)
+
+    def _hold(self, grab: int) -> Hold:
+        if grab not in self._holds:
+            raise ValueError(f"there is no grab {grab}; its hand has let go, or never held.")
+        return self._holds[grab]
+
+    # ---- all of it
+
+    def snapshot(self) -> bytes:
+        """Everything there is, to the last bit, findings aside.
+
+        Of equal worlds the bytes can differ: the engine writes its pairs in no fixed order.
+        """
+        books = {
+            "hz": self.hz,
+            "substeps": self.substeps,
+            "next": [self._next_id, self._next_grab],
+            "things": [[n, h.index, h.generation] for n, h in self._handles.items()],
+            "masses": list(self._masses.items()),
+            "holds": [[grab, hold_to_json(hold)] for grab, hold in self._holds.items()],
+        }
+        return pack(books, self._world.snapshot())
+
+    def restore(self, data: bytes) -> None:
+        """Back to a snapshot, one of another Physics too.  Raises ValueError, changing nothing."""
+        from rapier3d import PhysicsWorld, RigidBodyHandle, SerializationError
+
+        books, engine = unpack(data)
+        try:
+            self._world = PhysicsWorld.restore(engine)
+        except SerializationError as why:
+            raise ValueError(f"a snapshot is of another engine ({why}); take a new one.") from why
+        self.hz, self.substeps = books["hz"], books["substeps"]
+        self._next_id, self._next_grab = books["next"]
+        self._handles = {n: RigidBodyHandle(i, g) for n, i, g in books["things"]}
+        self._ids, self._meshes = {}, set()
+        for number in self._handles:
+            self._note_collider(number)
+        self._masses = dict(books["masses"])
+        self._holds = {grab: hold_from_json(hold) for grab, hold in books["holds"]}
+        self._events.clear()
+        self._attach()
+
+    def hash(self) -> str:
+        """SHA-256 of every pose and velocity, in the order of ids: equal worlds, equal hashes."""
+        return hash_of((n, self.pose(n), *self.velocity(n)) for n in sorted(self._handles))

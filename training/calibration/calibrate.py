@@ -1,0 +1,224 @@
+"""Where the second camera of a rig really sits, from the photos.
+
+Another modality's photos make a shape; then six numbers are looked for with which that shape shows
+the modality's photos best.  Small photos lead near, photos of the size of the training to the end.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shapeshift.rasterizer.project import LEAST_ALPHA
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.pose import View
+from shapeshift.training.baselines.plain import one_modality
+from shapeshift.training.calibration.extrinsics import Found, rigid, told
+from shapeshift.training.calibration.residuals import Frozen, Shape
+from shapeshift.training.first_anchors.initial import common_box
+from shapeshift.training.photos import BLACK, read
+from shapeshift.training.schedule import choose_background
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.train import Trainer
+
+STEPS = 2000  # of training the shape
+MOST_SIDE = 400  # pixels of a photo that the offset is found from
+SOLVE, SOLVE_FIRST = 5, 13  # steps at each offset that is tried, and at a stage's first
+PROBE = 0.004  # radians, and shares of the distance: 0.3 to 2 pixels
+MOST_STEP = 0.03  # of each of the six numbers, at once
+LEAST_STEP = 1e-5  # a step of less ends a stage
+LEAST_CURVE = 0.01  # of the largest: less curvature, or one downwards, counts as that
+Tell = Callable[[str, float], None]  # what is done now, and how far it is, 0..1
+
+
+@dataclass(frozen=True)
+class Stage:
+    smaller: int  # sides of the photos are divided by this
+    photos: int  # at most, spread evenly
+    tries: int  # offsets at most
+    probe: bool  # whether the curvature is measured, or that of the stage before is used
+
+
+STAGES = (
+    Stage(4, 36, 12, True), Stage(2, 36, 10, True), Stage(1, 36, 8, True), Stage(1, 72, 3, False),
+)  # fmt: skip
+
+
+def calibrate(
+    device,
+    capture: Capture,
+    settings: TrainSettings,
+    modality: str,
+    steps: int = STEPS,
+    stages: tuple[Stage, ...] = STAGES,
+    tell: Tell = lambda what, done: None,
+) -> Found:
+    """The offset of a modality's cameras.  Raises BadFile where there is nothing to hold it to."""
+    shape = shape_for(device, capture, settings, modality, steps, tell)
+    return search(device, capture, settings, modality, shape, stages, tell)
+
+
+def shape_for(
+    device, capture: Capture, settings: TrainSettings, modality: str, steps: int, tell: Tell
+) -> Shape:
+    """What another modality's photos show, as splats on the device.  Raises BadFile."""
+    other = reference_of(capture, modality)
+    if not capture.of(modality, "train"):
+        raise BadFile(f"{capture.folder}: modality '{modality}' has no training photos.")
+    _, factor = factors_of(capture, modality, other.name, settings.downscale or 1)
+    alone = one_modality(capture, other.name)
+    return shape_of(device, alone, shape_settings(settings, steps, factor), tell)
+
+
+def search(
+    device,
+    capture: Capture,
+    settings: TrainSettings,
+    modality: str,
+    shape: Shape,
+    stages: tuple[Stage, ...],
+    tell: Tell,
+) -> Found:
+    """The offset of a modality's cameras with which a shape shows its photos best."""
+    photos = capture.of(modality, "train")
+    other = reference_of(capture, modality)
+    factor, _ = factors_of(capture, modality, other.name, settings.downscale or 1)
+    behind = float(np.mean(choose_background(settings.background, capture.background) or BLACK))
+    distance = distance_of([photo.view for photo in photos])
+    offset, inverse, frozen, first = np.eye(4), None, None, None
+    for number, stage in enumerate(stages):
+        tell(f"cameras of {modality}", number / len(stages))
+        chosen = [
+            read(photo, factor * stage.smaller, settings.masks)
+            for photo in photos[:: -(-len(photos) // stage.photos)]
+        ]
+        before, frozen = frozen, Frozen(device, shape, chosen, behind, distance)
+        if before is not None:
+            frozen.gray = before.gray
+        first = first or frozen
+        offset, inverse = descend(frozen, offset, None if stage.probe else inverse, stage.tries)
+    return told(rigid(offset), gain_db(first, offset))
+
+
+def reference_of(capture: Capture, modality: str) -> Stop:
+    """The modality whose cameras are taken as right: visible light, else the nearest by x.
+
+    Raises BadFile where there is no such modality, or none beside it.
+    """
+    names = [stop.name for stop in capture.stops]
+    if modality not in names:
+        raise BadFile(
+            f"{capture.folder}: no modality '{modality}' to calibrate; it has {', '.join(names)}."
+        )
+    if len(names) < 2:
+        raise BadFile(
+            f"{capture.folder}: '{modality}' is its only modality; an offset of a rig's camera is "
+            "found against another one."
+        )
+    x = capture.stops[names.index(modality)].x
+    others = [stop for stop in capture.stops if stop.name != modality]
+    return min(others, key=lambda stop: (stop.kind != "rgb", abs(stop.x - x)))
+
+
+def factors_of(capture: Capture, modality: str, other: str, downscale: int) -> tuple[int, int]:
+    """What the sides of two modalities' photos are divided by: pixels of the same angle, since
+    splats that were trained at one size are a little too thick at another.
+    """
+    views = [next(p.view for p in capture.photos if p.modality == n) for n in (modality, other)]
+    focal, other_focal = (view.pinhole()[1] for view in views)
+    factor = max(downscale, -(-max(views[0].size) // MOST_SIDE))
+    return factor, max(round(other_focal * factor / focal), 1)
+
+
+def shape_settings(settings: TrainSettings, steps: int, factor: int) -> TrainSettings:
+    """Those of the run that makes the shape: as asked for, but of one modality, without growing."""
+    return replace(
+        settings, iterations=steps, seconds=None, grow=False, coarse=1, between="none",
+        view_dependent=False, downscale=factor,
+    )  # fmt: skip
+
+
+def shape_of(device, capture: Capture, settings: TrainSettings, tell: Tell) -> Shape:
+    """Means, scales, wxyz and opacity on the device of what a capture of one modality shows."""
+    (stop,) = capture.stops
+    trainer = Trainer(device, capture, settings)
+    for now in trainer.steps():
+        tell(f"shape from {stop.name}", now.fraction)
+    splats = trainer.step.decode(trainer.control(stop.name), np.zeros(3))
+    arrays = [device.download(array) for array in splats.fields()[:4]]
+    there = arrays[3] > LEAST_ALPHA
+    for array in arrays:
+        there &= np.isfinite(array.reshape(len(array), -1)).all(axis=1)
+    if not there.any():
+        raise BadFile(
+            f"{capture.folder}: the photos of '{stop.name}' gave no shape to hold the cameras to."
+        )
+    return tuple(device.upload(array[there]) for array in arrays)
+
+
+def distance_of(views: list[View]) -> float:
+    """Median metres from the cameras to the place that they look at together."""
+    eyes = np.array([view.world_from_eye.position for view in views])
+    return float(np.median(np.linalg.norm(eyes - common_box(views)[0], axis=1)))
+
+
+def curvature(frozen: Frozen, offset: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """(6, 6) how the slope changes with each of the six numbers; positive definite."""
+    gray, rows = frozen.gray, []
+    for way in PROBE * np.eye(6):
+        frozen.gray = gray
+        frozen.stand(offset @ frozen.step(way))
+        frozen.solve(SOLVE)
+        rows.append((frozen.slope()[1] - slope) / PROBE)
+    frozen.gray = gray
+    values, axes = np.linalg.eigh((np.array(rows) + np.array(rows).T) / 2)
+    values = np.abs(values)
+    return axes * np.maximum(values, LEAST_CURVE * values.max()) @ axes.T
+
+
+def descend(
+    frozen: Frozen, offset: np.ndarray, inverse: np.ndarray | None, tries: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(offset, inverse curvature) after BFGS from those; None: the curvature is measured first."""
+    frozen.stand(offset)
+    frozen.solve(SOLVE_FIRST)
+    cost, slope = frozen.slope()
+    if inverse is None:
+        inverse = np.linalg.inv(curvature(frozen, offset, slope))
+    for _ in range(tries):
+        way = -inverse @ slope
+        way *= min(1.0, MOST_STEP / np.abs(way).max()) if way.any() else 1.0
+        if not np.abs(way).max() > LEAST_STEP:
+            break
+        gray, tried = frozen.gray, offset @ frozen.step(way)
+        frozen.stand(tried)
+        frozen.solve(SOLVE)
+        cost_there, slope_there = frozen.slope()
+        inverse = learned(inverse, way, slope_there - slope)
+        if cost_there < cost:
+            offset, cost, slope = tried, cost_there, slope_there
+        else:
+            frozen.gray = gray
+    return offset, inverse
+
+
+def learned(inverse: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """The inverse curvature with what a step showed of it; where it bends down, smaller steps."""
+    along = way @ change
+    if not along > 0:
+        return inverse / 4
+    left = np.eye(6) - np.outer(way, change) / along
+    return left @ inverse @ left.T + np.outer(way, way) / along
+
+
+def gain_db(frozen: Frozen, offset: np.ndarray) -> float:
+    """How much better the photos are shown from `offset` than from the stated poses."""
+    costs = []
+    for where in (np.eye(4), offset):
+        frozen.gray = np.zeros_like(frozen.gray)
+        frozen.stand(where)
+        frozen.solve(SOLVE_FIRST)
+        costs.append(frozen.slope()[0])
+    before, now = np.maximum(costs, 1e-30)
+    return float(10 * np.log10(before / now))

@@ -1,0 +1,274 @@
+"""Where the first anchors stand: at points, on a visual hull, or in the cameras' common view."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.pose import View
+from shapeshift.training.first_anchors.point_sources import CLOUDS, cloud_points, depth_points
+from shapeshift.training.photos import LoadedPhoto
+
+SOURCES = ("auto", "capture", "depth", "hull", "random")  # or a file: see CLOUDS
+COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of a cube of the carved box's volume
+HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
+FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
+BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
+RANDOM_POINTS = 20_000
+SAMPLE = 1000  # points whose nearest neighbour is looked for
+
+
+def median_neighbour(points: np.ndarray, rng: np.random.Generator) -> float:
+    """Median distance in metres from a point to its nearest neighbour, over a sample."""
+    picked = rng.choice(len(points), min(SAMPLE, len(points)), replace=False)
+    square = (points**2).sum(1)
+    nearest = []
+    for chunk in np.array_split(picked, max(1, len(picked) // 100)):
+        distance2 = square[chunk, None] + square[None] - 2 * points[chunk] @ points.T
+        distance2[np.arange(len(chunk)), chunk] = np.inf
+        nearest.append(distance2.min(axis=1))
+    return float(np.sqrt(np.median(np.maximum(np.concatenate(nearest), 0))))
+
+
+def voxel_centres(points: np.ndarray, voxel: float) -> np.ndarray:
+    """(A, 3) float32 the grid nodes of spacing `voxel` that have a point, each once, sorted."""
+    return (np.unique(np.round(points / voxel), axis=0) * voxel).astype(np.float32)
+
+
+def choose_voxel(points: np.ndarray, most: int, rng: np.random.Generator) -> float:
+    """Median neighbour distance, or as much more as it takes to come down to `most` anchors."""
+    low = max(median_neighbour(points, rng), 1e-9)
+    if len(voxel_centres(points, low)) <= most:
+        return low
+    high = low
+    while len(voxel_centres(points, high)) > most:
+        low, high = high, high * 2
+    for _ in range(8):  # to 0.4 %
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if len(voxel_centres(points, middle)) > most else (low, middle)
+    return high
+
+
+def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(P, 2) pixels, row 0 on top, and (P,) whether the point lies in the image."""
+    camera_from_world, fx, fy, cx, cy = view.pinhole()
+    x, y, z = (points @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixel = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1)
+    width, height = view.size
+    inside = (z > view.near) & (pixel >= 0).all(1) & (pixel < (width, height)).all(1)
+    return pixel, inside
+
+
+def common_box(views: list[View]) -> tuple[np.ndarray, np.ndarray]:
+    """(centre (3,), half side) metres of the place that the cameras look at together."""
+    eyes = np.array([v.world_from_eye.position for v in views])
+    ahead = np.array([-v.world_from_eye.matrix()[:3, 2] for v in views])
+    # nearest point to all viewing axes, least squares; nearly parallel axes are held near the eyes
+    away = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
+    spread = max(float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-3)
+    pull = 1e-3 * len(views)
+    guess = (eyes + spread * ahead).mean(0)
+    centre = np.linalg.solve(
+        away.sum(0) + pull * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + pull * guess
+    )
+    distance = np.median(np.linalg.norm(eyes - centre, axis=1))
+    tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
+    return centre, float(1.5 * distance * min(tangent, 0.6))
+
+
+def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | None:
+    """(H, W) bool where the photo shows the object; None where it cannot be told."""
+    if photo.see_through:
+        return photo.rgba[..., 3] >= 128
+    if background is None:
+        return None
+    difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
+    return difference > BACKGROUND_NOISE
+
+
+def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
+    """(P, 3) centres of the surface cells of a box that no silhouette shows as background.
+
+    photos: (view, silhouette).  The box from `low` to `high` has about side^3 cells, all cubes:
+    in cells that are long one way, points would be nearest to each other the other way.
+    """
+    edge = float(np.prod((high - low) / side)) ** (1 / 3)  # metres
+    counts = np.maximum(np.rint((high - low) / edge), 1).astype(int)
+    axes = [(np.arange(count) + 0.5 - count / 2) * edge for count in counts]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + (low + high) / 2
+    solid, seen = np.ones(len(points), bool), np.zeros(len(points), int)
+    for view, shape in photos:
+        left = np.flatnonzero(solid)
+        pixel, inside = pixel_of(view, points[left])
+        column, row = pixel[inside].astype(int).T
+        solid[left[inside]] = shape[row, column]
+        seen[left[inside]] += 1
+    solid &= seen >= max(2, len(photos) // 4)
+    cells = np.pad(solid.reshape(counts), 1)
+    buried = np.ones_like(cells)
+    for shift in (-1, 1):
+        for dimension in range(3):
+            buried &= np.roll(cells, shift, dimension)
+    surface = (cells & ~buried)[1:-1, 1:-1, 1:-1].reshape(-1)
+    return points[surface]
+
+
+def visual_hull(photos: list[tuple], centre: np.ndarray, half: float) -> np.ndarray:
+    """(P, 3) surface of what all silhouettes allow, carved coarsely first, then in its own box."""
+    photos = photos[:: -(-len(photos) // HULL_PHOTOS)]
+    coarse = carved(photos, centre - half, centre + half, COARSE_SIDE)
+    if not len(coarse):
+        return coarse
+    margin = 2 * half / COARSE_SIDE
+    return carved(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
+
+
+def hull_points(photos: list[LoadedPhoto], background: tuple | None) -> list[np.ndarray]:
+    """(P, 3) the hull of each modality, since one may hide what another shows.
+
+    Empty where no photo tells object from background.
+    """
+    centre, half = common_box([p.view for p in photos])
+    found = []
+    for modality in dict.fromkeys(p.modality for p in photos):
+        shapes = [(p.view, silhouette(p, background)) for p in photos if p.modality == modality]
+        shapes = [(view, shape) for view, shape in shapes if shape is not None]
+        if shapes:
+            found.append(visual_hull(shapes, centre, half))
+    return found
+
+
+def filler_points(
+    points: np.ndarray, photos: list[LoadedPhoto], rng: np.random.Generator
+) -> np.ndarray:
+    """(P, 3) guesses for what has no points: walls without texture, the sky.
+
+    A photo is cut into cells; through each that no point falls into goes a ray, with one guess
+    between the median and the far end of what the photo sees.  Without them the splats that there
+    are blow up until they cover the wall.
+    """
+    found = []
+    for photo in photos[:: -(-len(photos) // FILLER_PHOTOS)]:
+        view = photo.view
+        pixel, inside = pixel_of(view, points)
+        if not inside.any():
+            continue
+        camera_from_world, fx, fy, cx, cy = view.pinhole()
+        depth = points[inside] @ camera_from_world[2, :3] + camera_from_world[2, 3]
+        cells = np.floor(pixel[inside] / view.size * FILLER_CELLS).astype(int)
+        empty = np.ones((FILLER_CELLS, FILLER_CELLS), bool)
+        empty[cells[:, 1], cells[:, 0]] = False
+        row, column = np.nonzero(empty)
+        x, y = (np.stack([column, row]) + rng.random((2, len(row)))) / FILLER_CELLS
+        near, far = np.percentile(depth, [50, 99])
+        z = 1 / rng.uniform(1 / (1.3 * far), 1 / near, len(row))
+        eye = np.stack(
+            [(x * view.size[0] - cx) / fx * z, (y * view.size[1] - cy) / fy * z, z, np.ones_like(z)]
+        )
+        found.append((np.linalg.inv(camera_from_world) @ eye)[:3].T)
+    return np.concatenate(found) if found else np.zeros((0, 3))
+
+
+class First(NamedTuple):
+    """Where a run starts."""
+
+    points: np.ndarray  # (P, 3) metres
+    origin: str  # of them, in words
+    shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
+
+
+def first_voxel(first: First, most: int, rng: np.random.Generator, cap: int) -> float:
+    """What leaves every shape `most` anchors at most and all of them together `cap`, metres.
+
+    Where modalities have shapes of their own, each needs as many anchors as it would need alone.
+    """
+    voxel = min(choose_voxel(shape, most, rng) for shape in first.shapes)
+    if len(voxel_centres(first.points, voxel)) <= cap:
+        return voxel
+    return choose_voxel(first.points, cap, rng)
+
+
+def initial_points(
+    capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto"
+) -> First:
+    """The first points, from the best source that there is.  Raises BadFile.
+
+    source: one of SOURCES, or the path of a cloud; auto takes the first of these that there is:
+    the capture's own points, depth photos, the visual hull, random ones.
+    """
+    hulls = []
+    if source not in SOURCES:
+        return as_one(seen_cloud(Path(source), capture, photos, rng))
+    if source in ("auto", "capture") and capture.points is not None and len(capture.points):
+        points = np.asarray(capture.points, np.float64)
+        return as_one(with_guesses(points, "points", capture, photos, rng))
+    if source in ("auto", "depth"):
+        points = depth_points(photos, rng)
+        if len(points):
+            return as_one(with_guesses(points, "depth photos", capture, photos, rng))
+    if source in ("auto", "hull"):
+        hulls = hull_points(photos, capture.background)
+    if shapes := tuple(hull for hull in hulls if len(hull)):
+        return First(np.concatenate(shapes), "hull", shapes)
+    if hulls and any(p.see_through for p in photos):
+        raise BadFile(
+            f"{capture.folder}: the masks have no volume in common; check that masks and poses "
+            "belong together, or train with --masks ignore."
+        )
+    if source not in ("auto", "random"):
+        lacking = {
+            "capture": "has no points of its own (COLMAP's points3D, or 'points' in its JSON)",
+            "depth": "has no depth photos that know anything",
+            "hull": "has neither masks nor a known background, so that nothing can be carved",
+        }[source]
+        raise BadFile(f"{capture.folder} {lacking}; take other --points, or leave them out.")
+    return as_one((random_points(photos, rng), "random"))
+
+
+def as_one(found: tuple[np.ndarray, str]) -> First:
+    """Points that all modalities start from alike."""
+    points, origin = found
+    return First(points, origin, (points,))
+
+
+def with_guesses(
+    points: np.ndarray, origin: str, capture: Capture, photos: list[LoadedPhoto],
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, str]:  # fmt: skip
+    """The points, and guesses beside them where the photos have no known background."""
+    if capture.background is not None or any(p.see_through for p in photos):
+        return points, origin
+    return np.concatenate([points, filler_points(points, photos, rng)]), f"{origin} and guesses"
+
+
+def seen_cloud(
+    path: Path, capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
+) -> tuple[np.ndarray, str]:
+    """What the photos see of a cloud file: scanners see farther than what was photographed."""
+    if path.suffix.lower() not in CLOUDS:
+        raise BadFile(
+            f"--points {path}: give {', '.join(SOURCES)}, or a file that ends in "
+            f"{', '.join(CLOUDS)}."
+        )
+    points, count = cloud_points(path, capture, rng)
+    seen = np.zeros(len(points), bool)
+    for photo in photos:
+        seen |= pixel_of(photo.view, points)[1]
+    if not seen.any():
+        raise BadFile(
+            f"{path}: no photo sees any of its {count:,} points; they must be in the world and the "
+            "metres of the capture's poses."
+        )
+    origin = f"{path.name} ({seen.sum():,} of {count:,} points)"
+    return with_guesses(points[seen], origin, capture, photos, rng)
+
+
+def random_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.ndarray:
+    """(P, 3) anywhere in the place that the cameras look at together."""
+    centre, half = common_box([p.view for p in photos])
+    cloud = centre + half * rng.uniform(-1, 1, (RANDOM_POINTS, 3))
+    watched = sum(pixel_of(p.view, cloud)[1] for p in photos) >= max(1, len(photos) // 3)
+    return cloud[watched] if watched.any() else cloud

@@ -1,0 +1,191 @@
+"""How much model a scene needs: parts are taken away one by one, and held-out photos decide.
+
+A change is judged by differences of the same photo and seed, so what is hard about a photo falls
+out of it.  A part goes where every modality, by its mean change less the error of that, stays
+within the tolerance of the model before, and of the largest one: neither may several parts cost
+more together, nor one part use up what another happened to win.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shapeshift.runtime_models.model import AnchorModel, Stop
+from shapeshift.training.settings import TrainSettings
+
+SHAPE = ("offset", "scale", "rotation", "opacity")
+LEAST_HIDDEN, LEAST_FEATURES, LEAST_ANCHORS = 8, 4, 50
+DROPPED, KEPT, UNSURE = "dropped", "kept", "kept: not sure"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One choice of settings, trained once a seed, or a stored form of such a model."""
+
+    psnr: dict[str, np.ndarray]  # modality: (seeds, photos) dB
+    models: tuple[AnchorModel, ...]  # one a seed, as their packages give them back
+    storage: str  # of their features, one of FEATURES
+    bytes: int  # of the first, on disk
+    decode_ms: float  # of the first, for another x and another eye
+    train_s: float  # mean of the seeds
+
+    def as_dict(self) -> dict:
+        model = self.models[0]
+        return {
+            "psnr_db": {n: round(float(v.mean()), 3) for n, v in self.psnr.items()},
+            "anchors": len(model.anchors), "splats_per_anchor": model.splats_per_anchor,
+            "features": model.features.shape[1], "storage": self.storage, "bytes": self.bytes,
+            "networks": {
+                name: {"inputs": list(m.inputs), "hidden": [len(b) for b in m.biases[:-1]]}
+                for name, m in model.networks.items()
+            },
+            "decode_ms": round(self.decode_ms, 3), "train_s": round(self.train_s, 2),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Change:
+    """Of a modality's PSNR in dB, and the standard error of that over photos and seeds."""
+
+    mean: float
+    error: float
+
+    def __str__(self) -> str:
+        return f"{self.mean:+.2f} ± {self.error:.2f}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What taking a part away did."""
+
+    part: str
+    change: dict[str, Change]  # to the model before, by modality
+    total: dict[str, Change]  # to the largest model
+    word: str  # DROPPED | KEPT | UNSURE
+    needed_by: tuple[str, ...]  # modalities that lose more than the tolerance, or may
+    bytes: int  # saved
+    decode_ms: float
+    train_s: float
+
+    def as_dict(self) -> dict:
+        def rows(found: dict[str, Change]) -> dict:
+            return {n: {"db": round(c.mean, 3), "error": finite(c.error)} for n, c in found.items()}
+
+        return {
+            "part": self.part, "verdict": self.word, "change": rows(self.change),
+            "total": rows(self.total), "needed_by": list(self.needed_by),
+            "saves_bytes": self.bytes, "saves_decode_ms": round(self.decode_ms, 3),
+            "saves_train_s": round(self.train_s, 2),
+        }  # fmt: skip
+
+
+def finite(error: float) -> float | None:
+    """What JSON can hold of an error."""
+    return round(error, 3) if np.isfinite(error) else None
+
+
+def change_of(before: np.ndarray, after: np.ndarray) -> Change:
+    """Of (seeds, photos) dB.  The error is NaN where one photo and one seed tell no spread."""
+    difference = np.asarray(after, np.float64) - before
+    seeds, photos = difference.shape
+    squares = []
+    if photos > 1:
+        squares.append(difference.mean(axis=0).var(ddof=1) / photos)
+    if seeds > 1:
+        squares.append(difference.mean(axis=1).var(ddof=1) / seeds)
+    error = float(np.sqrt(sum(squares))) if squares else float("nan")
+    return Change(float(difference.mean()), error)
+
+
+def changes(before: Measured, after: Measured) -> dict[str, Change]:
+    return {n: change_of(before.psnr[n], after.psnr[n]) for n in before.psnr}
+
+
+def judge(
+    part: str, full: Measured, before: Measured, after: Measured, tolerance_db: float
+) -> Verdict:
+    """Whether the part may go: `after` is the model without it, `full` the largest."""
+    change, total = changes(before, after), changes(full, after)
+    both = {n: (change[n], total[n]) for n in total}
+    needed_by = tuple(
+        n for n, two in both.items() if not all(c.mean - c.error >= -tolerance_db for c in two)
+    )
+    likely = all(c.mean >= -tolerance_db for two in both.values() for c in two)
+    word = DROPPED if not needed_by else UNSURE if likely else KEPT
+    return Verdict(
+        part, change, total, word, needed_by,
+        before.bytes - after.bytes, before.decode_ms - after.decode_ms,
+        before.train_s - after.train_s,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Part:
+    """Something that settings may do without."""
+
+    name: str
+    kind: str
+    heads: tuple[str, ...] = ()
+    again: bool = False  # whether there may be more of it
+
+    def without(self, settings: TrainSettings, stops: tuple[Stop, ...]) -> TrainSettings | None:
+        """The settings without it, None where it is not there (any more)."""
+        return REDUCE[self.kind](self, settings, stops)
+
+
+def _fix(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    fixed = settings.layout().fixed
+    more = [name for name in part.heads if name not in fixed]
+    if len(stops) < 2 or not more or (len(part.heads) > 1 and len(more) < len(part.heads)):
+        return None
+    return replace(settings, fixed=",".join([*fixed, *more]))
+
+
+def _no_view(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    return replace(settings, view_dependent=False) if settings.view_dependent else None
+
+
+def _layer(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    return replace(settings, layers=settings.layers - 1) if settings.layers > 1 else None
+
+
+def _hidden(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    half = settings.hidden // 2
+    return replace(settings, hidden=half) if half >= LEAST_HIDDEN else None
+
+
+def _features(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    half = settings.features // 2
+    return replace(settings, features=half) if half >= LEAST_FEATURES else None
+
+
+def _slot(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    fewer = settings.splats_per_anchor - 1
+    return replace(settings, splats_per_anchor=fewer) if fewer else None
+
+
+def _anchors(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    """Two thirds of them, at the start and at most; voxels of a surface as much larger."""
+    start, most = 2 * settings.anchors // 3, 2 * settings.max_anchors // 3
+    voxel = None if settings.voxel is None else settings.voxel * 1.5**0.5
+    if not min(start, most) >= LEAST_ANCHORS:
+        return None
+    return replace(settings, anchors=start, max_anchors=most, voxel=voxel)
+
+
+REDUCE = {
+    "fix": _fix, "view": _no_view, "layer": _layer, "hidden": _hidden, "features": _features,
+    "slot": _slot, "anchors": _anchors,
+}  # fmt: skip
+# What costs most to run comes first; the shape as a whole before its networks one by one.
+PARTS = (
+    Part("shape that follows x", "fix", SHAPE),
+    *(Part(f"{name} that follows x", "fix", (name,)) for name in SHAPE),
+    Part("colour that follows x", "fix", ("color",)),
+    Part("colour that follows the eye", "view"),
+    Part("a hidden layer", "layer", again=True),
+    Part("half of the hidden units", "hidden", again=True),
+    Part("half of the features", "features", again=True),
+    Part("one splat of every anchor", "slot", again=True),
+    Part("a third of the anchors", "anchors", again=True),
+)

@@ -1,0 +1,189 @@
+"""The search for the smallest model that shows a capture as well as the largest one asked for."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.runtime_models.package.drop_unused import compact
+from shapeshift.runtime_models.package.feature_codes import FEATURES
+from shapeshift.runtime_models.package.read_package import read_files
+from shapeshift.runtime_models.package.write_package import package_files, zip_files
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.fit.ablation import DROPPED, PARTS, Measured, Part, Verdict, judge
+from shapeshift.training.fit.view_metrics import likeness, most_pixels, shared_outlines
+from shapeshift.training.photos import BLACK, choose_downscale, load_photos
+from shapeshift.training.schedule import choose_background
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.train import Trainer
+
+Tell = Callable[[str, float], None]  # what is tried now, and how far it is, 0..1
+PIXELS = (0.02, 0.1, 0.5, 2.0)  # anchors that make up less in every photo are tried without
+DECODES = 6  # the fastest counts
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a capture needs, and how that was found."""
+
+    settings: TrainSettings  # that train it
+    full: Measured  # the largest
+    fitted: Measured
+    verdicts: tuple[Verdict, ...]
+    outlines: dict[tuple[str, str], float]  # of every two stops of the largest, see witness
+    photos: dict[str, int]  # held out, by modality
+    seeds: int
+    tolerance_db: float
+
+    def as_dict(self) -> dict:
+        return {
+            "tolerance_db": self.tolerance_db, "seeds": self.seeds, "held_out": self.photos,
+            "outlines": [{"stops": list(pair), "iou": round(v, 4)} for pair, v in
+                         self.outlines.items()],
+            "full": self.full.as_dict(), "fitted": self.fitted.as_dict(),
+            "parts": [verdict.as_dict() for verdict in self.verdicts],
+            "settings": self.settings.as_dict(),
+        }  # fmt: skip
+
+
+class Fit:
+    """One search.  Every trial is a training of its own, from the same seeds."""
+
+    def __init__(
+        self,
+        device,
+        capture: Capture,
+        settings: TrainSettings,
+        tolerance_db: float,
+        seeds: int,
+        tell: Tell,
+        parts: tuple[Part, ...] = PARTS,
+        last: TrainSettings | None = None,
+    ) -> None:
+        """last: settings whose iterations and seconds the chosen model is trained for once more.
+
+        Raises BadFile where the held-out photos could not tell how sure a difference is.
+        """
+        self.device, self.capture, self.tell = device, capture, tell
+        self.tolerance_db, self.seeds, self.verdicts = tolerance_db, seeds, []
+        self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
+        self.background = choose_background(settings.background, capture.background) or BLACK
+        self.held_out = load_photos(capture, "test", factor, settings.masks)
+        self.photos = load_photos(capture, "train", factor, settings.masks)
+        self.counts = {s.name: sum(p.modality == s.name for p in self.held_out) for s in self.stops}
+        for name, count in self.counts.items():
+            if not count or count * seeds < 2:
+                raise BadFile(
+                    f"{capture.folder}: {count} photos of '{name}' are held out, and a difference "
+                    "needs two to tell how sure it is; mark more with split 'test'"
+                    + (" or give --seeds 2." if count else ".")
+                )
+        self.settings, self.parts, self.last = settings, parts, last
+
+    def run(self) -> Need:
+        full = self.full = self.current = self.trained(self.settings, "the largest")
+        outlines = shared_outlines(self.device, full.models[0], self.held_out, self.stops)
+        for part in self.parts:
+            while (fewer := part.without(self.settings, self.stops)) is not None:
+                if not self.take(part.name, self.trained(fewer, f"without {part.name}")):
+                    break
+                self.settings = fewer
+                if not part.again:
+                    break
+        if self.last is not None:  # what is cleaned is held to the one that was trained last
+            budget = {"iterations": self.last.iterations, "seconds": self.last.seconds}
+            self.settings = replace(self.settings, **budget)
+            self.full = self.current = self.trained(self.settings, "the chosen model")
+        self.clean()
+        return Need(
+            self.settings, full, self.current, tuple(self.verdicts), outlines, self.counts,
+            self.seeds, self.tolerance_db,
+        )  # fmt: skip
+
+    def take(self, part: str, tried: Measured) -> bool:
+        """Notes what the trial did; goes on from it, and says so, where the part may go."""
+        verdict = judge(part, self.full, self.current, tried, self.tolerance_db)
+        self.verdicts.append(verdict)
+        if verdict.word == DROPPED:
+            self.current = tried
+        return verdict.word == DROPPED
+
+    def trained(self, settings: TrainSettings, name: str) -> Measured:
+        """A trial: settings trained once a seed.  Raises BadFile where a run ends unsettled."""
+        models, seconds = [], []
+        for seed in range(self.seeds):
+            what = name if self.seeds == 1 else f"{name}, seed {seed + 1} of {self.seeds}"
+            trainer = Trainer(
+                self.device, self.capture, replace(settings, seed=settings.seed + seed),
+                loaded={"train": self.photos, "test": self.held_out},
+            )  # fmt: skip
+            for now in trainer.steps():
+                self.tell(what, min(now.fraction, 1.0))
+            if not trainer.settled:
+                raise BadFile(
+                    f"A trial of {trainer.iteration} steps ends while new anchors still settle; "
+                    "give more --iterations, or --no-grow."
+                )
+            models.append(trainer.model())
+            seconds.append(trainer.elapsed)
+        return self.measured(models, FEATURES[0], float(np.mean(seconds)))
+
+    def measured(self, models: list[AnchorModel], storage: str, train_s: float) -> Measured:
+        """How alike the held-out photos are to what packages of the models show."""
+        files = [package_files(model, storage) for model in models]
+        back = [read_files(f.__getitem__, "the fitted scene") for f in files]
+        found = [
+            likeness(self.device, model, self.held_out, self.stops, self.background)
+            for model in back
+        ]
+        psnr = {s.name: np.stack([f[s.name] for f in found]) for s in self.stops}
+        size = len(zip_files(files[0]))
+        return Measured(psnr, tuple(back), storage, size, shift_ms(back[0]), train_s)
+
+    def clean(self) -> None:
+        """What goes without another training: what nothing shows, and digits of the features."""
+        now = self.current
+        smaller = [compact(model)[0] for model in now.models]
+        self.try_models("what no stop shows", smaller)
+        for pixels in PIXELS:
+            smaller = [self.without_faint(model, pixels) for model in self.current.models]
+            if not self.try_models(f"anchors of under {pixels:g} pixels in every photo", smaller):
+                break
+        for more, storage in pairwise(FEATURES):
+            now = self.current
+            tried = self.measured(list(now.models), storage, now.train_s)
+            if not self.take(f"features as {more} instead of {storage}", tried):
+                break
+
+    def try_models(self, part: str, models: list[AnchorModel]) -> bool:
+        """A trial of models made smaller; True, too, where there was nothing to take away."""
+        now = self.current
+        self.tell(f"without {part}", 1.0)
+        same = all(weights_of(a) == weights_of(b) for a, b in zip(models, now.models, strict=True))
+        return same or self.take(part, self.measured(models, now.storage, now.train_s))
+
+    def without_faint(self, model: AnchorModel, pixels: float) -> AnchorModel:
+        """The model without anchors that make up fewer pixels in every photo."""
+        most = most_pixels(self.device, model, [*self.photos, *self.held_out], self.stops)
+        return compact(model, np.repeat(most[:, None] >= pixels, model.splats_per_anchor, 1))[0]
+
+
+def weights_of(model: AnchorModel) -> int:
+    """How many numbers a model is made of."""
+    weights = sum(a.size for m in model.networks.values() for a in (*m.weights, *m.biases))
+    return model.anchors.size + model.features.size + weights
+
+
+def shift_ms(model: AnchorModel) -> float:
+    """Milliseconds of one thread for the splats at another x, seen from another place."""
+    evaluator, times = Evaluator(model, keep=True), []
+    for i in range(DECODES):
+        start = time.perf_counter()
+        evaluator.geometry(i % 2)
+        evaluator.color(i % 2, np.array([i, 1.0, 2.0]))
+        times.append(1e3 * (time.perf_counter() - start))
+    return min(times[1:])

@@ -1,0 +1,220 @@
+"""How one moves in the world: structs in, a standing out.  No OpenXR, no clock, no world.
+
+One stick walks where the head looks; the other turns sideways and flies up and down.  A held A or
+X aims a jump that its release makes, unless the hand squeezes.  Empty hands that squeeze hold the
+world.  B or Y brings the world back to its true size, held a second longer all is as at first.
+Callers put hands to rest that a panel or an object has.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shapeshift.vr.frame import SIDES, Frame
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import heading, moved, pinned, resized, turned, underfoot, yaw
+from shapeshift.vr.locomotion.teleport import Arc, Ground, level_ground, throw_arc
+from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, take
+
+TURNINGS = ("snap", "smooth", "none")
+LONGEST_S = 0.1  # of a frame: after a hitch nobody is thrown far
+GRIPS_AT, LETS_GO_AT = 0.6, 0.4  # of a squeeze
+TURNS_AT, REARMS_AT = 0.6, 0.3  # of a stick pushed aside, for one snap
+RISES_S, FALLS_S = 0.12, 0.35  # time constants of the vignette
+BLINK_S = 0.2  # so long the dark after a jump fades
+HOME_S = 1.0  # so long B or Y is held to begin anew
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a user chooses."""
+
+    walks: str = "left"  # the hand whose stick walks; the other turns and flies
+    turning: str = "snap"  # of TURNINGS
+    snap_rad: float = math.radians(30)
+    turn_rad_s: float = math.radians(90)  # smooth, at a full stick
+    walk_m_s: float = 1.6  # of the room, at a full stick
+    fly_m_s: float = 1.0
+    dead: float = 0.15  # of a stick that drifts
+    vignette: float = 0.8  # at full speed; 0: none
+
+    def __post_init__(self) -> None:
+        if self.walks not in SIDES:
+            raise ValueError(f"the hand that walks is '{self.walks}'; {' or '.join(SIDES)}.")
+        if self.turning not in TURNINGS:
+            raise ValueError(f"turning is '{self.turning}'; {', '.join(TURNINGS)} are there.")
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Between two frames."""
+
+    armed: bool = True  # the stick that snaps has come back since
+    squeezing: frozenset[str] = frozenset()
+    grips: Grips = ()  # of the world
+    aims: str | None = None  # the hand that aims a jump
+    pressed: frozenset[str] = frozenset()  # hands whose A or X is down
+    resets: tuple[str, float] | None = None  # the hand whose B or Y is down, and seconds of it
+    vignette: float = 0.0
+    blink: float = 0.0
+
+
+@dataclass(frozen=True)
+class Comfort:
+    """What is shown, and what else has to follow."""
+
+    vignette: float = 0.0  # 0..1, how far the edge of the picture is dark
+    blink: float = 0.0  # 0..1, how dark all of it is
+    arc: Arc | None = None
+    jumps: bool = False  # the room is elsewhere at once: what is held jumps along
+    home: bool = False  # the room is to be where it was at first; the caller knows where
+
+
+RULES = Rules()
+
+
+def move(
+    standing: Standing,
+    travel: Travel,
+    frame: Frame,
+    seconds: float,
+    rules: Rules = RULES,
+    ground: Ground | None = None,
+) -> tuple[Standing, Travel, Comfort]:
+    """The room a frame later; without a ground one jumps along the level that one stands on."""
+    seconds = min(seconds, LONGEST_S) if seconds > 0 else 0.0
+    travel = replace(travel, blink=max(travel.blink - seconds / BLINK_S, 0.0))
+    standing, travel = hold_world(standing, travel, frame)
+    if travel.grips:
+        travel = replace(travel, aims=None, resets=None, pressed=pressing(frame))
+        travel = fade(travel, 0.0, seconds)
+        return standing, travel, Comfort(travel.vignette, travel.blink)
+    standing, pace = walk(standing, frame, seconds, rules)
+    travel, angle, pace_turned = turn(travel, frame, seconds, rules)
+    if angle:
+        standing = turned(standing, angle, frame.head.position)
+    ground = ground or level_ground(standing.point(underfoot(frame.head))[1])
+    travel, arc, landing = aim(travel, frame, standing, ground)
+    if landing is not None:
+        standing = pinned(standing, underfoot(frame.head), standing.point(landing))
+    travel, true_size, home = reset(travel, frame, seconds)
+    true_size = true_size and standing.scale != 1.0
+    if true_size:
+        standing = resized(standing, frame.head, 1.0)
+    leaps = landing is not None or true_size or home
+    travel = replace(travel, blink=1.0 if leaps else travel.blink)
+    travel = fade(travel, max(pace, pace_turned) * rules.vignette, seconds)
+    jumps = leaps or (rules.turning == "snap" and angle != 0)
+    return standing, travel, Comfort(travel.vignette, travel.blink, arc, jumps, home)
+
+
+def hold_world(standing: Standing, travel: Travel, frame: Frame) -> tuple[Standing, Travel]:
+    """Empty hands that begin to squeeze take hold of the world, and draw it along."""
+    squeezing = frozenset(side for side in SIDES if squeezes(frame, side, travel.squeezing))
+    before = frozenset(side for side, _ in travel.grips)
+    holding = squeezing & (before | (squeezing - travel.squeezing))
+    # With every hand that comes or goes, and in a room with a new origin, holds begin anew.
+    anew = holding != before or frame.recentred
+    grips = take(standing, frame, holding) if anew else travel.grips
+    if grips:
+        standing = drawn_along(standing, frame, grips)
+    return standing, replace(travel, squeezing=squeezing, grips=grips)
+
+
+def squeezes(frame: Frame, side: str, before: frozenset[str]) -> bool:
+    """Whether a hand does, without trembling between yes and no."""
+    hand = frame.hands[side]
+    least = LETS_GO_AT if side in before else GRIPS_AT
+    return hand.active and hand.grip is not None and hand.squeeze >= least
+
+
+def pressing(frame: Frame) -> frozenset[str]:
+    """Hands whose A or X is down."""
+    return frozenset(side for side in SIDES if frame.hands[side].primary)
+
+
+def walk(standing: Standing, frame: Frame, seconds: float, rules: Rules) -> tuple[Standing, float]:
+    """Along the head on the level by one stick, up and down by the other; and at what pace, 0..1.
+
+    Metres of the room: who is small walks slowly.
+    """
+    aside, ahead = beyond_rest(frame.hands[rules.walks].stick, rules.dead)
+    sideways, up = beyond_rest(frame.hands[other(rules.walks)].stick, rules.dead)
+    up = up if abs(up) > abs(sideways) else 0.0
+    pace = max(math.hypot(aside, ahead), abs(up))
+    if pace == 0:
+        return standing, 0.0
+    level = np.array([aside, 0.0, -ahead]) * rules.walk_m_s
+    by = yaw(heading(frame.head.wxyz)).matrix()[:3, :3] @ level  # (3,) m/s, room
+    by[1] = up * rules.fly_m_s
+    world = standing.world_from_play.matrix()[:3, :3] @ by * standing.scale
+    return moved(standing, world * seconds), pace
+
+
+def turn(travel: Travel, frame: Frame, seconds: float, rules: Rules) -> tuple[Travel, float, float]:
+    """Radians to the left by which the room turns in this frame, and at what pace, 0..1."""
+    hand = frame.hands[other(rules.walks)]
+    x, y = hand.stick
+    aside = abs(x) >= abs(y)
+    if rules.turning == "smooth":
+        pushed = beyond_rest(hand.stick, rules.dead)[0] if aside else 0.0
+        return travel, -pushed * rules.turn_rad_s * seconds, abs(pushed)
+    if not hand.active:
+        return travel, 0.0, 0.0  # unseen for a moment: a stick still held shall not snap again
+    if rules.turning == "snap" and travel.armed and aside and abs(x) >= TURNS_AT:
+        return replace(travel, armed=False), -math.copysign(rules.snap_rad, x), 0.0
+    return replace(travel, armed=travel.armed or abs(x) < REARMS_AT), 0.0, 0.0
+
+
+def aim(
+    travel: Travel, frame: Frame, standing: Standing, ground: Ground
+) -> tuple[Travel, Arc | None, np.ndarray | None]:
+    """The arc while A or X is held, and where in the room (3,) its release lands."""
+    pressed = pressing(frame)
+    begun = [s for s in SIDES if s in pressed - travel.pressed and frame.hands[s].aim is not None]
+    aims = travel.aims or (begun[0] if begun else None)
+    travel = replace(travel, aims=aims, pressed=pressed)
+    if aims is None:
+        return travel, None, None
+    hand = frame.hands[aims]
+    # Lost, squeezing, or the origin moved under it: thought better of.
+    if hand.aim is None or hand.squeeze >= GRIPS_AT or frame.recentred:
+        return replace(travel, aims=None), None, None
+    arc = throw_arc(hand.aim, standing, ground)
+    if aims in pressed:
+        return travel, arc, None
+    return replace(travel, aims=None), None, arc.landing if arc.fine else None
+
+
+def reset(travel: Travel, frame: Frame, seconds: float) -> tuple[Travel, bool, bool]:
+    """Whether the world is to have its true size, B or Y let go, and whether all begins anew."""
+    if travel.resets is None:
+        down = [side for side in SIDES if frame.hands[side].secondary]
+        return replace(travel, resets=(down[0], 0.0) if down else None), False, False
+    side, before = travel.resets
+    hand = frame.hands[side]
+    if not hand.secondary:  # a hand that was lost did not let go of it
+        return replace(travel, resets=None), hand.active and before < HOME_S, False
+    lasts = before + seconds
+    return replace(travel, resets=(side, lasts)), False, before < HOME_S <= lasts
+
+
+def beyond_rest(stick: tuple[float, float], dead: float) -> tuple[float, float]:
+    """What a stick says beyond its dead zone, finer near it; what is no number rests."""
+    length = math.hypot(*stick)
+    if not dead < length < math.inf:
+        return 0.0, 0.0
+    pace = min((length - dead) / (1 - dead), 1.0) ** 2
+    return stick[0] / length * pace, stick[1] / length * pace
+
+
+def fade(travel: Travel, vignette: float, seconds: float) -> Travel:
+    """The vignette on its way to where it shall be."""
+    lasts = RISES_S if vignette > travel.vignette else FALLS_S
+    near = travel.vignette + (vignette - travel.vignette) * -math.expm1(-seconds / lasts)
+    return replace(travel, vignette=near if near > 0.005 else 0.0)
+
+
+def other(side: str) -> str:
+    return SIDES[1 - SIDES.index(side)]

@@ -1,0 +1,304 @@
+"""A session in a headset: its life, its frames, its pictures.
+
+    with Instance() as instance, Session(instance, ctx) as session:
+        for frame in session.frames():
+            session.submit(textures)  # one an eye, display-encoded, of session.sizes
+
+The order of a frame is the runtime's: wait, begin, locate, draw, hand over, end.
+"""
+
+import ctypes
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import moderngl
+import numpy as np
+
+from shapeshift.renderer.gl.context import is_software
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import IDENTITY
+from shapeshift.vr.frame import Frame
+from shapeshift.vr.openxr.display import display_period
+from shapeshift.vr.openxr.events import (
+    ControllersChanged,
+    GoingAway,
+    Recentred,
+    StateChanged,
+    take_events,
+)
+from shapeshift.vr.openxr.graphics import bind_current, check_requirements
+from shapeshift.vr.openxr.hands import Hands, pose_of
+from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
+from shapeshift.vr.openxr.life import BEGIN, END, Life
+from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
+from shapeshift.vr.openxr.swapchain import Swapchain, choose_format
+from shapeshift.vr.pace import Pace
+from shapeshift.vr.shown import Shown
+
+REST_S = 0.01  # between two looks at what the runtime says while there is nothing to draw
+NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a Standing
+MOST_ERRORS = 16  # of GL that a runtime may have left behind
+
+
+class Session:
+    """One session on the GL context that is current; use it in a `with`.
+
+    `sizes`: (width, height) of each eye's picture; `play`, `hands`, `life`, `pace` as named.
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        ctx: moderngl.Context,
+        part: float = 1.0,  # of the runtime's width and height of an eye
+        pixels: str = "",  # name of a Format; "": the best
+    ) -> None:
+        self._instance, self._ctx, self._xr = instance, ctx, instance.xr
+        self.life, self.pace = Life(), Pace()
+        self.recentrings = 0
+        self.profiles: dict[str, str] = {}  # side -> what its controller is taken for
+        self.keep = False  # read the runtime's images back into `kept`
+        self.kept: list[np.ndarray] = []
+        self._pending: list[Recentred] = []
+        self._open: object | None = None  # the runtime's state of the frame under way
+        self._views: tuple = ()  # the runtime's, of that frame
+        self._start_ns: int | None = None
+        self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
+        self._began = 0.0
+        self._finish = ctx.finish if is_software(ctx) else lambda: None
+        self._shown = Shown(ctx)
+        self._swapchains: list[Swapchain] = []
+        self.hands = Hands(instance.handle)
+        self._handle = self._create()
+        self.play = open_play_space(instance, self._handle)
+        self._view_space = open_head_space(instance, self._handle)
+        self.hands.attach(self._handle)
+        self.pace.display_s = display_period(instance, self._handle)
+        self._make_swapchains(part, pixels)
+
+    def _create(self) -> object:
+        xr, instance = self._xr, self._instance
+        check_requirements(instance)
+        binding = bind_current(instance)
+        pointer = ctypes.cast(ctypes.pointer(binding), ctypes.c_void_p)
+        info = xr.SessionCreateInfo(system_id=instance.system, next=pointer)
+        try:
+            with instance.asked("begin a session"):
+                return xr.create_session(instance.handle, info)
+        except (xr.exception.GraphicsDeviceInvalidError, xr.exception.ApiVersionUnsupportedError):
+            raise NoHeadset(
+                f"{instance.runtime} does not take pictures of {self._ctx.info['GL_RENDERER']}; "
+                "the headset hangs on another graphics card, or another runtime should be active."
+            ) from None
+
+    def _make_swapchains(self, part: float, pixels: str) -> None:
+        xr, instance = self._xr, self._instance
+        stereo = xr.ViewConfigurationType.PRIMARY_STEREO
+        system = (instance.handle, instance.system, stereo)
+        self._blend = choose_blend(xr, xr.enumerate_environment_blend_modes(*system))
+        told = xr.enumerate_view_configuration_views(*system)
+        offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
+        try:
+            self.pixels = choose_format(offered, pixels)
+        except ValueError as none:
+            raise NoHeadset(f"{instance.runtime}: {none}") from None
+        for view in told:
+            size = eye_size(view, part)
+            chain = Swapchain(instance, self._handle, self._ctx, size, self.pixels)
+            self._swapchains.append(chain)
+
+    @property
+    def sizes(self) -> list[tuple[int, int]]:
+        return [chain.size for chain in self._swapchains]
+
+    def frames(self, resting: Callable[[], None] = lambda: None) -> Iterator[Frame]:
+        """One frame after the other until the session is over; Lost where it went away.
+
+        A frame that nobody submits a picture for shows nothing.  `resting` is called while the
+        runtime wants no frames.
+        """
+        while True:
+            self._take_events()
+            if self.life.over:
+                break
+            if not self.life.running:
+                resting()
+                time.sleep(REST_S)
+                continue
+            yield self._begin()
+            if self._open is not None:
+                self._end([])
+        if self.life.lost:
+            raise Lost(f"{self._instance.runtime} ended the session.")
+
+    def submit(self, textures: Sequence[moderngl.Texture]) -> None:
+        """Shows one display-encoded RGBA8 picture an eye, of `sizes`, row 0 at the bottom."""
+        xr = self._xr
+        self.kept = []
+        for chain, texture in zip(self._swapchains, textures, strict=True):
+            picture = chain.show(texture, self._shown, self.keep)
+            if self.keep:
+                self.kept.append(picture)
+        views = []
+        for chain, view in zip(self._swapchains, self._views, strict=True):
+            whole = xr.Rect2Di(xr.Offset2Di(0, 0), xr.Extent2Di(*chain.size))
+            image = xr.SwapchainSubImage(chain.handle, whole, 0)
+            views.append(xr.CompositionLayerProjectionView(view.pose, view.fov, image))
+        none = xr.CompositionLayerFlags.NONE
+        layer = xr.CompositionLayerProjection(none, self.play.handle, views=views)
+        self._end([ctypes.byref(layer)])
+
+    def leave(self) -> None:
+        """Asks the runtime to end the session; frames() goes on until it has."""
+        if self.life.running:
+            with self._instance.asked("end the session"):
+                self._xr.request_exit_session(self._handle)
+        else:
+            self.life.states.append("EXITING")  # never begun: there is nothing to wait for
+
+    def _take_events(self) -> None:
+        xr = self._xr
+        with self._instance.asked("say what is new"):
+            for event in take_events(xr, self._instance.handle):
+                match event:
+                    case StateChanged(state):
+                        self._take_state(state)
+                    case Recentred():
+                        self._pending.append(event)
+                    case ControllersChanged():
+                        self.profiles = self.hands.profiles()
+                    case GoingAway():
+                        self.life.lost = True
+
+    def _take_state(self, state: str) -> None:
+        xr, act = self._xr, self.life.take(state)
+        if act == BEGIN:
+            stereo = xr.ViewConfigurationType.PRIMARY_STEREO
+            xr.begin_session(self._handle, xr.SessionBeginInfo(stereo))
+        elif act == END:
+            xr.end_session(self._handle)
+            self.pace.pause()
+
+    def _begin(self) -> Frame:
+        """Waits for the runtime's go, then says where all will be when this frame is seen."""
+        xr, asked = self._xr, time.perf_counter()
+        with self._instance.asked("give a frame"):
+            state = xr.wait_frame(self._handle)
+            self._began = time.perf_counter()
+            xr.begin_frame(self._handle)
+            self._open = state
+            now = state.predicted_display_time
+            if self._start_ns is None:
+                self._start_ns = now
+            seen_s = (now - self._start_ns) * 1e-9
+            period_s = state.predicted_display_period * 1e-9
+            self.pace.start(seen_s, period_s, self._began - asked)
+            self._take_head(now)
+            views, known = self._locate_eyes(now)
+            focused = self.life.focused
+            hands = self.hands.read(self.play.handle, now, focused)
+        drawn = bool(state.should_render) and known
+        recentred = self._recentred(now)
+        return Frame(views, self._head, hands, seen_s, period_s, drawn, focused, recentred)
+
+    def _take_head(self, now: int) -> None:
+        found = locate(self._xr, self._view_space, self.play, now)
+        if found is not None:
+            pose, placed, turned = found
+            self._head = known_part(pose, self._head, placed, turned)
+
+    def _locate_eyes(self, now: int) -> tuple[tuple[View, ...], bool]:
+        """play_from_eye of both, and whether the runtime knows how they are turned."""
+        xr = self._xr
+        stereo = xr.ViewConfigurationType.PRIMARY_STEREO
+        asked = xr.ViewLocateInfo(stereo, now, self.play.handle)
+        state, self._views = xr.locate_views(self._handle, asked)
+        placed, turned = valid(xr.ViewStateFlags, state.view_state_flags)
+        self._eyes = tuple(
+            known_part(pose_of(view.pose), old, placed, turned)
+            for view, old in zip(self._views, self._eyes, strict=True)
+        )
+        views = [
+            View(pose, tangents_of(view.fov), NEAR_M, FAR_M, chain.size)
+            for pose, view, chain in zip(self._eyes, self._views, self._swapchains, strict=True)
+        ]
+        return tuple(views), turned
+
+    def _recentred(self, now: int) -> bool:
+        """Whether play space has had another origin since the last frame."""
+        due = [event for event in self._pending if event.time_ns <= now]
+        self._pending = [event for event in self._pending if event.time_ns > now]
+        moved = any(moved_by(event.space, self.play.kind) for event in due)
+        self.recentrings += moved
+        return moved
+
+    def _end(self, layers: list) -> None:
+        xr, state = self._xr, self._open
+        self._open = None
+        self._finish()
+        self._drain()
+        info = xr.FrameEndInfo(state.predicted_display_time, self._blend, layers=layers)
+        self.pace.end(time.perf_counter() - self._began)
+        with self._instance.asked("take a frame"):
+            xr.end_frame(self._handle, info)
+        self._drain()
+
+    def pulse(self, side: str, strength: float, seconds: float) -> None:
+        """Buzzes a hand, 0 to 1.  Raises Lost."""
+        with self._instance.asked("buzz a hand"):
+            self.hands.pulse(side, strength, seconds)
+
+    def _drain(self) -> None:
+        """Forgets GL errors: SteamVR leaves some, and runtimes fail over older ones."""
+        for _ in range(MOST_ERRORS):
+            if self._ctx.error == "GL_NO_ERROR":
+                return
+
+    def close(self) -> None:
+        """Gives all back, also what was lost with the runtime."""
+        for chain in self._swapchains:
+            chain.close()
+        self._swapchains = []
+        self._shown.release()
+        ended = (self.hands.detach, self.hands.close)
+        for end in (*ended, lambda: self._xr.destroy_session(self._handle)):
+            try:
+                end()
+            except self._xr.exception.ErrorResult:
+                pass  # lost with the runtime
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.close()
+
+
+def eye_size(view, part: float) -> tuple[int, int]:
+    """Pixels of an eye: `part` of what the runtime recommends, at most what it allows."""
+    recommended = (view.recommended_image_rect_width, view.recommended_image_rect_height)
+    most = (view.max_image_rect_width, view.max_image_rect_height)
+    wanted = [max(1, round(part * side)) for side in recommended]
+    return min(wanted[0], most[0]), min(wanted[1], most[1])
+
+
+def choose_blend(xr, offered: Sequence) -> object:
+    """How the picture covers the room: wholly, or as glasses that are seen through like it best."""
+    modes = [xr.EnvironmentBlendMode(int(each)) for each in offered]
+    opaque = xr.EnvironmentBlendMode.OPAQUE
+    return opaque if opaque in modes or not modes else modes[0]
+
+
+def tangents_of(fov) -> tuple[float, float, float, float]:
+    """Left, right, down, up of an XrFovf, whose angles are signed."""
+    angles = (fov.angle_left, fov.angle_right, fov.angle_down, fov.angle_up)
+    return tuple(math.tan(angle) for angle in angles)
+
+
+def known_part(pose: Pose, old: Pose, placed: bool, turned: bool) -> Pose:
+    """The pose with what is not known of it as it was before."""
+    if not turned:
+        return Pose(pose.position, old.wxyz) if placed else old
+    wxyz = pose.wxyz / np.linalg.norm(pose.wxyz)  # float32 of the runtime
+    return Pose(pose.position if placed else old.position, wxyz)
