@@ -72,9 +72,8 @@ class Renderer:
         self._gpu = Gpu(ctx) if ctx is not None else None
         self._resolve = Resolve(self._gpu) if ctx is not None else None
         if drawing == "tiles":
-            from shapeshift.renderer.tiles.tiles import (
-                TilesDrawing,  # needs OpenCL, which quads do without
-            )
+            # Needs OpenCL, which quads do without.
+            from shapeshift.renderer.tiles.tiles import TilesDrawing
 
             self._drawing = TilesDrawing()
         else:

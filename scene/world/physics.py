@@ -12,6 +12,7 @@ import numpy as np
 from shapeshift.runtime_models.model import Finding
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
+from shapeshift.scene.world import physics_rules
 from shapeshift.scene.world.contacts import Contact, Tally, any_near, velocities
 from shapeshift.scene.world.grab import (
     WITH_HAND,
@@ -23,13 +24,6 @@ from shapeshift.scene.world.grab import (
     lead_hands,
     take_hold,
     throw,
-)
-from shapeshift.scene.world.physics_rules import (
-    MOST_SPEED,
-    engine,
-    more_substeps,
-    new_world,
-    stopped_bodies,
 )
 from shapeshift.scene.world.physics_shapes import (
     LEAST_EXTENT,
@@ -63,7 +57,7 @@ class Physics:
         hz: float = 90,
         substeps: int = 4,
     ) -> None:
-        rapier = engine()
+        rapier = physics_rules.engine()
         gravity = checked_number(gravity_m_s2, "the gravity in m/s2", -100, 100)
         self.hz = checked_number(hz, "the steps a second", 10, 1000)
         self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
@@ -74,7 +68,7 @@ class Physics:
         self._meshes: set[int] = set()  # statics that are triangle meshes
         self._holds: dict[int, Hold] = {}
         self._next_id, self._next_grab = FLOOR + 1, 1
-        self._world = new_world(gravity)
+        self._world = physics_rules.new_world(gravity)
         self._events = rapier.ChannelEventCollector()
         self._attach()
         if floor_y is not None:
@@ -288,7 +282,9 @@ class Physics:
         free = {n: (self._masses[n], body) for n, body in bodies.items() if n not in held}
         speeds = velocities(bodies)
         at_meshes = [(self._collider(a), self._collider(b)) for a in held for b in self._meshes]
-        substeps = self.substeps * more_substeps(speeds, any_near(self._world, at_meshes))
+        substeps = self.substeps * physics_rules.more_substeps(
+            speeds, any_near(self._world, at_meshes)
+        )
         rules = self._world.integration_parameters
         rules.dt = 1 / self.hz / substeps
         starts = [
@@ -305,7 +301,7 @@ class Physics:
             speeds = velocities(bodies)
         for hold in self._holds.values():
             hold.trail.append(hold.target)
-        self.findings += stopped_bodies(self._world, self._handles)
+        self.findings += physics_rules.stopped_bodies(self._world, self._handles)
         self._queries_stale = True
         return tally.contacts()
 
@@ -349,7 +345,7 @@ class Physics:
         with_hand = lag(hold, self._world.rigid_bodies[hold.hand], body) <= WITH_HAND
         self._let_go(grab)
         if with_hand and all(other.body != hold.body for other in self._holds.values()):
-            throw(hold, body, self.hz, MOST_SPEED)
+            throw(hold, body, self.hz, physics_rules.MOST_SPEED)
 
     def _let_go(self, grab: int) -> None:
         hold = self._holds.pop(grab)
