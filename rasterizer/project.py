@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 KERNELS = Path(__file__).parent / "kernels"
-RECORD = 12  # floats a splat: mean x y | conic a b c | opacity | r g b | half extents x y | cut
+# Floats a splat: mean x y | conic a b c | opacity | r g b | half extents x y | power threshold
+RECORD = 12
 LEAST_ALPHA = 1 / 255  # below it a pixel is not drawn (3DGS)
 LOW_PASS = 0.3  # px^2 added to the screen covariance (EWA, as 3DGS)
 CLAMP = 1.3  # the Jacobian's x/z and y/z stay within this many times the widest tangents (3DGS)
@@ -62,22 +63,24 @@ LOW_BITS = 12  # of a depth key: the first pass of the sort, counted while the t
 
 
 @dataclass(frozen=True)
-class Found:
-    """Where splats lie in the grid of tiles: what find_places and project_arena leave for `bin`."""
+class TileScratch:
+    """Where splats lie in the grid of tiles: what find_tile_bounds and project_arena
+    leave for `bin`.
+    """
 
-    places: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
+    tile_bounds: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
     # None where an order from before is used: nothing is to be sorted.
     pairs: "Array | None"  # (N, 2) uint32 splat and sort key of the visible, at each chunk's start
     table: "Array | None"  # (chunks, 1 << LOW_BITS) int32 histograms of the keys' low digit
-    status: "Array"  # (chunks, 4) uint32: pairs, instances, least and most key
+    status: "Array"  # (chunks, 4) uint32: pairs, intersections, least and most key
     chunk: int  # splats a chunk
     grid: tuple[int, int]  # tiles across, tiles down
 
     @staticmethod
-    def empty(device: Device, count: int, grid: tuple[int, int]) -> "Found":
+    def empty(device: Device, count: int, grid: tuple[int, int]) -> "TileScratch":
         """Arrays to be filled for `count` splats, in as many chunks as keep the device busy."""
         chunks = chunks_of(device, count)
-        return Found(
+        return TileScratch(
             device.empty((count, 2), np.uint32),
             device.empty((count, 2), np.uint32),
             device.empty((chunks, 1 << LOW_BITS), np.int32),
@@ -87,7 +90,7 @@ class Found:
         )
 
     def arrays(self) -> tuple:
-        return self.places, self.pairs, self.table, self.status
+        return self.tile_bounds, self.pairs, self.table, self.status
 
 
 def chunks_of(device: Device, count: int) -> int:
@@ -108,7 +111,7 @@ class Projected:
     depth: "Array"  # (N,) float32 metres along the view, 1e30 where culled
     low_pass: float = LOW_PASS  # px^2
     culled_counts: "Array | None" = None  # (chunks, 6) int32, CULL_REASONS
-    found: Found | None = None  # in the grid of the camera's image
+    scratch: TileScratch | None = None  # in the grid of the camera's image
 
     def culled(self, device: Device) -> dict[str, int]:
         """How many splats each gate kept out; empty where it was not counted."""

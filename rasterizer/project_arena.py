@@ -14,8 +14,8 @@ from shapeshift.rasterizer.project import (
     LOW_PASS,
     RECORD,
     Camera,
-    Found,
     Projected,
+    TileScratch,
     chunks_of,
     grid_of,
 )
@@ -96,10 +96,10 @@ def project_arena(
         variant["ANTIALIASED"] = 1
     frame = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     buffers = [_buffers(p) for p in projected]
-    found = projected[0].found
+    scratch = projected[0].scratch
     device.launch(
-        device.program(KERNEL, **variant)["project_arena"], len(found.status), 1,
-        count, found.chunk, sort.by_distance, sort.keep_outside,
+        device.program(KERNEL, **variant)["project_arena"], len(scratch.status), 1,
+        count, scratch.chunk, sort.by_distance, sort.keep_outside,
         device.constants(np.concatenate(frame)), mean_opacity, covariance, color, second_color,
         object_index, *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
     )  # fmt: skip
@@ -108,9 +108,9 @@ def project_arena(
 
 def _fits(earlier: list[Projected] | None, count: int, orders: int, grids: list) -> bool:
     """Whether the arrays of an earlier result are those that this one needs."""
-    if earlier is None or [p.found.grid for p in earlier] != grids:
+    if earlier is None or [p.scratch.grid for p in earlier] != grids:
         return False
-    pairs = {id(p.found.pairs) for p in earlier if p.found.pairs is not None}
+    pairs = {id(p.scratch.pairs) for p in earlier if p.scratch.pairs is not None}
     return earlier[0].depth.shape[0] == count and len(pairs) == orders
 
 
@@ -128,7 +128,7 @@ def _room(device: Device, count: int, orders: int, grids: list) -> list[Projecte
             device.empty((count, RECORD)),
             device.empty(count),
             culled_counts=device.empty((chunks, len(CULL_REASONS)), np.int32),
-            found=Found(
+            scratch=TileScratch(
                 device.empty((count, 2), np.uint32),
                 *pairs_and_table,
                 device.empty((chunks, 4), np.uint32),
@@ -141,9 +141,9 @@ def _room(device: Device, count: int, orders: int, grids: list) -> list[Projecte
 
 
 def _buffers(projected: Projected) -> tuple:
-    found = projected.found
+    scratch = projected.scratch
     results = (projected.record, projected.depth, projected.culled_counts)
-    return (*results, found.places, found.status, found.pairs, found.table)
+    return (*results, scratch.tile_bounds, scratch.status, scratch.pairs, scratch.table)
 
 
 def _packed(camera: Camera) -> np.ndarray:

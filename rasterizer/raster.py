@@ -1,4 +1,4 @@
-"""raster: instance lists -> image, and the gradients of an image -> those of the records."""
+"""raster: intersection lists -> image, and the gradients of an image -> those of the records."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pyopencl.array import Array
 
 KERNELS = Path(__file__).parent / "kernels"
-LEAST_THROUGH = 1e-4  # a pixel through which less comes is done (3DGS); cannot be seen
+MIN_TRANSMITTANCE = 1e-4  # a pixel with less left is done (3DGS); cannot be seen
 # form: kernel file, work-items a tile forward, work-items a tile backward
 FORMS = {
     "cpu": (KERNELS / "raster_cpu.cl", 1, 1),
@@ -50,7 +50,7 @@ def rasterize(
     file, group, _ = FORMS[form or device.kind]
     device.launch(
         device.program(file)["rasterize"], number * group, group,
-        width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
+        width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends,
     )  # fmt: skip
     return Frame(image, transmittance, ends)
@@ -62,14 +62,14 @@ def rasterize_rgba(
     tiles: Tiles,
     size: tuple[int, int],
     form: str | None = None,
-    least_through: float = LEAST_THROUGH,
+    min_transmittance: float = MIN_TRANSMITTANCE,
 ) -> np.ndarray:
     """(H, W, 4) float32 premultiplied over nothing, alpha = 1 - transmittance, row 0 on top.
 
-    least_through: what lies behind less transmittance than that is not drawn.  Read only; on a CPU
-    it is the device's own memory, which is reused when the array goes.
+    min_transmittance: where less than that is left, nothing behind is drawn (3DGS: 1e-4).  Read
+    only; on a CPU it is the device's own memory, which is reused when the array goes.
     """
-    return rasterize_rgba_views(device, [(projected, tiles)], size, form, least_through)[0]
+    return rasterize_rgba_views(device, [(projected, tiles)], size, form, min_transmittance)[0]
 
 
 def rasterize_rgba_views(
@@ -77,10 +77,10 @@ def rasterize_rgba_views(
     views: list[tuple[Projected, Tiles]],
     size: tuple[int, int],
     form: str | None = None,
-    least_through: float = LEAST_THROUGH,
+    min_transmittance: float = MIN_TRANSMITTANCE,
 ) -> list[np.ndarray]:
     """What rasterize_rgba gives, of several views of the same size."""
-    return rasterize_with_heat(device, views, [], size, form, least_through)[0]
+    return rasterize_with_heat(device, views, [], size, form, min_transmittance)[0]
 
 
 def rasterize_with_heat(
@@ -89,7 +89,7 @@ def rasterize_with_heat(
     heats: "list[Array]",
     size: tuple[int, int],
     form: str | None = None,
-    least_through: float = LEAST_THROUGH,
+    min_transmittance: float = MIN_TRANSMITTANCE,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """What rasterize_rgba gives of several views, and (H, W, 2) value and weight of their heat,
     blended as the colours are.
@@ -100,14 +100,14 @@ def rasterize_with_heat(
     images = [device.empty((height, width, 4)) for _ in views]
     hot = [device.empty((height, width, 2)) for _ in heats]
     inputs = [
-        (tiles.starts, tiles.instances, projected.record, image)
+        (tiles.starts, tiles.intersections, projected.record, image)
         for (projected, tiles), image in zip(views, images, strict=True)
     ]
     if heats:
         inputs = [(*given, *pair) for given, *pair in zip(inputs, heats, hot, strict=True)]
     draw_views = {"cpu": _draw_cpu, "gpu": _draw_gpu}[form or device.kind]
     if views:
-        draw_views(device, inputs, size, views[0][1].grid, float(least_through))
+        draw_views(device, inputs, size, views[0][1].grid, float(min_transmittance))
     return [device.view(image) for image in images], [device.view(image) for image in hot]
 
 
@@ -129,10 +129,10 @@ def _draw_gpu(
     defines = {"RGBA": 1, "STOP": least} | ({"HEAT": 1} if len(inputs[0]) > 4 else {})
     kernel = device.program(file, **defines)["rasterize"]  # built once for each value
     ends = device.empty(grid[0] * grid[1], np.int32)
-    for starts, instances, record, image, *heat in inputs:
+    for starts, intersections, record, image, *heat in inputs:
         device.launch(
             kernel, grid[0] * grid[1] * group, group,
-            *size, grid[0], starts, instances, record, 0.0, 0.0, 0.0, image, None, ends, *heat,
+            *size, grid[0], starts, intersections, record, 0.0, 0.0, 0.0, image, None, ends, *heat,
         )  # fmt: skip
 
 
@@ -167,12 +167,12 @@ def rasterize_backward(
     with_transmittance = grad_transmittance is not None
     device.launch(
         kernel, tiles.grid[0] * tiles.grid[1] * group, group,
-        width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.instances, tiles.places,
-        first_slot, projected.record, frame.image, frame.transmittance, grad_image,
-        grad_transmittance if with_transmittance else frame.transmittance, with_transmittance,
-        slots, *([] if error is None else [error]),
+        width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.intersections,
+        tiles.tile_bounds, first_slot, projected.record, frame.image, frame.transmittance,
+        grad_image, grad_transmittance if with_transmittance else frame.transmittance,
+        with_transmittance, slots, *([] if error is None else [error]),
     )  # fmt: skip
     grad_record = device.empty((count, RECORD))
     kernel = device.program(KERNELS / "sum_slots.cl")["sum_slots"]
-    device.launch(kernel, count, 64, count, tiles.places, first_slot, slots, grad_record)
+    device.launch(kernel, count, 64, count, tiles.tile_bounds, first_slot, slots, grad_record)
     return grad_record

@@ -35,16 +35,15 @@ def project_reference(
     root = jacobian @ camera_from_world[:3, :3] @ (rotations(wxyz) * scales[:, None, :])
     covariance = root @ root.transpose(0, 2, 1) + low_pass * np.eye(2)  # (N, 2, 2) px^2
     conic = np.linalg.inv(covariance)
-    cut = 2 * np.log(np.maximum(opacity, LEAST_ALPHA) / LEAST_ALPHA)
-    extent = np.sqrt(cut[:, None] * np.diagonal(covariance, axis1=1, axis2=2))
+    power_threshold = 2 * np.log(np.maximum(opacity, LEAST_ALPHA) / LEAST_ALPHA)
+    extent = np.sqrt(power_threshold[:, None] * np.diagonal(covariance, axis1=1, axis2=2))
     x, y = camera.fx * p[:, 0] / z + camera.cx, camera.fy * p[:, 1] / z + camera.cy
     width, height = camera.size
     seen = (p[:, 2] > camera.near) & (opacity > LEAST_ALPHA)
     seen &= (x + extent[:, 0] > 0) & (x - extent[:, 0] < width)
     seen &= (y + extent[:, 1] > 0) & (y - extent[:, 1] < height)
-    record = np.column_stack(
-        [x, y, conic[:, 0, 0], conic[:, 0, 1], conic[:, 1, 1], opacity, color, extent, cut]
-    )
+    conics = conic[:, (0, 0, 1), (0, 1, 1)]  # (N, 3): A, B, C of A dx^2 + 2 B dx dy + C dy^2
+    record = np.column_stack([x, y, conics, opacity, color, extent, power_threshold])
     record[~seen] = 0
     record[~seen, 9:11] = -1
     return record, np.where(seen, p[:, 2], 1e30)
@@ -58,7 +57,7 @@ def rasterize_reference(
     x, y = np.arange(width) + 0.5, np.arange(height)[:, None] + 0.5
     image, transmittance = np.zeros((3, height, width)), np.ones((height, width))
     for i in np.argsort(depth, kind="stable"):
-        mean_x, mean_y, a, b, c, opacity, *rgb, extent_x, extent_y, cut = record[i]
+        mean_x, mean_y, a, b, c, opacity, *rgb, extent_x, extent_y, power_threshold = record[i]
         if not extent_x > 0:
             continue
         columns = slice(*np.clip(np.floor([mean_x - extent_x, mean_x + extent_x + 2]), 0, width)
@@ -67,7 +66,7 @@ def rasterize_reference(
                      .astype(int))  # fmt: skip
         dx, dy = x[columns] - mean_x, y[rows] - mean_y
         r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
-        alpha = np.where(r <= cut, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0)
+        alpha = np.where(r <= power_threshold, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0)
         weight = alpha * transmittance[rows, columns]
         image[:, rows, columns] += np.multiply.outer(rgb, weight)
         transmittance[rows, columns] -= weight

@@ -101,7 +101,7 @@ def rasterize_depth(
     file, group, _ = FORMS[form or device.kind]
     device.launch(
         device.program(file, **WITH_DEPTH)["rasterize"], number * group, group,
-        width, height, tiles.grid[0], tiles.starts, tiles.instances, projected.record,
+        width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends, surfaces, metres,
     )  # fmt: skip
     return DepthFrame(Frame(image, transmittance, ends), surfaces, metres)
@@ -132,9 +132,9 @@ def rasterize_depth_backward(
     device.launch(
         device.program(file, **defines)["rasterize_backward"],
         tiles.grid[0] * tiles.grid[1] * group, group,
-        width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.instances, tiles.places,
-        first_slot, projected.record, frame.image, frame.transmittance, grad_image,
-        grad_transmittance, True, slots, *([] if error is None else [error]),
+        width, height, tiles.grid[0], tiles.starts, frame.tile_ends, tiles.intersections,
+        tiles.tile_bounds, first_slot, projected.record, frame.image, frame.transmittance,
+        grad_image, grad_transmittance, True, slots, *([] if error is None else [error]),
         drawn.surface, drawn.metres, grad_metres, depth_slots,
     )  # fmt: skip
     grad_record, grad_surface = device.empty((count, RECORD)), device.empty((count, SURFACE))
@@ -142,5 +142,5 @@ def rasterize_depth_backward(
         ("sum_slots", slots, grad_record), ("sum_surface", depth_slots, grad_surface),
     ):  # fmt: skip
         kernel = device.program(KERNELS / f"{name}.cl")[name]
-        device.launch(kernel, count, GROUP, count, tiles.places, first_slot, given, made)
+        device.launch(kernel, count, GROUP, count, tiles.tile_bounds, first_slot, given, made)
     return grad_record, grad_surface

@@ -32,18 +32,19 @@ def render_depth_reference(
     x, y = np.arange(width) + 0.5, np.arange(height)[:, None] + 0.5
     x, y = (np.broadcast_to(a, (height, width)) for a in (x, y))
     rays = np.stack([(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, np.ones_like(x)], -1)
-    image, through = np.zeros((3, height, width)), np.ones((height, width))
+    image, transmittance = np.zeros((3, height, width)), np.ones((height, width))
     metres = np.zeros((height, width))
     for i in np.argsort(depth, kind="stable"):
-        mean_x, mean_y, a, b, c, opacity, *rgb, extent_x, _, cut = record[i]
+        mean_x, mean_y, a, b, c, opacity, *rgb, extent_x, _, power_threshold = record[i]
         if not extent_x > 0:
             continue
         dx, dy = x - mean_x, y - mean_y
         r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
-        weight = np.where(r <= cut, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0) * through
+        alpha = np.where(r <= power_threshold, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0)
+        weight = alpha * transmittance
         drawn = weight > 0
         held = midpoint_depth(places[i], axes[i] @ axes[i].T, rays[drawn], camera.near)
         metres[drawn] += weight[drawn] * held
         image += np.multiply.outer(rgb, weight)
-        through = through - weight
-    return image + through * np.asarray(background)[:, None, None], through, metres
+        transmittance = transmittance - weight
+    return image + transmittance * np.asarray(background)[:, None, None], transmittance, metres

@@ -84,18 +84,18 @@ def test_lists_are_complete_sorted_and_stable(count, form):
     projected = project(d, *upload(splats), camera, form=form)
     tiles = bin_tiles(d, projected, camera.size, form)
     depth, record = d.download(projected.depth), d.download(projected.record)
-    visible = np.flatnonzero(d.download(tiles.places)[:, 0] >= 1 << 24) if count else []
+    visible = np.flatnonzero(d.download(tiles.tile_bounds)[:, 0] >= 1 << 24) if count else []
     wanted = np.argsort(depth, kind="stable")
     wanted = wanted[np.isin(wanted, visible)]
     np.testing.assert_array_equal(d.download(tiles.order), wanted)
 
-    starts, instances = d.download(tiles.starts), d.download(tiles.instances)
+    starts, intersections = d.download(tiles.starts), d.download(tiles.intersections)
     rank = np.full(count, -1)
     rank[wanted] = np.arange(len(wanted))
     assert starts[0] == 0 and starts[tiles.grid[0] * tiles.grid[1]] <= tiles.count
     touched = set()
     for tile in range(tiles.grid[0] * tiles.grid[1]):
-        here = instances[starts[tile] : starts[tile + 1]]
+        here = intersections[starts[tile] : starts[tile + 1]]
         assert np.all(np.diff(rank[here]) > 0)  # near to far, each splat once
         touched |= {(tile, i) for i in here.tolist()}
     assert touched >= pixels_touched(record, tiles.grid)
@@ -123,7 +123,7 @@ def test_both_forms_make_the_same_lists(size):
     cells = one.grid[0] * one.grid[1]
     listed = d.download(one.starts)[cells]
     assert 0 < listed <= one.count
-    for name, length in (("order", None), ("starts", cells + 1), ("instances", listed)):
+    for name, length in (("order", None), ("starts", cells + 1), ("intersections", listed)):
         np.testing.assert_array_equal(
             d.download(getattr(one, name))[:length], d.download(getattr(other, name))[:length]
         )
@@ -139,7 +139,7 @@ def test_a_wide_range_of_depths_takes_more_passes_and_stays_exact():
     depth = d.download(projected.depth)
     for form in FORMS:
         tiles = bin_tiles(d, projected, camera.size, form)
-        order, visible = d.download(tiles.order), d.download(tiles.places)[:, 0] >= 1 << 24
+        order, visible = d.download(tiles.order), d.download(tiles.tile_bounds)[:, 0] >= 1 << 24
         assert len(order) > 4000
         wanted = np.argsort(depth, kind="stable")
         np.testing.assert_array_equal(order, wanted[visible[wanted]])

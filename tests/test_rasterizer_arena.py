@@ -119,10 +119,10 @@ def test_every_gate_counts_what_it_keeps_out_once(limits):
     np.testing.assert_array_equal(record[:, 9] > 0, drawn)
     np.testing.assert_array_equal(d.download(got.depth) < 1e30, drawn)
     np.testing.assert_allclose(record[drawn, 5], opacity[drawn], rtol=2e-3, atol=1e-5)
-    cut = 2 * np.log(record[drawn, 5].astype(np.float64) / limits.min_alpha)
-    np.testing.assert_allclose(record[drawn, 11], cut, rtol=1e-4, atol=1e-5)
-    places = d.download(got.found.places)
-    assert not places[~drawn].any()
+    power_threshold = 2 * np.log(record[drawn, 5].astype(np.float64) / limits.min_alpha)
+    np.testing.assert_allclose(record[drawn, 11], power_threshold, rtol=1e-4, atol=1e-5)
+    tile_bounds = d.download(got.scratch.tile_bounds)
+    assert not tile_bounds[~drawn].any()
 
 
 def test_the_limits_of_this_test_stop_something_at_every_gate():
@@ -164,8 +164,8 @@ def test_two_views_in_one_launch_equal_each_alone(count):
         np.testing.assert_array_equal(
             d.download(got.record)[drawn], d.download(alone.record)[drawn]
         )
-        for name in ("places", "status"):
-            one, other = (d.download(getattr(p.found, name)) for p in (got, alone))
+        for name in ("tile_bounds", "status"):
+            one, other = (d.download(getattr(p.scratch, name)) for p in (got, alone))
             np.testing.assert_array_equal(one, other)
 
 
@@ -194,10 +194,10 @@ def test_keys_are_depth_or_distance_in_the_sort_frame(by_distance, keep_outside)
     centre[0, 3] -= 0.25
     sort = SortFrames((centre,), by_distance, keep_outside)
     both = project_arena(d, *arena(splats), np.eye(4)[None], [left, right], None, sort)
-    assert both[0].found.pairs is both[1].found.pairs
-    splat, key = keys_of(d, both[0].found)
+    assert both[0].scratch.pairs is both[1].scratch.pairs
+    splat, key = keys_of(d, both[0].scratch)
     np.testing.assert_array_equal(splat, np.unique(splat))  # in order, once each
-    touched = [d.download(p.found.places)[:, 0] > 0 for p in both]
+    touched = [d.download(p.scratch.tile_bounds)[:, 0] > 0 for p in both]
     expected = splats[3] >= LEAST_ALPHA if keep_outside else touched[0] | touched[1]
     np.testing.assert_array_equal(splat, np.flatnonzero(expected))
     p = as_double(splats)[0][splat] @ centre[:3, :3].T + centre[:3, 3]
@@ -207,21 +207,21 @@ def test_keys_are_depth_or_distance_in_the_sort_frame(by_distance, keep_outside)
         np.argsort(key, kind="stable"), np.argsort(floats_of(key), kind="stable")
     )
     assert keep_outside == (value.min() < 0) or by_distance
-    table = d.download(both[0].found.table)
+    table = d.download(both[0].scratch.table)
     np.testing.assert_array_equal(table.sum(0), np.bincount(key & 0xFFF, minlength=4096))
     for one in both:
-        status = d.download(one.found.status)
+        status = d.download(one.scratch.status)
         assert (status[:, 2].min(), status[:, 3].max()) == (key.min(), key.max())
 
 
 def test_without_sort_frames_nothing_is_entered():
     splats, camera, d = random_splats(100), off_centre_camera((90, 50)), device()
     got = project_arena(d, *arena(splats), np.eye(4)[None], [camera], None, SortFrames(()))[0]
-    assert got.found.pairs is None and got.found.table is None
-    assert d.download(got.found.status)[:, 0].sum() == 0
+    assert got.scratch.pairs is None and got.scratch.table is None
+    assert d.download(got.scratch.status)[:, 0].sum() == 0
     with_keys = project_arena(d, *arena(splats), np.eye(4)[None], [camera])[0]
     np.testing.assert_array_equal(
-        d.download(got.found.status)[:, 1], d.download(with_keys.found.status)[:, 1]
+        d.download(got.scratch.status)[:, 1], d.download(with_keys.scratch.status)[:, 1]
     )
 
 

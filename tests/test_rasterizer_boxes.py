@@ -24,12 +24,12 @@ def ellipses(centres, sigmas, turns, opacity=0.9) -> Projected:
     turn = np.array([[cos, -sin], [sin, cos]]).transpose(2, 0, 1)  # (N, 2, 2)
     covariance = turn * (sigmas**2)[:, None, :] @ turn.transpose(0, 2, 1)
     conic = turn * (sigmas**-2.0)[:, None, :] @ turn.transpose(0, 2, 1)
-    cut = np.full(count, 2 * np.log(opacity / LEAST))
-    extent = np.sqrt(cut[:, None] * np.diagonal(covariance, axis1=1, axis2=2))
+    power_threshold = np.full(count, 2 * np.log(opacity / LEAST))
+    extent = np.sqrt(power_threshold[:, None] * np.diagonal(covariance, axis1=1, axis2=2))
     rng = np.random.default_rng(0)
     record = np.column_stack(
         [centres, conic[:, 0, 0], conic[:, 0, 1], conic[:, 1, 1], np.full(count, opacity),
-         rng.random((count, 3)), extent, cut]
+         rng.random((count, 3)), extent, power_threshold]
     ).astype(np.float32)  # fmt: skip
     d = device()
     return Projected(d.upload(record), d.upload(rng.uniform(1, 2, count).astype(np.float32)))
@@ -38,9 +38,11 @@ def ellipses(centres, sigmas, turns, opacity=0.9) -> Projected:
 def pairs(tiles) -> set:
     """(tile, splat) of the lists."""
     d, cells = device(), tiles.grid[0] * tiles.grid[1]
-    starts, instances = d.download(tiles.starts), d.download(tiles.instances)
+    starts, intersections = d.download(tiles.starts), d.download(tiles.intersections)
     return {
-        (tile, int(i)) for tile in range(cells) for i in instances[starts[tile] : starts[tile + 1]]
+        (tile, int(i))
+        for tile in range(cells)
+        for i in intersections[starts[tile] : starts[tile + 1]]
     }
 
 
@@ -69,7 +71,7 @@ def test_no_pixel_is_lost_and_few_tiles_are_listed_in_vain(form, longest, shape)
     centres = rng.uniform((-30, -30), (430, 330), (count, 2))
     d, projected = device(), ellipses(centres, sigmas, turns)
     tiles = bin_tiles(d, projected, size, form)
-    assert (d.download(tiles.places)[:, 0] & BOX).any()
+    assert (d.download(tiles.tile_bounds)[:, 0] & BOX).any()
     listed, wanted = pairs(tiles), touched(projected, tiles.grid)
     assert len(listed) <= tiles.count
 

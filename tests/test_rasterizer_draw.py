@@ -19,14 +19,14 @@ from rasterizer_scenes import (
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera, Projected, project
 from shapeshift.rasterizer.raster import (
-    LEAST_THROUGH,
+    MIN_TRANSMITTANCE,
     rasterize,
     rasterize_rgba,
     rasterize_rgba_views,
 )
 from shapeshift.rasterizer.reference import project_reference, rasterize_reference
 
-STOP = LEAST_THROUGH
+STOP = MIN_TRANSMITTANCE
 BATCH = 32
 SIZES = [(1, 1), (3, 40), (15, 17), (16, 16), (17, 15), (33, 8), (83, 45)]
 
@@ -62,8 +62,8 @@ def test_an_early_stop_costs_what_it_leaves_out_and_no_more(form, least):
     d = device()
     projected = project(d, *upload(splats), camera)
     binned = (projected, bin_tiles(d, projected, camera.size))
-    whole = rasterize_rgba(d, *binned, camera.size, form, least_through=1e-6).copy()
-    short = rasterize_rgba(d, *binned, camera.size, form, least_through=least)
+    whole = rasterize_rgba(d, *binned, camera.size, form, min_transmittance=1e-6).copy()
+    short = rasterize_rgba(d, *binned, camera.size, form, min_transmittance=least)
     error = np.abs(short - whole).max()
     assert error <= least + 1e-6
     assert error > 0 or least < 1e-4  # the shortcut is taken
@@ -121,7 +121,7 @@ def test_a_broken_record_spoils_no_other_tile(value, column):
     tiles = bin_tiles(d, projected, camera.size)
     whole = rasterize_rgba(d, projected, tiles, camera.size).copy()
     record = d.download(projected.record)
-    starts, lists = d.download(tiles.starts), d.download(tiles.instances)
+    starts, lists = d.download(tiles.starts), d.download(tiles.intersections)
     bad = int(lists[0])
     record[bad, column] = value
     broken = Projected(d.upload(record), projected.depth)

@@ -173,7 +173,7 @@ def test_absolute_sums_can_be_left_out(form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_the_early_stop_costs_no_more_than_rounding(form):
-    """Opaque splats in many layers: most instances lie behind the stop, the twin has none."""
+    """Opaque splats in many layers: most intersections lie behind the stop, the twin has none."""
     size = (60, 44)
     splats, camera = random_splats(400, seed=6, scale=0.25, spread=0.3), off_centre_camera(size)
     splats[3][:] = np.maximum(splats[3], 0.5)

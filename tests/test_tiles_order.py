@@ -128,7 +128,7 @@ def test_sixteen_bit_keys_are_the_order_of_quantize(renderer, order):
     film(renderer, scene, [view], order=order, key_bits=16)
     quantised = orders_of(renderer)
     drawing = renderer._drawing
-    status = drawing.device.download(drawing._projected[0].found.status)
+    status = drawing.device.download(drawing._projected[0].scratch.status)
     assert (status[:, 3] <= 65534).all()
     film(renderer, scene, [view], order=order)
     exact = orders_of(renderer)

@@ -86,7 +86,7 @@ class Arena:
 
     def frame(self, views: list[View], into: list[Projected] | None) -> tuple:
         projected = self.project(views, into)
-        order = sort_order(self.device, projected[0].found)
+        order = sort_order(self.device, projected[0].scratch)
         size = views[0].size
         binned = [(p, bin_tiles(self.device, p, size, order=order)) for p in projected]
         return projected, rasterize_rgba_views(self.device, binned, size)
@@ -194,7 +194,7 @@ def measure(arena: Arena, views: list[View], prototype: Prototype | None) -> Tim
             lambda view=view, into=mono: (arena.shade(view), arena.frame([view], into)),
         )
         mono = times.add("project", lambda view=view, into=mono: arena.project([view], into))
-        order = times.add("sort", lambda p=mono: sort_order(device, p[0].found))
+        order = times.add("sort", lambda p=mono: sort_order(device, p[0].scratch))
         tiles = times.add("bin", lambda p=mono, o=order: bin_tiles(device, p[0], size, order=o))
         times.add(
             "raster",

@@ -1,19 +1,19 @@
-// bin: splats -> a list of instances (splat, tile) a tile, in depth order.  CPU form.
+// bin: splats -> a list of intersections (splat, tile) a tile, in depth order.  CPU form.
 // A work-item owns a contiguous chunk of splats, counts into a table of its own, and scatters from
 // its row of the scanned table: parallel, stable, and the same list for any number of chunks.
-#include "common/places_of_eight.cl"
-#define AHEAD 24  // splats: the next places are fetched while these are counted
+#include "common/tile_bounds_of_eight.cl"
+#define AHEAD 24  // splats: the next tile_bounds are fetched while these are counted
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
 // Per splat its tiles; per chunk the (splat, depth key) pairs of its visible splats, packed at the
-// chunk's start, and the histogram of their low digits.  status: visible, instances, key range.
-__kernel void find_places(int count, int chunk, int tiles_x, int tiles_y,
+// chunk's start, and the histogram of their low digits.  status: visible, intersections, key range.
+__kernel void find_tile_bounds(int count, int chunk, int tiles_x, int tiles_y,
                           __global const float* record, __global const float* depth,
-                          __global uint2* places, __global uint2* pairs,
+                          __global uint2* tile_bounds, __global uint2* pairs,
                           __global int* histogram, __global uint4* status) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
-  Chunk mine = open_chunk(first, places, pairs, histogram + c * LOW_BINS);
+  Chunk mine = open_chunk(first, tile_bounds, pairs, histogram + c * LOW_BINS);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
     float column[8][LANES], z[LANES];
@@ -32,15 +32,15 @@ __kernel void find_places(int count, int chunk, int tiles_x, int tiles_y,
     e.c = vload8(0, column[4]);
     e.half_x = vload8(0, column[5]);
     e.half_y = vload8(0, column[6]);
-    e.cut = vload8(0, column[7]);
+    e.power_threshold = vload8(0, column[7]);
     e.seen = (e.half_x > 0.0f) & ((int8)(0, 1, 2, 3, 4, 5, 6, 7) < n);
-    const Places p = places_of_eight(&e, tiles_x, tiles_y);
+    const TileBounds8 p = tile_bounds_of_eight(&e, tiles_x, tiles_y);
     enter_eight(&mine, i, n, &p, vload8(0, z));
   }
   status[c] = close_chunk(&mine, first);
 }
 
-// Counts (chunks, bins) -> places to write to, bin by bin and in it chunk by chunk.
+// Counts (chunks, bins) -> tile_bounds to write to, bin by bin and in it chunk by chunk.
 __kernel void scan_table(int bins, int chunks, __global int* table, __global int* starts) {
   int sum = 0;
   for (int b = 0; b < bins; b++) {
@@ -86,11 +86,11 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   }
 }
 
-// VISIT(tile, touched) for the tiles of a splat's place: branch free where it is within 2 x 2 tiles, as
+// VISIT(tile, touched) for the tiles of a splat's bounds: branch free where it is within 2 x 2 tiles, as
 // nearly all are; there `touched` is 0 or 1 and the tile may lie beyond the last one.
-#define FOR_EACH_TILE(place, tiles_x, splat)                                       \
-  const uint2 here = (place);                                                      \
-  const int tile = PLACE_ROW(here) * (tiles_x) + PLACE_COLUMN(here);               \
+#define FOR_EACH_TILE(bounds, tiles_x, splat)                                       \
+  const uint2 here = (bounds);                                                      \
+  const int tile = BOUNDS_ROW(here) * (tiles_x) + BOUNDS_COLUMN(here);               \
   if (here.x & MASKED && !(here.y & ~0x303u)) {                                    \
     VISIT(tile, here.y & 1);                                                       \
     VISIT(tile + 1, here.y >> 1 & 1);                                              \
@@ -112,28 +112,28 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
 
 // table (chunks, bins): how often each tile is touched; a row of tiles and more lies beyond them.
 __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global const int* order,
-                          __global const float* record, __global const uint2* places,
-                          __global uint2* sorted_places, __global int* table) {
+                          __global const float* record, __global const uint2* tile_bounds,
+                          __global uint2* sorted_bounds, __global int* table) {
   const int c = get_global_id(0);
   __global int* mine = table + c * bins;
   for (int t = 0; t < bins; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
-    PREFETCH(places + order[min(i + AHEAD, last - 1)]);
+    PREFETCH(tile_bounds + order[min(i + AHEAD, last - 1)]);
     const int splat = order[i];
-    const uint2 place = places[splat];
-    sorted_places[i] = place;  // side by side for the next pass
+    const uint2 bounds = tile_bounds[splat];
+    sorted_bounds[i] = bounds;  // side by side for the next pass
 #define VISIT(tile, touched) mine[tile] += touched
-    FOR_EACH_TILE(place, tiles_x, splat)
+    FOR_EACH_TILE(bounds, tiles_x, splat)
 #undef VISIT
   }
 }
 
-// instances is longer than the lists by a cache line a chunk: what touches nothing is written there.
+// intersections is longer than the lists by a cache line a chunk: what touches nothing is written there.
 __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int total,
                             __global const int* order, __global const float* record,
-                            __global const uint2* sorted_places, __global int* table,
-                            __global int* instances) {
+                            __global const uint2* sorted_bounds, __global int* table,
+                            __global int* intersections) {
   const int c = get_global_id(0);
   __global int* next = table + c * bins;
   const int spare = total + SPARE * c;
@@ -143,19 +143,19 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
 #define VISIT(tile, touched)                              \
   {                                                       \
     const int to = next[tile];                            \
-    instances[(touched) ? to : spare] = splat;            \
+    intersections[(touched) ? to : spare] = splat;            \
     next[tile] = to + (touched);                          \
   }
-    FOR_EACH_TILE(sorted_places[i], tiles_x, splat)
+    FOR_EACH_TILE(sorted_bounds[i], tiles_x, splat)
 #undef VISIT
   }
 }
 
-// First slot of every splat: gradients of its instances lie side by side from there.
-__kernel void number_slots(int count, __global const uint2* places, __global int* first_slot) {
+// First slot of every splat: gradients of its intersections lie side by side from there.
+__kernel void number_slots(int count, __global const uint2* tile_bounds, __global int* first_slot) {
   int sum = 0;
   for (int i = 0; i < count; i++) {
     first_slot[i] = sum;
-    sum += tiles_at(places[i]);
+    sum += tiles_at(tile_bounds[i]);
   }
 }

@@ -17,8 +17,8 @@
                          2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
 
 typedef struct {
-  float splats[BATCH * RECORD];  // conic and cut times -log2(e) / 2: exponents of 2
-  uint takers[BLOCKS];           // per block: bit j where it takes splat j
+  float splats[BATCH * RECORD];  // conic and power_threshold times -log2(e) / 2: exponents of 2
+  uint block_splats[BLOCKS];           // per block: bit j where it takes splat j
 #ifdef HEAT
   float2 heat[BATCH];
 #endif
@@ -47,7 +47,7 @@ inline float16 exp2_16(float16 x) {
 }
 
 // Sixteen words of sixteen bits, turned: bit j of word k becomes bit k of word j.
-inline ushort16 turn_bits(ushort16 a) {
+inline ushort16 transpose_bits(ushort16 a) {
   ushort16 other = a.s89abcdef01234567, low, high;
   low = (a & (ushort16)0x00ff) | other << (ushort16)8;
   high = (a & (ushort16)0xff00) | other >> (ushort16)8;
@@ -69,19 +69,19 @@ inline ushort16 turn_bits(ushort16 a) {
 
 // Columns of eight ellipses; x and y of the mean from the centre of the tile's first pixel.
 typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], cut[BATCH];
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], power_threshold[BATCH];
 } Columns;
 
 // Bit SIDE row + column of each block that the ellipse reaches, for eight splats from 8 g on: in
-// every row of blocks the interval of x, as in places_of_eight.cl.
+// every row of blocks the interval of x, as in tile_bounds_of_eight.cl.
 inline ushort8 blocks_of_eight(const Columns* e, int g, float x0, float y0) {
   const float8 x = vload8(g, e->x) - x0, y = vload8(g, e->y) - y0;
-  const float8 a = vload8(g, e->a), b = vload8(g, e->b), cut = vload8(g, e->cut);
+  const float8 a = vload8(g, e->a), b = vload8(g, e->b), power_threshold = vload8(g, e->power_threshold);
   const float8 ey = vload8(g, e->half_y);
   const float8 per_a = 1.0f / a, tilt = -b * per_a;
   const float8 lean = -b / vload8(g, e->c) * vload8(g, e->half_x);
   // 1.0001: float rounding must not lose a pixel.
-  const float8 most = 1.0001f * cut * per_a, per_yy = cut / fmax(ey * ey, FLT_MIN) * per_a;
+  const float8 most = 1.0001f * power_threshold * per_a, per_yy = power_threshold / fmax(ey * ey, FLT_MIN) * per_a;
   float8 top = -y;
   uint8 mask = 0;
   for (int row = 0; row < SIDE; row++) {
@@ -101,18 +101,18 @@ inline ushort8 blocks_of_eight(const Columns* e, int g, float x0, float y0) {
 }
 
 // Fills a batch from the list [p, end) and returns how many it got.
-inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
+inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
                  __global const float* record, Batch* batch) {
   const int n = min(BATCH, end - p), ahead = min(BATCH, end - p - n);
   for (int j = 0; j < ahead; j++) {  // of the next batch: the drawing of this one hides the misses
-    __global const float* from = record + (size_t)RECORD * instances[p + n + j];
+    __global const float* from = record + (size_t)RECORD * intersections[p + n + j];
     PREFETCH(from);
     PREFETCH(from + RECORD - 1);
   }
   Columns e;
   const float h = -HALF_LOG2E;
   for (int j = 0; j < n; j++) {
-    __global const float* from = record + (size_t)RECORD * instances[p + j];
+    __global const float* from = record + (size_t)RECORD * intersections[p + j];
     const float8 s = vload8(0, from);
     const float4 t = vload4(0, from + 8);
     e.x[j] = s.s0;
@@ -122,16 +122,16 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
     e.c[j] = s.s4;
     e.half_x[j] = t.s1;
     e.half_y[j] = t.s2;
-    e.cut[j] = t.s3;
+    e.power_threshold[j] = t.s3;
     vstore8(s * (float8)(1, 1, h, 2 * h, h, 1, 1, 1), 0, batch->splats + RECORD * j);
     vstore4(t * (float4)(1, 1, 1, h), 0, batch->splats + RECORD * j + 8);
   }
   ushort blocks[BATCH];
   for (int g = 0; g * LANES < n; g++)
     vstore8(blocks_of_eight(&e, g, x0 + 0.5f, y0 + 0.5f), g, blocks);
-  uint16 takers = convert_uint16(turn_bits(vload16(0, blocks)));
-  if (n > 16) takers |= convert_uint16(turn_bits(vload16(1, blocks))) << (uint16)16;
-  vstore16(takers & (0xffffffffu >> (BATCH - n)), 0, batch->takers);
+  uint16 block_splats = convert_uint16(transpose_bits(vload16(0, blocks)));
+  if (n > 16) block_splats |= convert_uint16(transpose_bits(vload16(1, blocks))) << (uint16)16;
+  vstore16(block_splats & (0xffffffffu >> (BATCH - n)), 0, batch->block_splats);
   return n;
 }
 
@@ -169,10 +169,10 @@ inline void store_heat(float16 hot, float16 weight, int x0, int y0, int width, i
 }
 #endif
 
-// least: a block is done when less than this comes through each of its pixels.
+// min_transmittance: a block is done when less than this comes through each of its pixels.
 inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
-                      __global const int* instances, __global const float* record,
-                      float least, __global float* image AND_HEAT) {
+                      __global const int* intersections, __global const float* record,
+                      float min_transmittance, __global float* image AND_HEAT) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
@@ -191,13 +191,13 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   uint open = 0xffff;
   const int end = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end && open;) {
-    const int n = fetch(p, end, x0, y0, instances, record, &batch);
+    const int n = fetch(p, end, x0, y0, intersections, record, &batch);
 #ifdef HEAT
-    for (int j = 0; j < n; j++) batch.heat[j] = heat[instances[p + j]].xw;
+    for (int j = 0; j < n; j++) batch.heat[j] = heat[intersections[p + j]].xw;
 #endif
     p += n;
     for (int k = 0; k < BLOCKS; k++) {
-      uint left = open >> k & 1 ? batch.takers[k] : 0;
+      uint left = open >> k & 1 ? batch.block_splats[k] : 0;
       if (!left) continue;
       const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
       const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
@@ -212,7 +212,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
         const float16 power =
             fma(dx, fma(s[CONIC_A], dx, s[CONIC_B] * dy), s[CONIC_C] * dy * dy);
         const float16 alpha = fmin(s[OPACITY] * exp2_16(power), MAX_ALPHA);
-        const float16 w = select((float16)(0), alpha, power >= s[CUT]) * t;
+        const float16 w = select((float16)(0), alpha, power >= s[POWER_THRESHOLD]) * t;
         r = fma(w, s[RED], r);
         g = fma(w, s[GREEN], g);
         b = fma(w, s[BLUE], b);
@@ -230,7 +230,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       R[k] = r;
       G[k] = g;
       B[k] = b;
-      if (!(max8(fmax(t.lo, t.hi)) >= least)) open &= ~(1u << k);
+      if (!(max8(fmax(t.lo, t.hi)) >= min_transmittance)) open &= ~(1u << k);
     }
   }
   for (int k = 0; k < BLOCKS; k++)
@@ -243,15 +243,15 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 }
 
 // One view, or the same tile of two views one after the other.
-__kernel void draw(int width, int height, int tiles_x, float least, __global const int* starts_0,
-                   __global const int* instances_0, __global const float* record_0,
+__kernel void draw(int width, int height, int tiles_x, float min_transmittance, __global const int* starts_0,
+                   __global const int* intersections_0, __global const float* record_0,
                    __global float* image_0 AND_HEAT_OF(0), __global const int* starts_1,
-                   __global const int* instances_1, __global const float* record_1,
+                   __global const int* intersections_1, __global const float* record_1,
                    __global float* image_1 AND_HEAT_OF(1)) {
   const int tile = get_global_id(0);
-  draw_tile(tile, width, height, tiles_x, starts_0, instances_0, record_0, least,
+  draw_tile(tile, width, height, tiles_x, starts_0, intersections_0, record_0, min_transmittance,
             image_0 GIVE_HEAT(0));
   if (image_1)
-    draw_tile(tile, width, height, tiles_x, starts_1, instances_1, record_1, least,
+    draw_tile(tile, width, height, tiles_x, starts_1, intersections_1, record_1, min_transmittance,
               image_1 GIVE_HEAT(1));
 }

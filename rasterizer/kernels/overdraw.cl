@@ -17,7 +17,7 @@ __kernel void overdraw(int count, int width, int height, __global const float* r
     for (int x = x0; x < x1; x++) {
       const float dx = x + 0.5f - r[MEAN_X];
       const float q = r[CONIC_A] * dx * dx + 2.0f * r[CONIC_B] * dx * dy + r[CONIC_C] * dy * dy;
-      if (q <= r[CUT]) atomic_inc(number + y * width + x);
+      if (q <= r[POWER_THRESHOLD]) atomic_inc(number + y * width + x);
     }
   }
 }

@@ -13,8 +13,8 @@ inline Rows scaled_row(float8 x, float8 y, float8 z, Rows by) {
   return row;
 }
 
-#define STORE_PLACES(rows) STORE_COLUMNS(rows, 4, 0, mean.x, mean.y, mean.z, mean.opacity)
-#define STORE_SIGMAS(rows)                                                       \
+#define STORE_MEANS(rows) STORE_COLUMNS(rows, 4, 0, mean.x, mean.y, mean.z, mean.opacity)
+#define STORE_COVARIANCES(rows)                                                       \
   STORE_COLUMNS(rows, 8, 0, dot3(a, a), dot3(a, b), dot3(a, c), dot3(b, b))      \
   STORE_COLUMNS(rows, 8, 4, dot3(b, c), dot3(c, c), 0, 0)
 
@@ -46,8 +46,8 @@ __kernel void pack(int count, int start, int run, __global const float* means,
     const Rows a = scaled_row(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), s);
     const Rows b = scaled_row(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), s);
     const Rows c = scaled_row(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), s);
-    STORE_ROWS(STORE_PLACES, (mean_opacity + 4 * (size_t)start), 4)
-    STORE_ROWS(STORE_SIGMAS, (covariance + 8 * (size_t)start), 8)
+    STORE_ROWS(STORE_MEANS, (mean_opacity + 4 * (size_t)start), 4)
+    STORE_ROWS(STORE_COVARIANCES, (covariance + 8 * (size_t)start), 8)
   }
 }
 

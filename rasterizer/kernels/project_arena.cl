@@ -1,7 +1,7 @@
 // project_arena: splats of many posed objects -> records, tiles and sort keys, for drawing alone.
 // A work-item owns a chunk and takes eight splats at a time as vectors.  Memory is the limit here:
 // a splat is read once for all views, the tiles are found while the ellipses are at hand (bin.cl's
-// find_places reads them again), and what no view can see is dropped before its covariance is read.
+// find_tile_bounds reads them again), and what no view can see is dropped before its covariance is read.
 // Needs: VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
 // OWN_COLORS = 1: the second view has colours of its own.
@@ -14,13 +14,13 @@
 #include "common/camera.cl"
 #include "common/limits.cl"
 #include "common/eight_rows.cl"
-#include "common/places_of_eight.cl"
+#include "common/tile_bounds_of_eight.cl"
 
 typedef struct {
   float8 x, y, z, opacity;        // mean in the object, metres
   float8 xx, xy, xz, yy, yz, zz;  // covariance in the object, m^2
   float8 red, green, blue;
-  float8 cut;                     // 2 ln(opacity / least alpha)
+  float8 power_threshold;                     // 2 ln(opacity / least alpha)
 } Eight;
 
 // Blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
@@ -91,7 +91,7 @@ inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fad
 #define STORE_RECORDS(rows)                                                          \
   STORE_COLUMNS(rows, RECORD, 0, px, py, c * per, -b * per)                          \
   STORE_COLUMNS(rows, RECORD, 4, a * per, opacity, s->red, s->green)                 \
-  STORE_COLUMNS(rows, RECORD, 8, s->blue, half_x, half_y, cut)
+  STORE_COLUMNS(rows, RECORD, 8, s->blue, half_x, half_y, power_threshold)
 
 // Screen ellipses of those `alive` in one view.  antialiased: above 0 where a splat is.
 // passed: per lane how many got past each gate.  record: of all splats, these are i to i + n; culled ones get extents of -1.
@@ -101,14 +101,14 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
                                 __global const float* limits, int i, int n,
                                 __global float* record, int8* passed) {
   const float low_pass = limits[LOW_PASS];
-  const float8 per_z = 1.0f / z, tan_x = x * per_z, tan_y = y * per_z;
-  const float8 jx = view[CAMERA_FX] * per_z, jy = view[CAMERA_FY] * per_z;
-  const float8 jxz = -jx * fmin(fmax(tan_x, view[LEAST_X]), view[MOST_X]);
-  const float8 jyz = -jy * fmin(fmax(tan_y, view[LEAST_Y]), view[MOST_Y]);
+  const float8 inv_z = 1.0f / z, tan_x = x * inv_z, tan_y = y * inv_z;
+  const float8 j00 = view[CAMERA_FX] * inv_z, j11 = view[CAMERA_FY] * inv_z;
+  const float8 j02 = -j00 * fmin(fmax(tan_x, view[MIN_TAN_X]), view[MAX_TAN_X]);
+  const float8 j12 = -j11 * fmin(fmax(tan_y, view[MIN_TAN_Y]), view[MAX_TAN_Y]);
   // Rows of J camera_from_object, then the screen covariance a, b, c.
-  const float8 ux = jx * m[0] + jxz * m[8], uy = jx * m[1] + jxz * m[9];
-  const float8 vx = jy * m[4] + jyz * m[8], vy = jy * m[5] + jyz * m[9];
-  const float8 uz = jx * m[2] + jxz * m[10], vz = jy * m[6] + jyz * m[10];
+  const float8 ux = j00 * m[0] + j02 * m[8], uy = j00 * m[1] + j02 * m[9];
+  const float8 vx = j11 * m[4] + j12 * m[8], vy = j11 * m[5] + j12 * m[9];
+  const float8 uz = j00 * m[2] + j02 * m[10], vz = j11 * m[6] + j12 * m[10];
   const float8 sx = s->xx * ux + s->xy * uy + s->xz * uz;
   const float8 sy = s->xy * ux + s->yy * uy + s->yz * uz;
   const float8 sz = s->xz * ux + s->yz * uy + s->zz * uz;
@@ -121,15 +121,15 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   const float8 bare = fmax(bare_a * bare_c - b * b, 0.0f);  // float rounding may go below 0
   const float8 determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
   const float8 per = 1.0f / determinant;
-  float8 cut = s->cut, opacity = s->opacity;
+  float8 power_threshold = s->power_threshold, opacity = s->opacity;
 #if ANTIALIASED
   // Mip-Splatting's 2D filter: what the low pass makes wider becomes fainter, the same light in all.
   const float8 kept = fmin(sqrt(bare / determinant), 1.0f);  // 1 where the quotient is no number
   opacity *= select((float8)(1), kept, antialiased > 0);
-  cut = fmax(2.0f * log(opacity * limits[PER_LEAST_ALPHA]), 0.0f);
+  power_threshold = fmax(2.0f * log(opacity * limits[PER_MIN_ALPHA]), 0.0f);
 #endif
-  float8 half_x = sqrt(cut * a), half_y = sqrt(cut * c);
-  const float8 px = jx * x + view[CAMERA_CX], py = jy * y + view[CAMERA_CY];
+  float8 half_x = sqrt(power_threshold * a), half_y = sqrt(power_threshold * c);
+  const float8 px = j00 * x + view[CAMERA_CX], py = j11 * y + view[CAMERA_CY];
   const float8 mid = 0.5f * (a + c), off = 0.5f * (a - c);
   const float8 major = mid + sqrt(off * off + b * b);  // px^2, one sigma squared
 
@@ -139,22 +139,22 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   const int8 inside = (px + half_x > 0.0f) & (px - half_x < view[IMAGE_WIDTH]) &
                       (py + half_y > 0.0f) & (py - half_y < view[IMAGE_HEIGHT]);
   const int8 seen = alive & (inside | ~finite);
-  int8 small = seen & finite & (major <= limits[MOST_PIXELS_2]);
-  small &= (determinant > 0.0f) & (determinant < FLT_MAX) & (fabs(s->red) <= MOST_COLOR) &
-           (fabs(s->green) <= MOST_COLOR) & (fabs(s->blue) <= MOST_COLOR);
-  const int8 large = small & (cut * major >= limits[LEAST_PIXELS_2]);
+  int8 small = seen & finite & (major <= limits[MAX_PIXELS_2]);
+  small &= (determinant > 0.0f) & (determinant < FLT_MAX) & (fabs(s->red) <= MAX_COLOR) &
+           (fabs(s->green) <= MAX_COLOR) & (fabs(s->blue) <= MAX_COLOR);
+  const int8 large = small & (power_threshold * major >= limits[MIN_PIXELS_2]);
   int8 drawn = large;
 #if ANTIALIASED
-  drawn &= opacity >= limits[LEAST_ALPHA];
+  drawn &= opacity >= limits[MIN_ALPHA];
 #endif
   if (limits[FADES] > 0) {
-    opacity *= ramp(limits[MOST_PIXELS] - sqrt(major), limits[PER_PIXELS]) *
-               ramp(limits[MOST_DISTANCE] - sqrt(square), limits[PER_DISTANCE]) *
-               ramp(sqrt(cut * major) - limits[LEAST_PIXELS], limits[PER_FOOTPRINT]);
-    drawn &= opacity >= limits[LEAST_ALPHA];
-    cut = fmax(2.0f * log(opacity * limits[PER_LEAST_ALPHA]), 0.0f);
-    half_x = sqrt(cut * a);
-    half_y = sqrt(cut * c);
+    opacity *= ramp(limits[MAX_PIXELS] - sqrt(major), limits[PER_PIXELS]) *
+               ramp(limits[MAX_DISTANCE] - sqrt(square), limits[PER_DISTANCE]) *
+               ramp(sqrt(power_threshold * major) - limits[MIN_PIXELS], limits[PER_FOOTPRINT]);
+    drawn &= opacity >= limits[MIN_ALPHA];
+    power_threshold = fmax(2.0f * log(opacity * limits[PER_MIN_ALPHA]), 0.0f);
+    half_x = sqrt(power_threshold * a);
+    half_y = sqrt(power_threshold * c);
   }
   passed[GATE_FRUSTUM] += seen;
   passed[GATE_SIZE] += small;
@@ -165,7 +165,7 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   half_x = select(none, half_x, drawn);
   half_y = select(none, half_y, drawn);
   STORE_ROWS(STORE_RECORDS, record, RECORD)
-  const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, cut, drawn};
+  const Ellipses out = {px, py, c * per, -b * per, a * per, half_x, half_y, power_threshold, drawn};
   return out;
 }
 
@@ -187,27 +187,27 @@ inline uint most_of(uint8 a) {
 
 // Splats without a record: told by their depth, and by a place that is no tile.
 inline void leave_out(int i, int n, __global float* record, __global float* depth,
-                      __global uint2* places) {
+                      __global uint2* tile_bounds) {
   for (int lane = 0; lane < n; lane++) {
     record[(size_t)RECORD * (i + lane) + EXTENT_X] = -1;
     depth[i + lane] = CULLED_DEPTH;
-    places[i + lane] = (uint2)(0);
+    tile_bounds[i + lane] = (uint2)(0);
   }
 }
 
 // frame: the limits, VIEW_SIZE floats a view, POSE floats an object.  by_distance: keys are metres
 // to the sort frame's origin, else along its z.  keep_outside: also splats that no view sees get a
-// key.  status: pairs of the view's order, instances, least and most key.
+// key.  status: pairs of the view's order, intersections, least and most key.
 __kernel void project_arena(
     int count, int chunk, int by_distance, int keep_outside, __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
     __global const float* color, __global const float* second_color,
     __global const int* object_index,
     __global float* record_0, __global float* depth_0, __global int* culled_0,
-    __global uint2* places_0, __global uint4* status_0, __global uint2* pairs_0,
+    __global uint2* tile_bounds_0, __global uint4* status_0, __global uint2* pairs_0,
     __global int* table_0,
     __global float* record_1, __global float* depth_1, __global int* culled_1,
-    __global uint2* places_1, __global uint4* status_1, __global uint2* pairs_1,
+    __global uint2* tile_bounds_1, __global uint4* status_1, __global uint2* pairs_1,
     __global int* table_1) {
   const int c = get_global_id(0);
   const int first = c * chunk, last = min(count, first + chunk);
@@ -216,7 +216,7 @@ __kernel void project_arena(
   __global float* const record[2] = {record_0, record_1};
   __global float* const depth[2] = {depth_0, depth_1};
   __global int* const culled[2] = {culled_0, culled_1};
-  __global uint2* const places[2] = {places_0, places_1};
+  __global uint2* const tile_bounds[2] = {tile_bounds_0, tile_bounds_1};
   __global uint4* const status[2] = {status_0, status_1};
   __global uint2* const pairs[2] = {pairs_0, pairs_1};
   __global int* const table[2] = {table_0, table_1};
@@ -227,9 +227,9 @@ __kernel void project_arena(
     keys[o] = none;
     for (int b = 0; b < LOW_BINS; b++) keys[o].bins[b] = 0;
   }
-  int8 passed[VIEWS][GATES], instances[VIEWS], entered = 0;
+  int8 passed[VIEWS][GATES], intersections[VIEWS], entered = 0;
   for (int v = 0; v < VIEWS; v++) {
-    instances[v] = 0;
+    intersections[v] = 0;
     for (int g = 0; g < GATES; g++) passed[v][g] = 0;
   }
   int current = -1;  // the object whose pose m holds
@@ -239,10 +239,10 @@ __kernel void project_arena(
     const int n = min(LANES, last - i);
     const int8 valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
     LOAD_ROWS(LOAD_MEANS, s, mean_opacity, 4)
-    const int8 bright = valid & (s.opacity >= limits[LEAST_ALPHA]) & (s.opacity < FLT_MAX);
+    const int8 bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
     entered += bright;
     if (!any(bright)) {
-      for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], places[v]);
+      for (int v = 0; v < VIEWS; v++) leave_out(i, n, record[v], depth[v], tile_bounds[v]);
       continue;
     }
     int8 object;
@@ -256,7 +256,7 @@ __kernel void project_arena(
       y[v] = to[4] * s.x + to[5] * s.y + to[6] * s.z + to[7];
       z[v] = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
       square[v] = x[v] * x[v] + y[v] * y[v] + z[v] * z[v];
-      const int8 near_enough = bright & (square[v] <= limits[MOST_DISTANCE_2]);
+      const int8 near_enough = bright & (square[v] <= limits[MAX_DISTANCE_2]);
       passed[v][GATE_DISTANCE] += near_enough;
       alive[v] = near_enough & (z[v] > views[VIEW_SIZE * v + NEAR]);
       anywhere |= alive[v];
@@ -265,12 +265,12 @@ __kernel void project_arena(
     if (any(anywhere)) {
       LOAD_ROWS(LOAD_COVARIANCES, s, covariance, 8)
       LOAD_ROWS(LOAD_COLORS, s, color, 4)
-      s.cut = fmax(2.0f * log(s.opacity * limits[PER_LEAST_ALPHA]), 0.0f);
+      s.power_threshold = fmax(2.0f * log(s.opacity * limits[PER_MIN_ALPHA]), 0.0f);
     }
     int8 drawn_anywhere = 0;
     for (int v = 0; v < VIEWS; v++) {
       if (!any(alive[v])) {
-        leave_out(i, n, record[v], depth[v], places[v]);
+        leave_out(i, n, record[v], depth[v], tile_bounds[v]);
         continue;
       }
 #if OWN_COLORS
@@ -282,13 +282,13 @@ __kernel void project_arena(
       const float8 antialiased = ANTIALIASED ? m[POSE - 1] : (float8)(0);
       const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], antialiased,
                                        alive[v], view, limits, i, n, record[v], passed[v]);
-      const Places p = places_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
-      instances[v] += p.count;
+      const TileBounds8 p = tile_bounds_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
+      intersections[v] += p.count;
       seen[v] = p.count > 0;
       drawn_anywhere |= seen[v];
       const float8 far = select((float8)(CULLED_DEPTH), z[v], e.seen);
       store_floats(far, i, n, depth[v]);
-      store_pairs(p.corner, p.mask, i, n, places[v]);
+      store_pairs(p.corner, p.mask, i, n, tile_bounds[v]);
     }
     for (int o = 0; o < ORDERS; o++) {
       const float8* to = m + 12 * (VIEWS + o);
@@ -311,7 +311,7 @@ __kernel void project_arena(
       culled[v][GATES * c + g] = max(before, 0) - max(after, 0);
       before = after;
     }
-    uint4 told = (uint4)(0, sum_int8(instances[v]), 0, 0);
+    uint4 told = (uint4)(0, sum_int8(intersections[v]), 0, 0);
     if (ORDERS) {
       const Keys* mine = keys + (ORDERS == 1 ? 0 : v);
       told.x = mine->next - first;

@@ -2,8 +2,8 @@
 // pixels, kept in registers and the first cache.
 // A block is eight pixels, BLOCK_W x BLOCK_H, one vector.  Columns of blocks are numbered first
 // down, then right, so that a column's blocks are neighbouring bits of a mask.
-// Reads: tile_start (tiles + 1), instances, record.  Early stop: blocks whose transmittance is
-// below STOP everywhere are dropped from the mask every BATCH instances; a tile ends with its last.
+// Reads: tile_start (tiles + 1), intersections, record.  Early stop: blocks whose transmittance is
+// below STOP everywhere are dropped from the mask every BATCH intersections; a tile ends with its last.
 #include "common/vector.cl"
 #include "common/raster.cl"
 #define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
@@ -18,7 +18,7 @@
 #define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
 
-// A batch of instances of one tile.
+// A batch of intersections of one tile.
 typedef struct {
   float splats[BATCH * RECORD];
   uint blocks[BATCH];  // those that the splat's ellipse touches
@@ -26,21 +26,21 @@ typedef struct {
 
 // What of a batch the masks are made of, a column each.
 typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], cut[BATCH];
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], power_threshold[BATCH];
 } Columns;
 
 // Bit k of each block that the ellipse touches, for eight splats from 8 g on: in every column of
 // blocks the interval of y while the ellipse is, in x, between its first and last pixel centres.
-//   y = tilt x +- sqrt((cut - x^2 / covariance_xx) / c), largest at x = lean
+//   y = tilt x +- sqrt((power_threshold - x^2 / covariance_xx) / c), largest at x = lean
 // With room for what float rounding does to a pixel's own test, as in span_of_row of tiles.cl: no
 // pixel is lost, so every bit of the image is that of a test of all blocks.
 inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
   const float8 x = vload8(g, e->x) - (x0 + 0.5f), y = vload8(g, e->y) - (y0 + 0.5f);
   const float8 a = vload8(g, e->a), b = vload8(g, e->b), c = vload8(g, e->c);
-  const float8 ex = vload8(g, e->half_x), ey = vload8(g, e->half_y), cut = vload8(g, e->cut);
+  const float8 ex = vload8(g, e->half_x), ey = vload8(g, e->half_y), power_threshold = vload8(g, e->power_threshold);
   const float8 per_c = 1.0f / c, tilt = -b * per_c, lean = -b / a * ey;
-  const float8 most = (1.0001f * cut + 5e-7f * (a * ex * ex + c * ey * ey)) * per_c;
-  const float8 per_xx = cut / fmax(ex * ex, FLT_MIN) * per_c;
+  const float8 most = (1.0001f * power_threshold + 5e-7f * (a * ex * ex + c * ey * ey)) * per_c;
+  const float8 per_xx = power_threshold / fmax(ex * ex, FLT_MIN) * per_c;
   const float8 spare = 1e-6f * (fabs(tilt) * (ex + fabs(x)) + ey + fabs(y));
   const float8 above = y - spare, below = y + spare, low = -1, high = TILE;
   float8 left = -x;
@@ -64,12 +64,12 @@ inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
 // Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
 // independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
 // use: a mask that is late makes every mispredicted end of a block loop dear.
-inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
+inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
                  __global const float* record, Batch* batch) {
   const int n = min(BATCH, end - p);
   Columns e;
   for (int j = 0; j < n; j++) {
-    __global const float* from = record + (size_t)RECORD * instances[p + j];
+    __global const float* from = record + (size_t)RECORD * intersections[p + j];
     float* s = batch->splats + RECORD * j;
     vstore8(vload8(0, from), 0, s);
     vstore4(vload4(0, from + 8), 0, s + 8);
@@ -80,7 +80,7 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* instances,
     e.c[j] = s[CONIC_C];
     e.half_x[j] = s[EXTENT_X];
     e.half_y[j] = s[EXTENT_Y];
-    e.cut[j] = s[CUT];
+    e.power_threshold[j] = s[POWER_THRESHOLD];
   }
   for (int g = 0; g * LANES < n; g++)
 #ifdef EVERY_BLOCK  // what a test compares with
@@ -143,14 +143,14 @@ __kernel void rasterize(RASTERIZE_TAKES) {
   int p = tile_start[tile];
   const int end = tile_start[tile + 1];
   while (p < end && open) {
-    const int n = fetch(p, end, x0, y0, instances, record, &batch);
+    const int n = fetch(p, end, x0, y0, intersections, record, &batch);
     for (int j = 0; j < n; j++) {
       const float* s = batch.splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
-      const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[CUT];
+      const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[POWER_THRESHOLD];
 #ifdef SURFACE
-      const float8 f = vload8(instances[p + j], surface);
+      const float8 f = vload8(intersections[p + j], surface);
 #endif
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
@@ -203,7 +203,7 @@ __kernel void rasterize(RASTERIZE_TAKES) {
 // Front to back again, with the same decisions.  Per pixel: T, and rest = what the gradient still
 // expects from behind: dL/dC . C + dL/dT T at first, less what each splat gave.  Then
 //   dL/dalpha = T (c . dL/dC) - rest / (1 - alpha)
-// which needs no division to get T back.  Each instance writes its 12 numbers to its own slot.
+// which needs no division to get T back.  Each intersection writes its 12 numbers to its own slot.
 // For growing: ABSOLUTE sums |gradient of the mean| in slots 9 and 10, or SHARE sums alpha T times
 // an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is defined.
 __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
@@ -214,7 +214,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
   float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
   float8 block_x[BLOCKS], block_y[BLOCKS];
 #ifdef SHARE
-  float8 wrong[BLOCKS];
+  float8 pixel_error[BLOCKS];
 #endif
 #ifdef SURFACE
   float8 grad_z[BLOCKS];
@@ -256,7 +256,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
     grad_b[k] = vload8(0, b);
     rest[k] = vload8(0, d);
 #ifdef SHARE
-    wrong[k] = vload8(0, e);
+    pixel_error[k] = vload8(0, e);
 #endif
 #ifdef SURFACE
     grad_z[k] = vload8(0, z);
@@ -264,24 +264,24 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
   }
   Batch batch;
   uint open = 0xffffffffu;
-  const int end = tile_end[tile], last_instance = tile_start[tile + 1];
+  const int end = tile_end[tile], last_intersection = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end; p += BATCH) {
-    const int n = fetch(p, end, x0, y0, instances, record, &batch);
+    const int n = fetch(p, end, x0, y0, intersections, record, &batch);
     int slot[BATCH];  // ahead of use, so that these misses overlap, too
     for (int j = 0; j < n; j++) {
-      const int splat = instances[p + j];
-      slot[j] = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
+      const int splat = intersections[p + j];
+      slot[j] = first_slot[splat] + rank_of_tile(tile_bounds[splat], tile_x, tile_y);
     }
     for (int j = 0; j < n; j++) {
       const float* s = batch.splats + RECORD * j;
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
-      const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[CUT];
+      const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[POWER_THRESHOLD];
       float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
       float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
 #ifdef SURFACE
-      const float8 f = vload8(instances[p + j], surface);
+      const float8 f = vload8(intersections[p + j], surface);
       float8 by_z = 0, by_l = 0, by_u = 0, by_v = 0, by_x = 0, by_y = 0;
       float8 by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
 #endif
@@ -338,7 +338,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
         extra_y += fabs(fma(C, gy, B * gx));
 #endif
 #ifdef SHARE
-        extra_x = fma(w, wrong[k], extra_x);
+        extra_x = fma(w, pixel_error[k], extra_x);
 #endif
 #ifdef WEIGHT
         sum_w += w;
@@ -361,9 +361,9 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
     }
     open = still_open(open, T);
   }
-  for (int p = end; p < last_instance; p++) {  // behind the early stop: nothing is felt there
-    const int splat = instances[p];
-    const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
+  for (int p = end; p < last_intersection; p++) {  // behind the early stop: nothing is felt there
+    const int splat = intersections[p];
+    const int slot = first_slot[splat] + rank_of_tile(tile_bounds[splat], tile_x, tile_y);
     __global float* out = slots + (size_t)RECORD * slot;
     vstore8((float8)(0), 0, out);
 #ifdef SURFACE

@@ -47,13 +47,13 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
     if (!open) break;
     const int n = min(PIXELS, end - p);
     if (l < n) {
-      __global const float* s = record + (size_t)RECORD * instances[p + l];
+      __global const float* s = record + (size_t)RECORD * intersections[p + l];
       for (int k = 0; k < RECORD; k++) batch[l * RECORD + k] = s[k];
 #ifdef SURFACE
-      splat_of[l] = instances[p + l];
+      splat_of[l] = intersections[p + l];
 #endif
 #ifdef HEAT
-      heats[l] = heat[instances[p + l]].xw;
+      heats[l] = heat[intersections[p + l]].xw;
 #endif
     }
     barrier(CLK_LOCAL_MEM_FENCE);
@@ -61,7 +61,7 @@ __kernel __attribute__((reqd_work_group_size(PIXELS, 1, 1))) void rasterize(
       __local const float* s = batch + j * RECORD;
       const float dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
       const float q = s[CONIC_A] * dx * dx + 2 * s[CONIC_B] * dx * dy + s[CONIC_C] * dy * dy;
-      if (!(q <= s[CUT])) continue;
+      if (!(q <= s[POWER_THRESHOLD])) continue;
       const float w = fmin(MAX_ALPHA, s[OPACITY] * exp(-0.5f * q)) * T;
       r += w * s[RED];
       g += w * s[GREEN];
@@ -104,7 +104,7 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     RASTERIZE_BACKWARD_TAKES) {
   __local float T[PIXELS], rest[PIXELS], grad_r[PIXELS], grad_g[PIXELS], grad_b[PIXELS];
 #ifdef SHARE
-  __local float wrong[PIXELS];
+  __local float pixel_error[PIXELS];
 #endif
 #ifdef SURFACE
   __local float grad_z[PIXELS];
@@ -118,7 +118,7 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     const size_t at = (size_t)py * width + px;
     T[i] = rest[i] = grad_r[i] = grad_g[i] = grad_b[i] = 0;
 #ifdef SHARE
-    wrong[i] = px < width && py < height ? error[at] : 0;
+    pixel_error[i] = px < width && py < height ? error[at] : 0;
 #endif
 #ifdef SURFACE
     grad_z[i] = px < width && py < height ? grad_metres[at] : 0;
@@ -140,7 +140,7 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
   for (int p = tile_start[tile]; p < end; p += LANES) {
     const bool mine = p + l < end;
     float s[RECORD], sum[RECORD], xx = 0, xy = 0, yy = 0, along_x = 0, along_y = 0;
-    const int splat = mine ? instances[p + l] : 0;
+    const int splat = mine ? intersections[p + l] : 0;
     for (int k = 0; k < RECORD; k++) {
       s[k] = mine ? record[(size_t)RECORD * splat + k] : 0;
       sum[k] = 0;
@@ -157,7 +157,7 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
       const float dx = x0 + (pixel & (TILE - 1)) + 0.5f - s[MEAN_X];
       const float dy = y0 + (pixel >> 4) + 0.5f - s[MEAN_Y];
       const float q = A * dx * dx + 2 * B * dx * dy + C * dy * dy;
-      if (meets && q <= s[CUT] && T[pixel] >= STOP) {
+      if (meets && q <= s[POWER_THRESHOLD] && T[pixel] >= STOP) {
         const float raw = s[OPACITY] * exp(-0.5f * q), alpha = fmin(raw, MAX_ALPHA);
         const float before = T[pixel], w = alpha * before;
         float given = grad_r[pixel] * s[RED] + grad_g[pixel] * s[GREEN] + grad_b[pixel] * s[BLUE];
@@ -194,10 +194,10 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
         sum[EXTENT_Y] += fabs(B * gx + C * gy);
 #endif
 #ifdef SHARE
-        sum[EXTENT_X] += w * wrong[pixel];
+        sum[EXTENT_X] += w * pixel_error[pixel];
 #endif
 #ifdef WEIGHT
-        sum[CUT] += w;
+        sum[POWER_THRESHOLD] += w;
 #endif
       }
       barrier(CLK_LOCAL_MEM_FENCE);
@@ -213,7 +213,7 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
       sum[MEAN_X] -= f.s1 * by_l + 2 * (f.s3 * by_x + f.s4 * by_y);
       sum[MEAN_Y] -= f.s2 * by_l + 2 * (f.s4 * by_x + f.s5 * by_y);
 #endif
-      const int slot = first_slot[splat] + rank_of_tile(places[splat], tile_x, tile_y);
+      const int slot = first_slot[splat] + rank_of_tile(tile_bounds[splat], tile_x, tile_y);
       for (int k = 0; k < RECORD; k++) slots[(size_t)RECORD * slot + k] = sum[k];
 #ifdef SURFACE
       vstore8(by, slot, depth_slots);
@@ -221,7 +221,7 @@ __kernel __attribute__((reqd_work_group_size(LANES, 1, 1))) void rasterize_backw
     }
   }
   for (int p = end + l; p < last; p += LANES) {  // behind the early stop: nothing is felt there
-    const int slot = first_slot[instances[p]] + rank_of_tile(places[instances[p]], tile_x, tile_y);
+    const int slot = first_slot[intersections[p]] + rank_of_tile(tile_bounds[intersections[p]], tile_x, tile_y);
     for (int k = 0; k < RECORD; k++) slots[(size_t)RECORD * slot + k] = 0;
 #ifdef SURFACE
     vstore8((float8)(0), slot, depth_slots);

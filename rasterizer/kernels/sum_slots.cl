@@ -1,22 +1,22 @@
-// The end of the backward pass, both forms: from gradients of instances to those of splats.
+// The end of the backward pass, both forms: from gradients of intersections to those of splats.
 #include "common/tiles.cl"
 
 // Of a box some tiles are in no list: their slots have to be 0 before the backward pass fills the
 // others.
-__kernel void clear_boxes(int count, int columns, __global const uint2* places,
+__kernel void clear_boxes(int count, int columns, __global const uint2* tile_bounds,
                           __global const int* first_slot, __global float* slots) {
   const int i = get_global_id(0);
-  if (i >= count || !(places[i].x & BOX)) return;
-  const size_t first = first_slot[i], last = first + tiles_at(places[i]);
+  if (i >= count || !(tile_bounds[i].x & BOX)) return;
+  const size_t first = first_slot[i], last = first + tiles_at(tile_bounds[i]);
   for (size_t k = first * columns; k < last * columns; k++) slots[k] = 0;
 }
 
 // A splat's slots lie side by side: their sum in a fixed order is its gradient.
-__kernel void sum_slots(int count, __global const uint2* places, __global const int* first_slot,
+__kernel void sum_slots(int count, __global const uint2* tile_bounds, __global const int* first_slot,
                         __global const float* slots, __global float* grad_record) {
   const int i = get_global_id(0);
   if (i >= count) return;
-  const int n = tiles_at(places[i]);
+  const int n = tiles_at(tile_bounds[i]);
   __global const float* slot = slots + (size_t)RECORD * first_slot[i];
   float8 lo = 0;
   float4 hi = 0;

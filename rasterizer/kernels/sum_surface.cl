@@ -1,12 +1,12 @@
-// sum_surface: gradients of instances' depths (common/surface.cl) -> those of splats.
+// sum_surface: gradients of intersections' depths (common/surface.cl) -> those of splats.
 #include "common/tiles.cl"
 
 // A splat's slots lie side by side: their sum in a fixed order is its gradient.
-__kernel void sum_surface(int count, __global const uint2* places, __global const int* first_slot,
+__kernel void sum_surface(int count, __global const uint2* tile_bounds, __global const int* first_slot,
                           __global const float* slots, __global float* grad_surface) {
   const int i = get_global_id(0);
   if (i >= count) return;
-  const int n = tiles_at(places[i]);
+  const int n = tiles_at(tile_bounds[i]);
   float8 sum = 0;
   for (int k = 0; k < n; k++) sum += vload8(first_slot[i] + k, slots);
   vstore8(sum, i, grad_surface);

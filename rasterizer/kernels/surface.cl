@@ -1,6 +1,6 @@
 // surface: splats -> how deep they lie under the pixels around them (common/surface.cl), and back.
 #include "common/record.cl"
-#include "common/place.cl"
+#include "common/ewa.cl"
 #include "common/surface.cl"
 
 // B with B B' = the inverse covariance times the square of the least scale: the splat's axes, each
@@ -22,9 +22,9 @@ inline floatn3 inverse_lengths(floatn3 s) {
 inline Inverse inverse_of(const Splat* s) {
   Inverse i;
   i.length = inverse_lengths(s->scale);
-  i.x = times3(s->turn_x, i.length);
-  i.y = times3(s->turn_y, i.length);
-  i.z = times3(s->turn_z, i.length);
+  i.x = times3(s->wr_x, i.length);
+  i.y = times3(s->wr_y, i.length);
+  i.z = times3(s->wr_z, i.length);
   const floatn3 p = s->p;
   i.t = make3(i.x.x * p.x + i.y.x * p.y + i.z.x * p.z, i.x.y * p.x + i.y.y * p.y + i.z.y * p.z,
               i.x.z * p.x + i.y.z * p.y + i.z.z * p.z);
@@ -40,13 +40,13 @@ __kernel void surface(int count, float near, __constant float* camera, __global 
                       __global const float* record, __global float* surface) {
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
-  const Splat s = place(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
+  const Splat s = project_splat(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
                         LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, 0);
   const Inverse i = inverse_of(&s);
   const intn seen = LOAD(record, RECORD, EXTENT_X) > 0;
   const floatn none = 0, per = s.p.z / i.beta, per_fx = 1 / camera[CAMERA_FX];
   const floatn per_fy = 1 / camera[CAMERA_FY];
-  const floatn reach = SURFACE_REACH * sqrt(dot3(s.root_z, s.root_z));
+  const floatn reach = SURFACE_REACH * sqrt(dot3(s.m_z, s.m_z));
 #define PUT(column, value) STORE(surface, SURFACE_SIZE, column, select(none, value, seen))
   PUT(SURFACE_Z, s.p.z);
   PUT(SURFACE_AU, i.b.x * per * per_fx);
@@ -67,7 +67,7 @@ __kernel void surface_backward(int count, float near, __constant float* camera,
                                __global float* grad_wxyz) {
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
-  Splat s = place(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
+  Splat s = project_splat(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
                   LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, 0);
   const Inverse i = inverse_of(&s);
   const intn seen = LOAD(record, RECORD, EXTENT_X) > 0;
@@ -93,18 +93,18 @@ __kernel void surface_backward(int count, float near, __constant float* camera,
   const floatn3 corner_y = blend3(by_xy, i.x, 2 * by_yy, i.y);
   const floatn3 gx = blend3(1, from_b_x, 1, corner_x), gy = blend3(1, from_b_y, 1, corner_y);
   const floatn3 gz = scale3(p.z, by_t);
-  // Its ends: Z -+ SURFACE_REACH |root_z|, the near one not beyond `near`.
+  // Its ends: Z -+ SURFACE_REACH |m_z|, the near one not beyond `near`.
   const floatn by_low = select(none, BY(SURFACE_LOW), VALUE(SURFACE_LOW) > near);
-  const floatn by_high = BY(SURFACE_HIGH), extent = sqrt(dot3(s.root_z, s.root_z));
-  const floatn3 g_root =
-      scale3(SURFACE_REACH * (by_high - by_low) / fmax(extent, FLT_MIN), s.root_z);
+  const floatn by_high = BY(SURFACE_HIGH), extent = sqrt(dot3(s.m_z, s.m_z));
+  const floatn3 g_m_z =
+      scale3(SURFACE_REACH * (by_high - by_low) / fmax(extent, FLT_MIN), s.m_z);
   const floatn3 nothing = make3(0, 0, 0);
   floatn3 by_scale, by_length;
   floatn by_q[4], by_turn[4];
-  turn_backward(&s, camera, nothing, nothing, g_root, &by_scale, by_q);
+  rotation_scale_backward(&s, camera, nothing, nothing, g_m_z, &by_scale, by_q);
   const floatn3 scale = s.scale;
   s.scale = i.length;
-  turn_backward(&s, camera, gx, gy, gz, &by_length, by_turn);
+  rotation_scale_backward(&s, camera, gx, gy, gz, &by_length, by_turn);
   // The least scale is a factor of all and cancels, so it counts as a constant.
   const floatn pz = dot3(i.z, by_t) + BY(SURFACE_Z) + (linear + 2 * square) / p.z + by_low + by_high;
   const floatn px = dot3(i.x, by_t), py = dot3(i.y, by_t);

@@ -20,17 +20,17 @@ __kernel void surface_arena(int count, float near, __constant float* camera,
   __global const float* m = poses + 12 * object_index[i];
   const float4 mean = vload4(i, mean_opacity);
   const float8 c = vload8(i, covariance);
-  const float3 turn[3] = {vload3(0, m), vload3(0, m + 4), vload3(0, m + 8)};
+  const float3 w[3] = {vload3(0, m), vload3(0, m + 4), vload3(0, m + 8)};
   float p[3], sigma[3][3];
   const float3 rows[3] = {(float3)(c.s0, c.s1, c.s2), (float3)(c.s1, c.s3, c.s4),
                           (float3)(c.s2, c.s4, c.s5)};
-  float3 half_turned[3];
+  float3 w_sigma[3];
   for (int a = 0; a < 3; a++) {
-    p[a] = dot(turn[a], mean.xyz) + m[4 * a + 3];
-    half_turned[a] = turn[a].x * rows[0] + turn[a].y * rows[1] + turn[a].z * rows[2];
+    p[a] = dot(w[a], mean.xyz) + m[4 * a + 3];
+    w_sigma[a] = w[a].x * rows[0] + w[a].y * rows[1] + w[a].z * rows[2];
   }
   for (int a = 0; a < 3; a++)
-    for (int b = 0; b < 3; b++) sigma[a][b] = dot(half_turned[a], turn[b]);
+    for (int b = 0; b < 3; b++) sigma[a][b] = dot(w_sigma[a], w[b]);
   const float reach = SURFACE_REACH * sqrt(fmax(sigma[2][2], 0.0f));
   // Cofactors instead of the inverse: their largest is exact of a flat splat, too.
   const float size = 1 / (sigma[0][0] + sigma[1][1] + sigma[2][2]);

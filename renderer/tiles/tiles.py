@@ -205,7 +205,7 @@ class TilesDrawing:
                 drawn = [(self._projected[i], tiles[i]) for i in same]
                 heats = self._heats_of(first, same) if self.draws_heat else []
                 images, heats = rasterize_with_heat(
-                    self.device, drawn, heats, size, least_through=settings.min_through
+                    self.device, drawn, heats, size, min_transmittance=settings.min_through
                 )
                 numbers = [first + i for i in same]
                 self._images.update(zip(numbers, images, strict=True))
@@ -266,8 +266,8 @@ class TilesDrawing:
         if self.sorts:
             sorted_by = self._projected[: self.sorts]  # views whose keys make an order
             for projected in sorted_by if key_bits == 16 else ():
-                quantize_keys(self.device, projected.found)
-            self._orders = [sort_order(self.device, p.found) for p in sorted_by]
+                quantize_keys(self.device, projected.scratch)
+            self._orders = [sort_order(self.device, p.scratch) for p in sorted_by]
         orders = self._orders * (len(views) if len(self._orders) == 1 else 1)
         return [
             bin_tiles(self.device, projected, view.size, order=order)
@@ -349,7 +349,7 @@ class TilesDrawing:
         camera = camera_of(view)
         sort = SortFrames((camera.camera_from_world,), settings.order == "distance")
         (projected,) = self._launch([view], settings, sort)
-        order = sort_order(self.device, projected.found)
+        order = sort_order(self.device, projected.scratch)
         tiles = bin_tiles(self.device, projected, view.size, order=order)
         surfaces = surface_arena(
             self.device, self._mean_opacity, self._covariance, self._object_index,

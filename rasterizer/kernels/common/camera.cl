@@ -4,7 +4,7 @@
 #define CAMERA_FY 13
 #define CAMERA_CX 14
 #define CAMERA_CY 15
-#define LEAST_X 16  // x/z and y/z are clamped to these in the Jacobian: project.py, Camera.limits
-#define MOST_X 17
-#define LEAST_Y 18
-#define MOST_Y 19
+#define MIN_TAN_X 16  // x/z and y/z are clamped to these in the Jacobian: project.py, Camera.limits
+#define MAX_TAN_X 17
+#define MIN_TAN_Y 18
+#define MAX_TAN_Y 19

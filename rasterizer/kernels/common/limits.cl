@@ -1,20 +1,20 @@
 // What project_arena is told beside the splats.  Limits of a frame, floats:
-#define LEAST_ALPHA 0      // a pixel below it is not drawn; PER_X: 1 over it
-#define PER_LEAST_ALPHA 1
+#define MIN_ALPHA 0      // a pixel below it is not drawn; PER_X: 1 over it
+#define PER_MIN_ALPHA 1
 #define LOW_PASS 2         // px^2 added to the screen covariance
-#define MOST_PIXELS 3      // one sigma of the longer screen axis; _2: squared
-#define MOST_PIXELS_2 4
-#define MOST_DISTANCE 5    // metres from the eye
-#define MOST_DISTANCE_2 6
-#define LEAST_PIXELS 7     // of the longer axis where alpha reaches the least
-#define LEAST_PIXELS_2 8
+#define MAX_PIXELS 3      // one sigma of the longer screen axis; _2: squared
+#define MAX_PIXELS_2 4
+#define MAX_DISTANCE 5    // metres from the eye
+#define MAX_DISTANCE_2 6
+#define MIN_PIXELS 7     // of the longer axis where alpha reaches the least
+#define MIN_PIXELS_2 8
 #define PER_PIXELS 9       // 1 over the width of the band before each limit in which opacity fades
 #define PER_DISTANCE 10    // to 0; 0: no band
 #define PER_FOOTPRINT 11
 #define FADES 12           // above 0: there is a band somewhere
 
 #define LIMITS 13
-#define MOST_COLOR 60000.0f  // what half floats hold with some room: larger is as good as infinite
+#define MAX_COLOR 60000.0f  // what half floats hold with some room: larger is as good as infinite
 
 // Of each view: a camera (camera.cl), then
 #define IMAGE_WIDTH 20  // pixels

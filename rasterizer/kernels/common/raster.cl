@@ -28,13 +28,13 @@
 
 #define RASTERIZE_TAKES                                                                        \
   int width, int height, int tiles_x, __global const int* tile_start,                          \
-      __global const int* instances, __global const float* record, float red, float green,     \
+      __global const int* intersections, __global const float* record, float red, float green,     \
       float blue, __global float* image, __global float* transmittance, __global int* tile_end \
       AND_SURFACE AND_HEAT
 
 #define RASTERIZE_BACKWARD_TAKES                                                                 \
   int width, int height, int tiles_x, __global const int* tile_start,                            \
-      __global const int* tile_end, __global const int* instances, __global const uint2* places, \
+      __global const int* tile_end, __global const int* intersections, __global const uint2* tile_bounds, \
       __global const int* first_slot, __global const float* record,                              \
       __global const float* image, __global const float* transmittance,                          \
       __global const float* grad_image, __global const float* grad_transmittance,                \

@@ -11,7 +11,7 @@
 #define BLUE 8
 #define EXTENT_X 9  // half size of the box where alpha reaches the least alpha; <= 0: culled
 #define EXTENT_Y 10
-#define CUT 11  // 2 ln(opacity / least alpha): the r at which alpha reaches the least alpha
+#define POWER_THRESHOLD 11  // 2 ln(opacity / least alpha): the r at which alpha reaches the least alpha
 
 #define CULLED_DEPTH 1e30f
 #define MAX_ALPHA 0.99f

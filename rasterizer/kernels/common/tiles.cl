@@ -1,4 +1,4 @@
-// Which tiles of 16x16 pixels a splat touches: its place, a uint2.
+// Which tiles of 16x16 pixels a splat touches: its bounds, a uint2.
 //   x: first column | first row << 12 | kind (0 culled, MASKED, BOX)
 //   y: MASKED: bit 8 row + column for each touched tile of a grid of 8 x 4
 //      BOX: columns | rows << 16 of a box larger than that grid; span_of_row says which of them
@@ -6,10 +6,10 @@
 #define TILE 16
 #define MASKED (1u << 24)
 #define BOX (2u << 24)
-#define PLACE_COLUMN(place) ((int)((place).x & 0xfff))
-#define PLACE_ROW(place) ((int)((place).x >> 12 & 0xfff))
+#define BOUNDS_COLUMN(bounds) ((int)((bounds).x & 0xfff))
+#define BOUNDS_ROW(bounds) ((int)((bounds).x >> 12 & 0xfff))
 
-inline uint2 place_of(const float* s, int tiles_x, int tiles_y) {
+inline uint2 tile_bounds_of(const float* s, int tiles_x, int tiles_y) {
   const float x = s[MEAN_X], y = s[MEAN_Y], ex = s[EXTENT_X], ey = s[EXTENT_Y];
   if (!(ex > 0)) return (uint2)(0);
   // Pixel centres lie at +0.5: the first and last pixels whose centre is inside the box.
@@ -24,10 +24,10 @@ inline uint2 place_of(const float* s, int tiles_x, int tiles_y) {
   if (columns == 1 && rows == 1) return (uint2)(corner | MASKED, 1);
   if (columns > 8 || rows > 4)
     return (uint2)(corner | BOX, (uint)columns | (uint)rows << 16);
-  // The interval of each row of tiles, as in places_of_eight.cl.
+  // The interval of each row of tiles, as in tile_bounds_of_eight.cl.
   const float per_a = 1.0f / s[CONIC_A], tilt = -s[CONIC_B] * per_a;
   const float lean = -s[CONIC_B] / s[CONIC_C] * ex;
-  const float per_yy = s[CUT] / fmax(ey * ey, FLT_MIN), most = 1.0001f * s[CUT];
+  const float per_yy = s[POWER_THRESHOLD] / fmax(ey * ey, FLT_MIN), most = 1.0001f * s[POWER_THRESHOLD];
   const float left = x0 * TILE + 0.5f - x;
   uint mask = 0;
   for (int row = 0; row < rows; row++) {
@@ -51,19 +51,19 @@ typedef struct {
   int columns;
 } Slant;
 
-inline Slant slant_of(__global const float* s, uint2 place) {
+inline Slant slant_of(__global const float* s, uint2 bounds) {
   const float x = s[MEAN_X], y = s[MEAN_Y], ex = s[EXTENT_X], ey = s[EXTENT_Y];
   const float a = s[CONIC_A], c = s[CONIC_C];
   Slant slant;
   slant.per_a = 1.0f / a;
   slant.tilt = -s[CONIC_B] * slant.per_a;
   slant.lean = -s[CONIC_B] / c * ex;
-  slant.per_yy = s[CUT] / fmax(ey * ey, FLT_MIN);
-  slant.most = fma(1.0001f, s[CUT], 5e-7f * fma(a * ex, ex, c * ey * ey));
+  slant.per_yy = s[POWER_THRESHOLD] / fmax(ey * ey, FLT_MIN);
+  slant.most = fma(1.0001f, s[POWER_THRESHOLD], 5e-7f * fma(a * ex, ex, c * ey * ey));
   slant.spare = 1e-6f * fma(fabs(slant.tilt), ey + fabs(y), ex + fabs(x));
-  slant.left = (float)(PLACE_COLUMN(place) * TILE) + 0.5f - x;
-  slant.top = (float)(PLACE_ROW(place) * TILE) + 0.5f - y;
-  slant.columns = place.y & 0xffff;
+  slant.left = (float)(BOUNDS_COLUMN(bounds) * TILE) + 0.5f - x;
+  slant.top = (float)(BOUNDS_ROW(bounds) * TILE) + 0.5f - y;
+  slant.columns = bounds.y & 0xffff;
   return slant;
 }
 
@@ -83,14 +83,14 @@ inline int2 span_of_row(const Slant* s, int row) {
 }
 
 // Slots of a splat: of a BOX also those of tiles that its ellipse does not touch.
-inline int tiles_at(uint2 place) {
-  if (place.x & MASKED) return popcount(place.y);
-  return (place.y & 0xffff) * (place.y >> 16);
+inline int tiles_at(uint2 bounds) {
+  if (bounds.x & MASKED) return popcount(bounds.y);
+  return (bounds.y & 0xffff) * (bounds.y >> 16);
 }
 
 // The how-manieth of the splat's tiles this one is, row by row.
-inline int rank_of_tile(uint2 place, int tile_x, int tile_y) {
-  const int column = tile_x - PLACE_COLUMN(place), row = tile_y - PLACE_ROW(place);
-  if (place.x & MASKED) return popcount(place.y & ((1u << (8 * row + column)) - 1u));
-  return row * (int)(place.y & 0xffff) + column;
+inline int rank_of_tile(uint2 bounds, int tile_x, int tile_y) {
+  const int column = tile_x - BOUNDS_COLUMN(bounds), row = tile_y - BOUNDS_ROW(bounds);
+  if (bounds.x & MASKED) return popcount(bounds.y & ((1u << (8 * row + column)) - 1u));
+  return row * (int)(bounds.y & 0xffff) + column;
 }

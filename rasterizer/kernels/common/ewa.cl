@@ -6,13 +6,13 @@
 typedef struct {
   floatn3 p;                     // mean in the camera, metres
   floatn w, x, y, z;             // unit quaternion
-  floatn inverse_length;         // of the one given
+  floatn inv_norm;         // of the one given
   floatn3 scale;
-  floatn3 turn_x, turn_y, turn_z;  // rows of the rotation camera_from_splat
-  floatn3 root_x, root_y, root_z;  // rows of turn diag(scale): covariance = root root^T
-  floatn3 row_x, row_y;          // rows of J root: the screen covariance is their Gram matrix
-  floatn jx, jxz, jy, jyz;       // Jacobian: d(px)/dx, d(px)/dz, d(py)/dy, d(py)/dz
-  floatn per_z, a, b, c, determinant;
+  floatn3 wr_x, wr_y, wr_z;  // rows of the rotation camera_from_splat
+  floatn3 m_x, m_y, m_z;  // rows of wr diag(scale): covariance = root root^T
+  floatn3 jm_x, jm_y;          // rows of J root: the screen covariance is their Gram matrix
+  floatn j00, j02, j11, j12;       // Jacobian: d(px)/dx, d(px)/dz, d(py)/dy, d(py)/dz
+  floatn inv_z, a, b, c, determinant;
 } Splat;
 
 inline floatn camera_row(__constant float* camera, int row, floatn3 v) {
@@ -22,7 +22,7 @@ inline floatn camera_row(__constant float* camera, int row, floatn3 v) {
 
 inline floatn3 times3(floatn3 a, floatn3 b) { return make3(a.x * b.x, a.y * b.y, a.z * b.z); }
 
-inline Splat place(floatn3 mean, floatn3 scale, floatn qw, floatn qx, floatn qy, floatn qz,
+inline Splat project_splat(floatn3 mean, floatn3 scale, floatn qw, floatn qx, floatn qy, floatn qz,
                    __constant float* camera, float low_pass) {
   Splat s;
   s.p.x = camera_row(camera, 0, mean);
@@ -41,49 +41,49 @@ inline Splat place(floatn3 mean, floatn3 scale, floatn qw, floatn qx, floatn qy,
   s.x *= inverse;
   s.y *= inverse;
   s.z *= inverse;
-  s.inverse_length = inverse * per;
+  s.inv_norm = inverse * per;
   const floatn w = s.w, x = s.x, y = s.y, z = s.z;
   const floatn3 r0 = make3(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y));
   const floatn3 r1 = make3(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x));
   const floatn3 r2 = make3(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y));
-  floatn3 turn[3];
+  floatn3 wr[3];
   for (int row = 0; row < 3; row++) {
     const float m0 = camera[4 * row], m1 = camera[4 * row + 1], m2 = camera[4 * row + 2];
-    turn[row] = make3(m0 * r0.x + m1 * r1.x + m2 * r2.x, m0 * r0.y + m1 * r1.y + m2 * r2.y,
+    wr[row] = make3(m0 * r0.x + m1 * r1.x + m2 * r2.x, m0 * r0.y + m1 * r1.y + m2 * r2.y,
                       m0 * r0.z + m1 * r1.z + m2 * r2.z);
   }
-  s.turn_x = turn[0];
-  s.turn_y = turn[1];
-  s.turn_z = turn[2];
-  s.root_x = times3(s.turn_x, scale);
-  s.root_y = times3(s.turn_y, scale);
-  s.root_z = times3(s.turn_z, scale);
+  s.wr_x = wr[0];
+  s.wr_y = wr[1];
+  s.wr_z = wr[2];
+  s.m_x = times3(s.wr_x, scale);
+  s.m_y = times3(s.wr_y, scale);
+  s.m_z = times3(s.wr_z, scale);
 
-  s.per_z = 1 / s.p.z;
-  const floatn tan_x = fmin(fmax(s.p.x * s.per_z, camera[LEAST_X]), camera[MOST_X]);
-  const floatn tan_y = fmin(fmax(s.p.y * s.per_z, camera[LEAST_Y]), camera[MOST_Y]);
-  s.jx = camera[CAMERA_FX] * s.per_z;
-  s.jy = camera[CAMERA_FY] * s.per_z;
-  s.jxz = -s.jx * tan_x;
-  s.jyz = -s.jy * tan_y;
-  s.row_x = blend3(s.jx, s.root_x, s.jxz, s.root_z);
-  s.row_y = blend3(s.jy, s.root_y, s.jyz, s.root_z);
-  const floatn a = dot3(s.row_x, s.row_x), c = dot3(s.row_y, s.row_y);
+  s.inv_z = 1 / s.p.z;
+  const floatn tan_x = fmin(fmax(s.p.x * s.inv_z, camera[MIN_TAN_X]), camera[MAX_TAN_X]);
+  const floatn tan_y = fmin(fmax(s.p.y * s.inv_z, camera[MIN_TAN_Y]), camera[MAX_TAN_Y]);
+  s.j00 = camera[CAMERA_FX] * s.inv_z;
+  s.j11 = camera[CAMERA_FY] * s.inv_z;
+  s.j02 = -s.j00 * tan_x;
+  s.j12 = -s.j11 * tan_y;
+  s.jm_x = blend3(s.j00, s.m_x, s.j02, s.m_z);
+  s.jm_y = blend3(s.j11, s.m_y, s.j12, s.m_z);
+  const floatn a = dot3(s.jm_x, s.jm_x), c = dot3(s.jm_y, s.jm_y);
   s.a = a + low_pass;
-  s.b = dot3(s.row_x, s.row_y);
+  s.b = dot3(s.jm_x, s.jm_y);
   s.c = c + low_pass;
-  // a c - b^2 cancels for long thin splats; |row_x x row_y|^2 is the same without the loss.
-  const floatn3 area = make3(s.row_x.y * s.row_y.z - s.row_x.z * s.row_y.y,
-                             s.row_x.z * s.row_y.x - s.row_x.x * s.row_y.z,
-                             s.row_x.x * s.row_y.y - s.row_x.y * s.row_y.x);
+  // a c - b^2 cancels for long thin splats; |jm_x x jm_y|^2 is the same without the loss.
+  const floatn3 area = make3(s.jm_x.y * s.jm_y.z - s.jm_x.z * s.jm_y.y,
+                             s.jm_x.z * s.jm_y.x - s.jm_x.x * s.jm_y.z,
+                             s.jm_x.x * s.jm_y.y - s.jm_x.y * s.jm_y.x);
   s.determinant = dot3(area, area) + low_pass * (a + c) + low_pass * low_pass;
   return s;
 }
 
 // Gradients of the scales and of the quaternion given, from those of root's rows.
-inline void turn_backward(const Splat* s, __constant float* camera, floatn3 gx, floatn3 gy,
+inline void rotation_scale_backward(const Splat* s, __constant float* camera, floatn3 gx, floatn3 gy,
                           floatn3 gz, floatn3* grad_scale, floatn* grad_wxyz) {
-  const floatn3 tx = times3(gx, s->turn_x), ty = times3(gy, s->turn_y), tz = times3(gz, s->turn_z);
+  const floatn3 tx = times3(gx, s->wr_x), ty = times3(gy, s->wr_y), tz = times3(gz, s->wr_z);
   *grad_scale = make3(tx.x + ty.x + tz.x, tx.y + ty.y + tz.y, tx.z + ty.z + tz.z);
   const floatn3 ux = times3(gx, s->scale), uy = times3(gy, s->scale), uz = times3(gz, s->scale);
   floatn3 g[3];  // rows of the gradient of the rotation world_from_splat
@@ -101,8 +101,8 @@ inline void turn_backward(const Splat* s, __constant float* camera, floatn3 gx, 
                          w * (g[1].x - g[0].y));
   // Through q = given / |given| only what is across q remains.
   const floatn along = dw * w + dx * x + dy * y + dz * z;
-  grad_wxyz[0] = (dw - along * w) * s->inverse_length;
-  grad_wxyz[1] = (dx - along * x) * s->inverse_length;
-  grad_wxyz[2] = (dy - along * y) * s->inverse_length;
-  grad_wxyz[3] = (dz - along * z) * s->inverse_length;
+  grad_wxyz[0] = (dw - along * w) * s->inv_norm;
+  grad_wxyz[1] = (dx - along * x) * s->inv_norm;
+  grad_wxyz[2] = (dy - along * y) * s->inv_norm;
+  grad_wxyz[3] = (dz - along * z) * s->inv_norm;
 }

@@ -1,4 +1,4 @@
-// place_of of tiles.cl for eight splats at once, and their entries in the packed lists of a chunk.
+// tile_bounds_of of tiles.cl for eight splats at once, and their entries in the packed lists of a chunk.
 #include "common/tiles.cl"
 #include "common/vector.cl"
 #define LOW_BITS 12  // of a depth key: the digit of the first sorting pass
@@ -9,35 +9,35 @@
 
 // Eight ellipses on the screen, pixels; `seen` is -1 where there is one.
 typedef struct {
-  float8 x, y, a, b, c, half_x, half_y, cut;
+  float8 x, y, a, b, c, half_x, half_y, power_threshold;
   int8 seen;
 } Ellipses;
 
 typedef struct {
   uint8 corner, mask;  // the two words of a place
   int8 count;          // tiles touched
-} Places;
+} TileBounds8;
 
 // What a chunk gathers: its visible splats, packed at its start, and a histogram of low digits.
 typedef struct {
-  __global uint2* places;
+  __global uint2* tile_bounds;
   __global uint2* pairs;  // splat, depth key
   __global int* bins;
   int next;            // where its next visible splat goes
-  int8 instances;      // of each lane, summed at the end; so with the range of keys
+  int8 intersections;      // of each lane, summed at the end; so with the range of keys
   uint8 least, most;
 } Chunk;
 
-inline Chunk open_chunk(int first, __global uint2* places, __global uint2* pairs,
+inline Chunk open_chunk(int first, __global uint2* tile_bounds, __global uint2* pairs,
                         __global int* bins) {
-  const Chunk chunk = {places, pairs, bins, first, 0, 0xffffffffu, 0};
+  const Chunk chunk = {tile_bounds, pairs, bins, first, 0, 0xffffffffu, 0};
   for (int b = 0; b < LOW_BINS; b++) bins[b] = 0;
   return chunk;
 }
 
-// visible splats, instances, least and most key.
+// visible splats, intersections, least and most key.
 inline uint4 close_chunk(const Chunk* chunk, int first) {
-  const int4 sum = chunk->instances.lo + chunk->instances.hi;
+  const int4 sum = chunk->intersections.lo + chunk->intersections.hi;
   const uint4 least = min(chunk->least.lo, chunk->least.hi);
   const uint4 most = max(chunk->most.lo, chunk->most.hi);
   return (uint4)(chunk->next - first, sum.x + sum.y + sum.z + sum.w,
@@ -45,7 +45,7 @@ inline uint4 close_chunk(const Chunk* chunk, int first) {
                  max(max(most.x, most.y), max(most.z, most.w)));
 }
 
-IN_PLACE Places places_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
+IN_PLACE TileBounds8 tile_bounds_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
   const float8 zero = 0;
   const float8 x = select(zero, e->x, e->seen), y = select(zero, e->y, e->seen);
   const float8 ex = select(zero, e->half_x, e->seen), ey = select(zero, e->half_y, e->seen);
@@ -60,10 +60,10 @@ IN_PLACE Places places_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
   const int8 masked = present & ~box;
   // A tile is touched where the ellipse is, in x, among its columns of pixel centres while it is,
   // in y, between the first and last of its row of tiles: an interval a row, no test a tile.
-  //   x = tilt y +- sqrt((cut - y^2 / covariance_yy) / a), largest at y = lean
+  //   x = tilt y +- sqrt((power_threshold - y^2 / covariance_yy) / a), largest at y = lean
   const float8 per_a = 1.0f / e->a, tilt = -e->b * per_a;
   const float8 lean = -e->b / e->c * ex;
-  const float8 per_yy = e->cut / fmax(ey * ey, FLT_MIN), most = 1.0001f * e->cut;
+  const float8 per_yy = e->power_threshold / fmax(ey * ey, FLT_MIN), most = 1.0001f * e->power_threshold;
   const float8 left = convert_float8(x0 * TILE) + 0.5f - x;
   float8 top = convert_float8(y0 * TILE) + 0.5f - y;
   uint8 mask = 0;
@@ -87,7 +87,7 @@ IN_PLACE Places places_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
   mask |= as_uint8(single & 1);
   count |= single & 1;
   const int8 touched = present & (box | (count > 0));
-  Places out;
+  TileBounds8 out;
   const uint8 corner = as_uint8(x0) | as_uint8(y0) << 12;
   out.corner = as_uint8(touched) & (corner | select((uint8)(MASKED), (uint8)(BOX), as_uint8(box)));
   const uint8 size = as_uint8(columns) | as_uint8(rows) << 16;
@@ -97,10 +97,10 @@ IN_PLACE Places places_of_eight(const Ellipses* e, int tiles_x, int tiles_y) {
 }
 
 // Enters `n` splats from number i on; depth: their eight depths.
-inline void enter_eight(Chunk* chunk, int i, int n, const Places* p, float8 depth) {
+inline void enter_eight(Chunk* chunk, int i, int n, const TileBounds8* p, float8 depth) {
   const uint8 c = p->corner, m = p->mask, key = as_uint8(depth);  // depths > 0 sort as their bits
   const int8 visible = p->count > 0;
-  chunk->instances += p->count;
+  chunk->intersections += p->count;
   chunk->least = min(chunk->least, key | ~as_uint8(visible));
   chunk->most = max(chunk->most, key & as_uint8(visible));
   if (n == LANES && all(visible)) {
@@ -108,7 +108,7 @@ inline void enter_eight(Chunk* chunk, int i, int n, const Places* p, float8 dept
                       key.s5, i + 6, key.s6, i + 7, key.s7),
              0, (__global uint*)(chunk->pairs + chunk->next));
     vstore16((uint16)(c.s0, m.s0, c.s1, m.s1, c.s2, m.s2, c.s3, m.s3, c.s4, m.s4, c.s5, m.s5, c.s6,
-                      m.s6, c.s7, m.s7), 0, (__global uint*)(chunk->places + i));
+                      m.s6, c.s7, m.s7), 0, (__global uint*)(chunk->tile_bounds + i));
     chunk->next += LANES;
     uint low[LANES];
     vstore8(key & (LOW_BINS - 1), 0, low);
@@ -120,7 +120,7 @@ inline void enter_eight(Chunk* chunk, int i, int n, const Places* p, float8 dept
   vstore8(c, 0, corner);
   vstore8(m, 0, mask);
   for (int lane = 0; lane < n; lane++) {
-    chunk->places[i + lane] = (uint2)(corner[lane], mask[lane]);
+    chunk->tile_bounds[i + lane] = (uint2)(corner[lane], mask[lane]);
     // Written over by the next one unless visible.
     chunk->pairs[chunk->next] = (uint2)(i + lane, keys[lane]);
     const int here = corner[lane] >= MASKED;
