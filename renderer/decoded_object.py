@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from shapeshift.renderer.colors.color_cache import Colored
+from shapeshift.renderer.colors.color_cache import ColorCache
 from shapeshift.renderer.colors.eye_colors import Look
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.runtime_models.model import Model
@@ -16,7 +16,7 @@ class DecodedObject:
     """What of an object lies in the arena now."""
 
     model: Model
-    colored: list[Colored]  # one for all views of a frame, or one a view
+    colored: list[ColorCache]  # one for all views of a frame, or one a view
     key: tuple | None = None  # control_key of x; None: not decoded yet
     x: Controls = 0.0  # of its geometry
     version: int = 0  # goes up with every other x

@@ -10,13 +10,13 @@ import numpy as np
 
 from shapeshift.renderer.backends import choose_backends
 from shapeshift.renderer.colors.color_cache import (
-    Colored,
+    ColorCache,
     centre_of,
     color_key,
     forget_colors,
     reach_of,
     reach_of_scaffold,
-    seen_anchors,
+    visible_anchors,
 )
 from shapeshift.renderer.colors.eye_colors import Look, drawn_together, shared_is_enough
 from shapeshift.renderer.colors.false_colors import (
@@ -150,7 +150,7 @@ class Renderer:
         except ValueError:
             self._drawing.allocate([])
             raise
-        self._decoded = [DecodedObject(model, [Colored(centre_of(model))]) for model in models]
+        self._decoded = [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
 
     def draw(
         self,
@@ -217,7 +217,7 @@ class Renderer:
         """Runs the colours of the visible objects for the middle of the eyes; own: for each eye."""
         groups = [[view] for view in views] if own else [views]
         for decoded in self._decoded:
-            fresh = (Colored(decoded.colored[0].centre) for _ in groups[len(decoded.colored) :])
+            fresh = (ColorCache(decoded.colored[0].centre) for _ in groups[len(decoded.colored) :])
             decoded.colored = [*decoded.colored[: len(groups)], *fresh]
         with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
             for which, group in enumerate(groups):
@@ -256,7 +256,7 @@ class Renderer:
             self._color_runs += 1
 
     def _wanted_anchors(
-        self, i: int, thing: SceneObject, decoded: DecodedObject, colored: Colored, stale: bool,
+        self, i: int, thing: SceneObject, decoded: DecodedObject, colored: ColorCache, stale: bool,
         views: list[View],
     ) -> np.ndarray | None:  # fmt: skip
         """(A,) bool: the anchors that views see and whose colours are stale; None: all.
@@ -281,11 +281,11 @@ class Renderer:
             parts = (thing.model.anchors, mean_opacity[mine], covariance[mine], k)
             colored.reach = reach_of(*parts)
         pose = thing.world_from_object.matrix()
-        seen = seen_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
+        seen = visible_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
         return seen if stale else seen & ~colored.anchors
 
     def _wanted_of_follower(
-        self, thing: SceneObject, colored: Colored, stale: bool, views: list[View]
+        self, thing: SceneObject, colored: ColorCache, stale: bool, views: list[View]
     ) -> tuple[bool, np.ndarray | None]:
         """Whether a model that follows the eye is to be decoded, and (A,) which anchors; None: all.
 
@@ -298,7 +298,7 @@ class Renderer:
             colored.reach = reach_of_scaffold(thing.model, self.settings.min_alpha)
             colored.reach_key = self.settings.min_alpha
         pose = thing.world_from_object.matrix()
-        seen = seen_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
+        seen = visible_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
         new = colored.anchors is not None and (seen & ~colored.anchors).any()
         return stale or bool(new), None if seen.all() else seen
 

@@ -28,12 +28,12 @@ class RenderSettings:
     # bits from 0 to the scene's brightest colour, half floats where that is over 64 or not bounded.
     target: str = "auto"
     render_scale: float = 1.0  # of the view's width and height, then shown at full size
-    min_through: float = 1e-4  # tiles: a pixel is done when less than this comes through (3DGS)
+    min_transmittance: float = 1e-4  # tiles: a pixel with less left is done (3DGS)
 
     # Culls
     max_pixels: float = math.inf  # tau_lambda: one sigma of a splat's longer axis, pixels
     max_distance: float = math.inf  # tau_dist: metres from the eye
-    min_pixels: float = 0.0  # footprint: half the quad's longer side, pixels (cut included)
+    min_pixels: float = 0.0  # footprint: half the quad's longer side, pixels, out to the cutoff
     fade: float = 0.0  # part of each of these three limits over which opacity goes to 0
 
     # Order
@@ -65,7 +65,7 @@ class RenderSettings:
             raise ValueError(f"{told}, expected three values of display sRGB from 0 to 1.")
         for name, least, most in (
             ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
-            ("min_through", 1e-6, 0.1),
+            ("min_transmittance", 1e-6, 0.1),
             ("max_pixels", 0.0, math.inf), ("max_distance", 0.0, math.inf),
             ("min_pixels", 0.0, math.inf), ("fade", 0.0, 1.0), ("resort_frames", 0, 1_000_000),
             ("resort_degrees", 0.0, 180.0), ("recolor_degrees", 0.0, 180.0),

@@ -12,7 +12,7 @@ PARALLEL = np.radians(1.0)  # eyes whose forward axes agree within this share an
 
 
 @dataclass(frozen=True)
-class Plan:
+class SortPlan:
     """What a frame does about its order."""
 
     frames: tuple[np.ndarray, ...]  # eye_from_world (4, 4) of each sort; none: the order is kept
@@ -33,7 +33,7 @@ class _Made:
     distance: float  # metres from the eye to the median splat, for order "distance"
 
 
-class Cadence:
+class SortPolicy:
     """Says frame by frame whether the order is kept: settings.resort_frames and resort_degrees."""
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Cadence:
         settings: RenderSettings,
         changed: bool,
         median_distance: Callable[[np.ndarray], float],
-    ) -> Plan:
+    ) -> SortPlan:
         """For one frame.  changed: a pose, a control value or the set of objects, since the last.
 
         median_distance(eye_from_world) is asked only where settings.order is "distance".
@@ -67,12 +67,12 @@ class Cadence:
             and not _turned(made, frames, settings)
         ):
             self._age = age
-            return Plan((), True, age)
+            return SortPlan((), True, age)
         turns_count = may_keep and settings.order == "distance" and settings.resort_degrees > 0
         distance = median_distance(frames[0]) if turns_count else 0.0
         self._made = _Made(asked, frames, distance) if may_keep else None
         self._age = 0
-        return Plan(frames, may_keep, 0)
+        return SortPlan(frames, may_keep, 0)
 
 
 def _turned(made: _Made, frames: tuple[np.ndarray, ...], settings: RenderSettings) -> bool:

@@ -88,7 +88,7 @@ def make(seed: int) -> Poisoned:
 
 def plain(settings: RenderSettings) -> bool:
     """Whether the first frame is what the oracle draws, to float rounding."""
-    whole = settings.render_scale == 1 and not settings.debug and settings.min_through < 1e-3
+    whole = settings.render_scale == 1 and not settings.debug and settings.min_transmittance < 1e-3
     return whole and settings.target not in ("rgba8", "rgba16") and settings.key_bits == 32
 
 
@@ -143,7 +143,7 @@ def settings_of(rng: np.random.Generator) -> RenderSettings:
         "recolor_degrees": [0.0, 30.0], "skip_unseen": [False, True],
         "target": ["auto", "rgba16f", "rgba32f", "rgba8", "rgba16"],
         "render_scale": [1.0, 1.0, 0.5, 2.0],
-        "min_through": [1e-4, 1e-6, 0.1],
+        "min_transmittance": [1e-4, 1e-6, 0.1],
         "debug": [""] * 8 + ["culls", "birdseye", "overdraw", "depth", "object"],
     }  # fmt: skip
     return RenderSettings(**{n: v[rng.integers(len(v))] for n, v in choice.items()})
@@ -242,7 +242,7 @@ def spoil_settings(made: Poisoned, rng: np.random.Generator) -> Poisoned:
     names = (
         "min_alpha", "low_pass", "max_pixels", "max_distance", "min_pixels", "fade",
         "render_scale", "resort_frames", "resort_degrees", "recolor_degrees", "key_bits", "order",
-        "min_through",
+        "min_transmittance",
     )  # fmt: skip
     name, value = names[rng.integers(len(names))], value_for(rng)
     made.told += f"; {name} = {value!r}"

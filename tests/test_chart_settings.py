@@ -49,7 +49,7 @@ def test_the_grid_of_table_3_is_whole():
 def test_what_a_drawing_does_not_read_is_left_out():
     for drawing, idle in NOT_READ.items():
         assert not any(field in n.changes for n in settings_of(drawing) for field in idle)
-    assert any("min_through" in n.changes for n in settings_of("tiles"))
+    assert any("min_transmittance" in n.changes for n in settings_of("tiles"))
     targets = {n.changes.get("target") for n in settings_of("quads")}
     assert {"rgba8", "rgba16f", "auto"} <= targets
     known = {field.name for field in fields(RenderSettings)}

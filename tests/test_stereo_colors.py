@@ -70,7 +70,9 @@ def test_each_eye_is_the_eye_drawn_alone(renderer, name, wish):
 
 
 def same_picture(renderer: Renderer, image: np.ndarray, wanted: np.ndarray) -> None:
-    if getattr(renderer._drawing, "_pair", None) is not None:  # rounded otherwise: test_one_draw
+    if (
+        getattr(renderer._drawing, "_stereo_pair", None) is not None
+    ):  # rounded otherwise: test_one_draw
         assert psnr_db(image, wanted) > 80
     else:
         np.testing.assert_array_equal(image, wanted)

@@ -30,7 +30,7 @@ def film(renderer: Renderer, scene: Scene, views: list, **settings) -> list[Fram
     return told
 
 
-def test_the_cadence_is_told(renderer):
+def test_the_sort_policy_is_told(renderer):
     scene = two_objects(2000)
     told = film(renderer, scene, [orbit(0)] * 5, resort_frames=3)
     assert [(s.sorts, s.order_age) for s in told] == [(1, 0), (0, 1), (0, 2), (1, 0), (0, 1)]
@@ -148,7 +148,7 @@ def test_sixteen_bit_keys_are_the_order_of_quantize(renderer, order):
 
 
 def test_two_hundred_frames_of_change_allocate_nothing(renderer):
-    """x, camera, limits, order and cadence change; the arena, the pool and the counts do not."""
+    """x, camera, limits, order and sort policy change; arena, pool and counts do not."""
     layers = random_layers(3000, layers=3)
     drawing = renderer._drawing
     settings = [

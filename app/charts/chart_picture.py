@@ -20,7 +20,7 @@ FAMILIES = {  # name -> (colour, fields that belong to it)
     "culls": ("#d55e00", ("min_alpha", "low_pass", "max_pixels", "max_distance", "min_pixels",
                           "fade")),
     "colour": ("#009e73", ("recolor_degrees", "skip_unseen", "stereo_colors")),
-    "pixels": ("#cc79a7", ("target", "render_scale", "min_through")),
+    "pixels": ("#cc79a7", ("target", "render_scale", "min_transmittance")),
     "several of them": ("#56564f", ()),
 }  # fmt: skip
 INK, PALE, FRONT = "#222222", "#e4e4e0", "#a8a49a"

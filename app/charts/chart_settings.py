@@ -8,7 +8,7 @@ from shapeshift.renderer.settings import RenderSettings
 
 EXACT = "exact"
 # Fields that a drawing does not read: a setting with one of them is left out of its chart.
-NOT_READ = {"tiles": ("target",), "quads": ("min_through",)}
+NOT_READ = {"tiles": ("target",), "quads": ("min_transmittance",)}
 TAU_PIXELS = (0.0, 10.0, 20.0)  # tau_lambda of the paper's Table 3; 0 = none
 TAU_PLACES = ("", "near", "far")  # tau_dist: 20 and 40 m there, Distances of the scene here
 
@@ -76,9 +76,9 @@ SETTINGS = (
     Named("alpha from 2/255", {"min_alpha": 2 / 255}),
     Named("alpha from 4/255", {"min_alpha": 4 / 255}, quick=True),
     Named("no low-pass", {"low_pass": 0.0}),
-    Named("stop at 1/2048", {"min_through": 1 / 2048}, quick=True),
-    Named("stop at 1/256", {"min_through": 1 / 256}, quick=True),
-    Named("stop at 1/64", {"min_through": 1 / 64}),
+    Named("stop at 1/2048", {"min_transmittance": 1 / 2048}, quick=True),
+    Named("stop at 1/256", {"min_transmittance": 1 / 256}, quick=True),
+    Named("stop at 1/64", {"min_transmittance": 1 / 64}),
     Named("75 % scale", {"render_scale": 0.75}, quick=True),
     Named("50 % scale", {"render_scale": 0.5}, quick=True),
     Named("16 bit, colours 2\u00b0, 1 px",
@@ -92,9 +92,9 @@ SETTINGS = (
     Named("sort 1\u00b0, colours 2\u00b0, 1 px, 75 %", {**COMBINED, "render_scale": 0.75}),
     Named("sort 1\u00b0, colours 2\u00b0, 1 px, 50 %", {**COMBINED, "render_scale": 0.5}),
     Named("stop 1/2048, sort 1\u00b0, colours 2\u00b0",
-          {**AFTER_1, "recolor_degrees": 2.0, "min_through": 1 / 2048}),
+          {**AFTER_1, "recolor_degrees": 2.0, "min_transmittance": 1 / 2048}),
     Named("stop 1/256, 2/255, 1.5 px",
-          {"min_through": 1 / 256, "min_alpha": 2 / 255, "min_pixels": 1.5}, quick=True),
+          {"min_transmittance": 1 / 256, "min_alpha": 2 / 255, "min_pixels": 1.5}, quick=True),
     *(row for row in _table_3() if row.eyes == 1),
     # Beside one eye, so that its ratio is what the second eye costs.
     Named("stereo", eyes=2, beside_eyes=1),

@@ -30,7 +30,7 @@ QUICK = {  # name -> what differs from exact; pairs come from what pays most on 
     "1 px footprint": {"min_pixels": 1.0},
     "2 px footprint": {"min_pixels": 2.0, "fade": 0.2},
     "64 px splats": {"max_pixels": 64.0, "fade": 0.2},
-    "stop at 1/256": {"min_through": 1 / 256},
+    "stop at 1/256": {"min_transmittance": 1 / 256},
     "75 % scale": {"render_scale": 0.75},
     "50 % scale": {"render_scale": 0.5},
     "sort 4, colours 5\u00b0, 1 px": {**LATER, "min_pixels": 1.0},
@@ -82,7 +82,7 @@ class QuickChart:
         self._settings = {
             name: replace(RenderSettings(background=self._exact.background), **changes)
             for name, changes in QUICK.items()
-            if "min_through" not in changes or not drawing.startswith("quads")
+            if "min_transmittance" not in changes or not drawing.startswith("quads")
         }
         self._pictures: list[np.ndarray] = []
         self._exact_ms: list[float] = []

@@ -23,12 +23,12 @@ MAX_LAMBDA = 512.0  # pixels; the slider's end means no limit
 FAR_RADII = 12.0  # scene radii; the distance slider's end means no limit
 MOST_FOOTPRINT = 8.0  # pixels
 BY_TURN = 31  # this place of the slider: no sort because of the number of frames
-STOPS = (RenderSettings().min_through, 1 / 2048, 1 / 256, 1 / 64)  # light left, where to stop
+STOPS = (RenderSettings().min_transmittance, 1 / 2048, 1 / 256, 1 / 64)  # light left, where to stop
 GROUPS = {  # heading -> the settings below it
     "Culls": ("max_pixels", "max_distance", "min_pixels", "fade"),
     "Order": ("order", "key_bits", "resort_frames", "resort_degrees"),
     "Colour": ("recolor_degrees", "skip_unseen"),
-    "Pixels": ("render_scale", "target", "min_through"),
+    "Pixels": ("render_scale", "target", "min_transmittance"),
 }
 ORDER_NAMES = {"depth": "order: along the view", "distance": "order: distance to the eye"}
 
@@ -210,13 +210,13 @@ def _pixels(settings: RenderSettings, drawing: str, ui_scale: float) -> RenderSe
         "floats are exact.", ui_scale,
     )  # fmt: skip
     imgui.begin_disabled(not tiles)
-    values = sorted({*STOPS, settings.min_through})
+    values = sorted({*STOPS, settings.min_transmittance})
     names = [f"pixel full at 1/{1 / value:.0f}" for value in values]
-    through = choice("through", settings.min_through, values, names)
+    through = choice("through", settings.min_transmittance, values, names)
     imgui.end_disabled()
     tip(
         "A pixel takes no more splats once so little light is left behind it. Saves blending in "
         "dense scenes; dark pixels change by as much at most." if tiles
         else "Quads blend every splat: there is nothing to stop.", ui_scale,
     )  # fmt: skip
-    return replace(settings, render_scale=percent / 100, target=target, min_through=through)
+    return replace(settings, render_scale=percent / 100, target=target, min_transmittance=through)

@@ -26,7 +26,7 @@ def color_key(model: Model, x: float, eye: np.ndarray) -> tuple:
 
 
 @dataclass
-class Colored:
+class ColorCache:
     """What an object's colours were last computed for."""
 
     centre: np.ndarray  # (3,) object frame metres: what the eye moves around
@@ -60,7 +60,7 @@ class Colored:
         return True
 
 
-def forget_colors(sets: list[Colored]) -> None:
+def forget_colors(sets: list[ColorCache]) -> None:
     """They are to be computed again, whatever the eye does."""
     for colored in sets:
         colored.key = None
@@ -106,7 +106,7 @@ def reach_of_scaffold(model: ScaffoldModel, min_alpha: float) -> np.ndarray:
     return away + np.float32(k) * np.linalg.norm(model.scales, axis=1)
 
 
-def seen_anchors(
+def visible_anchors(
     anchors: np.ndarray,
     reach: np.ndarray,
     world_from_object: np.ndarray,

@@ -119,11 +119,11 @@ def gate(
     if antialiased is not None:
         kept = np.fmin(np.sqrt(bare / determinant), 1)
         seen = np.where(antialiased, opacity * kept, opacity)
-    cut = np.sqrt(np.maximum(2 * np.log(seen / least), 0))
+    cutoff_sigmas = np.sqrt(np.maximum(2 * np.log(seen / least), 0))
     sigma = np.sqrt(major)
-    reach = cut * sigma  # pixels
-    shaped = np.isfinite(pixel[0] + pixel[1] + major + minor + cut) & (minor > 0)
-    half_x, half_y = cut * np.sqrt(a), cut * np.sqrt(c)
+    reach = cutoff_sigmas * sigma  # pixels
+    shaped = np.isfinite(pixel[0] + pixel[1] + major + minor + cutoff_sigmas) & (minor > 0)
+    half_x, half_y = cutoff_sigmas * np.sqrt(a), cutoff_sigmas * np.sqrt(c)
     inside = (pixel[0] - half_x < view.size[0]) & (pixel[0] + half_x > 0)
     inside &= (pixel[1] - half_y < view.size[1]) & (pixel[1] + half_y > 0)
     passes = [

@@ -21,12 +21,12 @@ from shapeshift.renderer.gl.overdraw import count_overdraw
 from shapeshift.renderer.gl.project import Projector
 from shapeshift.renderer.gl.sort_check import checked_sorter
 from shapeshift.renderer.gl.splat import Splatter
-from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, PairSplatter
+from shapeshift.renderer.gl.stereo_pair import LEAST_LOW_PASS, StereoPairSplatter
 from shapeshift.renderer.gl.surface import draw_surface
 from shapeshift.renderer.gl.target import brightest, choose_target
 from shapeshift.renderer.layout import MOST_VIEWS
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.sort_policy import Cadence, sort_frames
+from shapeshift.renderer.sort_policy import SortPolicy, sort_frames
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye
@@ -48,9 +48,9 @@ class QuadsDrawing:
         self._gpu = gpu
         self._projector = Projector(gpu)
         self._splatter = Splatter(gpu)
-        self._pair = PairSplatter(gpu) if is_software(gpu.ctx) else None
+        self._stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
-        self._cadence = Cadence()
+        self._sort_policy = SortPolicy()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
         self._models: list[Model] = []
         self._most: float | None = None  # brightest colour of these; None: not known yet
@@ -132,7 +132,7 @@ class QuadsDrawing:
         canted = len(sort_frames(views, settings)) > 1
         if canted:  # an order a view, and room for one: none is kept
             settings = replace(settings, resort_frames=1, resort_degrees=0.0)
-        plan = self._cadence.plan(views, settings, self._changed, self._median_distance)
+        plan = self._sort_policy.plan(views, settings, self._changed, self._median_distance)
         self._changed = False
         self.sorts, self.order_age = plan.sorts, plan.age
         at_once = len(views) <= MOST_VIEWS and arena.holds_views(len(views)) and not canted
@@ -157,14 +157,16 @@ class QuadsDrawing:
 
     def _splat(self, group: list[View], i: int, settings: RenderSettings) -> None:
         """Draws views that were projected together, from image i on; two at once where it pays."""
-        arena, shift = self._arena, None
+        arena, disparity = self._arena, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
-        paired = self._pair is not None and alike and not self.draws_heat
+        paired = self._stereo_pair is not None and alike and not self.draws_heat
         if paired and settings.low_pass >= LEAST_LOW_PASS:
-            shift = self._pair.shift(arena, group[0].size[0])
-        if shift is not None:
+            disparity = self._stereo_pair.disparity(arena, group[0].size[0])
+        if disparity is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
-            self._pair.draw(arena, pictures, shift, settings.min_alpha, self._splatter.unit)
+            self._stereo_pair.draw(
+                arena, pictures, disparity, settings.min_alpha, self._splatter.unit
+            )
             return
         for row, view in enumerate(group):
             heat = None
@@ -175,7 +177,7 @@ class QuadsDrawing:
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
         """Whatever the body does to the order, afterwards it is the one that was in use before."""
-        arena, cadence = self._arena, copy(self._cadence)
+        arena, sort_policy = self._arena, copy(self._sort_policy)
         now = (self.sorts, self.order_age, self._changed)
         kept = [(buffer, buffer.read()) for buffer in (arena.order, arena.command)]
         try:
@@ -183,7 +185,7 @@ class QuadsDrawing:
         finally:
             for buffer, data in kept:
                 buffer.write(data)
-            self._cadence = cadence
+            self._sort_policy = sort_policy
             self.sorts, self.order_age, self._changed = now
 
     def _median_distance(self, eye_from_world: np.ndarray) -> float:

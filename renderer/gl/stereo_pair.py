@@ -1,10 +1,11 @@
-"""pair: both eyes in one draw, for software GL: a triangle around a splat's two ellipses, two
-targets.
+"""stereo_pair: both eyes in one draw, for software GL: one triangle around a splat's two ellipses,
+two targets.
 
 Software GL pays for triangles and for the 4 x 4 pixels that they touch, and little for a second
 target.  So the right picture is moved along x by the disparity of the median splat, where the two
 ellipses of most splats nearly coincide, and moved back afterwards.  What is left of the disparity
-makes the triangles larger: above MOST_ASIDE two draws are as fast (docs/bench/passes_gl.py).
+makes the triangles larger: above MAX_RESIDUAL_DISPARITY two draws are as fast
+(docs/bench/passes_gl.py).
 """
 
 import moderngl
@@ -14,38 +15,38 @@ from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.layout import CULLED_KEY
 
-MOST_ASIDE = 5.5  # pixels between the two ellipses of a splat, in the mean
-FARTHEST = 1e6  # pixels: any larger shift is refused as well
+MAX_RESIDUAL_DISPARITY = 5.5  # pixels between the two ellipses of a splat, in the mean
+FARTHEST = 1e6  # pixels: any larger disparity is refused as well
 STEP = 64  # pixels by which targets grow
 SAMPLES, RUN = 16, 256  # so many runs of so many records tell the disparity
 LEAST_LOW_PASS = 0.05  # px^2: thinner ellipses have no inverse in half floats
 
 
-class PairSplatter:
+class StereoPairSplatter:
     """Draws two views of one size that share projection and order."""
 
     def __init__(self, gpu: Gpu) -> None:
         self._gpu = gpu
-        self._program = gpu.program("pair.vert", "pair.frag")
-        self._move = gpu.program("resolve.vert", "shifted.frag")
+        self._program = gpu.program("stereo_pair.vert", "stereo_pair.frag")
+        self._move = gpu.program("resolve.vert", "stereo_pair_crop.frag")
         self._triangles = gpu.ctx.vertex_array(self._program, [])
         self._screen = gpu.ctx.vertex_array(self._move, [])
         self._targets: moderngl.Framebuffer | None = None
 
-    def shift(self, arena: Arena, width: int) -> int | None:
+    def disparity(self, arena: Arena, width: int) -> int | None:
         """By how many pixels the right view, as just projected, has to move to lie on the left;
         None where splats lie too differently, so that two draws are no slower, and where the grid
         for pictures of `width` pixels would be wider than the driver draws.
         """
-        asides = disparities(arena)
-        if not asides.size:
+        sampled = disparities(arena)
+        if not sampled.size:
             return None
-        shift = int(np.rint(np.clip(np.median(asides), -FARTHEST, FARTHEST)))
-        near = np.abs(asides - shift).mean() <= MOST_ASIDE
-        return shift if near and grid_width(width, shift) <= self._gpu.max_side else None
+        disparity = int(np.rint(np.clip(np.median(sampled), -FARTHEST, FARTHEST)))
+        near = np.abs(sampled - disparity).mean() <= MAX_RESIDUAL_DISPARITY
+        return disparity if near and grid_width(width, disparity) <= self._gpu.max_side else None
 
     def draw(
-        self, arena: Arena, pictures: list[moderngl.Framebuffer], shift: int, min_alpha: float,
+        self, arena: Arena, pictures: list[moderngl.Framebuffer], disparity: int, min_alpha: float,
         unit: float = 1.0,
     ) -> None:  # fmt: skip
         """Draws the arena as it was last projected and sorted into the targets of both views.
@@ -54,8 +55,8 @@ class PairSplatter:
         """
         ctx = self._gpu.ctx
         width, height = pictures[0].size
-        first = (max(-shift, 0), max(shift, 0))  # column of the grid where each picture starts
-        size = (grid_width(width, shift), height)
+        first = max(-disparity, 0), max(disparity, 0)  # columns of the grid: each picture's first
+        size = (grid_width(width, disparity), height)
         both = self._target(size, pictures[0].color_attachments[0].dtype)
         with self._gpu.drawing_into(both):
             both.clear(0.0, 0.0, 0.0, 0.0)
@@ -63,7 +64,7 @@ class PairSplatter:
             ctx.blend_func = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
             bind(order=arena.order, records=arena.records, counts=arena.counts)
             program = self._program
-            program["size"].value, program["shifts"].value = both.size, first
+            program["size"].value, program["disparity_offsets"].value = both.size, first
             program["min_alpha"].value, program["count"].value = min_alpha, arena.count
             program["per_unit"].value = 1 / unit
             self._triangles.render_indirect(arena.command, moderngl.TRIANGLES, count=1)
@@ -102,9 +103,9 @@ class PairSplatter:
         self._screen.release()
 
 
-def grid_width(width: int, shift: int) -> int:
-    """Pixels across both pictures where they overlap but for `shift`; in steps, with room."""
-    return -(-(width + abs(shift)) // STEP) * STEP
+def grid_width(width: int, disparity: int) -> int:
+    """Pixels across both pictures where they overlap but for `disparity`; in steps, with room."""
+    return -(-(width + abs(disparity)) // STEP) * STEP
 
 
 def disparities(arena: Arena) -> np.ndarray:
@@ -120,7 +121,7 @@ def disparities(arena: Arena) -> np.ndarray:
         )
         left, right = left.reshape(-1, 8), right.reshape(-1, 8)
         keys = np.frombuffer(arena.keys.read(4 * rows, offset=4 * start), np.uint32)
-        both = (keys != CULLED_KEY) & (left[:, 7] > 0) & (right[:, 7] > 0)  # cut: bits of 0 are 0
+        both = (keys != CULLED_KEY) & (left[:, 7] > 0) & (right[:, 7] > 0)  # drawn: bits of 0 are 0
         x = [np.ascontiguousarray(view[both, 0]).view(np.float32) for view in (left, right)]
         found.append(x[0] - x[1])
     return np.concatenate(found) if found else np.zeros(0, np.float32)

@@ -217,15 +217,16 @@ def gate(
         )
     )  # fmt: skip
     distance = np.linalg.norm(mean, axis=1)
-    cut = np.sqrt(np.maximum(2 * np.log(seen / least), 0))  # sigmas to where alpha is `least`
-    extent = cut[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    # Alpha is `least` so many sigmas from the mean.
+    cutoff_sigmas = np.sqrt(np.maximum(2 * np.log(seen / least), 0))
+    extent = cutoff_sigmas[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     inside = np.all((mean_px - extent < view.size) & (mean_px + extent > 0), axis=1)
     shaped = np.isfinite(covariance).all(axis=(1, 2)) & np.isfinite(mean_px).all(axis=1)
-    shaped &= opacity / least < np.finfo(np.float32).max  # else the cut is infinite there
+    shaped &= opacity / least < np.finfo(np.float32).max  # else the cutoff is infinite there
     sigma = largest_axis_px(covariance)
     flat = np.linalg.det(np.where(shaped[:, None, None], covariance, 0)) <= 0
     colored = (np.abs(color) <= layout.HALF_MAX).all(axis=1)
-    reach = cut * sigma  # pixels
+    reach = cutoff_sigmas * sigma  # pixels
     faded = seen * ramp(largest - sigma, settings.fade, settings.max_pixels)
     faded = faded * ramp(farthest - distance, settings.fade, settings.max_distance)
     faded = faded * ramp(reach - smallest, settings.fade, settings.min_pixels)
@@ -267,7 +268,7 @@ def blend(
     dropped below min_alpha.
     """
     width, height = size
-    image, through = np.zeros((height, width, color.shape[1])), np.ones((height, width))
+    image, transmittance = np.zeros((height, width, color.shape[1])), np.ones((height, width))
     inverse = np.linalg.inv(covariance)
     radius = np.sqrt(np.maximum(2 * np.log(np.maximum(opacity, min_alpha) / min_alpha), 0))
     extent = radius[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))  # pixels
@@ -282,7 +283,7 @@ def blend(
             MAX_ALPHA, opacity[i] * np.exp(-0.5 * (a * dx * dx + 2 * b * dx * dy + c * dy * dy))
         )
         alpha[~(alpha >= min_alpha)] = 0
-        weight = alpha * through[y0:y1, x0:x1]
+        weight = alpha * transmittance[y0:y1, x0:x1]
         image[y0:y1, x0:x1] += weight[..., None] * color[i]
-        through[y0:y1, x0:x1] -= weight
-    return np.concatenate([image, 1 - through[..., None]], axis=2)
+        transmittance[y0:y1, x0:x1] -= weight
+    return np.concatenate([image, 1 - transmittance[..., None]], axis=2)

@@ -17,7 +17,7 @@ def reference_surface(scene: Scene, view: View, settings: RenderSettings | None 
     eye = view.world_from_eye.position
     found = [gate_object(o, view, settings, eye) for o in scene.objects if o.visible]
     width, height = view.size
-    metres, through = np.zeros((height, width)), np.ones((height, width))
+    metres, transmittance = np.zeros((height, width)), np.ones((height, width))
     normal = np.zeros((height, width, 3))
     _, fx, fy, cx, cy = view.pinhole()
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -28,12 +28,12 @@ def reference_surface(scene: Scene, view: View, settings: RenderSettings | None 
         d = np.stack([x, y], axis=-1) - splats.mean_px[i]
         r = np.einsum("hwi,ij,hwj->hw", d, np.linalg.inv(splats.covariance[i]), d)
         alpha = np.minimum(MAX_ALPHA, splats.opacity[i] * np.exp(-r / 2))
-        weight = np.where(alpha >= settings.min_alpha, alpha, 0) * through
+        weight = np.where(alpha >= settings.min_alpha, alpha, 0) * transmittance
         depth, facing = midpoint(splats.mean[i], splats.axes[i], rays, view.near)
         metres += weight * depth
         normal += weight[..., None] * facing
-        through -= weight
-    return Surface(metres, normal, 1 - through)
+        transmittance -= weight
+    return Surface(metres, normal, 1 - transmittance)
 
 
 def midpoint(

@@ -12,7 +12,7 @@ flat out float opacity;
 void main() {
     uint i = uint(gl_VertexID) / 3u, corner = uint(gl_VertexID) % 3u;
     Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
-    sigmas = e.cut * TRIANGLE[corner];
+    sigmas = e.cutoff_sigmas * TRIANGLE[corner];
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
     opacity = e.opacity;
     bool culled = keys[i] == CULLED_KEY;  // nobody wrote its record

@@ -58,7 +58,7 @@ struct Splat {
     float opacity;
     mat3 sigma;   // m^2
     vec3 rgb;
-    float cut;    // sigmas to where alpha falls to min_alpha
+    float cutoff_sigmas;    // sigmas to where alpha falls to min_alpha
 };
 
 struct Projected {
@@ -89,16 +89,16 @@ Projected project(Splat splat, const uint view) {
     vec3 sigma_u = splat.sigma * u, sigma_v = splat.sigma * v;
     float bare_a = dot(u, sigma_u), b = dot(v, sigma_u), bare_c = dot(v, sigma_v);
     float a = bare_a + low_pass, c = bare_c + low_pass;
-    float opacity = splat.opacity, cut = splat.cut;
+    float opacity = splat.opacity, cutoff_sigmas = splat.cutoff_sigmas;
     float bare = max(bare_a * bare_c - b * b, 0.0);
     float determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;  // px^4
 #if ANTIALIASED
     float kept = sqrt(bare / determinant);  // Mip-Splatting's 2D filter: the same light in all
     opacity *= kept < 1.0 ? kept : 1.0;     // not a number where the splat is too large to draw
-    cut = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
+    cutoff_sigmas = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
 #endif
     vec2 center = (tangent - t.xz) * focal;  // pixels
-    vec2 extent = cut * sqrt(vec2(a, c));
+    vec2 extent = cutoff_sigmas * sqrt(vec2(a, c));
     // One by one: with any(greaterThanEqual()) llvmpipe needs 9 % more for the whole pass.
     vec2 low = center - extent, high = center + extent;
     bool outside = low.x >= size[view].x || low.y >= size[view].y || high.x <= 0.0 || high.y <= 0.0;
@@ -108,16 +108,16 @@ Projected project(Splat splat, const uint view) {
     float root = sqrt(off * off + b * b);
     float major = mid + root;  // px^2
     float minor = determinant / major;
-    float sigma = sqrt(major), reach = cut * sigma;  // pixels
+    float sigma = sqrt(major), reach = cutoff_sigmas * sigma;  // pixels
     // One test for all of them: whatever is not finite makes the sum so.
-    bool shaped = finite(center.x + center.y + major + minor + cut) && minor > 0.0;
+    bool shaped = finite(center.x + center.y + major + minor + cutoff_sigmas) && minor > 0.0;
     float brightest = max(max(abs(splat.rgb.r), abs(splat.rgb.g)), abs(splat.rgb.b));
     bool colored = finite(splat.rgb.r + splat.rgb.g + splat.rgb.b) && brightest <= HALF_MAX;
 #if FADE
     vec3 ramps = (fade_ends - vec3(sigma, sqrt(distance2), reach)) * fade_slopes;
     ramps = clamp(vec3(ramps.xy, -ramps.z), 0.0, 1.0);
     opacity *= ramps.x * ramps.y * ramps.z;
-    cut = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
+    cutoff_sigmas = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
 #endif
 
     // The gates, last one first: the first that a splat fails counts it.
@@ -139,7 +139,7 @@ Projected project(Splat splat, const uint view) {
     e.minor = vec2(-direction.y, direction.x) * min(sqrt(minor), HALF_MAX);
     e.color = splat.rgb;
     e.opacity = opacity;
-    e.cut = cut;
+    e.cutoff_sigmas = cutoff_sigmas;
     // In the order for another view or frame: a quad without area, beside the image.
     if (row != COUNT_DRAWN) e = Ellipse(vec2(-1e6), vec2(0.0), vec2(0.0), vec3(0.0), 0.0, 0.0);
     return Projected(row, pack_record(e));
@@ -156,8 +156,8 @@ Splat load_splat(uint i) {
     vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz
     vec4 mean = mean_opacity[i];
     mat3 sigma = mat3(s0.x, s0.y, s0.z, s0.y, s0.w, s1.x, s0.z, s1.x, s1.y);
-    float cut = sqrt(max(2.0 * log(mean.w / min_alpha), 0.0));
-    return Splat(mean.xyz, mean.w, sigma, color[i].rgb, cut);
+    float cutoff_sigmas = sqrt(max(2.0 * log(mean.w / min_alpha), 0.0));
+    return Splat(mean.xyz, mean.w, sigma, color[i].rgb, cutoff_sigmas);
 }
 
 void write_record(uint i, Projected projected) {

@@ -26,7 +26,7 @@ void main() {
 #if HEAT
     value_weight = heat[splat].xw * vec2(per_unit, 1.0);
 #endif
-    sigmas = e.cut * TRIANGLE[corner];
+    sigmas = e.cutoff_sigmas * TRIANGLE[corner];
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
     color_opacity = vec4(e.color * per_unit, e.opacity);
     gl_Position = vec4(2.0 * pixel / size - 1.0, 0.0, 1.0);

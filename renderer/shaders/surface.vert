@@ -19,7 +19,7 @@ void main() {
     uint triangle = uint(gl_VertexID) / 3u, corner = uint(gl_VertexID) % 3u;
     uint i = order[counts[COUNT_SORTED] - 1u - triangle];  // the farthest first
     Ellipse e = unpack_record(records[2u * i], records[2u * i + 1u]);
-    sigmas = e.cut * TRIANGLE[corner];
+    sigmas = e.cutoff_sigmas * TRIANGLE[corner];
     opacity = e.opacity;
     center = e.center;
     depth_slope = surfaces[3u * i];

@@ -26,7 +26,7 @@ from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.sort_policy import Cadence
+from shapeshift.renderer.sort_policy import SortPolicy
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
@@ -68,7 +68,7 @@ class TilesDrawing:
         self._projected: list[Projected] = []
         self._rooms: dict[int, list[Projected]] = {}  # arrays of projection, kept between frames
         self._orders: list = []  # device arrays, splats near to far: one, or one a view
-        self._cadence = Cadence()
+        self._sort_policy = SortPolicy()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
         self._world_from_objects = np.zeros((0, 4, 4))
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
@@ -205,7 +205,7 @@ class TilesDrawing:
                 drawn = [(self._projected[i], tiles[i]) for i in same]
                 heats = self._heats_of(first, same) if self.draws_heat else []
                 images, heats = rasterize_with_heat(
-                    self.device, drawn, heats, size, min_transmittance=settings.min_through
+                    self.device, drawn, heats, size, min_transmittance=settings.min_transmittance
                 )
                 numbers = [first + i for i in same]
                 self._images.update(zip(numbers, images, strict=True))
@@ -221,7 +221,7 @@ class TilesDrawing:
 
     def _project(self, views: list[View], settings: RenderSettings) -> None:
         """Ellipses of all views, two in each launch: a splat is read once for both eyes."""
-        plan = self._cadence.plan(views, settings, self._changed, self._median_distance)
+        plan = self._sort_policy.plan(views, settings, self._changed, self._median_distance)
         self._changed = False
         frames = [OPENCV_FROM_EYE @ frame for frame in plan.frames]
         shared = len(frames) <= 1 < len(views)
@@ -278,11 +278,11 @@ class TilesDrawing:
     def order_set_aside(self) -> Iterator[None]:
         """Whatever the body does to the order, afterwards it is the one that was in use before."""
         names = ("_orders", "sorts", "order_age", "_changed")
-        kept, cadence = [getattr(self, name) for name in names], copy(self._cadence)
+        kept, sort_policy = [getattr(self, name) for name in names], copy(self._sort_policy)
         try:
             yield
         finally:
-            self._cadence = cadence
+            self._sort_policy = sort_policy
             for name, value in zip(names, kept, strict=True):
                 setattr(self, name, value)
 
@@ -357,9 +357,9 @@ class TilesDrawing:
         )  # fmt: skip
         drawn = rasterize_depth(self.device, projected, tiles, surfaces, view.size)
         normal = self.device.download(drawn.frame.image)
-        through = self.device.download(drawn.frame.transmittance)
+        transmittance = self.device.download(drawn.frame.transmittance)
         metres = self.device.download(drawn.metres)
-        return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - through)
+        return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - transmittance)
 
     def image(self, i: int) -> np.ndarray:
         """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""

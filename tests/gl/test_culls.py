@@ -124,11 +124,11 @@ def test_two_views_at_once_are_two_views(gpu, order, keep_outside, limits):
         assert counts == alone_counts == reference_counts(scene, view, settings)
         kept = drawn(keys)
         np.testing.assert_array_equal(records[kept], alone_records[kept])
-        cut = records[:, 7].view(np.float32)
+        cutoff_sigmas = records[:, 7].view(np.float32)
         culled = np.intersect1d(kept, np.flatnonzero(why))
-        assert len(culled) > 10 and not records[culled, 2:].any()  # no axes, no cut, no opacity
+        assert len(culled) > 10 and not records[culled, 2:].any()  # no axes, no cutoff, no opacity
         assert (records[culled, :2].view(np.float32) < 0).all()
-        assert (cut[np.intersect1d(kept, np.flatnonzero(why == 0))] > 0).all()
+        assert (cutoff_sigmas[np.intersect1d(kept, np.flatnonzero(why == 0))] > 0).all()
     wanted = (reasons[0] != 1) if keep_outside else (reasons[0] == 0) | (reasons[1] == 0)
     np.testing.assert_array_equal(drawn(keys), np.flatnonzero(wanted))
     places = np.concatenate(
@@ -241,8 +241,8 @@ def test_fade_multiplies_opacity_along_its_ramp(gpu, limit):
     got = records[index][:, 6].view(np.float32)
     np.testing.assert_allclose(got, truth.opacity[index], atol=2e-3)
     assert 5 < len(index) < 60 and got.min() < 0.1 and got.max() == np.float32(0.8)
-    cut = records[index][:, 7].view(np.float32)
-    np.testing.assert_allclose(cut, np.sqrt(2 * np.log(255 * got)), atol=3e-3)
+    cutoff_sigmas = records[index][:, 7].view(np.float32)
+    np.testing.assert_allclose(cutoff_sigmas, np.sqrt(2 * np.log(255 * got)), atol=3e-3)
 
 
 # What a splat of 0.8 does that crosses a limit by going away (or, for max_pixels, coming near).

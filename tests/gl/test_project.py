@@ -27,7 +27,7 @@ def projected(
     settings: RenderSettings | None = None,
     pose: np.ndarray | None = None,
 ) -> dict:
-    """counts and, for every splat drawn: index, depth, center, covariance, color, opacity, cut."""
+    """counts, and of every drawn splat: index, depth, center, covariance, color, opacity, cut."""
     count = len(splats.means)
     with Arena(gpu, [count]) as arena:
         arena.write_geometry(0, splats.means, splats.scales, splats.wxyz, splats.opacity)
@@ -48,7 +48,7 @@ def projected(
         "covariance": major[:, :, None] * major[:, None] + minor[:, :, None] * minor[:, None],
         "color": np.concatenate([halves(rows[:, 4]), halves(rows[:, 5])[:, :1]], axis=1),
         "opacity": rows[:, 6].copy().view(np.float32),
-        "cut": rows[:, 7].copy().view(np.float32),
+        "cutoff_sigmas": rows[:, 7].copy().view(np.float32),
     }
 
 
@@ -95,7 +95,9 @@ def test_records_are_the_float64_projection(gpu, n, tangents):
     expected = covariance[rows] * [[1, -1], [-1, 1]]  # y is up here
     size = np.trace(expected, axis1=1, axis2=2)[:, None, None]
     assert np.all(np.abs(got["covariance"] - expected) <= 2e-3 * size)
-    np.testing.assert_allclose(got["cut"], np.sqrt(2 * np.log(255 * opacity[rows])), atol=2e-3)
+    np.testing.assert_allclose(
+        got["cutoff_sigmas"], np.sqrt(2 * np.log(255 * opacity[rows])), atol=2e-3
+    )
     assert sum(got["counts"].values()) == n and got["counts"]["drawn"] == len(rows)
 
 
@@ -135,7 +137,7 @@ def test_opacity_at_the_threshold(gpu, min_alpha):
     settings = RenderSettings(min_alpha=min_alpha)
     got = projected(gpu, round_splats([(0, 0, -2)] * 3, opacity=around(min_alpha)), FRONT, settings)
     assert got["index"].tolist() == [1, 2]  # at the threshold it is drawn: alpha >= min_alpha
-    assert np.all(got["cut"] >= 0) and np.all(got["cut"] < 1e-3)
+    assert np.all(got["cutoff_sigmas"] >= 0) and np.all(got["cutoff_sigmas"] < 1e-3)
 
 
 def test_near_plane_and_distance_at_the_threshold(gpu):
@@ -163,7 +165,7 @@ def test_what_is_not_a_sane_number_is_culled(gpu, field, value):
     got = projected(gpu, replace(good, **{field: rows}), FRONT)
     harmless = field == "wxyz" and value == 3e38  # a direction all the same
     assert got["index"].tolist() == ([0, 1, 2, 3] if harmless else [0, 2, 3])
-    for name in ("center", "covariance", "color", "opacity", "cut", "depth"):
+    for name in ("center", "covariance", "color", "opacity", "cutoff_sigmas", "depth"):
         assert np.isfinite(got[name]).all(), name
 
 

@@ -23,8 +23,8 @@ def renderer(request, session_gpu):
     mlps = request.param.replace("pair", "onnxruntime")
     with session_gpu.ctx, Renderer(session_gpu.ctx, "quads", mlps, target="rgba32f") as made:
         if request.param != "pair":
-            made._drawing._pair = None
-        elif made._drawing._pair is None:
+            made._drawing._stereo_pair = None
+        elif made._drawing._stereo_pair is None:
             pytest.skip("a GPU draws the views one after the other")
         yield made
 

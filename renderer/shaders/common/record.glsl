@@ -8,14 +8,14 @@ struct Ellipse {
     vec2 major, minor;  // half axes, orthogonal
     vec3 color;
     float opacity;
-    float cut;  // sigmas to where alpha falls to the least that is drawn
+    float cutoff_sigmas;  // sigmas to where alpha falls to the least that is drawn
 };
 
 uvec4[2] pack_record(Ellipse e) {
     return uvec4[2](
         uvec4(floatBitsToUint(e.center), packHalf2x16(e.major), packHalf2x16(e.minor)),
         uvec4(packHalf2x16(e.color.rg), packHalf2x16(vec2(e.color.b, 0.0)),
-              floatBitsToUint(e.opacity), floatBitsToUint(e.cut)));
+              floatBitsToUint(e.opacity), floatBitsToUint(e.cutoff_sigmas)));
 }
 
 Ellipse unpack_record(uvec4 first, uvec4 second) {
@@ -25,6 +25,6 @@ Ellipse unpack_record(uvec4 first, uvec4 second) {
     e.minor = unpackHalf2x16(first.w);
     e.color = vec3(unpackHalf2x16(second.x), unpackHalf2x16(second.y).x);
     e.opacity = uintBitsToFloat(second.z);
-    e.cut = uintBitsToFloat(second.w);
+    e.cutoff_sigmas = uintBitsToFloat(second.w);
     return e;
 }

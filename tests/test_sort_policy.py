@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.renderer.settings import RenderSettings
-from shapeshift.renderer.sort_policy import Cadence, sort_frames
+from shapeshift.renderer.sort_policy import SortPolicy, sort_frames
 from shapeshift.scene.pose import Pose, View
 
 TANGENTS = (-0.5, 0.5, -0.4, 0.4)
@@ -19,53 +19,56 @@ def view(yaw: float = 0.0, position=(0.0, 0.0, 0.0), size=(64, 48)) -> View:
     return View(Pose(np.array(position, float), wxyz), TANGENTS, 0.1, 50.0, size)
 
 
-def ages(cadence: Cadence, views: list[View], settings: RenderSettings, changed=()) -> list[int]:
+def ages(policy: SortPolicy, views: list[View], settings: RenderSettings, changed=()) -> list[int]:
     """Age of the order in every frame of a film."""
     plans = [
-        cadence.plan([v], settings, i in changed, lambda frame: 2.0) for i, v in enumerate(views)
+        policy.plan([v], settings, i in changed, lambda frame: 2.0) for i, v in enumerate(views)
     ]
     assert all(p.sorts == (p.age == 0) for p in plans)
     return [p.age for p in plans]
 
 
 def test_by_default_every_frame_is_sorted_and_holds_only_what_is_seen():
-    cadence = Cadence()
+    policy = SortPolicy()
     for _ in range(3):
-        plan = cadence.plan([view()], RenderSettings(), False, lambda frame: 1.0)
+        plan = policy.plan([view()], RenderSettings(), False, lambda frame: 1.0)
         assert (plan.sorts, plan.age, plan.keep_outside) == (1, 0, False)
 
 
 def test_every_third_frame():
-    assert ages(Cadence(), [view()] * 8, RenderSettings(resort_frames=3)) == [0, 1, 2] * 2 + [0, 1]
+    assert ages(SortPolicy(), [view()] * 8, RenderSettings(resort_frames=3)) == [0, 1, 2] * 2 + [
+        0,
+        1,
+    ]
 
 
 def test_never_because_of_frames():
-    assert ages(Cadence(), [view()] * 5, RenderSettings(resort_frames=0)) == [0, 1, 2, 3, 4]
+    assert ages(SortPolicy(), [view()] * 5, RenderSettings(resort_frames=0)) == [0, 1, 2, 3, 4]
 
 
 def test_after_a_turn_measured_from_the_last_sort():
     film = [view(yaw) for yaw in (0, 2, 4, 6, 5, 3, 0.5)]
     settings = RenderSettings(resort_frames=0, resort_degrees=5.0)
-    assert ages(Cadence(), film, settings) == [0, 1, 2, 0, 1, 2, 0]
+    assert ages(SortPolicy(), film, settings) == [0, 1, 2, 0, 1, 2, 0]
 
 
 def test_frames_or_degrees_whichever_comes_first():
     film = [view(yaw) for yaw in (0, 6, 6, 6, 6)]
     settings = RenderSettings(resort_frames=3, resort_degrees=5.0)
-    assert ages(Cadence(), film, settings) == [0, 0, 1, 2, 0]
+    assert ages(SortPolicy(), film, settings) == [0, 0, 1, 2, 0]
 
 
 def test_by_distance_it_is_the_eye_that_has_to_move():
     settings = RenderSettings(order="distance", resort_frames=0, resort_degrees=5.0)
-    assert ages(Cadence(), [view(0), view(90)], settings) == [0, 1]
+    assert ages(SortPolicy(), [view(0), view(90)], settings) == [0, 1]
     step = 2.0 * np.tan(np.radians(5.0))  # seen from the median splat, 2 m away
     film = [view(position=(x * step, 0, 0)) for x in (0, 0.9, 1.1, 1.9, 2.2)]
-    assert ages(Cadence(), film, settings) == [0, 1, 0, 1, 0]
+    assert ages(SortPolicy(), film, settings) == [0, 1, 0, 1, 0]
 
 
 def test_what_changed_in_the_scene_sorts_anew():
     settings = RenderSettings(resort_frames=0)
-    assert ages(Cadence(), [view()] * 5, settings, changed={2}) == [0, 1, 0, 1, 2]
+    assert ages(SortPolicy(), [view()] * 5, settings, changed={2}) == [0, 1, 0, 1, 2]
 
 
 @pytest.mark.parametrize(
@@ -74,16 +77,16 @@ def test_what_changed_in_the_scene_sorts_anew():
     ids=lambda change: next(iter(change)),
 )
 def test_settings_that_the_order_depends_on_sort_anew(change):
-    cadence, kept = Cadence(), RenderSettings(resort_frames=0)
+    policy, kept = SortPolicy(), RenderSettings(resort_frames=0)
     asked = [kept, kept, replace(kept, **change), kept, kept, replace(kept, max_pixels=4)]
-    plans = [cadence.plan([view()], s, False, lambda frame: 1.0) for s in asked]
+    plans = [policy.plan([view()], s, False, lambda frame: 1.0) for s in asked]
     assert [p.age for p in plans] == [0, 1, 0, 0, 1, 2]
 
 
 def test_size_and_number_of_views_sort_anew():
-    cadence, settings = Cadence(), RenderSettings(resort_frames=0)
+    policy, settings = SortPolicy(), RenderSettings(resort_frames=0)
     groups = [[view()], [view(size=(32, 48))], [view(), view()], [view(), view(0.5)], [view()]]
-    plans = [cadence.plan(group, settings, False, lambda frame: 1.0) for group in groups]
+    plans = [policy.plan(group, settings, False, lambda frame: 1.0) for group in groups]
     assert [p.age for p in plans] == [0, 0, 0, 1, 0]
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.renderer.colors.color_cache import (
-    Colored,
+    ColorCache,
     centre_of,
     color_key,
     reach_of,
-    seen_anchors,
+    visible_anchors,
 )
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at
@@ -108,16 +108,16 @@ def test_colours_stay_until_the_eye_has_gone_around_by_so_much(renderer):
 
 
 def test_a_new_control_value_colours_whatever_the_angle():
-    colored = Colored(np.zeros(3), (0.5, (0.0, 0.0, 2.0)))
+    colored = ColorCache(np.zeros(3), (0.5, (0.0, 0.0, 2.0)))
     assert not colored.is_stale((0.5, (0.1, 0.0, 2.0)), 10.0)
     assert colored.is_stale((0.6, (0.0, 0.0, 2.0)), 10.0)
     assert colored.is_stale((0.5, (0.1, 0.0, 2.0)), 0.0)
     assert not colored.is_stale((0.5, (0.0, 0.0, 2.0)), 0.0)
     assert colored.is_stale((0.5, (0.0, 0.0, 0.0)), 10.0), "from the centre itself: no direction"
-    assert Colored(np.zeros(3)).is_stale((None, None), 10.0)
+    assert ColorCache(np.zeros(3)).is_stale((None, None), 10.0)
 
 
-def test_seen_anchors_hold_every_drawn_splat(renderer):
+def test_visible_anchors_hold_every_drawn_splat(renderer):
     """Against what projection draws, anchor by anchor, from many places and with wide splats."""
     model = random_model(500, seed=3)
     rng = np.random.default_rng(0)
@@ -138,7 +138,7 @@ def test_seen_anchors_hold_every_drawn_splat(renderer):
         drawn = (depth < 1e30).reshape(500, -1).any(axis=1)
         mean_opacity, _, covariance = drawing.splat_points()
         reach = reach_of(model.anchors, mean_opacity, covariance, np.sqrt(2 * np.log(255)))
-        seen = seen_anchors(model.anchors, reach, TURNED.matrix(), [view], settings)
+        seen = visible_anchors(model.anchors, reach, TURNED.matrix(), [view], settings)
         assert (seen | ~drawn).all()
         left_out[beside] += np.count_nonzero(~seen)
     told = "it must leave out something to be of use"

@@ -7,7 +7,7 @@ layout(std430, binding = SLOT_ORDER) readonly buffer Order { uint order[]; };  /
 layout(std430, binding = SLOT_RECORDS) readonly buffer Records { uvec4 records[]; };
 layout(std430, binding = SLOT_COUNTS) readonly buffer Counts { uint counts[]; };
 uniform vec2 size;    // pixels of the grid
-uniform vec2 shifts;  // x in the grid minus x in the left and right picture, pixels
+uniform vec2 disparity_offsets;  // x in the grid minus x in the left and right picture, pixels
 uniform uint count;   // splats; records of the right view start there
 uniform float per_unit;  // 1 over the display value that 1 in the pictures stands for
 
@@ -31,23 +31,23 @@ void main() {
     Ellipse left = unpack_record(records[2u * i], records[2u * i + 1u]);
     i += count;
     Ellipse right = unpack_record(records[2u * i], records[2u * i + 1u]);
-    left.center.x += shifts.x;
-    right.center.x += shifts.y;
-    bool in_left = left.cut > 0.0, in_right = right.cut > 0.0;  // else culled in that view
+    left.center.x += disparity_offsets.x;
+    right.center.x += disparity_offsets.y;
+    bool in_left = left.cutoff_sigmas > 0.0, in_right = right.cutoff_sigmas > 0.0;  // else culled in that view
 
-    // In the axes of one ellipse that one is a disc of radius cut around 0, the other lies in a
-    // disc around `aside`.  Each edge of the triangle is moved out until both are behind it.
+    // In the axes of one ellipse that one is a disc of radius cutoff_sigmas around 0, the other lies in a
+    // disc around `disparity`.  Each edge of the triangle is moved out until both are behind it.
     Ellipse e = left;
     if (!in_left) e = right;
     mat2 axes = mat2(e.major, e.minor);
-    vec2 aside = vec2(0.0);
+    vec2 disparity = vec2(0.0);
     float radius = 0.0;
     if (in_left && in_right) {
-        aside = inverse(axes) * (right.center - left.center);
-        radius = right.cut * stretch(inverse(axes) * mat2(right.major, right.minor));
+        disparity = inverse(axes) * (right.center - left.center);
+        radius = right.cutoff_sigmas * stretch(inverse(axes) * mat2(right.major, right.minor));
     }
     vec2 n = -0.5 * TRIANGLE[corner], m = -0.5 * TRIANGLE[(corner + 1u) % 3u];  // of two edges
-    float edge_n = max(e.cut, dot(n, aside) + radius), edge_m = max(e.cut, dot(m, aside) + radius);
+    float edge_n = max(e.cutoff_sigmas, dot(n, disparity) + radius), edge_m = max(e.cutoff_sigmas, dot(m, disparity) + radius);
     vec2 s = vec2(edge_n * m.y - edge_m * n.y, n.x * edge_m - m.x * edge_n) /
              (n.x * m.y - n.y * m.x);
     vec2 pixel = e.center + axes * s;
