@@ -1,12 +1,19 @@
-// bin: splats -> a list of intersections (splat, tile) a tile, in depth order.  CPU form.
-// A work-item owns a contiguous chunk of splats, counts into a table of its own, and scatters from
-// its row of the scanned table: parallel, stable, and the same list for any number of chunks.
+// bin: splats -> the list of intersections (splat, tile) of every tile, near to far.  CPU form. A
+// work-item owns a contiguous chunk of splats, counts into a table of its own, and scatters from
+// its row of the scanned table: parallel, stable, and the same list for any number of chunks.  3DGS
+// sorts intersections by tile and depth at once; here splats are sorted by depth before they are
+// spread over tiles, which sorts several times fewer keys and gives the same lists.
+// Reads:   record (N, 12) and depth (N,) of project.
+// Writes:  tile_bounds (N, 2), order, and starts (tiles + 1) and intersections: the lists, tile by
+//          tile.
+// Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
 #include "common/tile_bounds_of_eight.cl"
-#define AHEAD 24  // splats: the next tile_bounds are fetched while these are counted
+#define AHEAD 24  // splats: the next tile bounds are fetched while these are counted
 #define SPARE 16  // ints of a cache line: chunks must not write to the same one
 
-// Per splat its tiles; per chunk the (splat, depth key) pairs of its visible splats, packed at the
-// chunk's start, and the histogram of their low digits.  status: visible, intersections, key range.
+// Per splat its tile bounds; per chunk the (splat, depth key) pairs of its visible splats, packed
+// at the chunk's start, and the histogram of their low digits.  status: visible, intersections, key
+// range.
 __kernel void find_tile_bounds(int count, int chunk, int tiles_x, int tiles_y,
                           __global const float* record, __global const float* depth,
                           __global uint2* tile_bounds, __global uint2* pairs,
@@ -16,15 +23,18 @@ __kernel void find_tile_bounds(int count, int chunk, int tiles_x, int tiles_y,
   Chunk mine = open_chunk(first, tile_bounds, pairs, histogram + c * LOW_BINS);
   for (int i = first; i < last; i += LANES) {
     const int n = min(LANES, last - i);
+    // Eight records, transposed: means, conics, extents and the threshold, one column a vector.
     float column[8][LANES], z[LANES];
     for (int lane = 0; lane < LANES; lane++) {
       const size_t from = i + min(lane, n - 1);
       __global const float* s = record + RECORD * from;
       for (int k = 0; k < 5; k++) column[k][lane] = s[k];
+      // Opacity and colour are not needed: extents and threshold stand behind them.
       for (int k = 5; k < 8; k++) column[k][lane] = s[k + 4];
       z[lane] = depth[from];
     }
     Ellipses e;
+    // Columns of the record in their order: mean, conic, half extents, threshold.
     e.x = vload8(0, column[0]);
     e.y = vload8(0, column[1]);
     e.a = vload8(0, column[2]);
@@ -33,6 +43,7 @@ __kernel void find_tile_bounds(int count, int chunk, int tiles_x, int tiles_y,
     e.half_x = vload8(0, column[5]);
     e.half_y = vload8(0, column[6]);
     e.power_threshold = vload8(0, column[7]);
+    // Positive, so that NaN fails, as everywhere.
     e.seen = (e.half_x > 0.0f) & ((int8)(0, 1, 2, 3, 4, 5, 6, 7) < n);
     const TileBounds8 p = tile_bounds_of_eight(&e, tiles_x, tiles_y);
     enter_eight(&mine, i, n, &p, vload8(0, z));
@@ -40,9 +51,12 @@ __kernel void find_tile_bounds(int count, int chunk, int tiles_x, int tiles_y,
   status[c] = close_chunk(&mine, first);
 }
 
-// Counts (chunks, bins) -> tile_bounds to write to, bin by bin and in it chunk by chunk.
+// Counts (chunks, bins) -> the position of each chunk's first key of a bin, bin by bin and in it
+// chunk by chunk: that order makes the scatter stable.  One work-item: the table is
+// a few chunks wide.
 __kernel void scan_table(int bins, int chunks, __global int* table, __global int* starts) {
   int sum = 0;
+  // An exclusive prefix sum down the chunks of a bin, then on to the next bin.
   for (int b = 0; b < bins; b++) {
     starts[b] = sum;
     for (int c = 0; c < chunks; c++) {
@@ -57,6 +71,7 @@ __kernel void scan_table(int bins, int chunks, __global int* table, __global int
 // bins is a power of two, or more than any key needs.
 inline uint mask_of(int bins) { return (bins & (bins - 1)) ? 0xffffffffu : (uint)bins - 1; }
 
+// How many keys of each digit a chunk has, for passes after the first.
 __kernel void count_digits(int count, int chunk, int bins, uint origin, int shift,
                            __global const uint2* pairs, __global int* table) {
   const int c = get_global_id(0);
@@ -78,6 +93,7 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   const int last = packed ? first + (int)status[c].x : min(count, first + chunk);
   for (int i = first; i < last; i++) {
     const uint2 pair = pairs[i];
+    // The chunk's own row of the table says where the next key of this digit goes.
     const int to = next[(pair.y - origin) >> shift & mask_of(bins)]++;
     if (final)
       sorted_splats[to] = pair.x;
@@ -86,28 +102,29 @@ __kernel void scatter_digits(int count, int chunk, int bins, uint origin, int sh
   }
 }
 
-// VISIT(tile, touched) for the tiles of a splat's bounds: branch free where it is within 2 x 2 tiles, as
-// nearly all are; there `touched` is 0 or 1 and the tile may lie beyond the last one.
-#define FOR_EACH_TILE(bounds, tiles_x, splat)                                       \
-  const uint2 here = (bounds);                                                      \
-  const int tile = BOUNDS_ROW(here) * (tiles_x) + BOUNDS_COLUMN(here);               \
-  if (here.x & MASKED && !(here.y & ~0x303u)) {                                    \
-    VISIT(tile, here.y & 1);                                                       \
-    VISIT(tile + 1, here.y >> 1 & 1);                                              \
-    VISIT(tile + (tiles_x), here.y >> 8 & 1);                                      \
-    VISIT(tile + (tiles_x) + 1, here.y >> 9 & 1);                                  \
-  } else if (here.x & MASKED) {                                                    \
-    for (uint mask = here.y; mask; mask &= mask - 1) {                             \
-      const int bit = popcount(~mask & (mask - 1)); /* number of the lowest */     \
-      VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7), 1);                         \
-    }                                                                              \
-  } else if (here.x & BOX) {                                                       \
-    const Slant slant = slant_of(record + (size_t)RECORD * (splat), here);         \
-    for (int row = 0; row < (int)(here.y >> 16); row++) {                          \
-      const int2 span = span_of_row(&slant, row);                                  \
-      for (int column = span.x; column < span.y; column++)                         \
-        VISIT(tile + row * (tiles_x) + column, 1);                                 \
-    }                                                                              \
+// The tile walk: VISIT(tile, touched) for the tiles of a splat's bounds.  Branch free where they
+// lie within 2 x 2 tiles, as nearly all do; there `touched` is 0 or 1 and the tile may lie beyond
+// the last one.  Else bit by bit through the tile mask, or row by row through a box.
+#define FOR_EACH_TILE(bounds, tiles_x, splat)                                              \
+  const uint2 here = (bounds);                                                             \
+  const int tile = BOUNDS_ROW(here) * (tiles_x) + BOUNDS_COLUMN(here);                     \
+  if (here.x & MASKED && !(here.y & ~0x303u)) {                                            \
+    VISIT(tile, here.y & 1);                                                               \
+    VISIT(tile + 1, here.y >> 1 & 1);                                                      \
+    VISIT(tile + (tiles_x), here.y >> 8 & 1);                                              \
+    VISIT(tile + (tiles_x) + 1, here.y >> 9 & 1);                                          \
+  } else if (here.x & MASKED) {                                                            \
+    for (uint mask = here.y; mask; mask &= mask - 1) {                                     \
+      const int bit = popcount(~mask & (mask - 1)); /* number of the lowest */             \
+      VISIT(tile + (bit >> 3) * (tiles_x) + (bit & 7), 1);                                 \
+    }                                                                                      \
+  } else if (here.x & BOX) {                                                               \
+    const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * (splat), here);  \
+    for (int row = 0; row < (int)(here.y >> 16); row++) {                                  \
+      const int2 span = columns_of_row(&ellipse, row);                                     \
+      for (int column = span.x; column < span.y; column++)                                 \
+        VISIT(tile + row * (tiles_x) + column, 1);                                         \
+    }                                                                                      \
   }
 
 // table (chunks, bins): how often each tile is touched; a row of tiles and more lies beyond them.
@@ -119,7 +136,9 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
   for (int t = 0; t < bins; t++) mine[t] = 0;
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
+    // In depth order, so the loads are scattered: each is asked for before it is needed.
     PREFETCH(tile_bounds + order[min(i + AHEAD, last - 1)]);
+    // Near to far.
     const int splat = order[i];
     const uint2 bounds = tile_bounds[splat];
     sorted_bounds[i] = bounds;  // side by side for the next pass
@@ -129,7 +148,9 @@ __kernel void count_tiles(int count, int chunk, int tiles_x, int bins, __global 
   }
 }
 
-// intersections is longer than the lists by a cache line a chunk: what touches nothing is written there.
+// Writes every splat to the lists of its tiles, in depth order, so that each list is near to far.
+// The array is longer than the lists by a cache line a chunk: what touches nothing is written there
+// instead of branched around.
 __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int total,
                             __global const int* order, __global const float* record,
                             __global const uint2* sorted_bounds, __global int* table,
@@ -140,18 +161,19 @@ __kernel void scatter_tiles(int count, int chunk, int tiles_x, int bins, int tot
   const int last = min(count, (c + 1) * chunk);
   for (int i = c * chunk; i < last; i++) {
     const int splat = order[i];
-#define VISIT(tile, touched)                              \
-  {                                                       \
-    const int to = next[tile];                            \
-    intersections[(touched) ? to : spare] = splat;            \
-    next[tile] = to + (touched);                          \
+#define VISIT(tile, touched)                        \
+  {                                                 \
+    const int to = next[tile];                      \
+    intersections[(touched) ? to : spare] = splat;  \
+    next[tile] = to + (touched);                    \
   }
     FOR_EACH_TILE(sorted_bounds[i], tiles_x, splat)
 #undef VISIT
   }
 }
 
-// First slot of every splat: gradients of its intersections lie side by side from there.
+// First slot of every splat: the gradients of its intersections lie side by side from there, and
+// are summed in that order (sum_slots.cl).
 __kernel void number_slots(int count, __global const uint2* tile_bounds, __global int* first_slot) {
   int sum = 0;
   for (int i = 0; i < count; i++) {

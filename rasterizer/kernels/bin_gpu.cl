@@ -1,14 +1,19 @@
-// bin, GPU form: one work-item a splat; the sorts lie in sort_gpu.cl.
-// Depths are sorted, intersections written in that order, then sorted by tile: stable, so each tile's
-// list is near to far.
+// bin, GPU form: splats -> the lists of intersections; one work-item a splat, sorts in sort_gpu.cl.
+// Depths are sorted, intersections written in that order, then sorted by tile: stable, so each
+// tile's list is near to far, and the same as that of bin.cl.
+// Reads:   record (N, 12) and depth (N,) of project.
+// Writes:  tile_bounds (N, 2), keys and order, tile_of and intersections, starts (tiles + 1),
+//          first_slot.
+// Units:   pixels and tiles; depths in metres, sorted as the bits of floats above 0.
 #include "common/tiles.cl"
-#define ABSENT 0xffffffffu
+#define ABSENT 0xffffffffu  // sorts behind every depth, so that culled splats come last
 
 __kernel void find_tile_bounds(int count, int tiles_x, int tiles_y, __global const float* record,
                           __global const float* depth, __global uint2* tile_bounds,
                           __global uint* keys, __global int* splats) {
   const int i = get_global_id(0);
   if (i >= count) return;
+  // A private copy: tile_bounds_of() is shared with kernels that read records from elsewhere.
   float copy[RECORD];
   for (int k = 0; k < RECORD; k++) copy[k] = record[(size_t)RECORD * i + k];
   const uint2 bounds = tile_bounds_of(copy, tiles_x, tiles_y);
@@ -17,12 +22,14 @@ __kernel void find_tile_bounds(int count, int tiles_x, int tiles_y, __global con
   splats[i] = i;
 }
 
+// The number of list entries of a splat; of a box the rows are walked to count, and again to write.
 inline int intersections_at(__global const float* record, uint2 bounds) {
   if (!(bounds.x & BOX)) return tiles_at(bounds);
-  const Slant slant = slant_of(record, bounds);
+  // A box: fused multiply-adds in columns_of_row() make both walks agree to the last tile.
+  const EllipseRows ellipse = ellipse_rows_of(record, bounds);
   int sum = 0;
   for (int row = 0; row < (int)(bounds.y >> 16); row++) {
-    const int2 span = span_of_row(&slant, row);
+    const int2 span = columns_of_row(&ellipse, row);
     sum += span.y - span.x;
   }
   return sum;
@@ -37,11 +44,14 @@ __kernel void count_intersections(int count, __global const uint* keys, __global
   if (k > count) return;
   const bool here = k < count && keys[k] != ABSENT;
   // entry `count` becomes the total
-  intersections_of[k] = here ? intersections_at(record + (size_t)RECORD * order[k], tile_bounds[order[k]]) : 0;
+  intersections_of[k] =
+      here ? intersections_at(record + (size_t)RECORD * order[k], tile_bounds[order[k]]) : 0;
   slots_of[k] = here ? tiles_at(tile_bounds[order[k]]) : 0;
+  // Where the first culled splat stands in the order, there end the visible ones.
   if (!here && (k == 0 || keys[k - 1] != ABSENT)) visible[0] = k;
 }
 
+// Prefix sums of the counts said where each splat's entries go (offsets) and its slots (slots).
 __kernel void write_intersections(int count, int tiles_x, __global const int* order,
                               __global const float* record, __global const uint2* tile_bounds,
                               __global const int* offsets, __global const int* slots,
@@ -51,10 +61,12 @@ __kernel void write_intersections(int count, int tiles_x, __global const int* or
   if (k >= count) return;
   const int splat = order[k];
   const uint2 bounds = tile_bounds[splat];
+  // Number k in depth order: its entries follow those of all nearer splats.
   int to = offsets[k];
   first_slot[splat] = slots[k];
   const int tile = BOUNDS_ROW(bounds) * tiles_x + BOUNDS_COLUMN(bounds);
   if (bounds.x & MASKED) {
+    // The tile mask: mask & (mask - 1) clears the lowest bit, the ones below it are its number.
     for (uint mask = bounds.y; mask; mask &= mask - 1) {
       const int bit = popcount(~mask & (mask - 1));  // number of the lowest
       tile_of[to] = tile + (bit >> 3) * tiles_x + (bit & 7);
@@ -62,9 +74,10 @@ __kernel void write_intersections(int count, int tiles_x, __global const int* or
     }
     return;
   }
-  const Slant slant = slant_of(record + (size_t)RECORD * splat, bounds);
+  // The box: row by row of tiles, the interval of columns in each.
+  const EllipseRows ellipse = ellipse_rows_of(record + (size_t)RECORD * splat, bounds);
   for (int row = 0; row < (int)(bounds.y >> 16); row++) {
-    const int2 span = span_of_row(&slant, row);
+    const int2 span = columns_of_row(&ellipse, row);
     for (int column = span.x; column < span.y; column++) {
       tile_of[to] = tile + row * tiles_x + column;
       intersections[to++] = splat;
@@ -79,5 +92,6 @@ __kernel void find_starts(int total, int tiles, __global const uint* tile_of,
   if (i > total) return;
   const int before = i > 0 ? (int)tile_of[i - 1] : -1;
   const int here = i < total ? (int)tile_of[i] : tiles;
+  // Tiles without intersections between two that have some begin where the latter does.
   for (int t = before + 1; t <= here; t++) starts[t] = i;
 }

@@ -1,29 +1,37 @@
-// draw, CPU form of rasterize for the screen alone: no gradients, premultiplied RGBA, several views.
-// One work-item a tile of 16x16 pixels; a block is 4x4 of them, one vector of sixteen floats.
-// Instances are taken in batches.  Per batch every block gets the bits of the splats whose ellipse
-// reaches it, and walks them with its pixels in registers: one unforeseen branch a block and batch,
-// not one a splat, and nothing of a pixel is read or written in between.
+// draw: raster for the screen, CPU form: no gradients, premultiplied RGBA, one or two views. One
+// work-item a tile of 16x16 pixels; a block is 4x4 of them, one vector of sixteen floats.
+// Intersections are taken in batches.  Per batch every block gets the bits of the splats whose
+// ellipse reaches it, and walks them with its pixels in registers: one unforeseen branch a block
+// and batch, not one a splat, and nothing of a pixel is read or written in between. Blending is
+// 3DGS's, front to back (paper eq. 2): C += c alpha T, T *= 1 - alpha.
+// Reads:   the lists of bin (starts, intersections) and the records (N, 12) of each view; with HEAT
+//          = 1 value and weight of each splat (float4 x and w).
+// Writes:  image (H, W, 4), alpha = 1 - T; with HEAT heat_image (H, W, 2), blended as the colours
+//          are.
+// Units:   pixels, row 0 on top; display sRGB; transmittance T in 0..1.
 #include "common/vector.cl"
 #include "common/tiles.cl"
-// HEAT = 1: value and weight of each splat (float4 x and w) are blended as its colour is, into a
-// second image.
 #define SIDE 4     // pixels of a block, and blocks of a tile
 #define BLOCKS 16  // bits of a ushort
 #define BATCH 32   // bits of a uint
 
+// Pixel centres of a block, from its corner: lane k is column k % 4, row k / 4.
 #define LANE_X (float16)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f, \
                          0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
 #define LANE_Y (float16)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f, \
                          2.5f, 2.5f, 2.5f, 2.5f, 3.5f, 3.5f, 3.5f, 3.5f)
 
 typedef struct {
-  float splats[BATCH * RECORD];  // conic and power_threshold times -log2(e) / 2: exponents of 2
-  uint block_splats[BLOCKS];           // per block: bit j where it takes splat j
+  // Conic and threshold times -log2(e) / 2: exp(-power / 2) = 2^(...), with no factor left to
+  // apply.
+  float splats[BATCH * RECORD];
+  uint block_splats[BLOCKS];  // per block: bit j where splat j reaches it
 #ifdef HEAT
-  float2 heat[BATCH];
+  float2 heat[BATCH];         // value and weight of each
 #endif
 } Batch;
 
+// A kernel's arguments and those of its calls, with and without the heat of thermal stops.
 #ifdef HEAT
 #define AND_HEAT , __global const float4* heat, __global float2* heat_image
 #define AND_HEAT_OF(view) , __global const float4* heat_##view, __global float2* heat_image_##view
@@ -38,6 +46,7 @@ typedef struct {
 inline float16 exp2_16(float16 x) {
   const float16 shifted = x + 12582912.0f;
   const float16 f = x - (shifted - 12582912.0f);
+  // Far below a step of 8 bits, with two terms less than for gradients.
   float16 p = 9.570096662e-3f;
   p = fma(p, f, (float16)(5.591785991e-2f));
   p = fma(p, f, (float16)(2.402474496e-1f));
@@ -48,6 +57,8 @@ inline float16 exp2_16(float16 x) {
 
 // Sixteen words of sixteen bits, turned: bit j of word k becomes bit k of word j.
 inline ushort16 transpose_bits(ushort16 a) {
+  // Four rounds of a butterfly, as for a matrix: halves of 8, 4, 2 and 1 words change places with
+  // halves of as many bits.
   ushort16 other = a.s89abcdef01234567, low, high;
   low = (a & (ushort16)0x00ff) | other << (ushort16)8;
   high = (a & (ushort16)0xff00) | other >> (ushort16)8;
@@ -67,32 +78,46 @@ inline ushort16 transpose_bits(ushort16 a) {
                     high.s9, low.sa, high.sb, low.sc, high.sd, low.se, high.sf);
 }
 
-// Columns of eight ellipses; x and y of the mean from the centre of the tile's first pixel.
+// Columns of a batch's ellipses for vectors of eight; x and y of the mean from the centre of the
+// tile's first pixel.
 typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], power_threshold[BATCH];
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH],
+      power_threshold[BATCH];
 } Columns;
 
-// Bit SIDE row + column of each block that the ellipse reaches, for eight splats from 8 g on: in
-// every row of blocks the interval of x, as in tile_bounds_of_eight.cl.
+// The tile walk once more, for blocks in a tile: bit SIDE row + column of each block that the
+// ellipse reaches, for eight splats from 8 g on.  In every row of blocks the interval of x, with
+// the same slope, extremes and roots as in tiles.cl; here divided by A beforehand.
 inline ushort8 blocks_of_eight(const Columns* e, int g, float x0, float y0) {
+  // Means and half axes, relative to the tile's first pixel centre.
   const float8 x = vload8(g, e->x) - x0, y = vload8(g, e->y) - y0;
-  const float8 a = vload8(g, e->a), b = vload8(g, e->b), power_threshold = vload8(g, e->power_threshold);
+  const float8 a = vload8(g, e->a), b = vload8(g, e->b),
+      power_threshold = vload8(g, e->power_threshold);
   const float8 ey = vload8(g, e->half_y);
-  const float8 per_a = 1.0f / a, tilt = -b * per_a;
-  const float8 lean = -b / vload8(g, e->c) * vload8(g, e->half_x);
+  const float8 inv_a = 1.0f / a, slope = -b * inv_a;
+  const float8 y_extreme = -b / vload8(g, e->c) * vload8(g, e->half_x);
   // 1.0001: float rounding must not lose a pixel.
-  const float8 most = 1.0001f * power_threshold * per_a, per_yy = power_threshold / fmax(ey * ey, FLT_MIN) * per_a;
+  const float8 threshold = 1.0001f * power_threshold * inv_a,
+      inv_yy = power_threshold / fmax(ey * ey, FLT_MIN) * inv_a;
+  // From the mean to the first row of pixel centres in the strip.
   float8 top = -y;
   uint8 mask = 0;
   for (int row = 0; row < SIDE; row++) {
     const float8 bottom = top + (SIDE - 1);
-    const float8 up = fmin(fmax(lean, top), bottom), down = fmin(fmax(-lean, top), bottom);
-    const float8 right_x = x + tilt * up + sqrt(fmax(most - up * up * per_yy, 0.0f));
-    const float8 left_x = x + tilt * down - sqrt(fmax(most - down * down * per_yy, 0.0f));
+    const float8 y_right = fmin(fmax(y_extreme, top), bottom),
+        y_left = fmin(fmax(-y_extreme, top), bottom);
+    const float8 right_x =
+        x + slope * y_right + sqrt(fmax(threshold - y_right * y_right * inv_yy, 0.0f));
+    const float8 left_x =
+        x + slope * y_left - sqrt(fmax(threshold - y_left * y_left * inv_yy, 0.0f));
+    // Clamped before the conversion, since an ellipse may be as wide as any; >> 2 is / SIDE,
+    // downwards.
     const int8 right = convert_int8(floor(fmin(fmax(right_x, -1.0f), TILE - 1.0f))) >> 2;
     const int8 left = convert_int8(ceil(fmin(fmax(left_x, 0.0f), (float)TILE))) >> 2;
+    // Blocks up to `right`, less those before `left`.
     const uint8 until = ((uint8)1 << as_uint8(right + 1)) - 1u;
     const uint8 before = ((uint8)1 << as_uint8(left)) - 1u;
+    // A strip above or below the ellipse: its roots were held at 0 and mean nothing.
     const int8 meets = (top <= ey) & (bottom >= -ey);
     mask |= (until & ~before & as_uint8(meets)) << (uint8)(SIDE * row);
     top += SIDE;
@@ -103,12 +128,14 @@ inline ushort8 blocks_of_eight(const Columns* e, int g, float x0, float y0) {
 // Fills a batch from the list [p, end) and returns how many it got.
 inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
                  __global const float* record, Batch* batch) {
+  // The next batch's records are asked for now.
   const int n = min(BATCH, end - p), ahead = min(BATCH, end - p - n);
   for (int j = 0; j < ahead; j++) {  // of the next batch: the drawing of this one hides the misses
     __global const float* from = record + (size_t)RECORD * intersections[p + n + j];
     PREFETCH(from);
     PREFETCH(from + RECORD - 1);
   }
+  // Records go to the batch scaled for exp2, and their shapes to columns for the masks.
   Columns e;
   const float h = -HALF_LOG2E;
   for (int j = 0; j < n; j++) {
@@ -126,11 +153,13 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* intersectio
     vstore8(s * (float8)(1, 1, h, 2 * h, h, 1, 1, 1), 0, batch->splats + RECORD * j);
     vstore4(t * (float4)(1, 1, 1, h), 0, batch->splats + RECORD * j + 8);
   }
+  // From "blocks of a splat" to "splats of a block": the bit matrix is transposed.
   ushort blocks[BATCH];
   for (int g = 0; g * LANES < n; g++)
     vstore8(blocks_of_eight(&e, g, x0 + 0.5f, y0 + 0.5f), g, blocks);
   uint16 block_splats = convert_uint16(transpose_bits(vload16(0, blocks)));
   if (n > 16) block_splats |= convert_uint16(transpose_bits(vload16(1, blocks))) << (uint16)16;
+  // Bits beyond the n splats of the last batch are cleared.
   vstore16(block_splats & (0xffffffffu >> (BATCH - n)), 0, batch->block_splats);
   return n;
 }
@@ -138,15 +167,17 @@ inline int fetch(int p, int end, int x0, int y0, __global const int* intersectio
 // Pixels of a block, (4 rows) of (4 pixels) of rgba, to the image.
 inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int y0, int width,
                         int height, __global float* image) {
+  // Four vectors of one channel each -> rows of four pixels of rgba.
   float rows[16 * SIDE];
-#define ROW(i, p, q, u, v)                                                                   \
-  vstore16((float16)(r.p, g.p, b.p, a.p, r.q, g.q, b.q, a.q, r.u, g.u, b.u, a.u, r.v, g.v, b.v, \
+#define ROW(i, p, q, u, v)                                                                       \
+  vstore16((float16)(r.p, g.p, b.p, a.p, r.q, g.q, b.q, a.q, r.u, g.u, b.u, a.u, r.v, g.v, b.v,  \
                      a.v), i, rows)
   ROW(0, s0, s1, s2, s3);
   ROW(1, s4, s5, s6, s7);
   ROW(2, s8, s9, sa, sb);
   ROW(3, sc, sd, se, sf);
 #undef ROW
+  // At the right and lower edge a block may lie partly outside the image.
   const int columns = min(SIDE, width - x0);
   for (int i = 0; i < SIDE && y0 + i < height; i++) {
     __global float* to = image + 4 * ((size_t)(y0 + i) * width + x0);
@@ -160,6 +191,7 @@ inline void store_block(float16 r, float16 g, float16 b, float16 a, int x0, int 
 #ifdef HEAT
 inline void store_heat(float16 hot, float16 weight, int x0, int y0, int width, int height,
                        __global float2* heat_image) {
+  // Two channels, so rows of two floats; written pixel by pixel, since heat is rare.
   float h[16], w[16];
   vstore16(hot, 0, h);
   vstore16(weight, 0, w);
@@ -169,11 +201,13 @@ inline void store_heat(float16 hot, float16 weight, int x0, int y0, int width, i
 }
 #endif
 
-// min_transmittance: a block is done when less than this comes through each of its pixels.
+// min_transmittance: a block is done when less is left in each of its pixels (3DGS's early stop, by
+// blocks).
 inline void draw_tile(int tile, int width, int height, int tiles_x, __global const int* tile_start,
                       __global const int* intersections, __global const float* record,
                       float min_transmittance, __global float* image AND_HEAT) {
   const int x0 = tile % tiles_x * TILE, y0 = tile / tiles_x * TILE;
+  // T is the transmittance so far, R G B the sum of c alpha T, of all 16 blocks of the tile.
   float16 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
     const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
@@ -188,6 +222,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
   for (int k = 0; k < BLOCKS; k++) H[k] = W[k] = 0;
 #endif
   Batch batch;
+  // Bit k: block k still takes splats.
   uint open = 0xffff;
   const int end = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end && open;) {
@@ -201,18 +236,24 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       if (!left) continue;
       const float16 x = LANE_X + (float)(x0 + k % SIDE * SIDE);
       const float16 y = LANE_Y + (float)(y0 + k / SIDE * SIDE);
+      // One block's pixels, in registers for all of the batch's splats that reach it.
       float16 t = T[k], r = R[k], g = G[k], b = B[k];
 #ifdef HEAT
       float16 hot = H[k], weight = W[k];
 #endif
+      // Bits in order, lowest first: near to far, as the list is.
       for (; left; left &= left - 1) {
         const int lowest = popcount(~left & (left - 1));
         const float* s = batch.splats + RECORD * lowest;
         const float16 dx = x - s[MEAN_X], dy = y - s[MEAN_Y];
+        // -log2(e) / 2 times the power, by Horner in dx.
         const float16 power =
             fma(dx, fma(s[CONIC_A], dx, s[CONIC_B] * dy), s[CONIC_C] * dy * dy);
+        // 3DGS: alpha = min(0.99, o exp(-power / 2)), not drawn below min alpha, which is where the
+        // power exceeds its threshold; both are negated here.
         const float16 alpha = fmin(s[OPACITY] * exp2_16(power), MAX_ALPHA);
         const float16 w = select((float16)(0), alpha, power >= s[POWER_THRESHOLD]) * t;
+        // C += c alpha T.
         r = fma(w, s[RED], r);
         g = fma(w, s[GREEN], g);
         b = fma(w, s[BLUE], b);
@@ -220,6 +261,7 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
         hot = fma(w, batch.heat[lowest].x, hot);
         weight = fma(w, batch.heat[lowest].y, weight);
 #endif
+        // T (1 - alpha) = T - alpha T.
         t -= w;
       }
 #ifdef HEAT
@@ -230,9 +272,11 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
       R[k] = r;
       G[k] = g;
       B[k] = b;
+      // A positive test: what is not a number closes the block.
       if (!(max8(fmax(t.lo, t.hi)) >= min_transmittance)) open &= ~(1u << k);
     }
   }
+  // Premultiplied, over nothing: whoever shows it puts the background behind.
   for (int k = 0; k < BLOCKS; k++)
     store_block(R[k], G[k], B[k], 1 - T[k], x0 + k % SIDE * SIDE, y0 + k / SIDE * SIDE, width,
                 height, image);
@@ -242,12 +286,12 @@ inline void draw_tile(int tile, int width, int height, int tiles_x, __global con
 #endif
 }
 
-// One view, or the same tile of two views one after the other.
-__kernel void draw(int width, int height, int tiles_x, float min_transmittance, __global const int* starts_0,
-                   __global const int* intersections_0, __global const float* record_0,
-                   __global float* image_0 AND_HEAT_OF(0), __global const int* starts_1,
-                   __global const int* intersections_1, __global const float* record_1,
-                   __global float* image_1 AND_HEAT_OF(1)) {
+// One view, or the same tile of two views one after the other: eyes share what the caches hold.
+__kernel void draw(int width, int height, int tiles_x, float min_transmittance,
+                   __global const int* starts_0, __global const int* intersections_0,
+                   __global const float* record_0, __global float* image_0 AND_HEAT_OF(0),
+                   __global const int* starts_1, __global const int* intersections_1,
+                   __global const float* record_1, __global float* image_1 AND_HEAT_OF(1)) {
   const int tile = get_global_id(0);
   draw_tile(tile, width, height, tiles_x, starts_0, intersections_0, record_0, min_transmittance,
             image_0 GIVE_HEAT(0));

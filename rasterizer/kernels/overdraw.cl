@@ -1,4 +1,7 @@
 // overdraw: adds one to every pixel that a splat is blended into.  One work-item a splat.
+// Reads:   record (N, 12) of project or project_arena.
+// Writes:  number (H, W), which begins as zeros.
+// Units:   pixels, row 0 on top; splats.
 #include "common/record.cl"
 
 __kernel void overdraw(int count, int width, int height, __global const float* record,
@@ -12,11 +15,13 @@ __kernel void overdraw(int count, int width, int height, __global const float* r
   const int x1 = (int)clamp(floor(r[MEAN_X] + r[EXTENT_X] - 0.5f) + 1.0f, 0.0f, (float)width);
   const int y0 = (int)clamp(ceil(r[MEAN_Y] - r[EXTENT_Y] - 0.5f), 0.0f, (float)height);
   const int y1 = (int)clamp(floor(r[MEAN_Y] + r[EXTENT_Y] - 0.5f) + 1.0f, 0.0f, (float)height);
+  // The very test of raster: no tiles, no early stop, so this counts what each pixel could blend.
   for (int y = y0; y < y1; y++) {
     const float dy = y + 0.5f - r[MEAN_Y];
     for (int x = x0; x < x1; x++) {
       const float dx = x + 0.5f - r[MEAN_X];
       const float q = r[CONIC_A] * dx * dx + 2.0f * r[CONIC_B] * dx * dy + r[CONIC_C] * dy * dy;
+      // Splats overlap, so the count is atomic; integers add up to the same in any order.
       if (q <= r[POWER_THRESHOLD]) atomic_inc(number + y * width + x);
     }
   }

@@ -1,5 +1,9 @@
-// pack: means, scales, quaternions -> what project_arena reads of a splat, eight at a time.
-// Sigma = R S S^T R^T, stored as xx xy xz yy yz zz 0 0 (square metres, object frame).
+// pack: means, scales, quaternions -> what project_arena reads of a splat, eight at a time. Sigma =
+// R S S^T R^T (paper eq. 1; 3DGS, eq. 6), once a change of x instead of once a frame and view.
+// Reads:   means, scales (n, 3), wxyz (n, 4), opacity (n,) as a model decodes them.
+// Writes:  rows `start` and after of mean_opacity (N, 4) and covariance (N, 8): xx xy xz yy yz zz 0
+//          0.
+// Units:   metres and square metres in the object's frame; scales are one sigma.
 #include "common/eight_rows.cl"
 
 typedef struct {
@@ -8,14 +12,16 @@ typedef struct {
 
 inline float8 dot3(Rows a, Rows b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
+// A row of R S: Sigma's entries are the dot products of its rows.
 inline Rows scaled_row(float8 x, float8 y, float8 z, Rows by) {
   const Rows row = {x * by.x, y * by.y, z * by.z, 0};
   return row;
 }
 
+// Rows of the arena, eight at a time, a column a vector.
 #define STORE_MEANS(rows) STORE_COLUMNS(rows, 4, 0, mean.x, mean.y, mean.z, mean.opacity)
-#define STORE_COVARIANCES(rows)                                                       \
-  STORE_COLUMNS(rows, 8, 0, dot3(a, a), dot3(a, b), dot3(a, c), dot3(b, b))      \
+#define STORE_COVARIANCES(rows)                                              \
+  STORE_COLUMNS(rows, 8, 0, dot3(a, a), dot3(a, b), dot3(a, c), dot3(b, b))  \
   STORE_COLUMNS(rows, 8, 4, dot3(b, c), dot3(c, c), 0, 0)
 
 // A work-item takes `run` splats, a multiple of eight, to rows `start` and after of the arena.
@@ -43,9 +49,11 @@ __kernel void pack(int count, int start, int run, __global const float* means,
     x *= per;
     y *= per;
     z *= per;
+    // The rows of R S, from the unit quaternion.
     const Rows a = scaled_row(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), s);
     const Rows b = scaled_row(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), s);
     const Rows c = scaled_row(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), s);
+    // Rows start + i and on: eight at a time, the last few one by one.
     STORE_ROWS(STORE_MEANS, (mean_opacity + 4 * (size_t)start), 4)
     STORE_ROWS(STORE_COVARIANCES, (covariance + 8 * (size_t)start), 8)
   }

@@ -1,5 +1,10 @@
-// project: splats (means, scales, quaternions) -> records and depths, and the way back.
-// One work-item for WIDTH splats.  EWA splatting as in 3DGS: Sigma' = J W Sigma W^T J^T + low_pass.
+// project: splats (means, scales, quaternions) -> records and depths, and the way back; for
+// training. EWA splatting as in 3DGS: Sigma' = J W Sigma W^T J^T + low_pass I (common/ewa.cl has
+// the steps).
+// Reads:   means, scales (N, 3), wxyz (N, 4), opacity (N,), color (N, 3), a camera; the backward
+//          pass also the records and the gradients of them.
+// Writes:  record (N, 12), depth (N,); backward the gradients of the five arrays.
+// Units:   metres in the world, pixels on the screen, opacity 0..1, display sRGB.
 #include "common/record.cl"
 #include "common/ewa.cl"
 
@@ -10,12 +15,16 @@ __kernel void project(int count, int width, int height, float near, float min_al
                       __global float* record, __global float* depth) {
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
+  // The steps of the paper: R, M = W R S, J, Sigma' = (J M)(J M)^T + low pass.
   const Splat s = project_splat(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
                         LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, low_pass);
   const floatn alpha = LOAD(opacity, 1, 0);
   const floatn3 rgb = LOAD3(color);
+  // alpha(d) = o exp(-power / 2) >= min_alpha  <=>  power <= 2 ln(o / min_alpha), the threshold;
+  // the ellipse of that power reaches sqrt(threshold Sigma'_xx) to either side.
   const floatn per = 1 / s.determinant, power_threshold = 2 * log(alpha / min_alpha);
   const floatn half_x = sqrt(power_threshold * s.a), half_y = sqrt(power_threshold * s.c);
+  // The 2D mean; j00 p.x = fx x / z.
   const floatn x = s.j00 * s.p.x + camera[CAMERA_CX], y = s.j11 * s.p.y + camera[CAMERA_CY];
 
   // Positive tests, so that NaN fails: bright enough, in front, finite, on the screen.
@@ -25,9 +34,12 @@ __kernel void project(int count, int width, int height, float near, float min_al
   seen &= (half_x < FLT_MAX) & (half_y < FLT_MAX);
   seen &= (x + half_x > 0) & (x - half_x < (float)width);
   seen &= (y + half_y > 0) & (y - half_y < (float)height);
+  // A culled splat's record is all zeros with extents of -1: raster never meets it, and its
+  // gradients are zero.
   const floatn none = 0, culled = -1, far = CULLED_DEPTH;
   STORE(record, RECORD, MEAN_X, select(none, x, seen));
   STORE(record, RECORD, MEAN_Y, select(none, y, seen));
+  // The inverse of [a b; b c] is [c -b; -b a] / determinant.
   STORE(record, RECORD, CONIC_A, select(none, s.c * per, seen));
   STORE(record, RECORD, CONIC_B, select(none, -s.b * per, seen));
   STORE(record, RECORD, CONIC_C, select(none, s.a * per, seen));
@@ -49,12 +61,14 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
                                __global float* grad_opacity, __global float* grad_color) {
   const int first = get_global_id(0) * WIDTH, n = min(WIDTH, count - first);
   if (n <= 0) return;
+  // Computed again: cheaper than to store it between the passes.
   const Splat s = project_splat(LOAD3(means), LOAD3(scales), LOAD(wxyz, 4, 0), LOAD(wxyz, 4, 1),
                         LOAD(wxyz, 4, 2), LOAD(wxyz, 4, 3), camera, low_pass);
   const intn seen = LOAD(record, RECORD, EXTENT_X) > 0;
   const floatn none = 0;
 #define GRAD(column) LOAD(grad_record, RECORD, column)
 #define KEEP(value) select(none, value, seen)  // a culled splat's may be NaN
+  // Opacity and colour go through projection unchanged.
   STORE(grad_opacity, 1, 0, KEEP(GRAD(OPACITY)));
   STORE3(grad_color, make3(KEEP(GRAD(RED)), KEEP(GRAD(GREEN)), KEEP(GRAD(BLUE))));
 
@@ -64,12 +78,14 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   const floatn gA = GRAD(CONIC_A), gB = GRAD(CONIC_B), gC = GRAD(CONIC_C);
   const floatn xx = A * gA + 0.5f * B * gB, xy = 0.5f * A * gB + B * gC;
   const floatn yx = B * gA + 0.5f * C * gB, yy = 0.5f * B * gB + C * gC;
+  // b stands twice in Sigma', so its gradient is that of both.
   const floatn grad_a = -(xx * A + xy * B), grad_b = -2 * (xx * B + xy * C);
   const floatn grad_c = -(yx * B + yy * C);
+  // Sigma' = (J M)(J M)^T: a = u.u, b = u.v, c = v.v of its rows u and v, so dL/du = 2 a' u + b' v.
   const floatn3 gx = blend3(2 * grad_a, s.jm_x, grad_b, s.jm_y);
   const floatn3 gy = blend3(grad_b, s.jm_x, 2 * grad_c, s.jm_y);
 
-  // rows of J root, with J = [j00 0 j02; 0 j11 j12].
+  // Rows of J M with J = [j00 0 j02; 0 j11 j12]: dL/dJ, then dL/dM = J^T dL/d(J M) below.
   const floatn grad_j00 = dot3(gx, s.m_x), grad_j02 = dot3(gx, s.m_z);
   const floatn grad_j11 = dot3(gy, s.m_y), grad_j12 = dot3(gy, s.m_z);
   floatn3 grad_scale;
@@ -79,7 +95,8 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   STORE3(grad_scales, make3(KEEP(grad_scale.x), KEEP(grad_scale.y), KEEP(grad_scale.z)));
   for (int k = 0; k < 4; k++) STORE(grad_wxyz, 4, k, KEEP(grad_q[k]));
 
-  // x = fx X/Z + cx; j00 = fx/Z; j02 = -fx/Z tan_x, tan_x = X/Z unless clamped.
+  // The mean acts through x = fx X/Z + cx, through j00 = fx/Z and through j02 = -fx/Z tan_x, where
+  // tan_x = X/Z unless it is held; the low pass is a constant.
   const floatn tx = s.p.x * s.inv_z, ty = s.p.y * s.inv_z;
   const intn free_x = (tx > camera[MIN_TAN_X]) & (tx < camera[MAX_TAN_X]);
   const intn free_y = (ty > camera[MIN_TAN_Y]) & (ty < camera[MAX_TAN_Y]);
@@ -87,9 +104,11 @@ __kernel void project_backward(int count, float low_pass, __constant float* came
   const floatn along_y = select(none, -grad_j12 * s.j11 * s.inv_z, free_y);
   const floatn mean_x = GRAD(MEAN_X) * s.j00, mean_y = GRAD(MEAN_Y) * s.j11;
   const floatn px = mean_x + along_x, py = mean_y + along_y;
+  // All of J's entries fall as 1/Z.
   const floatn jacobian =
       grad_j00 * s.j00 + grad_j11 * s.j11 + grad_j02 * s.j02 + grad_j12 * s.j12;
   const floatn pz = -(px * tx + py * ty) - jacobian * s.inv_z;
+  // From the camera to the world: W^T.
   STORE3(grad_means, make3(KEEP(camera[0] * px + camera[4] * py + camera[8] * pz),
                            KEEP(camera[1] * px + camera[5] * py + camera[9] * pz),
                            KEEP(camera[2] * px + camera[6] * py + camera[10] * pz)));

@@ -1,10 +1,17 @@
-// project_arena: splats of many posed objects -> records, tiles and sort keys, for drawing alone.
-// A work-item owns a chunk and takes eight splats at a time as vectors.  Memory is the limit here:
-// a splat is read once for all views, the tiles are found while the ellipses are at hand (bin.cl's
-// find_tile_bounds reads them again), and what no view can see is dropped before its covariance is read.
-// Needs: VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
+// project_arena: splats of many posed objects -> records, tile bounds and sort keys, for drawing
+// alone. A work-item owns a chunk and takes eight splats at a time as vectors.  Memory is the limit
+// here: a splat is read once for all views, the tile bounds are found while the ellipses are at
+// hand (bin.cl's find_tile_bounds reads them again), and what no view can see is dropped before its
+// covariance is read.
+//  Sigma' = J W Sigma W^T J^T + low_pass I    (EWA splatting; 3DGS, eq. 5), of the rows u, v of J W
+// Needs:   VIEWS = 1 or 2; ORDERS = 0 (an order is kept), 1 (for all views) or VIEWS (one each).
 // ANTIALIASED = 1: some object is; without it such scenes alone would pay for the question.
 // OWN_COLORS = 1: the second view has colours of its own.
+// Reads:   frame (limits, views, poses), mean_opacity (N, 4), covariance (N, 8), color (N, 4),
+//          object_index (N,).
+// Writes:  of each view record (N, 12), depth (N,), tile_bounds (N, 2), culled (chunks, 6), status;
+//          of each order pairs (N, 2) of splat and key, and histograms of the keys' low digits.
+// Units:   metres in the object and in the camera, pixels on the screen, display sRGB.
 #ifndef ANTIALIASED
 #define ANTIALIASED 0
 #endif
@@ -20,7 +27,7 @@ typedef struct {
   float8 x, y, z, opacity;        // mean in the object, metres
   float8 xx, xy, xz, yy, yz, zz;  // covariance in the object, m^2
   float8 red, green, blue;
-  float8 power_threshold;                     // 2 ln(opacity / least alpha)
+  float8 power_threshold;  // 2 ln(opacity / min alpha)
 } Eight;
 
 // Blocks of 12 floats an object: camera_from_object of each view, then sort_from_object of each
@@ -36,6 +43,7 @@ inline void load_poses(float8* m, int8 object, int* current, __global const floa
     *current = object.s0;
     return;
   }
+  // Two objects meet in these eight splats: every lane gets its own pose.
   *current = -1;
   int index[LANES];
   vstore8(object, 0, index);
@@ -51,18 +59,21 @@ typedef struct {
   __global uint2* pairs;
   __global int* bins;
   int next;  // where the next pair goes
-  uint8 least, most;
+  uint8 min_key, max_key;
 } Keys;
 
 // Floats of any sign sort as these bits do.
 inline uint8 sortable(float8 value) {
   const uint8 bits = as_uint8(value);
+  // IEEE 754 as integers: negative floats have all bits turned, positive ones the sign alone.
   return bits ^ (as_uint8(as_int8(bits) >> 31) | 0x80000000u);
 }
 
+// Pairs of the splats that take part in an order, packed; and the first digit's histogram, as
+// bin.cl has them.
 inline void enter_keys(Keys* keys, int i, uint8 key, int8 member) {
-  keys->least = min(keys->least, key | ~as_uint8(member));
-  keys->most = max(keys->most, key & as_uint8(member));
+  keys->min_key = min(keys->min_key, key | ~as_uint8(member));
+  keys->max_key = max(keys->max_key, key & as_uint8(member));
   uint low[LANES];
   vstore8(key & (LOW_BINS - 1), 0, low);
   if (all(member)) {
@@ -93,65 +104,81 @@ inline float8 ramp(float8 room, float per) {  // per 0: there is no limit to fad
   STORE_COLUMNS(rows, RECORD, 4, a * per, opacity, s->red, s->green)                 \
   STORE_COLUMNS(rows, RECORD, 8, s->blue, half_x, half_y, power_threshold)
 
-// Screen ellipses of those `alive` in one view.  antialiased: above 0 where a splat is.
-// passed: per lane how many got past each gate.  record: of all splats, these are i to i + n; culled ones get extents of -1.
+// Screen ellipses of those `alive` in one view: the projection of the paper, then the gates.
+// antialiased: above 0 where a splat is.  passed: per lane how many got past each gate.  record:
+// that of all splats, these are i to i + n; culled ones get extents of -1.
 IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float8 y, float8 z,
                                 float8 square, float8 antialiased, int8 alive,
                                 __global const float* view,
                                 __global const float* limits, int i, int n,
                                 __global float* record, int8* passed) {
   const float low_pass = limits[LOW_PASS];
+  // Step 1, J: pixels per metre along x and y, and along z by the tangents, held as 3DGS holds
+  // them.
   const float8 inv_z = 1.0f / z, tan_x = x * inv_z, tan_y = y * inv_z;
   const float8 j00 = view[CAMERA_FX] * inv_z, j11 = view[CAMERA_FY] * inv_z;
   const float8 j02 = -j00 * fmin(fmax(tan_x, view[MIN_TAN_X]), view[MAX_TAN_X]);
   const float8 j12 = -j11 * fmin(fmax(tan_y, view[MIN_TAN_Y]), view[MAX_TAN_Y]);
-  // Rows of J camera_from_object, then the screen covariance a, b, c.
+  // Step 2, the rows u and v of J W, with W the rotation camera_from_object; J has two zeros.
   const float8 ux = j00 * m[0] + j02 * m[8], uy = j00 * m[1] + j02 * m[9];
   const float8 vx = j11 * m[4] + j12 * m[8], vy = j11 * m[5] + j12 * m[9];
   const float8 uz = j00 * m[2] + j02 * m[10], vz = j11 * m[6] + j12 * m[10];
+  // Step 3, Sigma u and Sigma v: Sigma is symmetric, six floats.
   const float8 sx = s->xx * ux + s->xy * uy + s->xz * uz;
   const float8 sy = s->xy * ux + s->yy * uy + s->yz * uz;
   const float8 sz = s->xz * ux + s->yz * uy + s->zz * uz;
   const float8 tx = s->xx * vx + s->xy * vy + s->xz * vz;
   const float8 ty = s->xy * vx + s->yy * vy + s->yz * vz;
   const float8 tz = s->xz * vx + s->yz * vy + s->zz * vz;
+  // Step 4, Sigma' = [u.Sigma u, u.Sigma v; ., v.Sigma v] + low pass = [a b; b c].
   const float8 bare_a = ux * sx + uy * sy + uz * sz, b = vx * sx + vy * sy + vz * sz;
   const float8 bare_c = vx * tx + vy * ty + vz * tz;
   const float8 a = bare_a + low_pass, c = bare_c + low_pass;
-  const float8 bare = fmax(bare_a * bare_c - b * b, 0.0f);  // float rounding may go below 0
+  // Step 5, its determinant: that without the low pass, which float rounding may take below 0, plus
+  // what the low pass adds.
+  const float8 bare = fmax(bare_a * bare_c - b * b, 0.0f);
   const float8 determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;
   const float8 per = 1.0f / determinant;
   float8 power_threshold = s->power_threshold, opacity = s->opacity;
 #if ANTIALIASED
-  // Mip-Splatting's 2D filter: what the low pass makes wider becomes fainter, the same light in all.
+  // Mip-Splatting's 2D filter (Yu et al. 2024): what the low pass makes wider becomes fainter by
+  // sqrt(det Sigma' / det with the low pass), so that all of it gives the same light.
   const float8 kept = fmin(sqrt(bare / determinant), 1.0f);  // 1 where the quotient is no number
   opacity *= select((float8)(1), kept, antialiased > 0);
   power_threshold = fmax(2.0f * log(opacity * limits[PER_MIN_ALPHA]), 0.0f);
 #endif
+  // Step 6: the half axes of the box of alpha >= min alpha, and the 2D mean.
   float8 half_x = sqrt(power_threshold * a), half_y = sqrt(power_threshold * c);
   const float8 px = j00 * x + view[CAMERA_CX], py = j11 * y + view[CAMERA_CY];
+  // The larger eigenvalue of Sigma', for the clipping threshold tau_lambda of the paper (section
+  // 4.1).
   const float8 mid = 0.5f * (a + c), off = 0.5f * (a - c);
   const float8 major = mid + sqrt(off * off + b * b);  // px^2, one sigma squared
 
   // The first gate that fails counts.  What is not finite is nowhere, so it fails at "size", whose
   // tests are positive.
   const int8 finite = (half_x < FLT_MAX) & (half_y < FLT_MAX) & isfinite(px + py);
+  // On the screen: the box meets the image.  Splats whose mean is outside stay if they reach in.
   const int8 inside = (px + half_x > 0.0f) & (px - half_x < view[IMAGE_WIDTH]) &
                       (py + half_y > 0.0f) & (py - half_y < view[IMAGE_HEIGHT]);
   const int8 seen = alive & (inside | ~finite);
+  // Not larger than tau_lambda; finite in everything that a pixel will be computed from.
   int8 small = seen & finite & (major <= limits[MAX_PIXELS_2]);
   small &= (determinant > 0.0f) & (determinant < FLT_MAX) & (fabs(s->red) <= MAX_COLOR) &
            (fabs(s->green) <= MAX_COLOR) & (fabs(s->blue) <= MAX_COLOR);
+  // sqrt(threshold lambda) is how far the splat reaches along its longer axis.
   const int8 large = small & (power_threshold * major >= limits[MIN_PIXELS_2]);
   int8 drawn = large;
 #if ANTIALIASED
   drawn &= opacity >= limits[MIN_ALPHA];
 #endif
+  // Bands before the limits in which opacity falls to 0: splats fade out instead of popping.
   if (limits[FADES] > 0) {
     opacity *= ramp(limits[MAX_PIXELS] - sqrt(major), limits[PER_PIXELS]) *
                ramp(limits[MAX_DISTANCE] - sqrt(square), limits[PER_DISTANCE]) *
                ramp(sqrt(power_threshold * major) - limits[MIN_PIXELS], limits[PER_FOOTPRINT]);
     drawn &= opacity >= limits[MIN_ALPHA];
+    // A fainter splat reaches alpha = min alpha nearer to its mean.
     power_threshold = fmax(2.0f * log(opacity * limits[PER_MIN_ALPHA]), 0.0f);
     half_x = sqrt(power_threshold * a);
     half_y = sqrt(power_threshold * c);
@@ -162,6 +189,7 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   passed[GATE_FADED] += drawn;
 
   const float8 none = -1;
+  // An extent of -1 says "culled" to everyone who reads the record.
   half_x = select(none, half_x, drawn);
   half_y = select(none, half_y, drawn);
   STORE_ROWS(STORE_RECORDS, record, RECORD)
@@ -169,23 +197,24 @@ IN_PLACE Ellipses project_eight(const Eight* s, const float8* m, float8 x, float
   return out;
 }
 
+// Reductions over the lanes, once a chunk.
 inline int sum_int8(int8 a) {
   const int4 b = a.lo + a.hi;
   const int2 c = b.lo + b.hi;
   return c.x + c.y;
 }
 
-inline uint least_of(uint8 a) {
+inline uint min_of(uint8 a) {
   const uint4 b = min(a.lo, a.hi);
   return min(min(b.x, b.y), min(b.z, b.w));
 }
 
-inline uint most_of(uint8 a) {
+inline uint max_of(uint8 a) {
   const uint4 b = max(a.lo, a.hi);
   return max(max(b.x, b.y), max(b.z, b.w));
 }
 
-// Splats without a record: told by their depth, and by a place that is no tile.
+// Splats without a record: their extent, their depth and their empty tile bounds say so.
 inline void leave_out(int i, int n, __global float* record, __global float* depth,
                       __global uint2* tile_bounds) {
   for (int lane = 0; lane < n; lane++) {
@@ -197,7 +226,7 @@ inline void leave_out(int i, int n, __global float* record, __global float* dept
 
 // frame: the limits, VIEW_SIZE floats a view, POSE floats an object.  by_distance: keys are metres
 // to the sort frame's origin, else along its z.  keep_outside: also splats that no view sees get a
-// key.  status: pairs of the view's order, intersections, least and most key.
+// key.  status: pairs of the view's order, intersections, least and largest key.
 __kernel void project_arena(
     int count, int chunk, int by_distance, int keep_outside, __global const float* frame,
     __global const float* mean_opacity, __global const float* covariance,
@@ -221,6 +250,7 @@ __kernel void project_arena(
   __global uint2* const pairs[2] = {pairs_0, pairs_1};
   __global int* const table[2] = {table_0, table_1};
 
+  // One more than ORDERS, since C has no arrays of none.
   Keys keys[ORDERS + 1];
   for (int o = 0; o < ORDERS; o++) {
     const Keys none = {pairs[o], table[o] + c * LOW_BINS, first, 0xffffffffu, 0};
@@ -239,6 +269,7 @@ __kernel void project_arena(
     const int n = min(LANES, last - i);
     const int8 valid = (int8)(0, 1, 2, 3, 4, 5, 6, 7) < n;
     LOAD_ROWS(LOAD_MEANS, s, mean_opacity, 4)
+    // Gate 1, opacity: absent splats of other modalities end here, eight at a time.
     const int8 bright = valid & (s.opacity >= limits[MIN_ALPHA]) & (s.opacity < FLT_MAX);
     entered += bright;
     if (!any(bright)) {
@@ -248,6 +279,8 @@ __kernel void project_arena(
     int8 object;
     LOAD_INDICES(object, object_index)
     load_poses(m, object, &current, poses);
+    // Gate 2, distance (the paper's second threshold, for distant splats), and the near plane; both
+    // need the mean alone.
     float8 x[VIEWS], y[VIEWS], z[VIEWS], square[VIEWS];
     int8 alive[VIEWS], seen[VIEWS + 1], anywhere = 0;
     for (int v = 0; v < VIEWS; v++) {
@@ -262,6 +295,8 @@ __kernel void project_arena(
       anywhere |= alive[v];
       seen[v] = 0;
     }
+    // Covariances and colours, the larger part of a splat, only where some view may see one of
+    // eight.
     if (any(anywhere)) {
       LOAD_ROWS(LOAD_COVARIANCES, s, covariance, 8)
       LOAD_ROWS(LOAD_COLORS, s, color, 4)
@@ -280,8 +315,10 @@ __kernel void project_arena(
 #endif
       __global const float* view = views + VIEW_SIZE * v;
       const float8 antialiased = ANTIALIASED ? m[POSE - 1] : (float8)(0);
+      // Gates 3 to 6 and the record.
       const Ellipses e = project_eight(&s, m + 12 * v, x[v], y[v], z[v], square[v], antialiased,
                                        alive[v], view, limits, i, n, record[v], passed[v]);
+      // The ellipses are in registers: their tile bounds are cheapest here.
       const TileBounds8 p = tile_bounds_of_eight(&e, (int)view[TILES_X], (int)view[TILES_Y]);
       intersections[v] += p.count;
       seen[v] = p.count > 0;
@@ -290,11 +327,15 @@ __kernel void project_arena(
       store_floats(far, i, n, depth[v]);
       store_pairs(p.corner, p.mask, i, n, tile_bounds[v]);
     }
+    // Sort keys: of each view its own, or of one frame between two eyes for both.
     for (int o = 0; o < ORDERS; o++) {
       const float8* to = m + 12 * (VIEWS + o);
+      // An order that is kept while the views turn holds every splat that is there.
       const int8 member = keep_outside ? bright : ORDERS == 1 ? drawn_anywhere : seen[o];
       if (!any(member)) continue;
       const float8 kz = to[8] * s.x + to[9] * s.y + to[10] * s.z + to[11];
+      // Depth along the view, as 3DGS sorts: it changes while a head turns, and splats pop
+      // (StopThePop, Radl et al. 2024).  The distance to the eye does not.
       float8 key = kz;
       if (by_distance) {
         const float8 kx = to[0] * s.x + to[1] * s.y + to[2] * s.z + to[3];
@@ -304,6 +345,7 @@ __kernel void project_arena(
       enter_keys(keys + o, i, sortable(key), member & isfinite(key));
     }
   }
+  // Counts a gate: how many came to it less how many passed.
   for (int v = 0; v < VIEWS; v++) {
     int before = last - first;
     for (int g = 0; g < GATES; g++) {
@@ -311,13 +353,13 @@ __kernel void project_arena(
       culled[v][GATES * c + g] = max(before, 0) - max(after, 0);
       before = after;
     }
-    uint4 told = (uint4)(0, sum_int8(intersections[v]), 0, 0);
+    uint4 summary = (uint4)(0, sum_int8(intersections[v]), 0, 0);
     if (ORDERS) {
       const Keys* mine = keys + (ORDERS == 1 ? 0 : v);
-      told.x = mine->next - first;
-      told.z = least_of(mine->least);
-      told.w = most_of(mine->most);
+      summary.x = mine->next - first;
+      summary.z = min_of(mine->min_key);
+      summary.w = max_of(mine->max_key);
     }
-    status[v][c] = told;
+    status[v][c] = summary;
   }
 }

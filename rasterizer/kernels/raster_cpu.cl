@@ -1,110 +1,17 @@
-// raster, CPU form, for training (draw_cpu.cl is for the screen): one work-item a tile of 16x16
-// pixels, kept in registers and the first cache.
-// A block is eight pixels, BLOCK_W x BLOCK_H, one vector.  Columns of blocks are numbered first
-// down, then right, so that a column's blocks are neighbouring bits of a mask.
-// Reads: tile_start (tiles + 1), intersections, record.  Early stop: blocks whose transmittance is
-// below STOP everywhere are dropped from the mask every BATCH intersections; a tile ends with its last.
+// raster, CPU form, for training (draw_cpu.cl is for the screen): lists of intersections -> an
+// image, and the gradients of an image -> those of every intersection.
+// One work-item a tile of 16x16 pixels, kept in registers and the first cache, in blocks of eight
+// pixels (common/raster_blocks.cl).  Blending front to back (3DGS, eq. 3; paper eq. 2):
+//   C = sum of c alpha T,  T the product of 1 - alpha of what lies before
+// Early stop: blocks whose transmittance is below STOP everywhere are dropped from the mask every
+// BATCH intersections; a tile ends with its last block.
+// Reads:   tile_start (tiles + 1), intersections, record (N, 12); backward also tile_end, the
+//          image, its transmittance and the gradients of both, tile_bounds and first_slot.
+// Writes:  image (3, H, W), transmittance (H, W), tile_end; backward the slots (count, 12).
+// Units:   pixels, row 0 on top; display sRGB; transmittance 0..1; depths in metres.
 #include "common/vector.cl"
 #include "common/raster.cl"
-#define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
-#define BLOCK_H 2
-#define DOWN (TILE / BLOCK_H)   // blocks in a column
-#define ACROSS (TILE / BLOCK_W)  // columns
-#define BLOCKS (DOWN * ACROSS)   // 32: one bit each
-#define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
-#define SHIFT_H 1                // log2 of BLOCK_H
-#define BATCH 32
-
-#define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
-#define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
-
-// A batch of intersections of one tile.
-typedef struct {
-  float splats[BATCH * RECORD];
-  uint blocks[BATCH];  // those that the splat's ellipse touches
-} Batch;
-
-// What of a batch the masks are made of, a column each.
-typedef struct {
-  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH], power_threshold[BATCH];
-} Columns;
-
-// Bit k of each block that the ellipse touches, for eight splats from 8 g on: in every column of
-// blocks the interval of y while the ellipse is, in x, between its first and last pixel centres.
-//   y = tilt x +- sqrt((power_threshold - x^2 / covariance_xx) / c), largest at x = lean
-// With room for what float rounding does to a pixel's own test, as in span_of_row of tiles.cl: no
-// pixel is lost, so every bit of the image is that of a test of all blocks.
-inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
-  const float8 x = vload8(g, e->x) - (x0 + 0.5f), y = vload8(g, e->y) - (y0 + 0.5f);
-  const float8 a = vload8(g, e->a), b = vload8(g, e->b), c = vload8(g, e->c);
-  const float8 ex = vload8(g, e->half_x), ey = vload8(g, e->half_y), power_threshold = vload8(g, e->power_threshold);
-  const float8 per_c = 1.0f / c, tilt = -b * per_c, lean = -b / a * ey;
-  const float8 most = (1.0001f * power_threshold + 5e-7f * (a * ex * ex + c * ey * ey)) * per_c;
-  const float8 per_xx = power_threshold / fmax(ex * ex, FLT_MIN) * per_c;
-  const float8 spare = 1e-6f * (fabs(tilt) * (ex + fabs(x)) + ey + fabs(y));
-  const float8 above = y - spare, below = y + spare, low = -1, high = TILE;
-  float8 left = -x;
-  uint8 mask = 0;
-  for (int column = 0; column < ACROSS; column++) {
-    const float8 right = left + (BLOCK_W - 1);
-    const float8 up = fmin(fmax(-lean, left), right), down = fmin(fmax(lean, left), right);
-    const float8 highest = above + tilt * up - sqrt(fmax(most - up * up * per_xx, 0.0f));
-    const float8 lowest = below + tilt * down + sqrt(fmax(most - down * down * per_xx, 0.0f));
-    const int8 top = convert_int8(ceil(fmin(fmax(highest, 0.0f), high))) / BLOCK_H;
-    const int8 bottom = convert_int8(floor(fmin(fmax(lowest, low), high - 1))) >> SHIFT_H;
-    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
-                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom)) & COLUMN_BITS;
-    const int8 meets = (left <= ex) & (right >= -ex);
-    mask |= (rows & as_uint8(meets)) << (uint8)(DOWN * column);
-    left += BLOCK_W;
-  }
-  return mask;
-}
-
-// Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
-// independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
-// use: a mask that is late makes every mispredicted end of a block loop dear.
-inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
-                 __global const float* record, Batch* batch) {
-  const int n = min(BATCH, end - p);
-  Columns e;
-  for (int j = 0; j < n; j++) {
-    __global const float* from = record + (size_t)RECORD * intersections[p + j];
-    float* s = batch->splats + RECORD * j;
-    vstore8(vload8(0, from), 0, s);
-    vstore4(vload4(0, from + 8), 0, s + 8);
-    e.x[j] = s[MEAN_X];
-    e.y[j] = s[MEAN_Y];
-    e.a[j] = s[CONIC_A];
-    e.b[j] = s[CONIC_B];
-    e.c[j] = s[CONIC_C];
-    e.half_x[j] = s[EXTENT_X];
-    e.half_y[j] = s[EXTENT_Y];
-    e.power_threshold[j] = s[POWER_THRESHOLD];
-  }
-  for (int g = 0; g * LANES < n; g++)
-#ifdef EVERY_BLOCK  // what a test compares with
-    vstore8((uint8)(0xffffffffu), g, batch->blocks);
-#else
-    vstore8(blocks_of_eight(&e, g, x0, y0), g, batch->blocks);
-#endif
-  return n;
-}
-
-// 1 on the pixels of block k that lie in the image: those outside need nothing and stop nothing.
-inline float8 inside(int k, int x0, int y0, int width, int height) {
-  const float8 x = LANE_X + (float)(x0 + k / DOWN * BLOCK_W);
-  const float8 y = LANE_Y + (float)(y0 + k % DOWN * BLOCK_H);
-  return select((float8)(0), (float8)(1), isless(x, (float8)(width)) & isless(y, (float8)(height)));
-}
-
-inline int lowest(uint bits) { return popcount(~bits & (bits - 1)); }  // number of the lowest bit
-
-inline uint still_open(uint open, const float8* T) {
-  for (int k = 0; k < BLOCKS; k++)
-    if (!(max8(T[k]) >= STOP)) open &= ~(1u << k);
-  return open;
-}
+#include "common/raster_blocks.cl"
 
 #ifdef SURFACE
 // The fraction of surface.cl: depth under pixels (dx, dy) from the mean, before it is held.
@@ -118,6 +25,7 @@ inline Depth8 depth_under(const float8 f, float8 dx, float8 dy) {
   const float8 q = fma(dx, fma(f.s3, dx, 2 * f.s4 * dy), f.s5 * dy * dy);
   d.ahead = 1.0f + l;
   d.per = 1.0f / fmax(fma((float8)(2.0f), l, 1.0f + q), SURFACE_LEAST);
+  // Z (1 + l) / (1 + 2 l + q), with the terms that the gradients need kept.
   d.z = f.s0 * d.ahead * d.per;
   return d;
 }
@@ -131,6 +39,7 @@ __kernel void rasterize(RASTERIZE_TAKES) {
   float8 Z[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) Z[k] = 0;
 #endif
+  // Transmittance and colours of all 256 pixels: 32 blocks of eight.
   float8 T[BLOCKS], R[BLOCKS], G[BLOCKS], B[BLOCKS], block_x[BLOCKS], block_y[BLOCKS];
   for (int k = 0; k < BLOCKS; k++) {
     block_x[k] = LANE_X + (float)(k / DOWN * BLOCK_W);  // pixel centres, from the tile's corner
@@ -146,18 +55,24 @@ __kernel void rasterize(RASTERIZE_TAKES) {
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
     for (int j = 0; j < n; j++) {
       const float* s = batch.splats + RECORD * j;
+      // Means from the tile's corner: small numbers, whose differences keep their digits.
       const float mx = s[MEAN_X] - x0, my = s[MEAN_Y] - y0;
+      // Exponents of 2: the conic times -log2(e) / 2.
       const float qa = -HALF_LOG2E * s[CONIC_A], qb = -2 * HALF_LOG2E * s[CONIC_B];
       const float qc = -HALF_LOG2E * s[CONIC_C], least = -HALF_LOG2E * s[POWER_THRESHOLD];
 #ifdef SURFACE
       const float8 f = vload8(intersections[p + j], surface);
 #endif
+      // Only blocks that are open and that the ellipse touches.
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
+        // power here is log2 of exp(-power / 2): largest at the mean, `least` at the threshold.
         const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
         float8 alpha = fmin(s[OPACITY] * exp2_8(power), MAX_ALPHA);
+        // Not drawn where the power is beyond its threshold (alpha below min alpha).
         alpha = select((float8)(0), alpha, power >= least);
+        // The weight alpha T of the splat in this pixel.
         const float8 w = alpha * T[k];
         R[k] = fma(w, s[RED], R[k]);
         G[k] = fma(w, s[GREEN], G[k]);
@@ -165,17 +80,21 @@ __kernel void rasterize(RASTERIZE_TAKES) {
 #ifdef SURFACE
         Z[k] = fma(w, fmin(fmax(depth_under(f, dx, dy).z, f.s6), f.s7), Z[k]);
 #endif
+        // T (1 - alpha).
         T[k] -= w;
       }
     }
     p += n;
     open = still_open(open, T);
   }
+  // The backward pass stops at the same intersection.
   tile_end[tile] = p;
+  // Planar output: three channels of (H, W), as the losses read them.
   const size_t plane = (size_t)width * height;
   for (int k = 0; k < BLOCKS; k++) {
     const float8 t = T[k];
     float r[LANES], g[LANES], b[LANES], a[LANES];
+    // What light is left comes from the background.
     vstore8(fma(t, red, R[k]), 0, r);
     vstore8(fma(t, green, G[k]), 0, g);
     vstore8(fma(t, blue, B[k]), 0, b);
@@ -202,15 +121,18 @@ __kernel void rasterize(RASTERIZE_TAKES) {
 
 // Front to back again, with the same decisions.  Per pixel: T, and rest = what the gradient still
 // expects from behind: dL/dC . C + dL/dT T at first, less what each splat gave.  Then
-//   dL/dalpha = T (c . dL/dC) - rest / (1 - alpha)
-// which needs no division to get T back.  Each intersection writes its 12 numbers to its own slot.
-// For growing: ABSOLUTE sums |gradient of the mean| in slots 9 and 10, or SHARE sums alpha T times
-// an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is defined.
+// dL/dalpha = T (c . dL/dC) - rest / (1 - alpha)
+// which needs no division to get T back, as 3DGS's walk from back to front does.  Each intersection
+// writes its 12 numbers to its own slot.
+// For densification: ABSOLUTE sums |gradient of the mean| in slots 9 and 10 (AbsGS), or SHARE sums
+// alpha T times an error of the pixel in 9; WEIGHT sums alpha T in 11.  Each only where it is
+// defined.
 __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
   const int tile = get_global_id(0);
   const int tile_x = tile % tiles_x, tile_y = tile / tiles_x;
   const int x0 = tile_x * TILE, y0 = tile_y * TILE;
   const size_t plane = (size_t)width * height;
+  // Of all 256 pixels: T, what is still to come from behind, and dL/dC.
   float8 T[BLOCKS], rest[BLOCKS], grad_r[BLOCKS], grad_g[BLOCKS], grad_b[BLOCKS];
   float8 block_x[BLOCKS], block_y[BLOCKS];
 #ifdef SHARE
@@ -244,6 +166,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
       r[lane] = grad_image[at];
       g[lane] = grad_image[at + plane];
       b[lane] = grad_image[at + 2 * plane];
+      // rest at first: dL/dC . C + dL/dT T of the finished pixel.
       d[lane] = r[lane] * image[at] + g[lane] * image[at + plane] + b[lane] * image[at + 2 * plane];
       if (with_transmittance) d[lane] += grad_transmittance[at] * transmittance[at];
 #ifdef SURFACE
@@ -266,6 +189,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
   uint open = 0xffffffffu;
   const int end = tile_end[tile], last_intersection = tile_start[tile + 1];
   for (int p = tile_start[tile]; p < end; p += BATCH) {
+    // The batches of the forward pass: blocks close at the same intersections.
     const int n = fetch(p, end, x0, y0, intersections, record, &batch);
     int slot[BATCH];  // ahead of use, so that these misses overlap, too
     for (int j = 0; j < n; j++) {
@@ -278,6 +202,8 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
       const float A = s[CONIC_A], B = s[CONIC_B], C = s[CONIC_C];
       const float qa = -HALF_LOG2E * A, qb = -2 * HALF_LOG2E * B;
       const float qc = -HALF_LOG2E * C, least = -HALF_LOG2E * s[POWER_THRESHOLD];
+      // Sums over the tile's pixels: of the colour, of the power and of its products with dx and
+      // dy, from which the gradients of mean and conic follow at the end.
       float8 sum_r = 0, sum_g = 0, sum_b = 0, sum_p = 0, sum_x = 0, sum_y = 0;
       float8 sum_xx = 0, sum_xy = 0, sum_yy = 0, extra_x = 0, extra_y = 0, sum_w = 0;
 #ifdef SURFACE
@@ -285,12 +211,15 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
       float8 by_z = 0, by_l = 0, by_u = 0, by_v = 0, by_x = 0, by_y = 0;
       float8 by_uu = 0, by_uv = 0, by_vv = 0, by_low = 0, by_high = 0;
 #endif
+      // The same blocks in the same order as in the forward pass, so the same T.
       for (uint left = open & batch.blocks[j]; left; left &= left - 1) {
         const int k = lowest(left);
         const float8 dx = block_x[k] - mx, dy = block_y[k] - my;
         const float8 power = fma(dx, fma(qa, dx, qb * dy), qc * dy * dy);
+        // Before 0.99 holds it, for the gradient below.
         const float8 raw = s[OPACITY] * exp2_8(power);
         const float8 alpha = select((float8)(0), fmin(raw, MAX_ALPHA), power >= least);
+        // T before this splat: dL/dalpha needs what light reached it.
         const float8 before = T[k];
         const float8 w = alpha * before;
 #ifdef SURFACE
@@ -298,12 +227,14 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
         const float8 z = fmin(fmax(d.z, f.s6), f.s7);
         const float8 given = fma(grad_z[k], z, fma(grad_r[k], s[RED],
                                  fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE])));
+        // Where the depth is held at LOW or HIGH, the gradient goes to that bound instead.
         const float8 all = w * grad_z[k], none = 0;
         by_low += select(none, all, isless(d.z, (float8)(f.s6)));
         by_high += select(none, all, isgreater(d.z, (float8)(f.s7)));
         const int8 free = isgreaterequal(d.z, (float8)(f.s6)) & islessequal(d.z, (float8)(f.s7));
         const float8 h = select(none, all, free);
         by_z = fma(h, d.ahead * d.per, by_z);
+        // The derivatives of Z (1 + l) / (1 + 2 l + q) by l and by q.
         const float8 by_ahead = h * f.s0 * d.per * (1.0f - 2.0f * d.ahead * d.per);
         const float8 by_q = -h * d.z * d.per, qu = by_q * dx, qv = by_q * dy;
         by_l += by_ahead;
@@ -317,15 +248,20 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
 #else
         const float8 given = fma(grad_r[k], s[RED], fma(grad_g[k], s[GREEN], grad_b[k] * s[BLUE]));
 #endif
+        // What is behind this splat gets the rest of the gradient.
         const float8 behind = fma(-w, given, rest[k]);
         rest[k] = behind;
         T[k] = before - w;
+        // dL/dc = alpha T dL/dC.
         sum_r = fma(w, grad_r[k], sum_r);
         sum_g = fma(w, grad_g[k], sum_g);
         sum_b = fma(w, grad_b[k], sum_b);
+        // More alpha shows more of c and hides more of what is behind.
         const float8 grad_alpha = fma(before, given, -behind / (1.0f - alpha));
         // d alpha / d power = alpha; none where the 0.99 holds it.
         const float8 g = select(alpha * grad_alpha, (float8)(0), raw > MAX_ALPHA);
+        // d ln alpha / d mean = Q d with Q the conic, d ln alpha / d Q = -d d^T / 2: what is summed
+        // is g d and g d d^T, and Q and the factors follow after the sum.
         const float8 gx = g * dx, gy = g * dy;
         sum_p += g;
         sum_x += gx;
@@ -334,6 +270,7 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
         sum_xy = fma(gx, dy, sum_xy);
         sum_yy = fma(gy, dy, sum_yy);
 #ifdef ABSOLUTE
+        // AbsGS: gradients of a large splat's two sides cancel, their absolute values do not.
         extra_x += fabs(fma(B, gy, A * gx));
         extra_y += fabs(fma(C, gy, B * gx));
 #endif
@@ -344,7 +281,9 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
         sum_w += w;
 #endif
       }
+      // Nobody else writes to this slot, so the sums need no atomics.
       __global float* out = slots + (size_t)RECORD * slot[j];
+      // Eight sums over lanes as one tree; then the factors that all pixels share.
       const float8 one = sums8(sum_x, sum_y, sum_xx, sum_xy, sum_yy, sum_p, sum_r, sum_g);
       vstore8((float8)(A * one.s0 + B * one.s1, B * one.s0 + C * one.s1, -0.5f * one.s2, -one.s3,
                        -0.5f * one.s4, one.s5 / s[OPACITY], one.s6, one.s7),
@@ -359,8 +298,10 @@ __kernel void rasterize_backward(RASTERIZE_BACKWARD_TAKES) {
 #endif
       vstore4((float4)(sum8(sum_b), sum8(extra_x), sum8(extra_y), sum8(sum_w)), 0, out + 8);
     }
+    // The very test of the forward pass, at the same intersection.
     open = still_open(open, T);
   }
+  // Slots are not cleared beforehand: every intersection writes its own.
   for (int p = end; p < last_intersection; p++) {  // behind the early stop: nothing is felt there
     const int splat = intersections[p];
     const int slot = first_slot[splat] + rank_of_tile(tile_bounds[splat], tile_x, tile_y);

@@ -1,7 +1,11 @@
 // resolve: a float image over a background, palette applied -> 8 bits a channel, bottom row first.
-// A work-item takes a row.  Twin: renderer/palette.apply_palette and Renderer.resolved.
+// A work-item takes a row.  Twin: renderer/colors/palette.py and Renderer.resolved.
+// Reads:   image (H, W, 4), premultiplied, row 0 on top; a palette; heat (H, W, 2) or none.
+// Writes:  pixels (H, W, 4) bytes, row 0 at the bottom, as GL wants it.
+// Units:   display sRGB; a palette's places are luminance 0..1.
 #define STEPS 256  // colours of a palette
 
+// + 0.5: to the nearest step, as GL does when it writes to an 8-bit target.
 inline uchar4 eight_bits(float4 color) {
   return convert_uchar4(convert_int4(clamp(color, 0.0f, 1.0f) * 255.0f + 0.5f));
 }
@@ -26,8 +30,10 @@ __kernel void resolve(int width, int height, float red, float green, float blue,
     // background.
     const float luminance = 0.2126f * color.x + 0.7152f * color.y + 0.0722f * color.z;
     const float2 of = heat ? heat[(size_t)y * width + x] : (float2)(luminance, color.w);
+    // 1e-6: a pixel that nothing covers has no value to look up.
     const float place = clamp(of.x / fmax(of.y, 1e-6f), 0.0f, 1.0f) * (STEPS - 1);
     const int below = min((int)place, STEPS - 2);
+    // Linear between two entries; the second table holds the differences, ready made.
     const float4 false_color = palette[below] + (place - below) * palette[STEPS + below];
     const float4 final = heat ? color : (float4)(0, 0, 0, color.w);
     out[x] = eight_bits(final + false_color * of.y + (1 - color.w) * behind);

@@ -1,7 +1,10 @@
-// shade_sh: spherical harmonics -> colour towards the eye, for eight splats as vectors.
-// colour = max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of 3DGS.
-// Needs: COEFFICIENTS = 1, 4, 9 or 16.  sh is (blocks, 3 * COEFFICIENTS, 8): what eight splats need
-// is one run of memory (with a stream a coefficient it took 2.6 times as long).
+// shade_sh: spherical harmonics -> colour towards the eye, for eight splats as vectors. colour =
+// max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of 3DGS.
+// Needs:   COEFFICIENTS = 1, 4, 9 or 16.
+// Reads:   mean_opacity (N, 4); sh (blocks, 3 COEFFICIENTS, 8): what eight splats need is one run
+//          of memory (with a stream a coefficient it took 2.6 times as long); seen, a byte a block.
+// Writes:  color (N, 4).
+// Units:   metres in the object; display sRGB, from 0 on.
 #include "common/eight_rows.cl"
 
 typedef struct {
@@ -15,12 +18,13 @@ inline float8 at_least_0(float8 color) {
   return select(color, fmax(color, 0.0f), finite);
 }
 
-#define ADD(k, basis)                        \
-  {                                          \
-    const float8 weight = basis;             \
-    red += weight * vload8(3 * (k), s);      \
-    green += weight * vload8(3 * (k) + 1, s); \
-    blue += weight * vload8(3 * (k) + 2, s); \
+// One coefficient of three channels, times its basis function.
+#define ADD(k, basis)                          \
+  {                                            \
+    const float8 weight = basis;               \
+    red += weight * vload8(3 * (k), s);        \
+    green += weight * vload8(3 * (k) + 1, s);  \
+    blue += weight * vload8(3 * (k) + 2, s);   \
   }
 
 #define STORE_COLORS(rows) STORE_COLUMNS(rows, 4, 0, red, green, blue, 0)
@@ -34,7 +38,9 @@ __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, 
     if (seen && !seen[block]) continue;
     const int n = min(LANES, count - LANES * block), i = start + LANES * block;
     __global const float* s = sh + (size_t)(3 * COEFFICIENTS * LANES) * block;
+    // 3DGS stores colours less a half.
     float8 red = 0.5f, green = 0.5f, blue = 0.5f;
+    // Degree 0: Y00 = 1 / (2 sqrt(pi)), the same from everywhere.
     ADD(0, 0.28209479177387814f)
 #if COEFFICIENTS > 1
     Means mean;
@@ -44,11 +50,13 @@ __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, 
     x *= per;
     y *= per;
     z *= per;
+    // Degree 1: sqrt(3 / (4 pi)) times -y, z, -x, in this order and with these signs.
     ADD(1, -0.4886025119029199f * y)
     ADD(2, 0.4886025119029199f * z)
     ADD(3, -0.4886025119029199f * x)
 #endif
 #if COEFFICIENTS > 4
+    // Degree 2: five functions; the constants are those of the real harmonics.
     const float8 xx = x * x, yy = y * y, zz = z * z, xy = x * y, yz = y * z, xz = x * z;
     ADD(4, 1.0925484305920792f * xy)
     ADD(5, -1.0925484305920792f * yz)
@@ -57,6 +65,7 @@ __kernel void shade_sh(int count, int start, int run, float eye_x, float eye_y, 
     ADD(8, 0.5462742152960396f * (xx - yy))
 #endif
 #if COEFFICIENTS > 9
+    // Degree 3: seven more.
     ADD(9, -0.5900435899266435f * y * (3 * xx - yy))
     ADD(10, 2.890611442640554f * xy * z)
     ADD(11, -0.4570457994644658f * y * (4 * zz - xx - yy))

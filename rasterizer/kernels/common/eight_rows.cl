@@ -1,8 +1,13 @@
-// Rows of row-major arrays, one a splat <-> eight splats as vectors, one a column.
+// eight_rows: rows of row-major arrays, one a splat <-> eight splats as vectors, one a column.
+// Reads:   in the kernel `i`, the first splat, and `n`, how many of eight there are.
+// Defines: LOAD_ROWS and the loads that it takes, STORE_ROWS, STORE_COLUMNS, store_floats,
+//          store_pairs.
+// Units:   those of the arrays.
 #include "common/record.cl"
 #include "common/vector.cl"
 
 // LOAD(into, rows) for splats i to i + n: where fewer than eight are left, the last one again.
+// Whole vectors are read where the array has eight rows left: a transpose in registers, no gather.
 #define LOAD_ROWS(LOAD, into, rows, width)                                                         \
   if (n == LANES) {                                                                                \
     LOAD(into, rows + (size_t)(width) * i)                                                         \
@@ -14,6 +19,7 @@
     LOAD(into, copy)                                                                               \
   }
 
+// The same for one int a splat: which object it belongs to.
 #define LOAD_INDICES(into, array)                                                                  \
   if (n == LANES) {                                                                                \
     into = vload8(0, array + i);                                                                   \
@@ -23,6 +29,7 @@
     into = vload8(0, copy);                                                                        \
   }
 
+// (N, 4) rows of mean and opacity: 32 floats in two loads, then every fourth of them.
 #define LOAD_MEANS(into, rows)                                                                     \
   {                                                                                                \
     const float16 rp = vload16(0, rows), rq = vload16(1, rows);                                    \
@@ -32,6 +39,8 @@
     into.opacity = (float8)(rp.s37bf, rq.s37bf);                                                   \
   }
 
+// (N, 8) rows of the upper triangle of Sigma and two unused floats, so that a row is half a
+// cache line: four loads, every eighth float.
 #define LOAD_COVARIANCES(into, rows)                                                               \
   {                                                                                                \
     const float16 ra = vload16(0, rows), rb = vload16(1, rows);                                    \
@@ -44,6 +53,7 @@
     into.zz = (float8)(ra.s5d, rb.s5d, rc.s5d, rd.s5d);                                            \
   }
 
+// (N, 4) rows, the last float unused.
 #define LOAD_COLORS(into, rows)                                                                    \
   {                                                                                                \
     const float16 rg = vload16(0, rows), rh = vload16(1, rows);                                    \
@@ -61,6 +71,7 @@
     into.z = (float8)(ra.s2, ra.s5, rb.s0, rb.s3, rb.s6, rc.s1, rc.s4, rc.s7);                     \
   }
 
+// (N,) arrays, as opacities.
 #define LOAD_ONES(into, rows) into = vload8(0, rows);
 
 // Four vectors -> rows of `stride` floats, into their columns from `at` on.  Straight to where they
@@ -83,6 +94,8 @@
   }
 
 // STORE(rows) for splats i to i + n of global rows of `width` floats.
+// Fewer than eight are left only at the end of an array: put together aside, so that nothing behind
+// it is written.
 #define STORE_ROWS(STORE, rows, width)                                                             \
   if (n == LANES) {                                                                                \
     STORE(rows + (size_t)(width) * i)                                                              \
@@ -92,6 +105,7 @@
     for (int k = 0; k < (width) * n; k++) rows[(size_t)(width) * i + k] = copy[k];                 \
   }
 
+// One float a splat, such as its depth.
 inline void store_floats(float8 values, int i, int n, __global float* array) {
   if (n == LANES) {
     vstore8(values, 0, array + i);
@@ -102,6 +116,7 @@ inline void store_floats(float8 values, int i, int n, __global float* array) {
   for (int lane = 0; lane < n; lane++) array[i + lane] = one[lane];
 }
 
+// Two uints a splat, such as its tile bounds.
 inline void store_pairs(uint8 a, uint8 b, int i, int n, __global uint2* array) {
   if (n == LANES) {
     vstore16((uint16)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3, a.s4, b.s4, a.s5, b.s5, a.s6,

@@ -1,9 +1,12 @@
-// How deep a splat lies under the pixels around its mean: 8 floats a splat.
+// surface: how deep a splat lies under the pixels around its mean: 8 floats a splat.
+// Reads:   nothing.
+// Defines: their columns, SURFACE_REACH and SURFACE_LEAST.
+// Units:   metres; slopes in 1/pixel, squares in 1/pixel^2.
 //
 // A ray through a pixel enters an ellipsoid and leaves it; halfway between the two lies the depth.
 // With p the mean in the camera, M the inverse of its covariance up to a factor and d the ray with
-// d.z = 1, that is z = d'Mp / d'Md.  For (u, v) pixels from the mean on the screen
-//   z = Z (1 + l) / (1 + 2 l + q),  l = AU u + AV v,  q = QUU u^2 + 2 QUV u v + QVV v^2
+// d.z = 1, that is z = d^T M p / d^T M d.  For (u, v) pixels from the mean on the screen
+//  z = Z (1 + l) / (1 + 2 l + q),  l = AU u + AV v,  q = QUU u^2 + 2 QUV u v + QVV v^2
 // which loses no digits.  Where the ray misses the ellipsoid, as it does around small and thin
 // ones, z is held between LOW and HIGH: SURFACE_REACH sigmas, and in front of the camera.
 #define SURFACE_SIZE 8

@@ -1,0 +1,124 @@
+// raster_blocks: the blocks of pixels that raster_cpu.cl keeps a tile in, and the batches of
+// intersections that it takes.  A block is eight pixels, BLOCK_W x BLOCK_H, one vector.  Blocks are
+// numbered down their column first, then to the right, so that a column's blocks are neighbouring
+// bits of a mask.
+// Reads:   STOP (common/raster.cl), RECORD (common/record.cl); EVERY_BLOCK, for a test.
+// Defines: BLOCK_W, BLOCK_H, BLOCKS, BATCH; Batch and fetch(); inside(), lowest(), still_open().
+// Units:   pixels, row 0 on top.
+#include "common/vector.cl"
+#include "common/raster.cl"
+#define BLOCK_W 4  // 8 x 1 touches a sixth more blocks
+#define BLOCK_H 2
+#define DOWN (TILE / BLOCK_H)   // blocks in a column
+#define ACROSS (TILE / BLOCK_W)  // columns
+#define BLOCKS (DOWN * ACROSS)   // 32: one bit each
+#define COLUMN_BITS (0xffffffffu >> (32 - DOWN))
+#define SHIFT_H 1                // log2 of BLOCK_H
+#define BATCH 32
+
+// Pixel centres of a block, from its corner.
+#define LANE_X (float8)(0.5f, 1.5f, 2.5f, 3.5f, 0.5f, 1.5f, 2.5f, 3.5f)
+#define LANE_Y (float8)(0.5f, 0.5f, 0.5f, 0.5f, 1.5f, 1.5f, 1.5f, 1.5f)
+
+// A batch of intersections of one tile; the records as they are: the backward pass needs the conic
+// unscaled.
+typedef struct {
+  float splats[BATCH * RECORD];
+  uint blocks[BATCH];  // those that the splat's ellipse touches
+} Batch;
+
+// What of a batch the masks are made of, a column each.
+typedef struct {
+  float x[BATCH], y[BATCH], a[BATCH], b[BATCH], c[BATCH], half_x[BATCH], half_y[BATCH],
+      power_threshold[BATCH];
+} Columns;
+
+// The tile walk of tiles.cl, turned: columns of blocks instead of rows of tiles.  Bit k of each
+// block that the ellipse touches, for eight splats from 8 g on: in every column of blocks the
+// interval of y while the ellipse is, in x, between its first and last pixel centres.
+// y = slope x +- sqrt((T - x^2 / Sigma'_xx) / C), slope = -B / C, lowest at x = x_extreme
+// With room for what float rounding does to a pixel's own test, as in columns_of_row(): no pixel is
+// lost, so every bit of the image is that of a test of all blocks.
+inline uint8 blocks_of_eight(const Columns* e, int g, int x0, int y0) {
+  const float8 x = vload8(g, e->x) - (x0 + 0.5f), y = vload8(g, e->y) - (y0 + 0.5f);
+  const float8 a = vload8(g, e->a), b = vload8(g, e->b), c = vload8(g, e->c);
+  const float8 ex = vload8(g, e->half_x), ey = vload8(g, e->half_y),
+      power_threshold = vload8(g, e->power_threshold);
+  const float8 inv_c = 1.0f / c, slope = -b * inv_c, x_extreme = -b / a * ey;
+  const float8 threshold =
+      (1.0001f * power_threshold + 5e-7f * (a * ex * ex + c * ey * ey)) * inv_c;
+  const float8 inv_xx = power_threshold / fmax(ex * ex, FLT_MIN) * inv_c;
+  const float8 rounding = 1e-6f * (fabs(slope) * (ex + fabs(x)) + ey + fabs(y));
+  // The room for rounding, added to the two ends once.
+  const float8 above = y - rounding, below = y + rounding, low = -1, high = TILE;
+  float8 left = -x;
+  uint8 mask = 0;
+  for (int column = 0; column < ACROSS; column++) {
+    const float8 right = left + (BLOCK_W - 1);
+    const float8 x_top = fmin(fmax(-x_extreme, left), right),
+        x_bottom = fmin(fmax(x_extreme, left), right);
+    const float8 highest =
+        above + slope * x_top - sqrt(fmax(threshold - x_top * x_top * inv_xx, 0.0f));
+    const float8 lowest =
+        below + slope * x_bottom + sqrt(fmax(threshold - x_bottom * x_bottom * inv_xx, 0.0f));
+    // Rows of blocks: from the one that holds the first pixel centre to the one that holds the
+    // last.
+    const int8 top = convert_int8(ceil(fmin(fmax(highest, 0.0f), high))) / BLOCK_H;
+    const int8 bottom = convert_int8(floor(fmin(fmax(lowest, low), high - 1))) >> SHIFT_H;
+    // Ones from top to bottom; a shift by more than the column empties it.
+    const uint8 rows = ((uint8)(COLUMN_BITS) << as_uint8(top)) &
+                       ((uint8)(COLUMN_BITS) >> as_uint8(DOWN - 1 - bottom)) & COLUMN_BITS;
+    // Columns left or right of the ellipse: their roots were held at 0 and mean nothing.
+    const int8 meets = (left <= ex) & (right >= -ex);
+    mask |= (rows & as_uint8(meets)) << (uint8)(DOWN * column);
+    left += BLOCK_W;
+  }
+  return mask;
+}
+
+// Fills a batch from the list [p, end) and returns how many it got.  Records are copied first:
+// independent loads, so that their misses overlap.  The masks are made eight at a time and ahead of
+// use: a mask that is late makes every mispredicted end of a block loop dear.
+inline int fetch(int p, int end, int x0, int y0, __global const int* intersections,
+                 __global const float* record, Batch* batch) {
+  const int n = min(BATCH, end - p);
+  Columns e;
+  for (int j = 0; j < n; j++) {
+    __global const float* from = record + (size_t)RECORD * intersections[p + j];
+    float* s = batch->splats + RECORD * j;
+    vstore8(vload8(0, from), 0, s);
+    vstore4(vload4(0, from + 8), 0, s + 8);
+    e.x[j] = s[MEAN_X];
+    e.y[j] = s[MEAN_Y];
+    e.a[j] = s[CONIC_A];
+    e.b[j] = s[CONIC_B];
+    e.c[j] = s[CONIC_C];
+    e.half_x[j] = s[EXTENT_X];
+    e.half_y[j] = s[EXTENT_Y];
+    e.power_threshold[j] = s[POWER_THRESHOLD];
+  }
+  for (int g = 0; g * LANES < n; g++)
+#ifdef EVERY_BLOCK  // what a test compares with
+    vstore8((uint8)(0xffffffffu), g, batch->blocks);
+#else
+    vstore8(blocks_of_eight(&e, g, x0, y0), g, batch->blocks);
+#endif
+  return n;
+}
+
+// 1 on the pixels of block k that lie in the image: those outside need nothing and stop nothing.
+inline float8 inside(int k, int x0, int y0, int width, int height) {
+  const float8 x = LANE_X + (float)(x0 + k / DOWN * BLOCK_W);
+  const float8 y = LANE_Y + (float)(y0 + k % DOWN * BLOCK_H);
+  return select((float8)(0), (float8)(1), isless(x, (float8)(width)) & isless(y, (float8)(height)));
+}
+
+inline int lowest(uint bits) { return popcount(~bits & (bits - 1)); }  // number of the lowest bit
+
+// 3DGS stops a pixel; here a block stops when all of its pixels do.  A positive test: what is not a
+// number stops it, too.
+inline uint still_open(uint open, const float8* T) {
+  for (int k = 0; k < BLOCKS; k++)
+    if (!(max8(T[k]) >= STOP)) open &= ~(1u << k);
+  return open;
+}
