@@ -1,9 +1,13 @@
-// decode_mlp: one network for every anchor.  One invocation an anchor; a whole layer in registers.
-// Loops run over uniform counts: unrolled, the compiler of a software driver takes a minute.
-// Psi is the same for all anchors and folded into the first bias, unless each has its own control.
-// Needs: LAYER_VECS (vec4 of the widest layer), BLOCK_VECS (vec4 of a uniform block),
-//        STORED_WEIGHTS (1: too many for a uniform block),
-//        OWN_CONTROL (1: Psi of a control an anchor is an input as the others are).
+// decode_mlp: one network F for every anchor (paper eq. 5): feature, direction, Psi(x) -> k splats.
+// One invocation an anchor; a whole layer in registers.  Loops run over uniform counts: unrolled,
+// the compiler of a software driver takes a minute. Psi is the same for all anchors and folded into
+// the first bias, unless each has its own control.
+// Needs:   LAYER_VECS (vec4 of the widest layer), BLOCK_VECS (vec4 of a uniform block),
+//          STORED_WEIGHTS (1: too many for a uniform block), OWN_CONTROL (1: Psi of a control an
+//          anchor is an input as the others are).
+// Reads:   anchors, features, weights; with OWN_CONTROL control.
+// Writes:  outputs, a head's numbers of every splat, after its activation.
+// Units:   metres in the object; features and Psi have none.
 #include "common/activation.glsl"
 #include "common/direction.glsl"
 layout(local_size_x = DECODE_WORKGROUP) in;
@@ -56,16 +60,20 @@ void main() {
         values[feature_vecs + 1u + v] = control[(first + anchor) * control_vecs + v];
 #endif
 
+    // Two halves of one array: what a layer takes and what it gives change places.
     uint from = 0u, to = LAYER_VECS, bias = layers;
     for (uint layer = 0u; layer < layers; layer++) {
         uint ins = uint(weights[layer].x), outs = uint(weights[layer].y);
         uint w = bias + outs;
+        // Four outputs at once: a vec4 of the bias, then a mat4 of weights for four inputs at a
+        // time.
         for (uint o = 0u; o < outs; o++) {
             vec4 sum = weights[bias + o];
             for (uint v = 0u; v < ins; v++, w += 4u)
                 sum += mat4(weights[w], weights[w + 1u], weights[w + 2u], weights[w + 3u])
                     * values[from + v];
             if (layer + 1u < layers) {
+                // ReLU between layers; the last layer is written through its activation.
                 values[to + o] = max(sum, vec4(0.0));
             } else {
                 for (uint c = 0u; c < 4u; c++) write(anchor, 4u * o + c, sum[c]);

@@ -1,8 +1,11 @@
 // heat: what thermal stops have in the colours of splats, kept apart from the colours of the others
 // until a palette is laid over the picture, or made colours of at once.
-// Needs: BLEND = 0: color (a thermal stop's, as decoded) -> heat; 1: heat -> color of other stops.
-// Reads:  color, palette, weights.   Writes: heat, or color.
-// heat: sum of weight * (value, 0, 0, 1), value 0..1; with a palette of weight * (its colour, 1).
+// Needs:   BLEND = 0: color (a thermal stop's, as decoded) -> heat; 1: heat -> color of other
+//          stops.
+// Reads:   color, palette, weights, or heat.
+// Writes:  heat: sum of weight * (value, 0, 0, 1), value 0..1; with a palette of weight * (its
+//          colour, 1); or color.
+// Units:   display sRGB; weights and values 0..1.
 #include "common/finite.glsl"
 layout(local_size_x = WORKGROUP) in;
 

@@ -1,4 +1,7 @@
 // lines: ends of line segments over a picture; see renderer/gl/lines.py.
+// Reads:   place, clip_from_object.
+// Writes:  gl_Position.
+// Units:   metres in the object's frame.
 in vec3 place;  // metres, object frame
 uniform mat4 clip_from_object;
 

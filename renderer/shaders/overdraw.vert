@@ -1,4 +1,8 @@
-// overdraw: the triangles of splat.vert in the order of the splats, for adding up instead of blending.
+// overdraw: the triangles of splat.vert in the order of the splats, for adding up instead of
+// blending.
+// Reads:   records and keys, of project.
+// Writes:  gl_Position, sigmas, opacity.
+// Units:   pixels from lower left; sigmas along the ellipse's own axes.
 #include "common/record.glsl"
 #include "common/triangle.glsl"
 

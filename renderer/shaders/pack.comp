@@ -1,5 +1,8 @@
-// pack: staged means, scales, rotations and opacities -> the arena.  One invocation a splat.
-// Sigma = R S S^T R^T (paper eq. 1), in the object's frame.
+// pack: staged means, scales, rotations and opacities -> the arena.  One invocation a splat. Sigma
+// = R S S^T R^T (paper eq. 1), in the object's frame: once a change of x, not once a frame.
+// Reads:   the staging buffer; anchors, where means are offsets (paper eq. 3).
+// Writes:  mean_opacity, covariance.
+// Units:   metres and square metres in the object; scales are one sigma.
 #include "common/rotation.glsl"
 layout(local_size_x = WORKGROUP) in;
 
@@ -22,12 +25,15 @@ void main() {
     uint at_wxyz = 6u * capacity + 4u * i;
     vec3 mean = vec3(staged[3u * i], staged[3u * i + 1u], staged[3u * i + 2u]);
     vec3 scale = vec3(staged[at_scale], staged[at_scale + 1u], staged[at_scale + 2u]);
-    vec4 wxyz = vec4(staged[at_wxyz], staged[at_wxyz + 1u], staged[at_wxyz + 2u], staged[at_wxyz + 3u]);
+    vec4 wxyz = vec4(staged[at_wxyz], staged[at_wxyz + 1u], staged[at_wxyz + 2u],
+                     staged[at_wxyz + 3u]);
     float opacity = staged[10u * capacity + i];
     if (is_offset) {
+        // mu = anchor + offset, the offset already in metres.
         uint splats_per_anchor = floatBitsToUint(anchors[0].w);
         mean += anchors[first_anchor + i / splats_per_anchor].xyz;
     }
+    // R S; columns are the ellipsoid's half axes.
     mat3 half_axes = rotation(wxyz) * mat3(scale.x, 0, 0, 0, scale.y, 0, 0, 0, scale.z);
     mat3 sigma = half_axes * transpose(half_axes);
     mean_opacity[start + i] = vec4(mean, opacity);

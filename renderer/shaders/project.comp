@@ -1,8 +1,12 @@
 // project: splats of one posed object -> screen ellipses, keys to sort by, counts.  The only
 // culling gate.  One invocation a splat, for VIEWS (1 or 2) views at once.
-// Eye space has y up and looks along -z; pixels count from lower left.
-// Screen covariance: J W Sigma W^T J^T + low_pass (EWA splatting, as 3DGS).
+//  Sigma' = J W Sigma W^T J^T + low_pass I   (EWA splatting, Zwicker et al. 2001; 3DGS, eq. 5)
 // No early returns: on llvmpipe each would mask all that follows (see docs/bench/ideas.md).
+// Reads:   mean_opacity, covariance, color of the object's splats; its pose, the views, the limits.
+// Writes:  records (two a splat where there are two views), keys, counts of what was culled and
+//          why.
+// Units:   metres in the object and the eye, which has y up and looks along -z; pixels from lower
+//          left; display sRGB.
 #ifndef VIEWS             // the variants, as Projector asks for them
 #define VIEWS 1           // views at once
 #define SORT_FRAME 0      // 1: the order is made along another frame than the first view's
@@ -28,7 +32,8 @@ layout(std430, binding = SLOT_COUNTS) buffer Counts { uint counts[]; };
 
 uniform uint first;            // splats of this object: rows first to last - 1
 uniform uint last;
-uniform vec4 frames[3 * (VIEWS + SORT_FRAME)];  // rows eye_from_object of each view, then the order's
+// Rows of eye_from_object of each view, then of the order's frame.
+uniform vec4 frames[3 * (VIEWS + SORT_FRAME)];
 uniform vec4 tangents[VIEWS];  // left, right, down, up of the view; left and down negative
 uniform vec2 clamps[VIEWS];    // largest tangents that the Jacobian sees, either side of the axis
 uniform vec2 size[VIEWS];      // pixels
@@ -58,7 +63,7 @@ struct Splat {
     float opacity;
     mat3 sigma;   // m^2
     vec3 rgb;
-    float cutoff_sigmas;    // sigmas to where alpha falls to min_alpha
+    float cutoff_sigmas;  // to where alpha falls to min_alpha
 };
 
 struct Projected {
@@ -66,7 +71,8 @@ struct Projected {
     uvec4 record[2];
 };
 
-vec3 place_in(uint frame, vec3 mean) {
+// A point of the object in a frame: three rows of a rigid transform.
+vec3 point_in_frame(uint frame, vec3 mean) {
     vec4 p = vec4(mean, 1.0);
     uint at = 3u * frame;
     return vec3(dot(frames[at], p), dot(frames[at + 1u], p), dot(frames[at + 2u], p));
@@ -74,22 +80,26 @@ vec3 place_in(uint frame, vec3 mean) {
 
 Projected project(Splat splat, const uint view) {
     vec4 t = tangents[view];
+    // The size of the picture over that of its tangents; off-centre views need no more.
     vec2 focal = size[view] / (t.yw - t.xz);  // pixels
     vec3 row_x = frames[3u * view].xyz, row_y = frames[3u * view + 1u].xyz;
     vec3 row_z = frames[3u * view + 2u].xyz;
-    vec3 p = place_in(view, splat.mean);  // metres
-    float distance2 = dot(p, p), z = -p.z, per_z = 1.0 / z;
+    vec3 p = point_in_frame(view, splat.mean);  // metres
+    float distance2 = dot(p, p), z = -p.z, inv_z = 1.0 / z;
 
-    // Rows of J W: how the pixel moves with the object's metres.  Far beside the view the slope of
-    // the projection is held, or a splat beside the eye would cover everything.
-    vec2 tangent = p.xy * per_z;
+    // Step 1, J: far beside the view the slope of the projection is held (3DGS), or a splat beside
+    // the eye would cover everything.
+    vec2 tangent = p.xy * inv_z;
     vec2 held = clamp(tangent, -clamps[view], clamps[view]);
-    vec3 u = focal.x * per_z * (row_x + held.x * row_z);
-    vec3 v = focal.y * per_z * (row_y + held.y * row_z);
+    // Step 2, u and v, the rows of J W: how the pixel moves with the object's metres.
+    vec3 u = focal.x * inv_z * (row_x + held.x * row_z);
+    vec3 v = focal.y * inv_z * (row_y + held.y * row_z);
+    // Step 3, Sigma' = [u.Sigma u, u.Sigma v; ., v.Sigma v] + low pass = [a b; b c], px^2.
     vec3 sigma_u = splat.sigma * u, sigma_v = splat.sigma * v;
     float bare_a = dot(u, sigma_u), b = dot(v, sigma_u), bare_c = dot(v, sigma_v);
     float a = bare_a + low_pass, c = bare_c + low_pass;
     float opacity = splat.opacity, cutoff_sigmas = splat.cutoff_sigmas;
+    // Step 4, the determinant: float rounding may take that without the low pass below 0.
     float bare = max(bare_a * bare_c - b * b, 0.0);
     float determinant = bare + low_pass * (bare_a + bare_c) + low_pass * low_pass;  // px^4
 #if ANTIALIASED
@@ -97,23 +107,27 @@ Projected project(Splat splat, const uint view) {
     opacity *= kept < 1.0 ? kept : 1.0;     // not a number where the splat is too large to draw
     cutoff_sigmas = sqrt(max(2.0 * log(opacity / min_alpha), 0.0));
 #endif
+    // Step 5: the 2D mean, and the box of alpha >= min alpha: cutoff times one sigma along x and y.
     vec2 center = (tangent - t.xz) * focal;  // pixels
     vec2 extent = cutoff_sigmas * sqrt(vec2(a, c));
     // One by one: with any(greaterThanEqual()) llvmpipe needs 9 % more for the whole pass.
     vec2 low = center - extent, high = center + extent;
     bool outside = low.x >= size[view].x || low.y >= size[view].y || high.x <= 0.0 || high.y <= 0.0;
 
-    // Axes of the ellipse.  The smaller one from the determinant: mid - off cancels for long ones.
+    // Step 6, the eigenvalues of Sigma': the squared half axes of the ellipse.  The smaller one
+    // from the determinant: mid - off cancels for long ones.
     float mid = 0.5 * (a + c), off = 0.5 * (a - c);
     float root = sqrt(off * off + b * b);
     float major = mid + root;  // px^2
     float minor = determinant / major;
+    // The paper's quad (section 4.1) ends where alpha does; its tau_lambda is max_pixels.
     float sigma = sqrt(major), reach = cutoff_sigmas * sigma;  // pixels
     // One test for all of them: whatever is not finite makes the sum so.
     bool shaped = finite(center.x + center.y + major + minor + cutoff_sigmas) && minor > 0.0;
     float brightest = max(max(abs(splat.rgb.r), abs(splat.rgb.g)), abs(splat.rgb.b));
     bool colored = finite(splat.rgb.r + splat.rgb.g + splat.rgb.b) && brightest <= HALF_MAX;
 #if FADE
+    // 1 away from a limit, 0 at it: splats fade out before they are culled instead of popping.
     vec3 ramps = (fade_ends - vec3(sigma, sqrt(distance2), reach)) * fade_slopes;
     ramps = clamp(vec3(ramps.xy, -ramps.z), 0.0, 1.0);
     opacity *= ramps.x * ramps.y * ramps.z;
@@ -129,12 +143,15 @@ Projected project(Splat splat, const uint view) {
     row = finite(distance2) && distance2 <= max_distance * max_distance ? row : COUNT_DISTANCE;
     row = finite(splat.opacity) && splat.opacity >= min_alpha ? row : COUNT_OPACITY;
 
+    // Step 7, the eigenvector of the larger eigenvalue, from the row of Sigma' that cancels less.
     // Two roots because their product could leave the floats: |along|^2 = 2 root (root + |off|).
     vec2 along = off >= 0.0 ? vec2(off + root, b) : vec2(b, root - off);
     vec2 direction = along * (inversesqrt(root) * inversesqrt(2.0 * (root + abs(off))));
+    // A disc has no direction: any will do.
     if (!(root > 1e-12 * mid)) direction = vec2(1.0, 0.0);
     Ellipse e;
     e.center = center;
+    // Half floats hold up to 65504; larger axes are those of splats that no limit culls.
     e.major = direction * min(sigma, HALF_MAX);
     e.minor = vec2(-direction.y, direction.x) * min(sqrt(minor), HALF_MAX);
     e.color = splat.rgb;
@@ -147,15 +164,18 @@ Projected project(Splat splat, const uint view) {
 
 // Depth or (BY_DISTANCE) distance as a float above 0, whose bits keep the order.
 float sort_value(vec3 mean) {
-    vec3 p = place_in(VIEWS * SORT_FRAME, mean);
+    vec3 p = point_in_frame(VIEWS * SORT_FRAME, mean);
     float value = BY_DISTANCE == 1 ? length(p) : -p.z;
+    // A rational map, so that what lies behind the eye keeps its order in a sliver above 0.
     return value > BEHIND ? value : BEHIND / (1.0 + BEHIND - value);
 }
 
+// Once for all views.
 Splat load_splat(uint i) {
     vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz
     vec4 mean = mean_opacity[i];
     mat3 sigma = mat3(s0.x, s0.y, s0.z, s0.y, s0.w, s1.x, s0.z, s1.x, s1.y);
+    // alpha = o exp(-r / 2) = min_alpha at r = 2 ln(o / min_alpha), the power threshold.
     float cutoff_sigmas = sqrt(max(2.0 * log(mean.w / min_alpha), 0.0));
     return Splat(mean.xyz, mean.w, sigma, color[i].rgb, cutoff_sigmas);
 }
@@ -168,6 +188,7 @@ void write_record(uint i, Projected projected) {
 void main() {
     uint i = first + gl_GlobalInvocationID.x, local = gl_LocalInvocationIndex;
     if (local <= COUNT_FARTHEST) group_counts[local] = local == COUNT_NEAREST ? CULLED_KEY : 0u;
+    // Counters are cleared before anybody adds to them.
     barrier();
     if (i < last) {
         Splat splat = load_splat(i);
@@ -183,6 +204,7 @@ void main() {
         drawn = drawn || there.row == COUNT_DRAWN;
 #endif
         float value = sort_value(splat.mean);
+        // An order that is kept holds every splat that is there, also those outside the view.
         bool sorted = (keep_outside ? here.row != COUNT_OPACITY : drawn) && finite(value);
         uint key = sorted ? floatBitsToUint(value) : CULLED_KEY;
         keys[i] = key;
@@ -193,6 +215,7 @@ void main() {
             atomicMax(group_counts[COUNT_FARTHEST], key);
         }
 #endif
+        // Nobody looks at the record of a splat that is neither drawn nor in an order.
         if (sorted || keep_outside) {
             write_record(i, here);
 #if VIEWS == 2
@@ -202,6 +225,7 @@ void main() {
     }
     barrier();
     if (local <= COUNT_SORTED) {
+        // One addition a group and counter; those of splats that are not sorted are taken off.
         uint culled = group_counts[local];
         if (culled > 0u) atomicAdd(counts[local], local == COUNT_SORTED ? 0u - culled : culled);
     } else if (KEY_RANGE == 1 && local == COUNT_NEAREST) {

@@ -1,6 +1,9 @@
 // resolve: a premultiplied image over a background.  A palette makes its colours of the image's
-// luminance, or adds those of the heat that was drawn beside it.
-// The palette colours what is there and not the background: values are divided by alpha first.
+// luminance, or adds those of the heat that was drawn beside it. The palette colours what is there
+// and not the background: values are divided by alpha first.
+// Reads:   image, palette, heat, at the pixel's place.
+// Writes:  shown, opaque.
+// Units:   display sRGB; image and heat count in `unit`.
 in vec2 place;
 uniform sampler2D image;
 uniform sampler2D palette;   // 256 x 1, display sRGB

@@ -1,5 +1,9 @@
-// shade_sh: spherical harmonics of degree 0 to 3 -> colour towards the eye.  One invocation a splat.
-// colour = max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of 3DGS.
+// shade_sh: spherical harmonics of degree 0 to 3 -> colour towards the eye.  One invocation a
+// splat. colour = max(0, 0.5 + sum of basis(direction) * coefficient), the basis and its signs of
+// 3DGS.
+// Reads:   sh (coefficients * 3, count), mean_opacity, eye.
+// Writes:  color.
+// Units:   metres in the object; display sRGB, from 0 on.
 #include "common/direction.glsl"
 #include "common/finite.glsl"
 layout(local_size_x = WORKGROUP) in;
@@ -13,6 +17,7 @@ uniform uint coefficients;  // 1, 4, 9 or 16
 uniform vec3 eye;           // metres in the object
 
 vec3 coefficient(uint i, uint k) {
+    // A stream a coefficient and channel: neighbouring invocations read neighbouring floats.
     uint at = 3u * k * count + i;
     return vec3(sh[at], sh[at + count], sh[at + 2u * count]);
 }
@@ -20,19 +25,23 @@ vec3 coefficient(uint i, uint k) {
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (!(i < count)) return;
+    // Degree 0 is the same from everywhere; 3DGS stores colours less a half.
     vec3 rgb = 0.5 + 0.28209479177387814 * coefficient(i, 0u);
     vec3 d = direction_from(eye, mean_opacity[start + i].xyz);
     float x = d.x, y = d.y, z = d.z, xx = x * x, yy = y * y, zz = z * z;
+    // Degree 1, in 3DGS's order: -y, z, -x.
     if (coefficients > 1u) {
         rgb += 0.4886025119029199
             * (z * coefficient(i, 2u) - y * coefficient(i, 1u) - x * coefficient(i, 3u));
     }
+    // Degree 2: five real harmonics.
     if (coefficients > 4u) {
         rgb += 1.0925484305920792 * (x * y * coefficient(i, 4u) - y * z * coefficient(i, 5u)
                                      - x * z * coefficient(i, 7u));
         rgb += 0.31539156525252005 * (2.0 * zz - xx - yy) * coefficient(i, 6u);
         rgb += 0.5462742152960396 * (xx - yy) * coefficient(i, 8u);
     }
+    // Degree 3: seven more.
     if (coefficients > 9u) {
         rgb -= 0.5900435899266435 * y * (3.0 * xx - yy) * coefficient(i, 9u);
         rgb += 2.890611442640554 * x * y * z * coefficient(i, 10u);

@@ -1,4 +1,8 @@
-// sort_count: how often each digit occurs in a group's keys.  First of the three steps of a pass.
+// sort_count: how often each digit occurs in a group's keys.  First of the three steps of a pass of
+// a radix sort: least significant digit first, stable.
+// Reads:   keys.
+// Writes:  histogram [group][digit].
+// Units:   none.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_KEYS) readonly buffer Keys { uint keys[]; };
@@ -15,6 +19,7 @@ void main() {
     uint first = group * SORT_BLOCKS * WORKGROUP;
     for (uint block = 0u; block < SORT_BLOCKS; block++) {
         uint i = first + block * WORKGROUP + local;
+        // The digits of a group's keys add up to the same in any order.
         if (i < count) atomicAdd(occurrences[(keys[i] >> shift) & 255u], 1u);
     }
     barrier();

@@ -1,5 +1,8 @@
-// sort_scan: digit counts of all groups -> where each group's first key of a digit goes.
-// One group, one invocation a digit: digits in order, within a digit groups in order.
+// sort_scan: digit counts of all groups -> where each group's first key of a digit goes. One group,
+// one invocation a digit: digits in order, within a digit groups in order.
+// Reads:   histogram [group][digit].
+// Writes:  histogram.
+// Units:   keys.
 layout(local_size_x = RADIX) in;
 
 layout(std430, binding = SLOT_HISTOGRAM) buffer Histogram { uint histogram[]; };
@@ -20,6 +23,7 @@ void main() {
         totals[digit] += before;
         barrier();
     }
+    // Exclusive: where the digit begins; then from group to group.
     uint next = totals[digit] - total;
     for (uint group = 0u; group < group_count; group++) {
         uint here = histogram[group * RADIX + digit];

@@ -1,6 +1,9 @@
-// sort_scatter: keys and indices to where their digit belongs, order kept among equal digits.
-// A group walks through its blocks of WORKGROUP keys; within a block, a bit set a digit says which
+// sort_scatter: keys and indices to where their digit belongs, order kept among equal digits. A
+// group walks through its blocks of WORKGROUP keys; within a block, a bit set a digit says which
 // invocations hold it, and the bits below one's own are one's rank.
+// Reads:   keys, order_in, histogram.
+// Writes:  keys_out, order_out.
+// Units:   none.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_KEYS) readonly buffer Keys { uint keys[]; };
@@ -21,6 +24,7 @@ void main() {
     uint own_word = local >> 5, own_bit = 1u << (local & 31u);
     uint first = group * SORT_BLOCKS * WORKGROUP;
     for (uint block = 0u; block < SORT_BLOCKS; block++) {
+        // A digit's bit set is cleared by the invocation of its number.
         for (uint word = 0u; word < WORDS; word++) holders[word * RADIX + local] = 0u;
         barrier();
         uint i = first + block * WORKGROUP + local;
@@ -30,6 +34,7 @@ void main() {
             key = keys[i];
             digit = (key >> shift) & 255u;
             to = next[digit];
+            // Bits may be set in any order: the set is the same, so the sort is stable.
             atomicOr(holders[own_word * RADIX + digit], own_bit);
         }
         barrier();
@@ -38,11 +43,13 @@ void main() {
             for (uint word = 0u; word < WORDS; word++) {
                 uint bits = holders[word * RADIX + digit];
                 total += uint(bitCount(bits));
-                uint before = word < own_word ? bits : word == own_word ? bits & (own_bit - 1u) : 0u;
+                uint before =
+                    word < own_word ? bits : word == own_word ? bits & (own_bit - 1u) : 0u;
                 rank += uint(bitCount(before));
             }
             keys_out[to + rank] = key;
             order_out[to + rank] = shift == 0u ? i : order_in[i];
+            // The last holder moves the group's next place on, after everybody has read it.
             if (rank == total - 1u) next[digit] = to + total;
         }
         barrier();

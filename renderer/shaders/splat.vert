@@ -1,6 +1,9 @@
 // splat: one triangle a splat, pulled from the records, tight around the ellipse where alpha ends.
-// Needs: HEAT (1: what is thermal of a splat is drawn into a second image).
 // Software GL needs a fifth less time than with a quad of two: its cost is that of the triangles.
+// Needs:   HEAT (1: what is thermal of a splat is drawn into a second image).
+// Reads:   order, records, counts; with HEAT heat.
+// Writes:  gl_Position, sigmas, color_opacity; with HEAT value_weight.
+// Units:   pixels from lower left; sigmas along the ellipse's own axes.
 #include "common/record.glsl"
 #include "common/triangle.glsl"
 
@@ -27,6 +30,7 @@ void main() {
     value_weight = heat[splat].xw * vec2(per_unit, 1.0);
 #endif
     sigmas = e.cutoff_sigmas * TRIANGLE[corner];
+    // Along the half axes, which are one sigma.
     vec2 pixel = e.center + sigmas.x * e.major + sigmas.y * e.minor;
     color_opacity = vec4(e.color * per_unit, e.opacity);
     gl_Position = vec4(2.0 * pixel / size - 1.0, 0.0, 1.0);

@@ -1,5 +1,8 @@
-// pair: one triangle a splat around its two ellipses, those of the left and of the right view, in a
-// grid of pixels where the two lie close to each other; see renderer/gl/stereo_pair.py.
+// stereo_pair: one triangle a splat around its two ellipses, those of the left and of the right
+// view, in a grid of pixels where the two lie close to each other; see renderer/gl/stereo_pair.py.
+// Reads:   order, records of both views, counts.
+// Writes:  gl_Position; sigmas in both ellipses, colours, opacities.
+// Units:   pixels of the grid from lower left; sigmas along each ellipse's own axes.
 #include "common/record.glsl"
 #include "common/triangle.glsl"
 
@@ -33,10 +36,12 @@ void main() {
     Ellipse right = unpack_record(records[2u * i], records[2u * i + 1u]);
     left.center.x += disparity_offsets.x;
     right.center.x += disparity_offsets.y;
-    bool in_left = left.cutoff_sigmas > 0.0, in_right = right.cutoff_sigmas > 0.0;  // else culled in that view
+    // A culled splat's cutoff is 0.
+    bool in_left = left.cutoff_sigmas > 0.0, in_right = right.cutoff_sigmas > 0.0;
 
-    // In the axes of one ellipse that one is a disc of radius cutoff_sigmas around 0, the other lies in a
-    // disc around `disparity`.  Each edge of the triangle is moved out until both are behind it.
+    // In the axes of one ellipse that one is a disc around 0 whose radius is its cutoff, and the
+    // other lies in a disc around what is left of the disparity.  Each edge of the triangle is
+    // moved out until both discs are behind it.
     Ellipse e = left;
     if (!in_left) e = right;
     mat2 axes = mat2(e.major, e.minor);
@@ -44,10 +49,13 @@ void main() {
     float radius = 0.0;
     if (in_left && in_right) {
         disparity = inverse(axes) * (right.center - left.center);
+        // The right ellipse in axes of the left: a disc as large as these stretch it at most.
         radius = right.cutoff_sigmas * stretch(inverse(axes) * mat2(right.major, right.minor));
     }
     vec2 n = -0.5 * TRIANGLE[corner], m = -0.5 * TRIANGLE[(corner + 1u) % 3u];  // of two edges
-    float edge_n = max(e.cutoff_sigmas, dot(n, disparity) + radius), edge_m = max(e.cutoff_sigmas, dot(m, disparity) + radius);
+    float edge_n = max(e.cutoff_sigmas, dot(n, disparity) + radius),
+          edge_m = max(e.cutoff_sigmas, dot(m, disparity) + radius);
+    // The corner where the two moved edges meet: n . s = edge_n and m . s = edge_m.
     vec2 s = vec2(edge_n * m.y - edge_m * n.y, n.x * edge_m - m.x * edge_n) /
              (n.x * m.y - n.y * m.x);
     vec2 pixel = e.center + axes * s;
@@ -55,6 +63,7 @@ void main() {
     sigmas = vec4(s, NOWHERE);
     if (!in_left) sigmas = vec4(NOWHERE, s);
     if (in_left && in_right) {
+        // The same pixel, in the right ellipse's own axes.
         sigmas.zw = inverse(mat2(right.major, right.minor)) * (pixel - right.center);
     }
     left_color = left.color * per_unit;

@@ -1,4 +1,7 @@
-// shifted: the part of an image that starts at column `first`, pixel by pixel.
+// stereo_pair_crop: the part of an image that starts at column `first`, pixel by pixel.
+// Reads:   image, first.
+// Writes:  color.
+// Units:   pixels.
 uniform sampler2D image;
 uniform int first;
 out vec4 color;

@@ -1,9 +1,12 @@
-// surface: splats of one posed object -> how deep they lie around their means, and normals.
-// One invocation a splat.  A ray through a pixel is halfway through the ellipsoid at the depth
-//   Z (1 + l) / (1 + 2 l + q),  l = a . d,  q = quadratic form of d, d pixels from the mean;
+// surface: splats of one posed object -> how deep they lie around their means, and normals. One
+// invocation a splat.  A ray through a pixel is halfway through the ellipsoid at the depth
+//  Z (1 + l) / (1 + 2 l + q),  l = a . d,  q = quadratic form of d, d pixels from the mean;
 // with M the inverse of the covariance up to a factor, b = M p, beta = p . b:
-//   a = Z b.xy / (f beta),  q = Z^2 M / (f f beta).  The normal is b, towards the eye.
-// x right, y up, z forward; pixels count from lower left.  Same formula as kernels/surface_arena.cl.
+//  a = Z b.xy / (f beta),  q = Z^2 M / (f f beta).  The normal is b, towards the eye.
+// Same formula as in rasterizer/kernels/surface_arena.cl.
+// Reads:   mean_opacity, covariance; the object's pose, the lens.
+// Writes:  surfaces, three vec4 a splat.
+// Units:   metres; x right, y up, z forward; slopes in 1/pixel; pixels count from lower left.
 layout(local_size_x = WORKGROUP) in;
 
 layout(std430, binding = SLOT_MEAN_OPACITY) readonly buffer MeanOpacity { vec4 mean_opacity[]; };
@@ -35,6 +38,7 @@ void main() {
     float yz = c[0][1] * c[0][2] - c[0][0] * c[1][2], zz = c[0][0] * c[1][1] - c[0][1] * c[0][1];
     mat3 m = mat3(xx, xy, xz, xy, yy, yz, xz, yz, zz) / max(xx + yy + zz, 1e-37);
     vec3 b = m * p;
+    // Never 0: a plane through the eye shows nothing, and nothing of it may be NaN.
     float beta = max(dot(p, b), 1e-12 * dot(p, p)), per = p.z / beta;
     vec2 slope = b.xy * per / focal;
     vec3 square = vec3(m[0][0], m[0][1], m[1][1]) * per * p.z /

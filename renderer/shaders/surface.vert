@@ -1,4 +1,7 @@
 // surface: the triangles of splat.vert, with the depth and the normal of their splats.
+// Reads:   order, records, counts, surfaces.
+// Writes:  gl_Position, sigmas, opacity, centre, depth and normal.
+// Units:   pixels from lower left; metres.
 #include "common/record.glsl"
 #include "common/triangle.glsl"
 

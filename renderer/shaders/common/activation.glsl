@@ -1,6 +1,7 @@
+// activation: what a network's last layer goes through, by kind (networks.ACTIVATIONS).
 // Reads:   nothing.
-// Defines: float activate(uint kind, float z)   kinds as networks.ACTIVATIONS: none, tanh, sigmoid,
-//          softplus, exp.
+// Defines: float activate(uint kind, float z); kinds: none, tanh, sigmoid, softplus, exp.
+// Units:   none; a head's gain gives metres or display values.
 
 float activate(uint kind, float z) {
     switch (kind) {

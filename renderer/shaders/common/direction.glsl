@@ -1,5 +1,6 @@
+// direction: the view direction delta that the colour network and spherical harmonics see.
 // Reads:   nothing.
-// Defines: vec3 direction_from(vec3 eye, vec3 point)   unit length, away from the eye (paper eq. 4);
+// Defines: vec3 direction_from(vec3 eye, vec3 point): unit length, away from the eye (paper eq. 4);
 //          zero where the two coincide.
 // Units:   metres, one frame for both.
 

@@ -1,14 +1,19 @@
+// record: what projection leaves of a splat: its ellipse on the screen, packed in 32 bytes. Halves
+// carry axes and colours to 0.05 %: 83 dB against float64 for 20,000 random splats.
 // Reads:   nothing.
-// Defines: struct Ellipse; uvec4[2] pack_record(Ellipse); Ellipse unpack_record(uvec4, uvec4)
+// Defines: struct Ellipse; uvec4[2] pack_record(Ellipse); Ellipse unpack_record(uvec4, uvec4).
 // Units:   pixels from lower left; axes are one sigma; colour is display sRGB.
-// Halves carry axes and colours to 0.05 %: 83 dB against float64 for 20,000 random splats.
 
 struct Ellipse {
     vec2 center;
-    vec2 major, minor;  // half axes, orthogonal
+    // Half axes, orthogonal: eigenvectors of Sigma' times the roots of its eigenvalues, so that a
+    // pixel center + s.x major + s.y minor lies s sigmas from the mean.
+    vec2 major, minor;
     vec3 color;
     float opacity;
-    float cutoff_sigmas;  // sigmas to where alpha falls to the least that is drawn
+    // Sigmas to where alpha falls to the least that is drawn; its square is the power threshold, 2
+    // ln(opacity / min alpha), of the OpenCL records.
+    float cutoff_sigmas;
 };
 
 uvec4[2] pack_record(Ellipse e) {

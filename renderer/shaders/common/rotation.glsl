@@ -1,5 +1,7 @@
+// rotation: R of the covariance (paper eq. 1) from a quaternion.
 // Reads:   nothing.
-// Defines: mat3 rotation(vec4 wxyz)   columns are the local axes; any length, zero = identity.
+// Defines: mat3 rotation(vec4 wxyz): columns are the local axes; any length, zero = identity.
+// Units:   none.
 
 mat3 rotation(vec4 wxyz) {
     // Divided by the largest first: squares of very small or large numbers leave the floats.
