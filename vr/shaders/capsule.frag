@@ -1,4 +1,7 @@
 // capsule: soft light from above and from the head for what is solid; lines shine by themselves.
+// Reads:   normal, towards_eye and color of capsule.vert; lit.
+// Writes:  shown, premultiplied.
+// Units:   display sRGB.
 in vec3 normal;
 in vec3 towards_eye;
 in vec4 color;
@@ -10,6 +13,8 @@ void main() {
     if (lit) {
         vec3 n = normalize(normal);
         float facing = max(dot(n, normalize(towards_eye)), 0.0);
+        // A hemisphere light: all from above, nothing from below; the rest follows the head, so
+        // that a hand is never black.
         float sky = 0.5 + 0.5 * n.y;
         rgb *= 0.30 + 0.42 * sky + 0.28 * facing;
         rgb *= mix(0.72, 1.0, smoothstep(0.0, 0.45, facing));  // a darker outline parts the fingers

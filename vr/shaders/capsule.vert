@@ -1,5 +1,8 @@
 // capsule: a line with round ends and a thickness, one instance each; its normals point outward.
-// Reads: a unit ball whose lower half stays at a and whose upper half is moved to b.
+// Reads:   a unit ball whose lower half stays at a and whose upper half is moved to b; per capsule
+//          its ends, radii and colours; clip_from_play, eye, tangent_px.
+// Writes:  gl_Position, normal, towards_eye, color.
+// Units:   metres of the room; display sRGB and opacity.
 in vec3 ball;    // direction in the capsule's own axes, z along the line
 in float upper;  // 1: belongs to the end at b
 in vec3 a;       // metres, room
@@ -22,11 +25,13 @@ void main() {
     vec3 line = b - a;
     float length_m = length(line);
     vec3 along = length_m > 1e-6 ? line / length_m : vec3(0.0, 0.0, 1.0);
+    // Any axis that is not the line's gives two across it.
     vec3 other = abs(along.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0);
     vec3 aside = normalize(cross(other, along));
     normal = ball.x * aside + ball.y * cross(along, aside) + ball.z * along;
     vec3 middle = mix(a, b, upper);
     float radius = mix(radii.x, radii.y, upper);
+    // A pixel at this distance, in metres.
     float least = LEAST_PX * tangent_px * distance(eye, middle);
     float wide = max(radius, least);
     color = mix(color_a, color_b, upper);

@@ -1,5 +1,8 @@
 // floor: a grid on a level of the world and a glow at the horizon, where splats leave an eye's
 // picture uncovered.  What it writes is added to that picture, or taken off a bright one.
+// Reads:   coverage, the alpha of the splats' picture; the eye, the level and the grid's spacing.
+// Writes:  shown, the light to be added, alpha 0.
+// Units:   metres of the world; tangents of the eye; display sRGB.
 in vec2 place;              // 0..1 from lower left
 uniform sampler2D coverage; // alpha: how much splats hide of what is behind them
 uniform bool top_first;     // its first row is the upper one

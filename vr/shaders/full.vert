@@ -1,4 +1,7 @@
 // full: one triangle that covers the viewport.
+// Reads:   nothing.
+// Writes:  gl_Position, place.
+// Units:   place in 0..1 from lower left.
 out vec2 place;  // 0..1 from lower left
 
 void main() {

@@ -1,5 +1,8 @@
 // over: the splats' picture darkened towards its edge (the vignette) or all over (after a jump),
 // and over that hands, lines and the panel.  Blended by ONE, ONE_MINUS_SRC_ALPHA.
+// Reads:   drawn, premultiplied, within box; tangents, vignette, blink.
+// Writes:  shown, premultiplied: its alpha is what is hidden of the splats.
+// Units:   pixels; tangents of the eye; display sRGB.
 in vec2 place;
 uniform sampler2D drawn;   // premultiplied, as large as the target
 uniform ivec4 box;         // the pixels of it that hold anything: left, bottom, width, height

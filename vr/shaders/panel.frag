@@ -1,5 +1,8 @@
 // panel: TAPS samples a pixel on a turned grid, each from a level finer than its size asks for:
 // small letters stay crisp and, with four, do not crawl when the head moves.
+// Reads:   picture, premultiplied; opacity.
+// Writes:  shown, premultiplied.
+// Units:   display sRGB; place in 0..1 of the picture.
 in vec2 place;
 uniform sampler2D picture;  // display sRGB, premultiplied
 uniform float opacity;      // 0..1

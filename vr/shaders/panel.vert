@@ -1,4 +1,7 @@
 // panel: its picture as a rectangle in the room.
+// Reads:   clip_from_panel, half_size.
+// Writes:  gl_Position, place.
+// Units:   metres; place in 0..1 of the picture, row 0 on top.
 uniform mat4 clip_from_panel;
 uniform vec2 half_size;  // metres
 out vec2 place;          // 0..1 of the picture, row 0 on top

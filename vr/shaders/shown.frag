@@ -1,6 +1,9 @@
 // shown: an eye's display-encoded picture, or a part of it, into another framebuffer.
 // FRAMEBUFFER_SRGB is off, so values arrive as they are written: an sRGB image of the runtime wants
 // them encoded, as they are; for a linear one they are decoded here, the one conversion there is.
+// Reads:   image, part, linear.
+// Writes:  shown, opaque.
+// Units:   display sRGB, or light where linear.
 in vec2 place;
 uniform sampler2D image;  // display sRGB
 uniform vec4 part;        // left, bottom, width, height of the image, 0..1
