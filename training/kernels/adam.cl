@@ -1,4 +1,7 @@
 // Adam (Kingma and Ba, 2015), one work-item a parameter.
+// Reads:   grad; rates, one for all or one a parameter; the moments of the steps before.
+// Writes:  value, mean and square, in place.
+// Units:   those of the parameter; a rate is a step in them.
 
 #define BETA1 0.9f
 #define BETA2 0.999f

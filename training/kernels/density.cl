@@ -1,6 +1,9 @@
 // What growing and pruning decide on, summed over steps.  Defined by density.py: SPLATS, and
 // PULL, what draws newcomers: 0 the gradient of the mean, 1 the sum of its absolute values (slots 9
 // and 10), 2 the splat's share of the pixels' error (slot 9).
+// Reads:   record and grad_record (N, 12), opacity (N,); image and target for error_map.
+// Writes:  sums over steps: gradient (N, 2), opacity_sum (A,), seen (A, 2); error (H, W).
+// Units:   gradients times `unit`; opacity 0..1; pixels; display sRGB.
 
 // One work-item an anchor.  gradient (N, 2): sum of a splat's pull times `unit`, and the steps in
 // which it was on screen.  opacity (A,): sum of its splats' opacity above zero.

@@ -5,6 +5,9 @@
 // offset = reach * tanh(h) metres     (bounded: culling boxes can rely on it)
 // scale  = unit * exp(clip(h, -6, 3)) metres, one sigma
 // opacity = tanh(h), below zero absent; colour = sigmoid(h); rotation is left as it comes, wxyz.
+// Reads:   raw (A, RAW), anchors (A, 3); backward the Gaussians and their gradients.
+// Writes:  means, scales, wxyz, opacity, color; backward grad_raw and grad_anchors.
+// Units:   metres; one sigma; opacity and display sRGB in 0..1.
 
 #define LOWEST -6.0f
 #define HIGHEST 3.0f

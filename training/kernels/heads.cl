@@ -1,5 +1,11 @@
-// The five heads, forward and backward: anchor features -> raw outputs (paper section 3.2, eq. 5).
-// CPU form: vectors of eight units, a few anchors at a time; heads_gpu.cl is the other.
+// heads: the five heads, forward and backward: anchor features -> raw outputs (paper section 3.2,
+// eq. 5). CPU form: vectors of eight units, a few anchors at a time; heads_gpu.cl is the other.
+//  unit_1 = ReLU(W1^T (f, delta, Psi) + b1), unit_l = ReLU(W^T unit_l-1 + b), raw = W2^T unit + b2
+// Reads:   weights, bias, anchors (A, 3), features (A, FEATURES), the eye; backward hidden and
+//          grad_raw.
+// Writes:  raw (A, RAW), hidden (A, 5, LAYERS, HIDDEN); backward grad_features, grad_anchors and
+//          grad_chunks, the weights' gradients of each chunk.
+// Units:   anchors and eye in metres; features, Psi and units have none.
 #include "heads_shared.cl"
 #define BLOCK 8  // anchors that share one pass over the weights in the backward kernel
 
@@ -16,6 +22,7 @@ inline void add_pair(float8 sum[4][2], const float *in, int stride, int takes,
   }
 }
 
+// The last vector of a layer with an odd number of them.
 inline void add_one(float8 sum[4][2], const float *in, int stride, int takes,
                     __global const float *weights, int gives) {
   for (int i = 0; i < takes; i++) {
@@ -27,16 +34,20 @@ inline void add_one(float8 sum[4][2], const float *in, int stride, int takes,
 // A middle layer of head m for four anchors, in place; l counts hidden layers, so it is 1 or more.
 inline void middle_forward(float unit[4][HIDDEN], const int a[4], int m, int l,
                            __global const float *weights, __global float *hidden) {
+  // Four anchors' units; in place only when all of the layer is done.
   float next[4][HIDDEN];
   for (int j = 0; j < HIDDEN8; j += 2) {
     int wide = min(2, HIDDEN8 - j);
     float8 h[4][2];
     for (int b = 0; b < 4; b++)
+      // Sums begin with the bias, which lies behind the layer's weights.
       for (int v = 0; v < wide; v++) h[b][v] = vload8(j + v, weights + HIDDEN * HIDDEN);
+    // Two vectors of outputs at a time, and the last alone where their number is odd.
     if (wide == 2) add_pair(h, unit[0], HIDDEN, HIDDEN, weights + 8 * j, HIDDEN);
     else add_one(h, unit[0], HIDDEN, HIDDEN, weights + 8 * j, HIDDEN);
     for (int b = 0; b < 4; b++)
       for (int v = 0; v < wide; v++) {
+        // ReLU, kept for the backward pass.
         float8 y = fmax(h[b][v], (float8)(0.0f));
         vstore8(y, j + v, next[b]);
         vstore8(y, j + v, hidden + UNITS_OF(a[b], m, l));
@@ -55,23 +66,32 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
   if (!(first_anchor < anchors_count)) return;
   float3 eye = (float3)(eye_x, eye_y, eye_z);
   int a[4];
+  // Private copies: read again for every pair of output vectors of every head.
   float feature[4][FEATURES], direction[4][3];
   for (int b = 0; b < 4; b++) {
     a[b] = min(first_anchor + b, anchors_count - 1);  // the last ones repeat and write the same
     for (int i = 0; i < FEATURES; i++) feature[b][i] = features[a[b] * FEATURES + i];
+    // The direction delta of paper eq. 4.
     float4 d = direction_and_inverse(eye, anchors + 3 * a[b]);
     direction[b][0] = d.x; direction[b][1] = d.y; direction[b][2] = d.z;
   }
+  // Offset, scale, rotation, opacity, colour, one after the other: one head's weights at a time
+  // are in the cache.
   for (int m = 0; m < 5; m++) {
     __global const float *first = weights + WEIGHTS_AT[m];
+    // A head's weights: W1, b1, the middle layers, W2, b2 (heads_shared.cl).
     __global const float *second = first + LAST_AT;
+    // Units of four anchors, layer after layer in place.
     float unit[4][HIDDEN];
     for (int j = 0; j < HIDDEN8; j += 2) {
+      // Only the colour looks at the direction.
       int wide = min(2, HIDDEN8 - j), looks = m == COLOR && VIEW_COLOR ? 3 : 0;
+      // Columns 8 j and on of the rows of W1 that meet the features, and of those that meet delta.
       __global const float *by_feature = first + 8 * j;
       __global const float *by_direction = by_feature + DIRECTION_ROW * HIDDEN;
       float8 h[4][2];
       for (int b = 0; b < 4; b++)
+        // b1 with W1_control . Psi in it: Psi costs nothing an anchor.
         for (int v = 0; v < wide; v++) h[b][v] = vload8(j + v, bias + m * HIDDEN);
       if (wide == 2) {
         add_pair(h, feature[0], FEATURES, FEATURES, by_feature, HIDDEN);
@@ -89,9 +109,11 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
     }
     for (int l = 1; l < LAYERS; l++)
       middle_forward(unit, a, m, l, first + MIDDLE_AT + (l - 1) * MIDDLE_SIZE, hidden);
+    // The last layer: linear, as wide as the head's outputs of k splats.
     int outs = OUT[m];
     for (int c = 0; c < outs / 8; c += 2) {
       int wide = min(2, outs / 8 - c);
+      // From b2 on, which lies behind W2.
       float8 y[4][2];
       for (int b = 0; b < 4; b++)
         for (int v = 0; v < wide; v++) y[b][v] = vload8(c + v, second + HIDDEN * outs);
@@ -104,22 +126,27 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
 }
 
 // What a head's backward pass knows of its block of anchors; rows beyond the end add nothing.
+// Everything is private: a block's numbers are used for hundreds of weights each.
 typedef struct {
   float input[BLOCK][FEATURES], unit[BLOCK][HIDDEN], d_out[BLOCK][MAX_OUT], d_unit[BLOCK][HIDDEN];
   float8 d_input[BLOCK][FEATURES8];
   float4 direction[BLOCK];  // unit vector, 1 / distance
 } Block;
 
+// Features and directions are those of all five heads.
 inline void load_anchors(Block *k, int base, int count, float3 eye, __global const float *anchors,
                          __global const float *features) {
   for (int b = 0; b < BLOCK; b++) {
+    // Beyond the end the last anchor again: it is read, and its gradient is 0.
     int a = base + min(b, count - 1);
     for (int i = 0; i < FEATURES; i++) k->input[b][i] = features[a * FEATURES + i];
+    // All five heads add to the gradient of the same features.
     for (int i = 0; i < FEATURES8; i++) k->d_input[b][i] = 0;
     k->direction[b] = direction_and_inverse(eye, anchors + 3 * a);
   }
 }
 
+// What a layer gave in the forward pass: the input of the next, and where its ReLU was open.
 inline void load_units(Block *k, int m, int l, int base, int count,
                        __global const float *hidden) {
   for (int b = 0; b < BLOCK; b++) {
@@ -129,10 +156,12 @@ inline void load_units(Block *k, int m, int l, int base, int count,
   }
 }
 
+// A head's block: dL / d raw as it comes from the Gaussians, and its last hidden units.
 inline void load_head(Block *k, int m, int base, int count, __global const float *hidden,
                       __global const float *grad_raw) {
   for (int b = 0; b < BLOCK; b++) {
     int a = base + min(b, count - 1);
+    // Rows beyond the end: a gradient of 0 adds nothing anywhere.
     float live = b < count ? 1.0f : 0.0f;
     for (int c = 0; c < OUT[m] / 8; c++)
       vstore8(live * vload8(c, grad_raw + a * RAW + OUT_AT[m]), c, k->d_out[b]);
@@ -143,10 +172,12 @@ inline void load_head(Block *k, int m, int base, int count, __global const float
 // b2 and W2 of a head with `outs` outputs.
 inline void second_layer_gradient(Block *k, int outs, __global float *grad) {
   for (int c = 0; c < outs / 8; c++) {
+    // db2 = sum of d, dW2 = sum of unit d, over the block's anchors.
     float8 d[BLOCK], sum = vload8(c, grad + HIDDEN * outs);
     for (int b = 0; b < BLOCK; b++) { d[b] = vload8(c, k->d_out[b]); sum += d[b]; }
     vstore8(sum, c, grad + HIDDEN * outs);
     for (int j = 0; j < HIDDEN; j++) {
+      // Row j of W2, for all of the block's anchors: one load and store of the gradient for eight.
       float8 g = vload8(c, grad + j * outs);
       for (int b = 0; b < BLOCK; b++) g += k->unit[b][j] * d[b];
       vstore8(g, c, grad + j * outs);
@@ -157,13 +188,17 @@ inline void second_layer_gradient(Block *k, int outs, __global float *grad) {
 // Through the last layer and the ReLU into the last hidden units.
 inline void last_units_gradient(Block *k, int m, __global const float *second_t) {
   for (int j = 0; j < HIDDEN8; j++) {
+    // Eight hidden units of every anchor in the block.
     float8 d[BLOCK];
     for (int b = 0; b < BLOCK; b++) d[b] = 0;
+    // d_unit = W2 d_out.
     for (int c = 0; c < OUT[m]; c++) {
+      // Row c of W2^T: how output c moves the units.
       float8 w = vload8(j, second_t + c * HIDDEN);
       for (int b = 0; b < BLOCK; b++) d[b] += k->d_out[b][c] * w;
     }
     for (int b = 0; b < BLOCK; b++) {
+      // ReLU lets nothing back where it was 0.
       d[b] = select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
       vstore8(d[b], j, k->d_unit[b]);
     }
@@ -175,6 +210,7 @@ inline void last_units_gradient(Block *k, int m, __global const float *second_t)
 inline void middle_layer_gradient(Block *k, __global const float *middle_t, __global float *grad) {
   float8 before[BLOCK][HIDDEN8];
   for (int j = 0; j < HIDDEN8; j++) {
+    // db = sum of d, dW = sum of unit d.
     float8 d[BLOCK], sum = vload8(j, grad + HIDDEN * HIDDEN);
     for (int b = 0; b < BLOCK; b++) { d[b] = vload8(j, k->d_unit[b]); sum += d[b]; }
     vstore8(sum, j, grad + HIDDEN * HIDDEN);
@@ -183,12 +219,15 @@ inline void middle_layer_gradient(Block *k, __global const float *middle_t, __gl
       for (int b = 0; b < BLOCK; b++) g += k->unit[b][i] * d[b];
       vstore8(g, j, grad + i * HIDDEN);
     }
+    // And on to the units below: W d, through their ReLU.
     for (int b = 0; b < BLOCK; b++) d[b] = 0;
     for (int i = 0; i < HIDDEN; i++) {
+      // W d by the transposed W: vectors of units below, no sums across lanes.
       float8 w = vload8(j, middle_t + i * HIDDEN);
       for (int b = 0; b < BLOCK; b++) d[b] += k->d_unit[b][i] * w;
     }
     for (int b = 0; b < BLOCK; b++)
+      // Kept aside until all of d_unit has been read.
       before[b][j] =
           select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
   }
@@ -199,18 +238,22 @@ inline void middle_layer_gradient(Block *k, __global const float *middle_t, __gl
 // b1 and W1 of the features (and of the direction).
 inline void first_layer_gradient(Block *k, int m, __global float *grad) {
   for (int j = 0; j < HIDDEN8; j++) {
+    // db1 and the features' rows of dW1; Psi's rows follow from db1 at the end (control_gradient).
     float8 d[BLOCK], sum = vload8(j, grad + INPUTS * HIDDEN);
     for (int b = 0; b < BLOCK; b++) { d[b] = vload8(j, k->d_unit[b]); sum += d[b]; }
+    // The gradient of the folded bias.
     vstore8(sum, j, grad + INPUTS * HIDDEN);
     for (int i = 0; i < FEATURES; i++) {
       float8 g = vload8(j, grad + i * HIDDEN);
       for (int b = 0; b < BLOCK; b++) g += k->input[b][i] * d[b];
       vstore8(g, j, grad + i * HIDDEN);
     }
+    // Only the colour head has seen the direction.
     if (!(m == COLOR && VIEW_COLOR)) continue;
     for (int i = 0; i < 3; i++) {
       float8 g = vload8(j, grad + (DIRECTION_ROW + i) * HIDDEN);
       for (int b = 0; b < BLOCK; b++) {
+        // The three rows that meet the direction.
         float4 u = k->direction[b];
         g += (i == 0 ? u.x : i == 1 ? u.y : u.z) * d[b];
       }
@@ -219,26 +262,32 @@ inline void first_layer_gradient(Block *k, int m, __global float *grad) {
   }
 }
 
+// dL / d feature = W1 d, summed over heads.
 inline void add_input_gradient(Block *k, __global const float *first_t) {
   for (int j = 0; j < HIDDEN; j++)
     for (int i = 0; i < FEATURES8; i++) {
+      // Row j of W1^T: how unit j moves the features.
       float8 w = vload8(i, first_t + j * FEATURES);
       for (int b = 0; b < BLOCK; b++) k->d_input[b][i] += k->d_unit[b][j] * w;
     }
 }
 
-// The colour's view direction turns when its anchor moves: d direction / d anchor = (I - u u^T) / r.
+// The colour's view direction turns when its anchor moves:
+// d direction / d anchor = (I - u u^T) / r
 inline void add_direction_gradient(Block *k, int base, int count, __global const float *first,
                                    __global float *grad_anchors) {
   for (int b = 0; b < count; b++) {
     float g[3];
     for (int i = 0; i < 3; i++) {
+      // dL / d direction by the three rows of W1.
       g[i] = 0;
       for (int j = 0; j < HIDDEN; j++)
         g[i] += k->d_unit[b][j] * first[(DIRECTION_ROW + i) * HIDDEN + j];
     }
+    // What is along the direction changes its length alone, and that is always 1.
     float3 u = k->direction[b].xyz, by_direction = (float3)(g[0], g[1], g[2]);
     float3 flow = (by_direction - u * dot(by_direction, u)) * k->direction[b].w;
+    // Added to what came through the means.
     vstore3(vload3(base + b, grad_anchors) + flow, base + b, grad_anchors);
   }
 }
@@ -256,18 +305,23 @@ __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float e
   int chunk = get_global_id(0);
   if (!(chunk < chunks)) return;
   __global float *grad = grad_chunks + (long)chunk * WEIGHTS;
+  // A chunk's own gradients, from 0.
   for (int i = 0; i < WEIGHTS; i++) grad[i] = 0;
   float3 eye = (float3)(eye_x, eye_y, eye_z);
+  // Chunks of nearly equal size; long, since anchors times chunks may leave 32 bits.
   int from = (long)anchors_count * chunk / chunks, to = (long)anchors_count * (chunk + 1) / chunks;
   Block k;
   for (int base = from; base < to; base += BLOCK) {
     int count = min(BLOCK, to - base);
+    // Eight anchors at a time, the last block with fewer.
     load_anchors(&k, base, count, eye, anchors, features);
+    // A head at a time, from its outputs down to the features.
     for (int m = 0; m < 5; m++) {
       __global float *g_first = grad + WEIGHTS_AT[m];
       load_head(&k, m, base, count, hidden, grad_raw);
       second_layer_gradient(&k, OUT[m], g_first + LAST_AT);
       last_units_gradient(&k, m, second_t + OUT_AT[m] * HIDDEN);
+      // Middle layers from the last to the first.
       for (int l = MIDDLE - 1; l >= 0; l--) {
         load_units(&k, m, l, base, count, hidden);
         middle_layer_gradient(&k, middle_t + (m * MIDDLE + l) * HIDDEN * HIDDEN,
@@ -278,6 +332,7 @@ __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float e
       if (m == COLOR && VIEW_COLOR)
         add_direction_gradient(&k, base, count, weights + WEIGHTS_AT[m], grad_anchors);
     }
+    // All heads have added: the features' gradient is complete.
     for (int b = 0; b < count; b++)
       for (int i = 0; i < FEATURES8; i++)
         vstore8(k.d_input[b][i], i, grad_features + (base + b) * FEATURES);

@@ -1,20 +1,26 @@
-// What both forms of the heads share: sizes, the folded bias, the ends of the backward pass.
+// heads_shared: what both forms of the heads share: sizes, the folded bias, the ends of the
+// backward pass.
 //
-// Defined by networks.py: FEATURES, HIDDEN (padded to 8), CONTROL, RAW (row of all raw outputs) and
-// for each head m OUTm (padded width), OUT_AT m (its place in a raw row), WEIGHTS_ATm.
 // The weights of one head lie as W1 [FEATURES + CONTROL + 3][HIDDEN], b1 [HIDDEN], then for each of
-// LAYERS - 1 middle layers W [HIDDEN][HIDDEN], b [HIDDEN], then W2 [HIDDEN][OUT], b2 [OUT]; the last
-// three rows of W1 meet the view direction, which only the last head (colour) takes, and that only
-// with VIEW_COLOR.  CONDITIONED has a bit for each head that sees Psi.  Rows that nothing meets and
-// padding are zero, get zero gradients and so stay zero.
+// LAYERS - 1 middle layers W [HIDDEN][HIDDEN], b [HIDDEN], then W2 [HIDDEN][OUT], b2 [OUT]; the
+// last three rows of W1 meet the view direction, which only the last head (colour) takes, and that
+// only with VIEW_COLOR.  CONDITIONED has a bit for each head that sees Psi.  Rows that nothing
+// meets and padding are zero, get zero gradients and so stay zero.
 //
-// Psi is one vector a head for all anchors, so W1_control . Psi + b1 is folded into one bias a step;
-// that is exact and halves the first layer.
+// Psi is one vector a head for all anchors (paper eq. 6 and 7), so W1_control . Psi + b1 is folded
+// into one bias a step; that is exact and halves the first layer.
+// Needs:   of networks.py FEATURES, HIDDEN (padded to 8), CONTROL, LAYERS, RAW (row of all raw
+//          outputs) and for each head m OUTm (padded width), OUT_ATm (its place in a raw row),
+//          WEIGHTS_ATm.
+// Reads:   weights, control (Psi a head); grad_chunks.
+// Writes:  bias and the transposed layers; grad, the gradient of all weights.
+// Units:   anchors in metres; features, Psi and units have none.
 
 #define DIRECTION_ROW (FEATURES + CONTROL)
 #define INPUTS (FEATURES + CONTROL + 3)
 #define HIDDEN8 (HIDDEN / 8)
 #define FEATURES8 (FEATURES / 8)
+// The heads in their order: offset, scale, rotation, opacity, colour.
 #define COLOR 4
 #define MIDDLE (LAYERS - 1)
 #define MIDDLE_SIZE ((HIDDEN + 1) * HIDDEN)
@@ -29,6 +35,7 @@ __constant int WEIGHTS_AT[5] = {WEIGHTS_AT0, WEIGHTS_AT1, WEIGHTS_AT2, WEIGHTS_A
 // Unit vector from the eye to an anchor (eq. 4) and 1 / distance; finite when they coincide.
 inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {
   float3 d = (float3)(anchor[0], anchor[1], anchor[2]) - eye;
+  // 1e-8 metres: where eye and anchor coincide, the direction is 0 and nothing is infinite.
   float inverse = 1.0f / fmax(sqrt(dot(d, d)), 1e-8f);
   return (float4)(d * inverse, inverse);
 }
@@ -41,10 +48,13 @@ __kernel void prepare_weights(__global const float *weights, __global const floa
   int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
   __global const float *first = weights + WEIGHTS_AT[m];
   __global const float *second = first + LAST_AT;
+  // b1 + W1_control . Psi.
   float sum = first[INPUTS * HIDDEN + j];
   if (CONDITIONED >> m & 1)
-    for (int d = 0; d < CONTROL; d++) sum += control[m * CONTROL + d] * first[(FEATURES + d) * HIDDEN + j];
+    for (int d = 0; d < CONTROL; d++)
+      sum += control[m * CONTROL + d] * first[(FEATURES + d) * HIDDEN + j];
   bias[m * HIDDEN + j] = sum;
+  // Transposed: neighbouring inputs of one unit lie side by side.
   for (int i = 0; i < FEATURES; i++)
     first_t[(m * HIDDEN + j) * FEATURES + i] = first[i * HIDDEN + j];
   for (int l = 0; l < MIDDLE; l++)
@@ -55,6 +65,7 @@ __kernel void prepare_weights(__global const float *weights, __global const floa
     second_t[OUT_AT[m] * HIDDEN + c * HIDDEN + j] = second[j * OUT[m] + c];
 }
 
+// The shares of a weight's gradient, always in the same order.
 __kernel void sum_chunks(int chunks, __global const float *grad_chunks, __global float *grad) {
   int i = get_global_id(0);
   if (!(i < WEIGHTS)) return;
