@@ -153,9 +153,9 @@ class Passes:
         keys = np.frombuffer(self.arena.keys.read(), np.uint32)[: self.count]
         rows = rows[keys != layout.CULLED_KEY]
         axes = np.ascontiguousarray(rows[:, 2:4]).view(np.float16).astype(np.float64)  # (n, 4)
-        cut = np.ascontiguousarray(rows[:, 7]).view(np.float32)
+        cutoff_sigmas = np.ascontiguousarray(rows[:, 7]).view(np.float32)
         lengths = np.hypot(axes[:, 0], axes[:, 1]) * np.hypot(axes[:, 2], axes[:, 3])
-        return float((4 * cut.astype(np.float64) ** 2 * lengths).sum())
+        return float((4 * cutoff_sigmas.astype(np.float64) ** 2 * lengths).sum())
 
     def full_screen_ms(self, splats: int) -> float:
         """The draw of so many splats whose triangles each cover the image."""
@@ -166,7 +166,7 @@ class Passes:
             row[:, 2] = np.array([2 * width, 0], np.float16).view(np.uint32)
             row[:, 3] = np.array([0, 2 * height], np.float16).view(np.uint32)
             row[:, 4:6] = np.array([0.5, 0.5, 0.5, 0], np.float16).view(np.uint32)
-            row[:, 6:] = np.array([0.5, 1.0], np.float32).view(np.uint32)  # opacity, cut
+            row[:, 6:] = np.array([0.5, 1.0], np.float32).view(np.uint32)  # opacity, cutoff_sigmas
             counts = np.zeros(layout.COUNTS_SIZE, np.uint32)
             counts[layout.COUNTS["SORTED"]] = splats
             for buffer, data in (
