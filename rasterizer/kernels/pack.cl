@@ -1,8 +1,9 @@
-// pack: means, scales, quaternions -> what project_arena reads of a splat, eight at a time. Sigma =
-// R S S^T R^T (paper eq. 1; 3DGS, eq. 6), once a change of x instead of once a frame and view.
+// pack: means, scales, quaternions -> what project_arena reads of a splat, eight at a time:
+//   Sigma = R S S^T R^T   (paper eq. 1; 3DGS, eq. 6)
+// once a change of x instead of once a frame and view.
 // Reads:   means, scales (n, 3), wxyz (n, 4), opacity (n,) as a model decodes them.
-// Writes:  rows `start` and after of mean_opacity (N, 4) and covariance (N, 8): xx xy xz yy yz zz 0
-//          0.
+// Writes:  rows `start` and after of mean_opacity (N, 4) and covariance (N, 8): xx xy xz yy yz zz
+//          and two zeros.
 // Units:   metres and square metres in the object's frame; scales are one sigma.
 #include "common/eight_rows.cl"
 

@@ -1,6 +1,7 @@
 // surface: splats -> how deep they lie under the pixels around them (common/surface.cl), and back.
-// The depth of a ray d with d.z = 1 is d^T M p / d^T M d, M = Sigma^-1 up to a factor; with M = B
-// B^T, t = B^T p, b = B t and beta = p . b it is written in pixels from the mean.
+// The depth of a ray d with d.z = 1 is d^T M p / d^T M d, M = Sigma^-1 up to a factor; with
+//   M = B B^T,  t = B^T p,  b = B t,  beta = p . b
+// it is written in pixels from the mean.
 // Reads:   means, scales (N, 3), wxyz (N, 4), record (N, 12), a camera; backward also surface and
 //          its gradients (N, 8).
 // Writes:  surface (N, 8); backward adds to the gradients of means, scales and quaternions.

@@ -27,12 +27,12 @@ void main() {
     vec4 s0 = covariance[2u * i], s1 = covariance[2u * i + 1u];  // xx xy xz yy | yz zz
     vec4 mean = vec4(mean_opacity[i].xyz, 1.0);
     mat3 sigma = mat3(s0.x, s0.y, s0.z, s0.y, s0.w, s1.x, s0.z, s1.x, s1.y);
-    mat3 turn = transpose(mat3(rows[0].xyz, rows[1].xyz, -rows[2].xyz));  // columns by columns
+    mat3 w = transpose(mat3(rows[0].xyz, rows[1].xyz, -rows[2].xyz));  // columns by columns
     vec3 p = vec3(dot(rows[0], mean), dot(rows[1], mean), -dot(rows[2], mean));
-    mat3 turned = turn * sigma * transpose(turn);
-    float reach = REACH * sqrt(max(turned[2][2], 0.0));
+    mat3 w_sigma_wt = w * sigma * transpose(w);
+    float reach = REACH * sqrt(max(w_sigma_wt[2][2], 0.0));
     // Cofactors instead of the inverse: their largest is exact of a flat splat, too.
-    mat3 c = turned / (turned[0][0] + turned[1][1] + turned[2][2]);
+    mat3 c = w_sigma_wt / (w_sigma_wt[0][0] + w_sigma_wt[1][1] + w_sigma_wt[2][2]);
     float xx = c[1][1] * c[2][2] - c[1][2] * c[1][2], xy = c[0][2] * c[1][2] - c[0][1] * c[2][2];
     float xz = c[0][1] * c[1][2] - c[0][2] * c[1][1], yy = c[0][0] * c[2][2] - c[0][2] * c[0][2];
     float yz = c[0][1] * c[0][2] - c[0][0] * c[1][2], zz = c[0][0] * c[1][1] - c[0][1] * c[0][1];
