@@ -3,15 +3,16 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 
 from renderer.backends import choose_backends
 from renderer.debug import debug_image, opaque, prepare_debug
+from renderer.decoded_object import DecodedObject
 from renderer.eye_colors import Look, drawn_together, shared_is_enough
-from renderer.false_colors import BESIDE, PICTURE, SPLATS, FalseColors, Shade, false_colors
+from renderer.false_colors import BESIDE, PICTURE, SPLATS, FalseColors, false_colors
 from renderer.gpu import Gpu
 from renderer.palette import apply_palette, lay_heat, palette_colors
 from renderer.recolor import (
@@ -29,28 +30,14 @@ from renderer.settings import TARGETS, FrameStats, RenderSettings
 from renderer.surface import Surface
 from renderer.timing import PassTimer
 from runtime_models.evaluate import follows_eye, shape_follows_control
-from runtime_models.model import Model, SplatLayers
+from runtime_models.model import SplatLayers
 from runtime_models.stop_weights import Controls, same_controls
 from scene.control import control_key, control_of
 from scene.metrics import psnr
 from scene.pose import View
 from scene.scene import Scene, SceneObject
 
-NO_SHADE = Shade(None)  # nothing is decoded yet
 HIDDEN = np.full((4, 4), np.nan)  # no splat passes the culling gate with this pose
-
-
-@dataclass
-class _Decoded:
-    """What of an object lies in the arena now."""
-
-    model: Model
-    colored: list[Colored]  # one for all views of a frame, or one a view
-    key: tuple | None = None  # control_key of x; None: not decoded yet
-    x: Controls = 0.0  # of its geometry
-    version: int = 0  # goes up with every other x
-    shade: Shade = NO_SHADE  # which colours are decoded
-    look: Look | None = None  # made for the first pair of eyes
 
 
 class Renderer:
@@ -88,7 +75,7 @@ class Renderer:
             self._drawing = QuadsDrawing(self._gpu, mlps, sort)
         self._timer = PassTimer(ctx)
         self._scene = Scene(())
-        self._decoded: list[_Decoded] = []
+        self._decoded: list[DecodedObject] = []
         self._false_key: list | None = None  # what the next was chosen for
         self._false_colors = FalseColors()
         self._drawing.allocate([])
@@ -120,7 +107,7 @@ class Renderer:
         self._drawing.place(poses)
         self._scene = scene
 
-    def _decode_geometry(self, i: int, decoded: _Decoded, x: Controls) -> None:
+    def _decode_geometry(self, i: int, decoded: DecodedObject, x: Controls) -> None:
         """Geometry of object i at x, unless it lies in the arena already."""
         if decoded.key is not None and same_controls(x, decoded.x):
             return  # a selector changed where nothing is
@@ -156,7 +143,7 @@ class Renderer:
         except ValueError:
             self._drawing.allocate([])
             raise
-        self._decoded = [_Decoded(model, [Colored(centre_of(model))]) for model in models]
+        self._decoded = [DecodedObject(model, [Colored(centre_of(model))]) for model in models]
 
     def draw(
         self,
@@ -262,7 +249,7 @@ class Renderer:
             self._color_runs += 1
 
     def _wanted_anchors(
-        self, i: int, thing: SceneObject, decoded: _Decoded, colored: Colored, stale: bool,
+        self, i: int, thing: SceneObject, decoded: DecodedObject, colored: Colored, stale: bool,
         views: list[View],
     ) -> np.ndarray | None:  # fmt: skip
         """(A,) bool: the anchors that views see and whose colours are stale; None: all.

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, ControlEncoding, Mlp, Stop
+from runtime_models.refit_encoding import encoding_for
 from runtime_models.stop_weights import StopWeights
 from runtime_models.write_package import write_package
 
@@ -112,7 +113,8 @@ def run_in_numpy(mlp: Mlp, rows: np.ndarray) -> np.ndarray:
 
 
 def random_package(folder: Path, anchors: int, **kind) -> Path:
-    """The file of a random model in a folder."""
+    """The file of a random model in a folder, by default with an encoding as trained today."""
     path = folder / "random.shift"
+    kind.setdefault("encoding", encoding_for([stop.x for stop in STOPS]))
     write_package(make_random_model(anchors, **kind), path)
     return path

@@ -10,6 +10,7 @@ from runtime_models.evaluate import evaluate
 from runtime_models.model import HEADS, SIZE_PER_SPLAT, ControlEncoding, Stop
 from runtime_models.read_package import read_files
 from runtime_models.write_package import package_files
+from tests.models import psi_of
 from training.export import model_of
 from training.gaussians import Activation, Gaussians
 from training.networks import HeadLayout, Heads, initial_weights, padded
@@ -265,7 +266,8 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     on_device = [device.upload(a) for a in (weights, anchors, features)]
     colors = []
     for x in (0.0, 0.3, 1.0):
-        raw = heads.forward(*on_device, encoding.encode(x), EYE)
+        psi = psi_of(read, x).astype(np.float32)
+        raw = heads.forward(*on_device, psi, EYE)
         ours = activation.forward(raw, on_device[1])
         theirs = evaluate(read, x, EYE)
         for name in ("means", "scales", "opacity", "color"):

@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 
 from runtime_models.memory import Account
 from runtime_models.model import BadFile
+from runtime_models.package_files import MANIFEST
 from runtime_models.plain_splats import RawSplats, Reading
 from runtime_models.zip_files import DAMAGED, KNOWN, member_names, opened_zip
 
@@ -30,7 +31,10 @@ def is_gzip(head: bytes, path: Path) -> bool:
 
 
 def is_zip_of_one(head: bytes, path: Path) -> bool:
-    return head[:2] == b"PK" and path.is_file() and len(known_in(path)) == 1
+    """A package, which is a zip with a scene.json, is none, whatever else lies in it."""
+    if head[:2] != b"PK" or not path.is_file() or MANIFEST in member_names(path):
+        return False
+    return len(known_in(path)) == 1
 
 
 def known_in(path: Path) -> list[str]:
