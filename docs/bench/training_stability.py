@@ -41,7 +41,7 @@ from training.schedule import choose_background  # noqa: E402
 from training.synthetic.balls import make_balls  # noqa: E402
 
 HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
-ANCHORS = ("--anchors", "1000", "--max-anchors", "2000")
+ANCHORS = ("--max-anchors", "2000")
 MOST_SAID = 5  # sentences a row
 USUAL = (
     " held out; ",
