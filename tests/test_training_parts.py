@@ -8,6 +8,7 @@ from rasterizer.device import open_device
 from runtime_models.model import BadFile, Stop
 from scene.capture import Capture, Photo
 from scene.pose import View, look_at, perspective
+from training.backgrounds import choose_background
 from training.guard import Guard
 from training.initial import (
     choose_voxel,
@@ -20,7 +21,7 @@ from training.initial import (
 from training.networks import HeadLayout
 from training.optimizer import Adam
 from training.photos import LoadedPhoto, choose_downscale, load_photos
-from training.schedule import Budget, Schedule, choose_background
+from training.schedule import Budget, Schedule
 from training.settings import LONG, PAPER, SHORT, TrainSettings, preset
 
 RNG = np.random.default_rng

@@ -8,6 +8,7 @@ import numpy as np
 from runtime_models.model import BadFile
 from scene.capture import Capture
 from scene.pose import View
+from training.backgrounds import NOISE
 from training.photos import LoadedPhoto
 from training.point_sources import CLOUDS, cloud_points, depth_points
 
@@ -15,7 +16,6 @@ SOURCES = ("auto", "capture", "depth", "hull", "random")  # or a file: see CLOUD
 COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of a cube of the carved box's volume
 HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
 FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
-BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
 RANDOM_POINTS = 20_000
 NO_POINTS = np.zeros((0, 3))
 SAMPLE = 1000  # points whose nearest neighbour is looked for
@@ -87,7 +87,7 @@ def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | Non
     if background is None:
         return None
     difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
-    return difference > BACKGROUND_NOISE
+    return difference > NOISE
 
 
 def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from runtime_models.plain_splats import PlainSplats
 from runtime_models.rotation import normalize
 from runtime_models.spherical_harmonics import C0
 from scene.capture import Capture
+from training.backgrounds import choose_background
 from training.drawing import Color
 from training.first_anchors import neighbour_distance, seen_colors
 from training.guard import EVERY as GUARD_EVERY
@@ -23,7 +24,7 @@ from training.plain_density import changed_splats, decide, extent_of, reset_opac
 from training.plain_settings import PlainRates, PlainSettings
 from training.plain_step import REST, PlainEvidence, PlainStep
 from training.run import SETTLE, Run
-from training.schedule import Budget, Schedule, choose_background
+from training.schedule import Budget, Schedule
 
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
 DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
@@ -60,7 +61,9 @@ class PlainTrainer(Run):
         self.factor = settings.downscale or choose_downscale(capture.photos)
         photos = load_photos(capture, "train", self.factor, settings.masks)
         self.held_out = load_photos(capture, "test", self.factor, settings.masks)
-        background = choose_background(settings.background, capture.background)
+        background = choose_background(settings.background, capture.background, photos)
+        if settings.background == "auto":
+            self.capture = replace(capture, background=background)  # hulls are carved out of it
         self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
         self.extent = extent_of([p.view for p in photos])
         self.targets = Targets(device)

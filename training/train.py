@@ -1,9 +1,12 @@
 """The training loop: a Capture in, step after step, and at any moment an AnchorModel out."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from runtime_models.model import AnchorModel, BadFile, ControlEncoding
 from scene.capture import Capture
+from training.backgrounds import choose_background, told_background
 from training.between import Between, Way, add, blended, own_blend, straight_pull
 from training.coarse import Coarse
 from training.densify import absent_as_nan, change, changed_state
@@ -27,7 +30,7 @@ from training.photos import (
 )
 from training.rise import Rise, after_fall
 from training.run import SETTLE, Run
-from training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
+from training.schedule import Budget, Schedule, balance_of, turns_of
 from training.settings import Rates, TrainSettings
 from training.step import Step
 from training.visibility import Visibility
@@ -83,7 +86,10 @@ class Trainer(Run):
         for name, found in by_modality.items():
             if not found:
                 raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
-        background = choose_background(settings.background, capture.background)
+        background = choose_background(settings.background, capture.background, photos)
+        if settings.background == "auto" and background != capture.background:
+            self.capture = replace(capture, background=background)  # hulls are carved out of it
+            self.doubts.append(told_background(background))
         turns = turns_of(balance_of(settings.balance), list(by_modality))
         self.schedule = Schedule(by_modality, settings.seed, background, turns)
         self.between = Between(
