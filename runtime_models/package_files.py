@@ -5,16 +5,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 from runtime_models.memory import Account
-from runtime_models.model import BadFile
+from runtime_models.model import AnchorModel, BadFile
 from runtime_models.zip_files import opened_zip, read_member
 
 FORMAT = "shapeshift 1"
+FRAMES_FORMAT = "shapeshift 2"  # the same, and anchors.npz holds the anchors' own frames
 MANIFEST = "scene.json"
 ANCHORS = "anchors.npz"
 WHOLE = f"a package is {MANIFEST}, {ANCHORS} and five ONNX files"
 
 LARGEST = {MANIFEST: 16 << 20, ANCHORS: 4 << 30}  # bytes, unpacked
 LARGEST_NETWORK = 256 << 20  # bytes; five of 64 MB would draw one frame a minute
+
+
+def format_name(model: AnchorModel) -> str:
+    """What the manifest of its package names."""
+    return FORMAT if model.frames is None else FRAMES_FORMAT
 
 
 def open_package(path: Path, memory: Account) -> Callable[[str], bytes]:

@@ -12,7 +12,7 @@ from runtime_models.lcc.read_lcc2 import is_lcc2, read_lcc2
 from runtime_models.lint_package import refuse_filling
 from runtime_models.memory import refuse_empty
 from runtime_models.model import AnchorModel, BadFile, Mlp, Model, ScaffoldModel, SplatLayers
-from runtime_models.package_files import ANCHORS, FORMAT, MANIFEST
+from runtime_models.package_files import ANCHORS, MANIFEST, format_name
 from runtime_models.plain_splats import Reading
 from runtime_models.read_layer_list import LIST, has_layer_list, read_layer_list
 from runtime_models.read_layers import layer_files, read_layers
@@ -130,7 +130,7 @@ def describe(model: Model, path: str | Path) -> dict:
     anchored = isinstance(model, AnchorModel)
     plain = isinstance(model, SplatLayers)
     facts = {
-        "format": FORMAT if anchored else model.provenance.get("format", "splats"),
+        "format": format_name(model) if anchored else model.provenance.get("format", "splats"),
         "anchors": 0 if plain else len(model.anchors),
         "splats": model.splat_count,
         "sh_degree": round(model.sh.shape[1] ** 0.5) - 1 if plain else None,

@@ -160,7 +160,7 @@ def depth_error(trainer: Trainer) -> float:
 
 
 def trained(device, capture, **changes) -> Trainer:
-    settings = TrainSettings(iterations=60, anchors=400, grow=False, **changes)
+    settings = TrainSettings(iterations=60, max_anchors=400, grow=False, **changes)
     trainer = Trainer(device, capture, settings)
     for _ in trainer.steps():
         pass

@@ -18,7 +18,8 @@ from runtime_models.write_layer_list import layer_name, write_layer_list
 from scene.read_capture import read_capture
 from tests.training_runs import run
 from training.evaluate import evaluate_model
-from training.plain import PlainTrainer, first_scales, one_modality, seen_colors
+from training.first_anchors import neighbour_distance, seen_colors
+from training.plain import PlainTrainer, one_modality
 from training.plain_density import (
     AFTER_RESET,
     SMALLER,
@@ -142,8 +143,12 @@ def test_first_scales_are_the_distances_to_the_nearest():
     points = np.zeros((5, 3))
     points[:, 1] = [0, 1, 3, 7, 15]
     wanted = [[1, 3, 7], [1, 2, 6], [2, 3, 4], [4, 6, 7], [8, 12, 14]]
-    np.testing.assert_allclose(first_scales(points), np.sqrt(np.mean(np.square(wanted), axis=1)))
-    assert first_scales(points[:2]).tolist() == [1, 1] and first_scales(points[:1]).tolist() == [1]
+    np.testing.assert_allclose(
+        neighbour_distance(points), np.sqrt(np.mean(np.square(wanted), axis=1))
+    )
+    assert neighbour_distance(points[:2]).tolist() == [1, 1] and neighbour_distance(
+        points[:1]
+    ).tolist() == [1]
 
 
 def test_first_colours_are_the_photos(device, balls):

@@ -102,7 +102,7 @@ def mixed(tmp_path_factory) -> Capture:
 def test_from_the_file_to_the_scene_and_its_legend(mixed, tmp_path):
     """Sixteen bits, one channel and another size train as any photo; range and unit stay."""
     out = tmp_path / "mixed.shift"
-    arguments = [mixed.folder, "--out", out, "--iterations", 150, "--anchors", 500]
+    arguments = [mixed.folder, "--out", out, "--iterations", 150, "--max-anchors", 500]
     assert cli.main(["train", *map(str, arguments)]) == 0
     model = read_model(out)
     thermal = Stop("Thermal", 1.0, "thermal", "ironbow", (20.0, 100.0), "°C")

@@ -24,7 +24,7 @@ def balls(tmp_path_factory):
 
 
 def found_in(capture) -> list:
-    trainer = Trainer(open_device("cpu"), capture, TrainSettings(iterations=400, anchors=2500))
+    trainer = Trainer(open_device("cpu"), capture, TrainSettings(iterations=400, max_anchors=2500))
     for _ in trainer.steps():
         pass
     return suspects(trainer)

@@ -15,7 +15,7 @@ from training.rise import AFTER_A_FALL, FAINT, LEAST_RATE, PULL, Rise, after_fal
 from training.settings import TrainSettings
 from training.train import Trainer
 
-SETTINGS = TrainSettings(iterations=450, grow=False, anchors=600)
+SETTINGS = TrainSettings(iterations=450, grow=False, max_anchors=600)
 
 
 @pytest.fixture(scope="module")

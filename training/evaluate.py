@@ -15,10 +15,10 @@ from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
+from training.backgrounds import choose_background
 from training.drawing import camera_of
 from training.metrics import psnr, ssim
 from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
-from training.schedule import choose_background
 
 
 @dataclass(frozen=True)
@@ -124,12 +124,12 @@ def evaluate_model(
     distance: what Score.vgg is the mean of, a function of (picture, photo, weight).
     """
     factor = downscale or choose_downscale(capture.photos)
-    behind = choose_background(background, capture.background) or BLACK
     photos = load_photos(capture, "test", factor, masks)
     if not photos:
         raise BadFile(
             f"{capture.folder}: no photo is held out for testing; mark some with split 'test'."
         )
+    behind = choose_background(background, known_background(model, capture), photos) or BLACK
     painter, scores = Painter(device, model), {}
     for stop in capture.stops:
         alive = painter.set_control(stop_for(model, stop).x)
@@ -148,6 +148,15 @@ def evaluate_model(
                 float(np.mean(errors)) if errors else None,
             )
     return scores
+
+
+def known_background(model: Model, capture: Capture) -> tuple | None:
+    """The capture's background, or the one that a training found in its photos."""
+    found = model.provenance.get("background")
+    if capture.background is not None or not isinstance(found, list | tuple):
+        return capture.background
+    good = len(found) == 3 and all(isinstance(v, int | float) and 0 <= v <= 1 for v in found)
+    return tuple(map(float, found)) if good else None
 
 
 def name_in(capture: Capture, photo: LoadedPhoto) -> str:

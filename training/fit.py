@@ -14,9 +14,9 @@ from runtime_models.model import AnchorModel, BadFile
 from runtime_models.read_package import read_files
 from runtime_models.write_package import package_files, zip_files
 from scene.capture import Capture
+from training.backgrounds import choose_background
 from training.need import DROPPED, PARTS, Measured, Part, Verdict, judge
 from training.photos import BLACK, choose_downscale, load_photos
-from training.schedule import choose_background
 from training.settings import TrainSettings
 from training.train import Trainer
 from training.witness import likeness, most_pixels, shared_outlines
@@ -71,9 +71,10 @@ class Fit:
         self.device, self.capture, self.tell = device, capture, tell
         self.tolerance_db, self.seeds, self.verdicts = tolerance_db, seeds, []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
-        self.background = choose_background(settings.background, capture.background) or BLACK
         self.held_out = load_photos(capture, "test", factor, settings.masks)
         self.photos = load_photos(capture, "train", factor, settings.masks)
+        behind = choose_background(settings.background, capture.background, self.photos)
+        self.background = behind or BLACK
         self.counts = {s.name: sum(p.modality == s.name for p in self.held_out) for s in self.stops}
         for name, count in self.counts.items():
             if not count or count * seeds < 2:

@@ -13,12 +13,12 @@ from rasterizer.project import LEAST_ALPHA
 from runtime_models.model import BadFile, Stop
 from scene.capture import Capture
 from scene.pose import View
+from training.backgrounds import choose_background
 from training.initial import common_box
 from training.photos import BLACK, read
 from training.plain import one_modality
 from training.rig import Found, rigid, told
 from training.rig_solve import Frozen, Shape
-from training.schedule import choose_background
 from training.settings import TrainSettings
 from training.train import Trainer
 
@@ -84,7 +84,6 @@ def search(
     photos = capture.of(modality, "train")
     other = reference_of(capture, modality)
     factor, _ = factors_of(capture, modality, other.name, settings.downscale or 1)
-    behind = float(np.mean(choose_background(settings.background, capture.background) or BLACK))
     distance = distance_of([photo.view for photo in photos])
     offset, inverse, frozen, first = np.eye(4), None, None, None
     for number, stage in enumerate(stages):
@@ -93,6 +92,8 @@ def search(
             read(photo, factor * stage.smaller, settings.masks)
             for photo in photos[:: -(-len(photos) // stage.photos)]
         ]
+        background = choose_background(settings.background, capture.background, chosen)
+        behind = float(np.mean(background or BLACK))
         before, frozen = frozen, Frozen(device, shape, chosen, behind, distance)
         if before is not None:
             frozen.gray = before.gray

@@ -46,6 +46,11 @@ class Run(ABC):
     grown_at: int  # iteration of the last change of what is counted
     run_length: int | None  # iterations in all; None until a timed run's is known
 
+    @property
+    @abstractmethod
+    def splat_count(self) -> int:
+        """How many splats the model has at any stop, absent ones too."""
+
     @abstractmethod
     def warm_up(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted."""
@@ -86,7 +91,8 @@ class Run(ABC):
 
     def visible(self) -> float:
         """The share of all splats that the last drawing has on screen."""
-        return float((self.device.view(self.drawing.projected.record)[:, 9] > 0).mean())
+        shown = self.device.view(self.drawing.projected.record)[:, 9] > 0
+        return float(shown.sum() / self.splat_count)
 
     def psnr_of(self, drawing: Drawing, photo: LoadedPhoto, background: Color) -> float:
         """Decibels of a drawing against its photo."""

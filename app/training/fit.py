@@ -38,12 +38,11 @@ class TrialOptions:
     """Train the chosen model again for this long.  Default: the trial's model is written."""
     preset: Literal["fast", "paper"] = "fast"
     """As of train: options that are left out take its numbers."""
-    max_anchors: int | None = None
-    """Most anchors that growing may reach."""
     seed: Annotated[int | None, EXPERT] = None
     """Seed of the first training; the others count on from it."""
     grow: Annotated[bool | None, EXPERT] = None
-    """Add and remove anchors between 10 % and 60 % of each training; --no-grow: keep the first."""
+    """Add anchors and move the least useful ones up to 80 % of each training; --no-grow: keep the
+    first ones."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from app.paths import full
 if TYPE_CHECKING:
     from training.train import Trainer
 
-LESS = "fewer --anchors and --max-anchors, or a larger --downscale, need less"
+LESS = "fewer --max-anchors, or a larger --downscale, need less"
 
 
 def refuse_place(out: Path) -> None:

@@ -44,10 +44,8 @@ class MethodOptions:
     Default: not measured."""
     seed: Annotated[int | None, EXPERT] = None
     """Seed of all random numbers."""
-    anchors: int | None = None
-    """Most anchors that a model starts with."""
     max_anchors: int | None = None
-    """Most anchors that growing may reach, for each model."""
+    """Most anchors that each model may have."""
     splats: Annotated[int | None, EXPERT] = None
     """Most plain splats that a modality starts with."""
     max_splats: Annotated[int | None, EXPERT] = None
@@ -207,9 +205,7 @@ def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
 def train_options(method: str, options: Options) -> TrainOptions:
     """What `launch.py train` would be asked for."""
     shared = {f.name for f in fields(TrainOptions)} & {f.name for f in fields(options)}
-    strange = {"splats": ("anchors", "max_anchors")}.get(
-        method, ("splats", "max_splats", "sh_degree")
-    )
+    strange = {"splats": ("max_anchors",)}.get(method, ("splats", "max_splats", "sh_degree"))
     shared -= {"calibrate", *strange}  # what it finds is the same for all methods
     asked = {n: getattr(options, n) for n in shared}
     model = "splats" if method == "splats" else "anchors"

@@ -49,8 +49,6 @@ class RunOptions:
     """fast: minutes on a CPU.  paper: the numbers of the paper."""
     resume: bool = False
     """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""
-    max_anchors: int | None = None
-    """Most anchors that growing may reach."""
     max_mb: float | None = None
     """Most megabytes of the package on disk, from the start on."""
     points: Annotated[str | None, Opt(metavar="WHERE")] = None
@@ -72,29 +70,8 @@ class RunOptions:
     seed: Annotated[int | None, EXPERT] = None
     """Seed of all random numbers."""
     grow: Annotated[bool | None, EXPERT] = None
-    """Add and remove anchors between 10 % and 60 % of the run; --no-grow: keep the first ones."""
-    growth: Annotated[Literal["gradient", "absgrad", "error"] | None, EXPERT] = None
-    """What decides where anchors are added: gradient, the gradient by a splat's position on screen;
-    absgrad, the same of every pixel without its sign; error, the splat's share of the picture's
-    error."""
-    grow_threshold: Annotated[float | None, EXPERT] = None
-    """Threshold of --growth; smaller adds more anchors."""
-    grow_grids: Annotated[int | None, EXPERT] = None
-    """Voxel grids that new anchors fill: 1, the start's; 2, also one of half the width; 3, also one
-    of a quarter."""
-    grow_each: Annotated[bool | None, EXPERT] = None
-    """Decide where anchors are added for each modality by its own photos, not by the mean."""
-    grow_replace: Annotated[float | None, EXPERT] = None
-    """Share of all anchors, 0 to 1, that may be removed to make room once --max-anchors is reached:
-    those that contribute least."""
-    prune_opacity: Annotated[float | None, EXPERT] = None
-    """Remove anchors whose splats have a smaller mean opacity."""
-    prune_weight: Annotated[float | None, EXPERT] = None
-    """Remove anchors that contribute less than this to the pictures of every modality, in pixels;
-    0.1 is a useful value, 0 removes none."""
-    prune_views: Annotated[float | None, EXPERT] = None
-    """Remove anchors that are seen in a smaller share of all pictures; 0.01 is a useful value, 0
-    removes none."""
+    """Add anchors and move the least useful ones to where pictures need them, up to 80 % of the
+    run; --no-grow: keep the first ones."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,14 +34,14 @@ from scene.capture import Capture  # noqa: E402
 from scene.photo import load_photo  # noqa: E402
 from scene.read_capture import read_capture  # noqa: E402
 from scene.write_capture import write_capture  # noqa: E402
+from training.backgrounds import choose_background  # noqa: E402
 from training.evaluate import Painter, stop_for  # noqa: E402
 from training.metrics import psnr  # noqa: E402
 from training.photos import BLACK, load_photos  # noqa: E402
-from training.schedule import choose_background  # noqa: E402
 from training.synthetic.balls import make_balls  # noqa: E402
 
 HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
-ANCHORS = ("--anchors", "1000", "--max-anchors", "2000")
+ANCHORS = ("--max-anchors", "2000")
 MOST_SAID = 5  # sentences a row
 USUAL = (
     " held out; ",
