@@ -46,26 +46,23 @@ def choose_downscale(photos: tuple[Photo, ...]) -> int:
 
 def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
     """Load one photo, made smaller by `factor`; `masks` is that of TrainSettings."""
-    width, height = photo.view.size
-    size = (max(round(width / factor), 1), max(round(height / factor), 1))
-    rgb, mask = load_photo(photo, size)
-    alpha, weight = np.ones_like(rgb[..., :1]), None
-    if mask is not None and photo.mask is None:  # the file's own alpha; colours times alpha
-        alpha = mask[..., None]
-        rgb = rgb / np.maximum(alpha, 1e-6)
-    elif mask is not None and masks == "object":
-        alpha = mask[..., None]
+    rgb, mask, lost = load_photo(photo, factor)
+    alpha, weight = np.full(rgb.shape[:2], 255, np.uint8), None
+    if mask is not None and (photo.mask is None or masks == "object"):
+        alpha = mask
     elif mask is not None and masks == "valid":
-        weight = mask.astype(np.float32)
-        if not weight.sum() > 0:
+        weight = mask.astype(np.float32) / 255
+        if not weight.any():
             raise BadFile(f"{photo.mask} is black all over: nothing of its photo would count.")
-    rgba = np.clip(np.rint(255 * np.concatenate([rgb, alpha], axis=2)), 0, 255).astype(np.uint8)
-    depth = None if photo.depth is None else load_depth(photo, size)
+    if lost is not None and lost.any():  # neither object nor background: nothing is known there
+        alpha = np.where(lost, np.uint8(255), alpha)
+        weight = np.where(lost, np.float32(0), np.float32(1) if weight is None else weight)
+    rgba = np.concatenate([rgb, alpha[..., None]], axis=2)
+    depth = None if photo.depth is None else load_depth(photo, factor)
     if depth is not None:  # nothing is known of what does not count
-        seen = rgba[..., 3] >= 128 if weight is None else weight >= 0.5
+        seen = alpha >= 128 if weight is None else (weight >= 0.5) & (alpha >= 128)
         depth = np.where(seen, depth, np.float32(0))
-    view = photo.view.resized(size)
-    masked = mask is not None
+    view, masked = photo.view.divided(factor), mask is not None
     return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth, masked)
 
 
