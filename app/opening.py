@@ -1,4 +1,4 @@
-"""How every command opens its scene: the options of reading, progress, a word on what is wrong."""
+"""How every command opens its scene or its photos: the options of reading, progress, doubts."""
 
 import math
 import time
@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT
 from app.terminal import say
 from runtime_models.model import Finding, Model
 from runtime_models.plain_splats import Reading
+
+if TYPE_CHECKING:
+    from scene.capture import Capture
 
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
 
@@ -78,6 +81,21 @@ def open_model(
     for finding in model.findings:
         say(sentence(finding))
     return model
+
+
+def open_capture(path: Path) -> "Capture":
+    """Posed photos, not their pixels; progress and doubts of its files go to stderr.
+
+    Raises BadFile.
+    """
+    from app.progress import working
+    from scene.read_capture import read_capture
+
+    with working("reading the capture"):
+        capture = read_capture(path)
+    for doubt in capture.doubts:
+        say(doubt)
+    return capture
 
 
 def sentence(finding: Finding) -> str:

@@ -345,7 +345,6 @@ class Trainer(Run):
             "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),
             "iterations": self.iteration,
-            "seconds": round(self.elapsed, 3),
             "voxel_m": self.voxel,
             "first_anchors": self.origin,
             "downscale": self.factor,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL
-from app.opening import ReadingOptions, open_model
+from app.opening import ReadingOptions, open_capture, open_model
 from app.terminal import open_console, say, tell_json
 
 if TYPE_CHECKING:
@@ -45,7 +45,6 @@ def run(options: Options) -> int:
     from app.paths import full
     from app.progress import working
     from rasterizer.device import open_device
-    from scene.read_capture import read_capture
     from scene.scene_file import is_scene_file
     from training.evaluate import evaluate_model, report
     from training.rig import rig_of, with_found
@@ -58,7 +57,7 @@ def run(options: Options) -> int:
             "trained; name the model of one object."
         )
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    capture = read_capture(options.capture)
+    capture = open_capture(options.capture)
     if options.modality is not None:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)
