@@ -16,6 +16,7 @@ from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
 from training.drawing import camera_of
+from training.exposure import fitted_psnr
 from training.metrics import psnr, ssim
 from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from training.schedule import choose_background
@@ -30,6 +31,7 @@ class Score:
     each: dict[str, float]  # PSNR of every photo, dB, by its path in the capture
     vgg: float | None = None  # training.vgg_distance; None: not measured
     depth_error: float | None = None  # of photos with depth: Painter.depth_error
+    fitted_db: float | None = None  # of right halves, colours fitted on left ones: fitted_psnr
 
     @property
     def median_db(self) -> float:
@@ -146,7 +148,11 @@ def evaluate_model(
                 {name_in(capture, p): db for p, db in zip(mine, each, strict=True)},
                 None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
                 float(np.mean(errors)) if errors else None,
-            )
+                float(np.mean([
+                    fitted_psnr(picture, photo, wanted)
+                    for photo, (picture, wanted, _) in zip(mine, pairs, strict=True)
+                ])),
+            )  # fmt: skip
     return scores
 
 
@@ -172,6 +178,7 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
                 "median_db": round(s.median_db, 4),
                 "ssim": round(s.ssim, 5),
                 "photos": s.photos,
+                "fitted_db": None if s.fitted_db is None else round(s.fitted_db, 4),
                 "psnr_db_each": {photo: round(db, 3) for photo, db in s.each.items()},
             }
             | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})

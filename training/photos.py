@@ -1,4 +1,4 @@
-"""Photos of a capture, read once, made smaller, and handed to the loss as targets on the device."""
+"""Photos of a capture, read once and made smaller: what training and its scores know of them."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,8 @@ from scene.capture import Capture, Photo
 from scene.depth_photo import load_depth
 from scene.photo import load_photo
 from scene.pose import View
-from training.depth_loss import DepthLoss, DepthTarget, DepthWish
-from training.losses import ImageLoss, Target
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
-CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use
 BLACK = (0.0, 0.0, 0.0)
 
 
@@ -68,51 +65,3 @@ def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
 
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
     return [read(p, factor, masks) for p in capture.photos if p.split == split]
-
-
-class Targets:
-    """Makes loss targets of photos and keeps as many as fit into CACHE_BYTES."""
-
-    def __init__(self, device) -> None:
-        self.device = device
-        self.losses: dict[tuple[int, int], ImageLoss] = {}
-        self.kept: dict[tuple, Target | DepthTarget] = {}
-        self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
-        self.bytes = 0
-
-    def loss(self, photo: LoadedPhoto) -> ImageLoss:
-        """The image loss of the photo's size."""
-        size = photo.view.size
-        if size not in self.losses:
-            self.losses[size] = ImageLoss(self.device, size)
-        return self.losses[size]
-
-    def target(self, photo: LoadedPhoto, background: tuple[float, float, float]) -> Target:
-        """The photo over a background; kept unless the photo shows the background."""
-        key = (photo.modality, photo.name, photo.view.size)
-        if key in self.kept:
-            return self.kept[key]
-        rgba = self.device.upload(photo.rgba)
-        target = self.loss(photo).target(rgba, background, photo.weight)
-        if not photo.see_through and self.bytes + target.bytes <= CACHE_BYTES:
-            self.kept[key] = target
-            self.bytes += target.bytes
-        return target
-
-    def wish(self, photo: LoadedPhoto, share: float) -> DepthWish | None:
-        """What is to be learned from the photo's depth; None where it has none or share is 0."""
-        if photo.depth is None or not share > 0:
-            return None
-        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size, "depth")
-        if size not in self.depth_losses:
-            self.depth_losses[size] = DepthLoss(self.device, size)
-        loss = self.depth_losses[size]
-        target = self.kept.get(key) or loss.target(photo.depth)
-        if key not in self.kept and self.bytes + target.bytes <= CACHE_BYTES:
-            self.kept[key] = target
-            self.bytes += target.bytes
-        return DepthWish(loss, target, share) if target.known else None
-
-    def forget(self) -> None:
-        """Make all targets anew at their next use: the photos have another size now."""
-        self.kept, self.bytes = {}, 0

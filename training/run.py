@@ -9,12 +9,15 @@ import numpy as np
 
 from rasterizer.device import Device
 from training.drawing import Color, Drawing
+from training.exposure import Exposures
+from training.losses import Target
 from training.metrics import psnr
 from training.optimizer import Adam
 from training.photos import LoadedPhoto
 from training.plain_settings import PlainRates, PlainSettings
 from training.schedule import Budget
 from training.settings import Rates, TrainSettings
+from training.targets import Targets
 
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
 PACE_STEPS = 20  # steps after which the length of a timed run is known
@@ -50,6 +53,8 @@ class Run(ABC):
     settings: TrainSettings | PlainSettings
     budget: Budget
     adam: Adam
+    targets: Targets
+    exposures: Exposures
     drawing: Drawing  # the last one
     iteration: int  # steps done
     elapsed: float  # seconds that the steps took, by clock_of
@@ -95,6 +100,16 @@ class Run(ABC):
         if self.run_length is None and self.iteration == PACE_STEPS:
             self.run_length = int(self.settings.seconds / (self.elapsed / (PACE_STEPS - 1)))
             self.adam.set_rates(self.all_rates())
+
+    def target(self, photo: LoadedPhoto, background: Color, own: bool = True) -> Target:
+        """What the last drawing, of this photo, should have been.
+
+        own: it is of the photo's own stop, so that it tells how bright the photo is.
+        """
+        fraction = self.budget.fraction(self.iteration, self.elapsed)
+        known = self.exposures if fraction >= self.exposures.begin else None
+        image = self.drawing.frame.image if own else None
+        return self.targets.target(photo, background, known, image)
 
     def visible(self) -> float:
         """The share of all splats that the last drawing has on screen."""

@@ -13,23 +13,19 @@ from training.density_strategy import strategy
 from training.doubts import usable
 from training.drawing import Color
 from training.export import model_of
+from training.exposure import Exposures
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import first_voxel, initial_points, voxel_centres
 from training.networks import HeadLayout, initial_weights, padded
 from training.optimizer import Adam
-from training.photos import (
-    BLACK,
-    LoadedPhoto,
-    Targets,
-    choose_downscale,
-    load_photos,
-)
+from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from training.rise import Rise, after_fall
 from training.run import SETTLE, Run
 from training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
 from training.settings import Rates, TrainSettings
 from training.step import Step
+from training.targets import Targets
 
 GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
 EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background
@@ -97,6 +93,7 @@ class Trainer(Run):
         )  # fmt: skip
         self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
         self.targets, self.photo_factor = Targets(device), 1
+        self.exposures = Exposures(device, by_modality)
         self.rise = Rise(settings.rise, 0, settings.revive)
         thermal = [stop.name for stop in self.stops if stop.kind == "thermal"]
         self.roughness = dict.fromkeys(thermal, settings.thermal_smooth)
@@ -146,6 +143,7 @@ class Trainer(Run):
         self.adam.load(state)
         self.evidence = Evidence(self.device, self.layout, len(values["anchors"]), self.watch)
         self.evidence.load(state)
+        self.exposures.load(state)
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
         """(state, notes) from which `resume` goes on to the same bits."""
@@ -156,7 +154,7 @@ class Trainer(Run):
             "settings": self.settings.as_dict(),
             "rise": [self.rise.steps, self.rise.since, self.rise.pull],
         }  # fmt: skip
-        return self.adam.state() | self.evidence.state(), notes
+        return self.adam.state() | self.evidence.state() | self.exposures.state(), notes
 
     @property
     def anchors_count(self) -> int:
@@ -175,7 +173,7 @@ class Trainer(Run):
 
         On the way the guard learns what a healthy picture of every modality has on screen.
         """
-        before, evidence = self.adam.state(), self.evidence.state()
+        before, evidence, known = self.adam.state(), self.evidence.state(), self.exposures.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
             whole = {(p.view.size, p.depth is None): p for p in photos}.values()
@@ -187,6 +185,7 @@ class Trainer(Run):
                     self.learn_at(photo, background, self.between.middle)
         self.adam.load(before)
         self.evidence.load(evidence)
+        self.exposures.load(known)
 
     def next_photo(self) -> LoadedPhoto:
         """The photo of this step, as small as this part of the run has them."""
@@ -202,11 +201,12 @@ class Trainer(Run):
     ) -> dict[str, object]:
         """Gradients of how a photo differs.  control: Psi of each head, if not that of its stop."""
         settings = self.settings
-        control = self.control(photo.modality) if control is None else control
-        target = self.targets.target(photo, background)
+        own = control is None
+        control = self.control(photo.modality) if own else control
         self.evidence.stop = [s.name for s in self.stops].index(photo.modality)
         depth = self.targets.wish(photo, settings.depth_share)
         self.drawing = self.step.draw(photo.view, control, background, depth is not None)
+        target = self.target(photo, background, own)
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
             settings.opacity_share, settings.scale_share, self.evidence, depth,
@@ -294,6 +294,7 @@ class Trainer(Run):
         looks = self.rise.steps if self.rise.since == self.iteration else 0
         self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
         self.rate_scale /= 2
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
         return True
 
     def go_on_from(self, state: dict[str, np.ndarray]) -> None:

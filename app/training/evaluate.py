@@ -112,12 +112,15 @@ def print_table(result: dict) -> None:
     vgg = ["VGG distance"] if "vgg_file" in result else []
     depth = any("depth_error" in score for score in result["modalities"].values())
     more = [*vgg, *(["depth error %"] if depth else [])]
-    table = Table("modality", "PSNR dB", "median", "SSIM", *more, "photos", "splats alive")
+    table = Table(
+        "modality", "PSNR dB", "median", "fitted", "SSIM", *more, "photos", "splats alive"
+    )
     worst = {}
     for name, score in result["modalities"].items():
         photo, db = min(score["psnr_db_each"].items(), key=lambda pair: pair[1])
         worst[photo] = f"{photo} {db:.1f} dB"
-        row = [f"{score['psnr_db']:.2f}", f"{score['median_db']:.2f}", f"{score['ssim']:.4f}"]
+        row = [f"{score[key]:.2f}" for key in ("psnr_db", "median_db", "fitted_db")]
+        row.append(f"{score['ssim']:.4f}")
         row += [f"{score['vgg_distance']:.4f}"] if vgg else []
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")

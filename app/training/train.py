@@ -208,7 +208,7 @@ def run(options: Options) -> int:
     save(trainer, options.out, checkpoint)
     if not interrupted:
         pace_package(options.out)
-    say(summary(trainer, options.out, interrupted))
+    say(summary(trainer, options.out, interrupted), *trainer.exposures.remarks())
     if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
         say(found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):

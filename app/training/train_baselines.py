@@ -131,7 +131,7 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
         runs[trainer.stop.name] = Run(file, trainer.elapsed, trainer.iteration)
-        say(told(trainer, trainer.count))
+        say(told(trainer, trainer.count), *trainer.exposures.remarks())
         if interrupted:
             break
     write_layer_list(layers, out)
@@ -161,7 +161,7 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
         interrupted = train(trainer, None)
         write_package(trainer.model(), files[name])
         runs[name] = Run(files[name], trainer.elapsed, trainer.iteration)
-        say(told(trainer, trainer.anchors_count))
+        say(told(trainer, trainer.anchors_count), *trainer.exposures.remarks())
         if interrupted:
             break
     return Outcome(runs, interrupted)
