@@ -171,7 +171,7 @@ def uneven(capture, folder, gains: np.ndarray):
 
 
 def test_a_training_finds_the_brightness_of_its_photos(device, balls, tmp_path):
-    """Planted gains of a tenth come back to a third of that; heat, which is even, stays as it is."""
+    """Planted gains of a tenth come back to a third of that; even heat stays as it is."""
     for name in ("rgb", "thermal"):
         (tmp_path / name).symlink_to(balls.folder / name)
     planted = np.exp(RNG(1).normal(size=24) / 6)  # of these 24 a standard deviation of 0.103
