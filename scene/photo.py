@@ -64,6 +64,8 @@ def load_photo(photo: Photo, factor: int = 1) -> Pixels:
     channel, the colours are laid over black with the latter.  Of a bent lens the pixels are those
     of its straight camera, scene.undistort.
     """
+    if photo.lens is not None:  # what is made of it is beside it in memory
+        charge_pixels(photo.path, photo.view.size)
     image, file_size = decoded(photo.path, photo.counts, factor)
     mask, alpha = None, image.getchannel("A") if image.mode == "RGBA" else None
     if photo.mask is not None:

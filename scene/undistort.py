@@ -17,7 +17,9 @@ STRAIGHT = 0.5  # pixels that distortion may shift a corner by before it matters
 WIDEST = 1.75  # tangent of the half angle up to which a pinhole shows anything: 120 degrees
 SAMPLES = 2048  # of a ray from the principal point, to WIDEST at a corner
 DIRECTIONS = 64  # of such rays
-LEAST_KEPT = 0.25  # of the photo's area; less is left of it only where the numbers are wrong
+LEAST_KEPT = 0.25  # of the photo's area; less is left of it only where the numbers are wrong ...
+MOST_GROWN = 8  # times it; 120 degrees of real lenses, which squeeze their edges, grow three times
+ROWS = 256  # of pixels whose places are computed at a time
 CELLS = (64, 32, 16, 8)  # pixels a side of a mesh's cells, within which pixels are interpolated ...
 MESH_ERROR = 0.05  # ... with an error of so many pixels at most, where any of CELLS allows it
 OUTSIDE = -1e4  # pixels: where the mesh has cells that no photo has
@@ -78,7 +80,9 @@ def fold(lens: Lens) -> float:
 
 @lru_cache(maxsize=64)
 def pinhole_of(lens: Lens) -> Pinhole:
-    """The straight camera.  Raises BadFile where the lens leaves too little of the photo."""
+    """The straight camera.  Raises BadFile where the lens leaves too little of the photo, or would
+    make too much of it.
+    """
     limit, (fx, fy), (width, height) = min(fold(lens), WIDEST), lens.focal, lens.size
     along = np.linspace(0, limit, SAMPLES)
     none = np.zeros_like(along)
@@ -96,6 +100,11 @@ def pinhole_of(lens: Lens) -> Pinhole:
         raise BadFile(
             f"its lens ({lens.model}) folds the photo over itself within {limit:.2f} of the focal "
             "length; check the distortion's numbers and their camera model"
+        )
+    if not size[0] * size[1] <= MOST_GROWN * width * height:
+        raise BadFile(
+            f"its lens ({lens.model}) would make {size[0]}x{size[1]} pixels of the photo's "
+            f"{width}x{height}; check the distortion's numbers and their camera model"
         )
     return Pinhole((fx, fy), (left * fx, up * fy), size)
 
@@ -156,5 +165,9 @@ def undistorted(
 def lost(lens: Lens, size: tuple[int, int], by: float) -> np.ndarray:
     """(H, W) bool which pixels of the straight camera, each `by` of its own, see past the photo."""
     x, y = ((np.arange(side) + 0.5) * by for side in size)
-    at, edge = straight_pixels(lens, x, y), max(by / 2, 0.5)
-    return ~((at >= edge) & (at <= np.array(lens.size) - edge)).all(axis=2)
+    edge, out = max(by / 2, 0.5), np.ones(size[::-1], bool)
+    for start in range(0, len(y), ROWS):
+        at = straight_pixels(lens, x, y[start : start + ROWS])
+        inside = (at >= edge) & (at <= np.array(lens.size) - edge)
+        out[start : start + ROWS] = ~inside.all(axis=2)
+    return out
