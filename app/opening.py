@@ -1,6 +1,7 @@
 """How every command opens its scene or its photos: the options of reading, progress, doubts."""
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -46,8 +47,7 @@ class ReadingOptions:
 
         if self.max_splats < 0:
             raise UsageError(f"--max-splats is {self.max_splats}, expected 0 (all) or more.")
-        if not 0 <= self.memory < math.inf:
-            raise UsageError(f"--memory is {self.memory}, expected GB, or 0 for what is usual.")
+        refuse_memory(self.memory)
         return Reading(
             self.mode,
             self.up,
@@ -57,6 +57,14 @@ class ReadingOptions:
             most_splats=self.max_splats,
             memory_gb=self.memory,
         )
+
+
+def refuse_memory(gigabytes: float) -> None:
+    """Raises UsageError for what is no amount."""
+    from app.errors import UsageError
+
+    if not 0 <= gigabytes < math.inf:
+        raise UsageError(f"--memory is {gigabytes}, expected GB, or 0 for what is usual.")
 
 
 def open_model(
@@ -83,14 +91,18 @@ def open_model(
     return model
 
 
-def open_capture(path: Path) -> "Capture":
+def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
     """Posed photos, not their pixels; progress and doubts of its files go to stderr.
 
-    Raises BadFile.
+    memory_gb: --memory, for all that this process reads from now on.  Raises BadFile, UsageError.
     """
     from app.progress import working
+    from runtime_models.memory import VARIABLE
     from scene.read_capture import read_capture
 
+    if memory_gb:
+        refuse_memory(memory_gb)
+        os.environ[VARIABLE] = str(memory_gb)  # where its pixels are read, also by children
     with working("reading the capture"):
         capture = read_capture(path)
     for doubt in capture.doubts:

@@ -15,11 +15,13 @@ from runtime_models.evaluate import Evaluator, follows_eye
 from runtime_models.model import BadFile, Model, Stop
 from scene.capture import Capture
 from scene.pose import View
-from training.drawing import camera_of
+from training.drawing import Color, camera_of
 from training.exposure import fitted_psnr
 from training.metrics import psnr, ssim
-from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
+from training.photos import BLACK, LoadedPhoto, choose_downscale, read
 from training.schedule import choose_background
+
+LIKENESS = ("psnr_db", "ssim", "vgg", "depth_error", "fitted_db")  # fields of Score: means
 
 
 @dataclass(frozen=True)
@@ -127,33 +129,46 @@ def evaluate_model(
     """
     factor = downscale or choose_downscale(capture.photos)
     behind = choose_background(background, capture.background) or BLACK
-    photos = load_photos(capture, "test", factor, masks)
-    if not photos:
+    if not any(photo.split == "test" for photo in capture.photos):
         raise BadFile(
             f"{capture.folder}: no photo is held out for testing; mark some with split 'test'."
         )
     painter, scores = Painter(device, model), {}
     for stop in capture.stops:
         alive = painter.set_control(stop_for(model, stop).x)
-        mine = [p for p in photos if p.modality == stop.name]
-        pairs = [(painter.picture(p.view, behind), p.over(behind), p.weight) for p in mine]
-        errors = [e for p in mine if (e := painter.depth_error(p)) is not None]
-        if pairs:
-            each = [float(psnr(*pair)) for pair in pairs]
-            scores[stop.name] = Score(
-                float(np.mean(each)),
-                float(np.mean([ssim(*pair) for pair in pairs])),
-                len(pairs),
-                alive,
-                {name_in(capture, p): db for p, db in zip(mine, each, strict=True)},
-                None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
-                float(np.mean(errors)) if errors else None,
-                float(np.mean([
-                    fitted_psnr(picture, photo, wanted)
-                    for photo, (picture, wanted, _) in zip(mine, pairs, strict=True)
-                ])),
-            )  # fmt: skip
+        names, found = [], []
+        for photo in capture.of(stop.name, "test"):
+            loaded = read(photo, factor, masks)  # one at a time is in memory
+            names.append(name_in(capture, loaded))
+            found.append(likeness(painter, loaded, behind, distance))
+        if found:
+            each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
+            means = {key: mean_of(found, key) for key in LIKENESS}
+            scores[stop.name] = Score(photos=len(found), alive=alive, each=each, **means)
     return scores
+
+
+def likeness(
+    painter: Painter, photo: LoadedPhoto, behind: Color, distance: Callable[..., float] | None
+) -> dict[str, float]:
+    """What Score has the means of, of one photo; without what it has not."""
+    picture, wanted = painter.picture(photo.view, behind), photo.over(behind)
+    found = {
+        "psnr_db": float(psnr(picture, wanted, photo.weight)),
+        "ssim": float(ssim(picture, wanted, photo.weight)),
+        "fitted_db": fitted_psnr(picture, photo, wanted),
+    }
+    if distance is not None:
+        found["vgg"] = float(distance(picture, wanted, photo.weight))
+    if (error := painter.depth_error(photo)) is not None:
+        found["depth_error"] = error
+    return found
+
+
+def mean_of(found: list[dict[str, float]], key: str) -> float | None:
+    """Over the photos that have it; None where none does."""
+    values = [of[key] for of in found if key in of]
+    return float(np.mean(values)) if values else None
 
 
 def name_in(capture: Capture, photo: LoadedPhoto) -> str:

@@ -1,9 +1,11 @@
 """Photos of a capture, read once and made smaller: what training and its scores know of them."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from runtime_models.memory import Memory, amount
 from runtime_models.model import BadFile
 from scene.capture import Capture, Photo
 from scene.depth_photo import load_depth
@@ -11,6 +13,7 @@ from scene.photo import load_photo
 from scene.pose import View
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
+PHOTOS = 0.5  # of the memory that files may take: what photos do as long as a run lasts
 BLACK = (0.0, 0.0, 0.0)
 
 
@@ -36,9 +39,47 @@ class LoadedPhoto:
 
 
 def choose_downscale(photos: tuple[Photo, ...]) -> int:
-    """The smallest whole factor after which no side exceeds MOST_PIXELS."""
+    """The smallest whole factor after which no side exceeds MOST_PIXELS and all fit into memory."""
     longest = max(max(photo.view.size) for photo in photos)
-    return -(-longest // MOST_PIXELS)
+    factor = -(-longest // MOST_PIXELS)
+    while factor < longest and memory_of(photos, factor) > memory_for_photos():
+        factor += 1
+    return factor
+
+
+def memory_of(photos: tuple[Photo, ...], factor: int) -> int:
+    """Bytes that photos take whose sides are divided by `factor`: see LoadedPhoto."""
+    each = (math.prod(p.view.divided(factor).size) * bytes_a_pixel(p) for p in photos)
+    return sum(each)
+
+
+def bytes_a_pixel(photo: Photo) -> int:
+    weighted = photo.mask is not None or photo.lens is not None
+    return 4 + 4 * weighted + 4 * (photo.depth is not None)
+
+
+def memory_for_photos() -> int:
+    """Bytes that all photos of a run may take together."""
+    return int(PHOTOS * Memory().most)
+
+
+def too_much(photos: tuple[Photo, ...], factor: int) -> str:
+    """Why photos of this size do not fit into memory, in words; "" where they do."""
+    needed, may = memory_of(photos, factor), memory_for_photos()
+    if needed <= may:
+        return ""
+    width, height = photos[0].view.divided(factor).size
+    return (
+        f"{len(photos):,} photos of {width}x{height} pixels would take {amount(needed)} of "
+        f"memory, photos may take {amount(may)}"
+    )
+
+
+def memory_doubts(photos: tuple[Photo, ...], factor: int) -> list[str]:
+    """A sentence where photos are smaller than usual because of memory."""
+    usual = -(-max(max(photo.view.size) for photo in photos) // MOST_PIXELS)
+    why = too_much(photos, usual) if usual < factor else ""
+    return [f"{why}: they are made {factor} times smaller; --memory GB allows more."] if why else []
 
 
 def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
@@ -64,4 +105,9 @@ def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
 
 
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
-    return [read(p, factor, masks) for p in capture.photos if p.split == split]
+    """All photos of a split.  Raises BadFile, also where they would need too much memory."""
+    mine = tuple(photo for photo in capture.photos if photo.split == split)
+    if mine and (why := too_much(mine, factor)):
+        fits = choose_downscale(capture.photos)
+        raise BadFile(f"{capture.folder}: {why}; --downscale {fits} fits, --memory GB allows more.")
+    return [read(photo, factor, masks) for photo in mine]

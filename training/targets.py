@@ -1,22 +1,24 @@
-"""Photos as targets of the losses, on the device; as many are kept as fit into CACHE_BYTES."""
+"""Photos as targets of the losses, on the device; as many are kept as fit into memory."""
 
+from runtime_models.memory import Memory
 from training.depth_loss import DepthLoss, DepthTarget, DepthWish
 from training.exposure import NONE, Exposures
 from training.losses import ImageLoss, Target
 from training.photos import LoadedPhoto
 
-CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use
+CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use ...
+CACHE = 0.25  # ... and beyond that part of the memory that files may take
 
 
 class Targets:
-    """Makes loss targets of photos and keeps as many as fit into CACHE_BYTES."""
+    """Makes loss targets of photos and keeps as many as fit."""
 
     def __init__(self, device) -> None:
         self.device = device
         self.losses: dict[tuple[int, int], ImageLoss] = {}
         self.kept: dict[tuple, Target | DepthTarget] = {}
         self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
-        self.bytes = 0
+        self.bytes, self.most = 0, min(CACHE_BYTES, int(CACHE * Memory().most))
 
     def loss(self, photo: LoadedPhoto) -> ImageLoss:
         """The image loss of the photo's size."""
@@ -47,7 +49,7 @@ class Targets:
         target = self.loss(photo).target(rgba, background, photo.weight, gain)
         if gain != NONE:
             return target
-        if not photo.see_through and self.bytes + target.bytes <= CACHE_BYTES:
+        if not photo.see_through and self.bytes + target.bytes <= self.most:
             self.kept[key] = target
             self.bytes += target.bytes
         return target
@@ -61,7 +63,7 @@ class Targets:
             self.depth_losses[size] = DepthLoss(self.device, size)
         loss = self.depth_losses[size]
         target = self.kept.get(key) or loss.target(photo.depth)
-        if key not in self.kept and self.bytes + target.bytes <= CACHE_BYTES:
+        if key not in self.kept and self.bytes + target.bytes <= self.most:
             self.kept[key] = target
             self.bytes += target.bytes
         return DepthWish(loss, target, share) if target.known else None

@@ -19,7 +19,7 @@ from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import first_voxel, initial_points, voxel_centres
 from training.networks import HeadLayout, initial_weights, padded
 from training.optimizer import Adam
-from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
+from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos, memory_doubts
 from training.rise import Rise, after_fall
 from training.run import SETTLE, Run
 from training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
@@ -72,6 +72,8 @@ class Trainer(Run):
             for split in ("train", "test")
         )
         photos, self.doubts = usable(photos, settings.masks)
+        if not settings.downscale:
+            self.doubts += memory_doubts(capture.photos, self.factor)
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:

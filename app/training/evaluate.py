@@ -57,7 +57,7 @@ def run(options: Options) -> int:
             "trained; name the model of one object."
         )
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    capture = open_capture(options.capture)
+    capture = open_capture(options.capture, options.memory)
     if options.modality is not None:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)

@@ -91,7 +91,7 @@ def run(options: Options) -> int:
     if options.final_iterations is not None or options.final_seconds is not None:
         longer = {"iterations": options.final_iterations, "seconds": options.final_seconds}
         last = settings_of(replace(options, **longer), None)
-    capture, device = open_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
         capture = with_found(capture, settings.rig)

@@ -91,7 +91,7 @@ def run(options: Options) -> int:
         raise UsageError("--methods spz packs the files of splats; add splats before it.")
     if options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is a file; --out is a folder.")
-    capture, device = open_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
     refuse_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)

@@ -192,7 +192,7 @@ def run(options: Options) -> int:
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options, resume[1]["settings"] if resume else None)
-    capture = open_capture(options.capture)
+    capture = open_capture(options.capture, options.memory)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:

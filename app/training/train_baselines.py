@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # Options that say where and how long, or how photos are read: they go for every kind of model.
 COMMON = {"capture", "out", "model", "separate", "resume", "preset", "device", "downscale", "masks",
-          "background", "seconds", "iterations"}  # fmt: skip
+          "background", "seconds", "iterations", "memory"}  # fmt: skip
 PAPER_ITERATIONS = 30000  # of 3DGS, and of the shape-shifting paper
 
 
@@ -68,7 +68,7 @@ def run_baseline(options: Options) -> int:
     if options.separate and options.model == "splats":
         raise UsageError("plain splats are one model a modality already; leave out --separate.")
     settings = plain_settings(options) if options.model == "splats" else settings_of(options, None)
-    capture, device = open_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
