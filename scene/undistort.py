@@ -20,7 +20,15 @@ DIRECTIONS = 64  # of such rays
 LEAST_KEPT = 0.25  # of the photo's area; less is left of it only where the numbers are wrong ...
 MOST_GROWN = 8  # times it; 120 degrees of real lenses, which squeeze their edges, grow three times
 ROWS = 256  # of pixels whose places are computed at a time
-CELLS = (64, 32, 16, 8)  # pixels a side of a mesh's cells, within which pixels are interpolated ...
+CELLS = (
+    64,
+    48,
+    32,
+    24,
+    16,
+    12,
+    8,
+)  # pixels a side of a mesh's cells, within which pixels are interpolated ...
 MESH_ERROR = 0.05  # ... with an error of so many pixels at most, where any of CELLS allows it
 OUTSIDE = -1e4  # pixels: where the mesh has cells that no photo has
 

@@ -12,7 +12,17 @@ from scene.pose import View, look_at, perspective
 from scene.read_capture import read_capture
 from scene.write_capture import write_capture
 from tests.training_runs import run
-from training.exposure import FEWEST, FROM, MOST, NOISE, NONE, Exposures, fitted_psnr, log_gain
+from training.exposure import (
+    FEWEST,
+    FROM,
+    LIKE,
+    MOST,
+    NOISE,
+    NONE,
+    Exposures,
+    fitted_psnr,
+    log_gain,
+)
 from training.losses import ImageLoss
 from training.photos import LoadedPhoto
 from training.settings import TrainSettings
@@ -57,6 +67,11 @@ def test_the_gain_of_a_look_is_least_squares_over_what_counts(device, size, mask
     np.testing.assert_allclose(
         exposures.log_gain[0], log_gain(product, square), rtol=1e-4, atol=1e-5
     )
+    weights = counts / max(counts.sum(), 1e-9)
+    a, b = (v - (weights * v).sum(axis=(1, 2), keepdims=True) for v in (drawn, wanted))
+    both, ours, own = ((weights * v).sum() for v in (a * b, a * a, b * b))
+    like = both * abs(both) / (ours * own) if min(ours, own) > 1e-5 else 0.0
+    assert exposures.likeness[0] == pytest.approx(like, abs=1e-4)
 
 
 def test_nothing_drawn_or_shown_is_no_gain():
@@ -71,7 +86,7 @@ def known(device, logs: np.ndarray) -> tuple[Exposures, list[LoadedPhoto]]:
     rgba = opaque(np.full((4, 4, 3), 128, np.uint8))
     photos = [photo_of(rgba, name=str(i)) for i in range(len(logs))]
     exposures = Exposures(device, {"RGB": photos})
-    exposures.log_gain[:] = logs
+    exposures.log_gain[:], exposures.likeness[:] = logs, LIKE
     return exposures, photos
 
 
@@ -89,6 +104,25 @@ def test_gains_count_from_the_noise_on(device, spread):
     assert f"differ in brightness by {100 * spread:.0f} %" in exposures.remarks()[0]
 
 
+@pytest.mark.parametrize(("sign", "like"), [(1, 1.0), (-1, -1.0), (0, 0.0)])
+def test_likeness_has_a_sign_and_knows_no_gain(device, sign, like):
+    """Half as bright is as like; a negative is not like; a sheet of one colour is like nothing."""
+    rgb = RNG(1).integers(20, 230, (6, 9, 3)).astype(np.uint8)
+    photo = photo_of(opaque(rgb))
+    image = 0.5 + sign * 0.5 * (rgb.transpose(2, 0, 1) / np.float32(255) - 0.5)
+    exposures = Exposures(device, {"RGB": [photo]})
+    exposures.look(photo, device.upload(image.astype(np.float32)), device.upload(photo.rgba))
+    assert exposures.likeness[0] == pytest.approx(like, abs=1e-4)
+
+
+@pytest.mark.parametrize(("like", "counts"), [(LIKE, True), (LIKE - 1e-9, False), (-1.0, False)])
+def test_a_model_that_does_not_show_the_photos_says_nothing_of_them(device, like, counts):
+    logs = 0.2 * np.array([-1.0, 1] * 5)[:, None] * np.ones(3)
+    exposures, photos = known(device, logs)
+    exposures.likeness[4:] = like  # the median of ten, four of which are at the bound
+    assert (exposures.gain(photos[0]) != NONE) == counts == bool(exposures.remarks())
+
+
 def test_few_or_unknown_photos_are_left_as_they_are(device):
     logs = np.array([-0.5, 0.5] * FEWEST)[:FEWEST, None] * np.ones(3)
     exposures, photos = known(device, logs)
@@ -99,7 +133,8 @@ def test_few_or_unknown_photos_are_left_as_they_are(device):
     again.load(exposures.state())
     np.testing.assert_array_equal(again.log_gain, exposures.log_gain)
     again.load({})  # of a run before there were any
-    again.load({"exposure.log_gain": np.zeros((2, 3)), "exposure.begin": np.array(0.5)})
+    other, _ = known(device, np.zeros((2, 3)))
+    again.load(other.state())
     np.testing.assert_array_equal(again.log_gain, exposures.log_gain)
     assert again.begin == FROM
     again.forget(0.25)

@@ -6,7 +6,8 @@ over their gains.  The gains' mean over a modality is 1, so that the model has t
 
 A model that is not trained to the end, or cannot show everything, leaves gains of a few percent
 where there are none.  NOISE of them is taken for that, and with it a share of all gains (Wiener's
-filter): where photos do not differ by more, nothing is changed.
+filter): where photos do not differ by more, nothing is changed.  A model that does not show the
+photos yet, such as the fog that a run from random points begins with, says nothing of them.
 """
 
 import numpy as np
@@ -16,7 +17,8 @@ from training.networks import KERNELS
 from training.photos import LoadedPhoto
 
 FROM = 0.25  # of the run: before that the model shows too little
-NOISE = 0.04  # standard deviation of the gains' logarithms; docs/bench/photos.csv
+NOISE = 0.04  # standard deviation of the gains' logarithms; docs/bench/exposure.csv
+LIKE = 0.8  # squared correlation of drawings and photos, median; docs/bench/exposure.csv
 FEWEST = 6  # known photos of a modality, and half of them: then a mean means something
 MOST = 4.0  # times brighter or darker; beyond it is no exposure
 SATURATED = 254 / 255  # as in kernels/exposure.cl
@@ -34,6 +36,7 @@ class Exposures:
         self.row = {name: row for row, name in enumerate(names)}
         self.rows = {m: [self.row[m, p.name] for p in each] for m, each in photos.items()}
         self.log_gain = np.full((len(names), 3), np.nan)  # NaN: not looked at yet
+        self.likeness = np.full(len(names), np.nan)  # squared correlation with what was drawn
         self.begin = FROM  # share of the run from which on photos are looked at
         self.nothing = device.zeros(1)
 
@@ -43,27 +46,30 @@ class Exposures:
         masked, weight = int(photo.weight is not None), self.nothing
         if masked:
             weight = self.device.upload(np.ascontiguousarray(photo.weight, np.float32))
-        sums = self.device.empty(3 * height), self.device.empty(3 * height)
+        rows = self.device.empty(6 * 3 * height)
         self.device.launch(
-            self.kernel, 3 * height, 1, width, height, masked, image, rgba, weight, *sums
+            self.kernel, 3 * height, 1, width, height, masked, image, rgba, weight, rows
         )
-        product, square = (
-            self.device.download(rows).reshape(3, height).sum(axis=1, dtype=np.float64)
-            for rows in sums
-        )
-        self.log_gain[self.row[photo.modality, photo.name]] = log_gain(product, square)
+        sums = self.device.download(rows).reshape(6, 3, height).sum(axis=2, dtype=np.float64)
+        row = self.row[photo.modality, photo.name]
+        self.log_gain[row] = log_gain(product=sums[4], square=sums[3])
+        self.likeness[row] = likeness(*sums)
 
     def forget(self, fraction: float) -> None:
         """The picture was lost at this share of the run: begin anew, as late as from the start."""
-        self.log_gain[:] = np.nan
+        self.log_gain[:], self.likeness[:] = np.nan, np.nan
         self.begin = fraction + FROM
 
     def spread(self, modality: str) -> float:
-        """Standard deviation of the logarithms of a modality's gains; 0 while too few are known."""
-        known = self.log_gain[self.rows[modality]]
-        known = known[np.isfinite(known).all(axis=1)]
-        enough = len(known) >= max(FEWEST, len(self.rows[modality]) / 2)
-        return float(np.sqrt(known.var(axis=0).mean())) if enough else 0.0
+        """Standard deviation of the logarithms of a modality's gains.
+
+        0 while too few of them are known, or the model shows too little of its photos.
+        """
+        known, like = (of[self.rows[modality]] for of in (self.log_gain, self.likeness))
+        seen = np.isfinite(known).all(axis=1)
+        if not (seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE):
+            return 0.0
+        return float(np.sqrt(known[seen].var(axis=0).mean()))
 
     def gain(self, photo: LoadedPhoto) -> Gain:
         """What the photo's colours are times the model's; NONE where all photos are alike."""
@@ -86,14 +92,15 @@ class Exposures:
         ]
 
     def state(self) -> dict[str, np.ndarray]:
-        begin = np.array(self.begin)
-        return {"exposure.log_gain": self.log_gain.copy(), "exposure.begin": begin}
+        known = {"log_gain": self.log_gain.copy(), "likeness": self.likeness.copy()}
+        return {f"exposure.{n}": v for n, v in (known | {"begin": np.array(self.begin)}).items()}
 
     def load(self, state: dict[str, np.ndarray]) -> None:
         """Of `state`; a checkpoint that has none, or that of other photos, leaves them unknown."""
         kept = state.get("exposure.log_gain")
         if kept is not None and kept.shape == self.log_gain.shape:
             self.log_gain, self.begin = kept.copy(), float(state["exposure.begin"])
+            self.likeness = state["exposure.likeness"].copy()
 
 
 def log_gain(product: np.ndarray, square: np.ndarray) -> np.ndarray:
@@ -101,6 +108,17 @@ def log_gain(product: np.ndarray, square: np.ndarray) -> np.ndarray:
     known = (square > 0) & (product > 0)
     ratio = np.where(known, product, 1) / np.where(known, square, 1)
     return np.log(np.clip(ratio, 1 / MOST, MOST))
+
+
+def likeness(count, drawn, photo, drawn2, product, photo2) -> float:
+    """Squared correlation, with its sign, by sums over pixels, each (3,) a channel.
+
+    0 where either has no contrast.
+    """
+    each = np.maximum(count, 1e-9)
+    ours, own = ((b - a * a / each).sum() for a, b in ((drawn, drawn2), (photo, photo2)))
+    both = (product - drawn * photo / each).sum()
+    return float(both * abs(both) / (ours * own)) if min(ours, own) > 1e-6 * count.sum() else 0.0
 
 
 def fitted_psnr(image: np.ndarray, photo: LoadedPhoto, wanted: np.ndarray) -> float:

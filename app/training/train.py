@@ -210,7 +210,7 @@ def run(options: Options) -> int:
         pace_package(options.out)
     say(summary(trainer, options.out, interrupted), *trainer.exposures.remarks())
     if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
-        say(found)
+        say(*found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
     return INTERRUPTED if interrupted else 0
