@@ -19,6 +19,7 @@ from training.exposure import (
     MOST,
     NOISE,
     NONE,
+    NORMAL,
     Exposures,
     fitted_psnr,
     log_gain,
@@ -92,8 +93,8 @@ def known(device, logs: np.ndarray) -> tuple[Exposures, list[LoadedPhoto]]:
 
 @pytest.mark.parametrize("spread", [0.0, NOISE - 1e-6, NOISE + 1e-6, 0.2])
 def test_gains_count_from_the_noise_on(device, spread):
-    """A share of 1 - (noise / spread)^2 of each, their mean over the photos 1."""
-    logs = 0.3 + spread * np.array([-1.0, 1] * 5)[:, None] * np.ones(3)
+    """A share of 1 - (noise / spread)^2 of each, their median over the photos 1."""
+    logs = 0.3 + spread / NORMAL * np.array([-1.0, 1] * 5)[:, None] * np.ones(3)
     exposures, photos = known(device, logs)
     gains = np.array([exposures.gain(photo) for photo in photos])
     if spread < NOISE:
@@ -102,6 +103,14 @@ def test_gains_count_from_the_noise_on(device, spread):
     share = 1 - (NOISE / spread) ** 2
     np.testing.assert_allclose(np.log(gains), share * (logs - 0.3), atol=1e-9)
     assert f"differ in brightness by {100 * spread:.0f} %" in exposures.remarks()[0]
+
+
+def test_single_photos_change_no_others(device):
+    """Dark ones, or wrong poses, are what suspects are for."""
+    logs = np.repeat(np.linspace(-0.02, 0.02, 20)[:, None], 3, axis=1)
+    logs[:4] = -0.8
+    exposures, photos = known(device, logs)
+    assert all(exposures.gain(photo) == NONE for photo in photos) and exposures.remarks() == []
 
 
 @pytest.mark.parametrize(("sign", "like"), [(1, 1.0), (-1, -1.0), (0, 0.0)])

@@ -2,7 +2,8 @@
 
 A camera that chooses exposure and white balance by itself shows the same thing in other colours in
 each photo.  A photo is taken to be the model's picture times a gain a channel; targets are photos
-over their gains.  The gains' mean over a modality is 1, so that the model has the middle of them.
+over their gains.  The gains' median over a modality is 1, so that the model has the middle of them;
+middle and spread are medians, so that single dark photos, or wrong poses, change no other photo.
 
 A model that is not trained to the end, or cannot show everything, leaves gains of a few percent
 where there are none.  NOISE of them is taken for that, and with it a share of all gains (Wiener's
@@ -20,6 +21,7 @@ FROM = 0.25  # of the run: before that the model shows too little
 NOISE = 0.04  # standard deviation of the gains' logarithms; docs/bench/exposure.csv
 LIKE = 0.8  # squared correlation of drawings and photos, median; docs/bench/exposure.csv
 FEWEST = 6  # known photos of a modality, and half of them: then a mean means something
+NORMAL = 1.4826  # standard deviations a median deviation, of a normal spread
 MOST = 4.0  # times brighter or darker; beyond it is no exposure
 SATURATED = 254 / 255  # as in kernels/exposure.cl
 Gain = tuple[float, float, float]  # of red, green and blue
@@ -61,7 +63,7 @@ class Exposures:
         self.begin = fraction + FROM
 
     def spread(self, modality: str) -> float:
-        """Standard deviation of the logarithms of a modality's gains.
+        """Of the logarithms of a modality's gains, by their median deviation, as a standard one.
 
         0 while too few of them are known, or the model shows too little of its photos.
         """
@@ -69,7 +71,8 @@ class Exposures:
         seen = np.isfinite(known).all(axis=1)
         if not (seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE):
             return 0.0
-        return float(np.sqrt(known[seen].var(axis=0).mean()))
+        away = np.abs(known[seen] - np.median(known[seen], axis=0))
+        return float(NORMAL * np.sqrt((np.median(away, axis=0) ** 2).mean()))
 
     def gain(self, photo: LoadedPhoto) -> Gain:
         """What the photo's colours are times the model's; NONE where all photos are alike."""
@@ -77,7 +80,7 @@ class Exposures:
         spread = self.spread(photo.modality)
         if not (spread > NOISE and np.isfinite(own).all()):
             return NONE
-        middle = np.nanmean(self.log_gain[self.rows[photo.modality]], axis=0)
+        middle = np.nanmedian(self.log_gain[self.rows[photo.modality]], axis=0)
         share = 1 - (NOISE / spread) ** 2
         return tuple(np.exp(share * (own - middle)).tolist())
 
