@@ -21,7 +21,8 @@ from scene.camera_list import (
     pose_matrix,
     read_name,
 )
-from scene.capture_rules import COLMAP_UP, CaptureWorld, image_size
+from scene.capture_photos import image_size
+from scene.capture_rules import COLMAP_UP, CaptureWorld
 from scene.pose import View
 from scene.read_transforms import ENDINGS, POSES, gather, opencv_axes
 

@@ -22,13 +22,14 @@ from training.drawing import camera_of
 from training.evaluate import evaluate_model, report
 from training.losses import ImageLoss
 from training.optimizer import Adam
-from training.photos import Targets, read
+from training.photos import read
 from training.plain_reference import decode_plain_reference
 from training.plain_step import GROUPS, PlainStep
 from training.reference import decode_reference, image_loss_reference
 from training.settings import TrainSettings
 from training.step import Step
 from training.synthetic.balls import make_balls
+from training.targets import Targets
 from training.train import Trainer
 
 SHARE = 0.7

@@ -88,7 +88,8 @@ def test_another_state_for_which_memory_lacks_changes_nothing(balls, no_memory):
     with pytest.raises(RuntimeError, match="no room"):
         trainer.go_on_from(fewer)
     after, _ = trainer.checkpoint()
-    assert all(np.array_equal(before[name], after[name]) for name in before)
+    for name in before:  # of photos that were not looked at yet, NaN
+        np.testing.assert_array_equal(before[name], after[name])
 
 
 def test_numbers_that_end_in_the_last_step_are_not_kept(balls, tmp_path, at_step, capsys):
@@ -170,7 +171,7 @@ def test_a_scene_that_shows_nothing_is_called_that(balls):
     trainer = Trainer(open_device(), balls, TrainSettings(iterations=150, max_anchors=600))
     for _ in trainer.steps():
         pass
-    assert hopeless(trainer) == ""
+    assert hopeless(trainer) == []
     state = trainer.adam.state()
     trainer.adam.load(state | {"anchors.value": state["anchors.value"] + np.float32(1000)})
-    assert "RGB, Thermal: the pictures are no nearer" in hopeless(trainer)
+    assert "RGB, Thermal: the pictures are no nearer" in hopeless(trainer)[0]

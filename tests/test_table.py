@@ -180,7 +180,7 @@ def test_a_model_of_all_modalities_tells_its_size_once():
     rows = [replace(made("joint", 30, 0.5), modality="RGB"), made("joint", 30, 0.5)]
     _, lines = cells([*rows, made("splats", 31, 9)])
     assert [line[0] for line in lines] == ["shape-shifting", "", "3DGS splats"]
-    assert [line[-2] for line in lines] == ["", "0.50", "9.00"]
+    assert [line[-3:-1] for line in lines] == [["", ""], ["0.50", "100"], ["9.00", "100"]]
 
 
 def test_options_go_to_the_methods_that_have_them(tmp_path):

@@ -87,7 +87,8 @@ def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | Non
     if background is None:
         return None
     difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
-    return difference > NOISE
+    shape = difference > NOISE
+    return shape if photo.weight is None else shape | ~(photo.weight > 0)  # unknown: not carved
 
 
 def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:

@@ -14,17 +14,19 @@ from runtime_models.spherical_harmonics import C0
 from scene.capture import Capture
 from training.backgrounds import choose_background
 from training.drawing import Color
+from training.exposure import Exposures
 from training.first_anchors import neighbour_distance, seen_colors
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import choose_voxel, initial_points, voxel_centres
 from training.optimizer import Adam
-from training.photos import BLACK, LoadedPhoto, Targets, choose_downscale, load_photos
+from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from training.plain_density import changed_splats, decide, extent_of, reset_opacity
 from training.plain_settings import PlainRates, PlainSettings
 from training.plain_step import REST, PlainEvidence, PlainStep
 from training.run import SETTLE, Run
 from training.schedule import Budget, Schedule
+from training.targets import Targets
 
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
 DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
@@ -67,6 +69,7 @@ class PlainTrainer(Run):
         self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
         self.extent = extent_of([p.view for p in photos])
         self.targets = Targets(device)
+        self.exposures = Exposures(device, self.schedule.photos)
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, settings.rate_scale
         self.adam = Adam(device, self.first_values(photos), self.all_rates())
@@ -127,9 +130,9 @@ class PlainTrainer(Run):
         return loss.value()
 
     def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
-        target = self.targets.target(photo, background)
         depth = self.targets.wish(photo, self.settings.depth_share)
         self.drawing = self.step.draw(photo.view, background, depth is not None)
+        target = self.target(photo, background)
         loss = self.targets.loss(photo)
         share = self.settings.ssim_share
         return self.step.gradients(self.drawing, loss, target, share, self.evidence, depth)
@@ -168,6 +171,7 @@ class PlainTrainer(Run):
         self.adam.load(self.guard.fall_back())
         self.evidence = PlainEvidence(self.device, self.count)
         self.rate_scale /= 2
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
         return True
 
     def change(self) -> None:

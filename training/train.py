@@ -15,24 +15,20 @@ from training.density_budget import most_anchors
 from training.doubts import usable
 from training.drawing import Color, camera_of
 from training.export import model_of
+from training.exposure import Exposures
 from training.first_anchors import first_anchors
 from training.guard import EVERY as GUARD_EVERY
 from training.guard import SNAPSHOT_EVERY, Guard
 from training.initial import initial_points
 from training.networks import HeadLayout, initial_weights, padded
 from training.optimizer import Adam
-from training.photos import (
-    BLACK,
-    LoadedPhoto,
-    Targets,
-    choose_downscale,
-    load_photos,
-)
+from training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos, memory_doubts
 from training.rise import Rise, after_fall
 from training.run import SETTLE, Run
 from training.schedule import Budget, Schedule, balance_of, turns_of
 from training.settings import Rates, TrainSettings
 from training.step import Step
+from training.targets import Targets
 from training.visibility import Visibility
 
 GROW_FROM, GROW_UNTIL = 0.05, 0.8  # of the run
@@ -82,6 +78,8 @@ class Trainer(Run):
             for split in ("train", "test")
         )
         photos, self.doubts = usable(photos, settings.masks)
+        if not settings.downscale:
+            self.doubts += memory_doubts(capture.photos, self.factor)
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:
@@ -102,6 +100,7 @@ class Trainer(Run):
         self.coarse = Coarse(settings.coarse, settings.coarse_until, {})
         self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
         self.targets, self.photo_factor = Targets(device), 1
+        self.exposures = Exposures(device, by_modality)
         self.rise = Rise(settings.rise, 0, settings.revive)
         thermal = [stop.name for stop in self.stops if stop.kind == "thermal"]
         self.roughness = dict.fromkeys(thermal, settings.thermal_smooth)
@@ -155,6 +154,7 @@ class Trainer(Run):
         self.evidence, self.visibility = self.unwatched(len(values["anchors"]))
         self.evidence.load(state)
         self.visibility.load(state)
+        self.exposures.load(state)
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
         """(state, notes) from which `resume` goes on to the same bits."""
@@ -165,7 +165,8 @@ class Trainer(Run):
             "settings": self.settings.as_dict(),
             "rise": [self.rise.steps, self.rise.since, self.rise.pull],
         }  # fmt: skip
-        return self.adam.state() | self.evidence.state() | self.visibility.state(), notes
+        known = self.evidence.state() | self.visibility.state() | self.exposures.state()
+        return self.adam.state() | known, notes
 
     @property
     def anchors_count(self) -> int:
@@ -188,7 +189,8 @@ class Trainer(Run):
 
         On the way the guard learns what a healthy picture of every modality has on screen.
         """
-        before, watched = self.adam.state(), self.evidence.state() | self.visibility.state()
+        before = self.adam.state()
+        known = self.evidence.state() | self.visibility.state() | self.exposures.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
             whole = {(p.view.size, p.depth is None): p for p in photos}.values()
@@ -199,8 +201,9 @@ class Trainer(Run):
                 if self.between.middle is not None:
                     self.learn_at(photo, background, self.between.middle)
         self.adam.load(before)
-        self.evidence.load(watched)
-        self.visibility.load(watched)
+        self.evidence.load(known)
+        self.visibility.load(known)
+        self.exposures.load(known)
 
     def next_photo(self) -> LoadedPhoto:
         """The photo of this step, as small as this part of the run has them."""
@@ -216,15 +219,15 @@ class Trainer(Run):
     ) -> dict[str, object]:
         """Gradients of how a photo differs.  control: Psi of each head, if not that of its stop."""
         settings = self.settings
-        target, at_stop = self.targets.target(photo, background), control is None
+        at_stop, rows = control is None, None
         self.evidence.stop = stop = [s.name for s in self.stops].index(photo.modality)
         depth = self.targets.wish(photo, settings.depth_share)
-        rows = None
         if at_stop:
             control, rows = self.control(photo.modality), self.rows(photo)
         self.drawing = self.step.draw(photo.view, control, background, depth is not None, rows)
         if at_stop:
             self.visibility.note(stop, rows, self.step.there["anchors"], self.drawing.splats)
+        target = self.target(photo, background, at_stop)
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
             settings.opacity_share, settings.scale_share, self.evidence, depth,
@@ -319,6 +322,7 @@ class Trainer(Run):
         looks = self.rise.steps if self.rise.since == self.iteration else 0
         self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
         self.rate_scale /= 2
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
         return True
 
     def go_on_from(self, state: dict[str, np.ndarray]) -> None:
@@ -374,7 +378,6 @@ class Trainer(Run):
             "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),
             "iterations": self.iteration,
-            "seconds": round(self.elapsed, 3),
             "voxel_m": self.voxel,
             "first_anchors": self.origin,
             "downscale": self.factor,

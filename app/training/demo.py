@@ -9,9 +9,9 @@ from app.command_line import EXPERT, SIZE
 from app.paths import full
 from app.terminal import say
 
-MOST_BYTES = 2_500_000  # the package lies in the repository
+MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 20 minutes of a core
-MOST_ANCHORS = 36000
+MOST_ANCHORS = 30000
 BETWEEN, SHARE = "shapes", 0.5  # what lies between the stops, and in how many of the steps
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL
-from app.terminal import open_console, tell_json
+from app.terminal import open_console, say, tell_json
 from app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ class Options(PhotoOptions, SizeOptions, ModelOptions, TrialOptions):
 
 
 TRIAL = 600  # steps
+CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
 
 
 def defaults() -> dict[str, str]:
@@ -70,13 +71,13 @@ def defaults() -> dict[str, str]:
 def run(options: Options) -> int:
     from app.commands.bench import write_json
     from app.errors import UsageError
+    from app.opening import open_capture
     from app.pace import with_pace
     from app.paths import full
     from app.progress import progress_bar
-    from app.training.train import calibrated, say, settings_of
+    from app.training.train import calibrated, settings_of
     from rasterizer.device import open_device
     from runtime_models.write_package import refuse_foreign, write_package
-    from scene.read_capture import read_capture
     from training.fit import Fit
     from training.rig import with_found
 
@@ -89,7 +90,7 @@ def run(options: Options) -> int:
     if options.final_iterations is not None or options.final_seconds is not None:
         longer = {"iterations": options.final_iterations, "seconds": options.final_seconds}
         last = settings_of(replace(options, **longer), None)
-    capture, device = read_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
         capture = with_found(capture, settings.rig)
@@ -104,7 +105,8 @@ def run(options: Options) -> int:
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]
-    noted = with_pace(replace(model, provenance={**model.provenance, "need": result}))
+    report = {**model.provenance, "need": without_times(result)}
+    noted = with_pace(replace(model, provenance=report))
     size = write_package(noted, options.out, need.fitted.storage)
     print_report(need)
     what = "the fitted model of the first seed with this report in it"
@@ -115,6 +117,14 @@ def run(options: Options) -> int:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")
     return 0
+
+
+def without_times(result: object) -> object:
+    """The report but for what clocks say: a package is the same bytes for the same seed."""
+    if isinstance(result, dict):
+        kept = {key: value for key, value in result.items() if not key.endswith(CLOCKS)}
+        return {key: without_times(value) for key, value in kept.items()}
+    return [without_times(part) for part in result] if isinstance(result, list) else result
 
 
 def print_report(need: "Need") -> None:

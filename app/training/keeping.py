@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from app.errors import UsageError
 from app.paths import full
+from app.terminal import say
 
 if TYPE_CHECKING:
     from training.train import Trainer
@@ -65,7 +66,6 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
     Raises UsageError where that cannot be; then both lie in a folder of the system's for temporary
     files, if there is room.
     """
-    from app.training.train import say
     from runtime_models.write_package import write_package
     from training.checkpoint import write_checkpoint
 

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from app.command_line import EXPERT, MODALITY, POSITIONAL
+from app.opening import open_capture
 from app.paths import full
+from app.terminal import say
 from app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
-from app.training.train import INTERRUPTED, say
+from app.training.train import INTERRUPTED
 from app.training.train import Options as TrainOptions
 from app.training.train_options import PhotoOptions, SizeOptions
 
@@ -76,7 +78,6 @@ def run(options: Options) -> int:
     from app.charts.chart_rows import RowsFile
     from app.errors import UsageError
     from rasterizer.device import open_device
-    from scene.read_capture import read_capture
     from training.rig import with_found
     from training.vgg_distance import VggDistance
 
@@ -88,7 +89,7 @@ def run(options: Options) -> int:
         raise UsageError("--methods spz packs the files of splats; add splats before it.")
     if options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is a file; --out is a folder.")
-    capture, device = read_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
     refuse_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -132,7 +133,7 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
             )
         if distance is not None:
             for photo in held_out:
-                refuse_small(*(max(round(side / factor), 1) for side in photo.view.size))
+                refuse_small(*photo.view.divided(factor).size)
 
 
 def offset_of(device, capture: "Capture", options: Options) -> str:

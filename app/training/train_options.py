@@ -58,6 +58,9 @@ class PhotoOptions:
     """Colour behind everything.  auto: the capture's own, else random where photos have masks."""
     device: Literal["cpu", "gpu"] | None = None
     """Kind of OpenCL device that must be used.  Default: the fastest that there is."""
+    memory: Annotated[float | None, EXPERT] = None
+    """GB of memory that files may take: photos half of it, for as long as the training lasts.
+    Default: three quarters of this machine's."""
 
 
 # What --help says where the preset's number is None, or where the capture decides.
