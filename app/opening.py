@@ -1,17 +1,21 @@
-"""How every command opens its scene: the options of reading, progress, a word on what is wrong."""
+"""How every command opens its scene or its photos: the options of reading, progress, doubts."""
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import Finding, Model
 from shapeshift.runtime_models.splats.plain_splats import Reading
+
+if TYPE_CHECKING:
+    from shapeshift.scene.captures.capture import Capture
 
 PATIENCE_S = 1.0  # what takes longer shows a progress bar
 
@@ -43,8 +47,7 @@ class ReadingOptions:
 
         if self.max_splats < 0:
             raise UsageError(f"--max-splats is {self.max_splats}, expected 0 (all) or more.")
-        if not 0 <= self.memory < math.inf:
-            raise UsageError(f"--memory is {self.memory}, expected GB, or 0 for what is usual.")
+        refuse_memory(self.memory)
         return Reading(
             self.mode,
             self.up,
@@ -54,6 +57,14 @@ class ReadingOptions:
             most_splats=self.max_splats,
             memory_gb=self.memory,
         )
+
+
+def refuse_memory(gigabytes: float) -> None:
+    """Raises UsageError for what is no amount."""
+    from shapeshift.app.errors import UsageError
+
+    if not 0 <= gigabytes < math.inf:
+        raise UsageError(f"--memory is {gigabytes}, expected GB, or 0 for what is usual.")
 
 
 def open_model(
@@ -78,6 +89,25 @@ def open_model(
     for finding in model.findings:
         say(sentence(finding))
     return model
+
+
+def open_capture(path: Path, memory_gb: float | None = None) -> "Capture":
+    """Posed photos, not their pixels; progress and doubts of its files go to stderr.
+
+    memory_gb: --memory, for all that this process reads from now on.  Raises BadFile, UsageError.
+    """
+    from shapeshift.app.progress import working
+    from shapeshift.runtime_models.files.memory import VARIABLE
+    from shapeshift.scene.captures.read_capture import read_capture
+
+    if memory_gb:
+        refuse_memory(memory_gb)
+        os.environ[VARIABLE] = str(memory_gb)  # where its pixels are read, also by children
+    with working("reading the capture"):
+        capture = read_capture(path)
+    for doubt in capture.doubts:
+        say(doubt)
+    return capture
 
 
 def sentence(finding: Finding) -> str:

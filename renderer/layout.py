@@ -37,6 +37,7 @@ SLOTS = {
     "SURFACES": 4,  # vec4 (N, 3)    depth around the mean, and a normal
     # decode
     "ANCHORS": 2,  # vec4 (A,)      metres in the object
+    "FRAMES": 3,  # vec4 (A, 2)    factors along an anchor's axes, and its unit quaternion wxyz
     "FEATURES": 3,  # vec4 (A, F / 4)
     "OUTPUT": 4,  # float          a head's numbers
     "WEIGHTS": 5,  # vec4           of a head that does not fit a uniform block

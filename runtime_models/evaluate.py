@@ -16,7 +16,7 @@ from shapeshift.runtime_models.model import (
     Splats,
 )
 from shapeshift.runtime_models.package.write_onnx import write_onnx
-from shapeshift.runtime_models.rotation import normalize
+from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.runtime_models.scaffold.evaluate_scaffold import ScaffoldEvaluator
 from shapeshift.runtime_models.session import BATCH, open_session
 from shapeshift.runtime_models.stop_weights import Controls
@@ -87,10 +87,13 @@ class Evaluator:
         self._threads = threads
         self._own: tuple[np.ndarray, np.ndarray] | None = None  # x of anchors, Psi (A, d)
         self._centres: np.ndarray | None = None  # (A, k * 3) the anchor of every splat
+        self._frames: FrameColumns | None = None
         self._scaffold: ScaffoldEvaluator | None = None
         if isinstance(model, ScaffoldModel):
             self._scaffold = ScaffoldEvaluator(model, keep)
         elif isinstance(model, AnchorModel):
+            if model.frames is not None:
+                self._frames = FrameColumns(model)
             kind = FoldedNetwork if fold else WholeNetwork
             for name, mlp in model.networks.items():
                 self._networks[name] = kind(name, mlp, model, threads)
@@ -183,10 +186,13 @@ class Evaluator:
         if name in self._lasting:
             return self._kept[name]
         values = self._run(name, x)
+        if self._frames is not None:
+            values = self._frames.apply(name, values)
         if name == "offset":
             values += self._centres
         if self._kept is not None and "control" not in self.model.networks[name].inputs:
             self._lasting.add(name)
+            self._kept[name] = values
         return values
 
     def _run(
@@ -240,6 +246,28 @@ class Evaluator:
         if self._own is None or not np.array_equal(self._own[0], x):  # five networks ask for it
             self._own = np.array(x), self.model.psi(x)
         return self._own[1]
+
+
+class FrameColumns:
+    """What anchors' frames make of the outputs of the networks of the shape."""
+
+    def __init__(self, model: AnchorModel) -> None:
+        frames, k = model.frames, model.splats_per_anchor
+        self._axes = rotation_matrices(frames.wxyz) * frames.scales[:, None]  # (A, 3, 3)
+        self._scales = np.tile(frames.scales, k)  # (A, k * 3)
+        self._wxyz = np.repeat(frames.wxyz, k, axis=0)  # (A * k, 4)
+
+    def apply(self, name: str, values: np.ndarray) -> np.ndarray:
+        """(A, k * size) in the object's frame of such in each anchor's own; may be `values`."""
+        count = len(self._axes)
+        if name == "offset":
+            own = values.reshape(count, -1, 3)  # (A, k, 3)
+            return np.matmul(own, self._axes.transpose(0, 2, 1)).reshape(count, -1)
+        if name == "scale":
+            values *= self._scales
+        elif name == "rotation":
+            values = product(self._wxyz, values.reshape(-1, 4)).reshape(count, -1)
+        return values
 
 
 def _own(weights: np.ndarray, layer: np.ndarray) -> np.ndarray:

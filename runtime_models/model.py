@@ -1,6 +1,6 @@
 """The central types of what a scene holds: anchor model, plain splat layers, decoded splats."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -92,6 +92,20 @@ class Mlp:
 
 
 @dataclass(frozen=True)
+class AnchorFrames:
+    """Every anchor's own axes and sizes: a splat is predicted in them, as if all were alike.
+
+    Its mean is anchor + R (s * offset), its scales s * scale, its rotation that of R times its own.
+    """
+
+    scales: np.ndarray  # (A, 3) s, factors above 0, along the anchor's axes
+    wxyz: np.ndarray  # (A, 4) R, unit quaternions, object from anchor
+
+    def __post_init__(self) -> None:
+        check(scales=(self.scales, "A 3"), wxyz=(self.wxyz, "A 4"))
+
+
+@dataclass(frozen=True)
 class AnchorModel:
     """A trained shape-shifting model: anchors, features and five networks (paper section 3.2)."""
 
@@ -106,9 +120,12 @@ class AnchorModel:
     findings: tuple[Finding, ...] = ()
     pace: tuple[Pace, ...] = ()  # of some pairs of stops
     between_stops: str = "blend"  # one of BETWEEN_STOPS: x there is a blend, or encoded as it is
+    frames: AnchorFrames | None = None  # None: the object's axes and size 1 for all
 
     def __post_init__(self) -> None:
         check(anchors=(self.anchors, "A 3"), features=(self.features, "A F"))
+        if self.frames is not None:
+            check(anchors=(self.anchors, "A 3"), scales=(self.frames.scales, "A 3"))
 
     @property
     def splat_count(self) -> int:
@@ -122,6 +139,20 @@ class AnchorModel:
     def psi(self, control: Controls) -> np.ndarray:
         """(1, d) float32 control encoding, or (A, d) of one control an anchor."""
         return encode_control(self.encoding, self.blend, control)
+
+    def with_anchors(self, rows: np.ndarray | slice) -> "AnchorModel":
+        """The same networks for these rows of the anchors, in their order."""
+        frames = self.frames
+        if frames is not None:
+            frames = AnchorFrames(
+                np.ascontiguousarray(frames.scales[rows]), np.ascontiguousarray(frames.wxyz[rows])
+            )
+        return replace(
+            self,
+            anchors=np.ascontiguousarray(self.anchors[rows]),
+            features=np.ascontiguousarray(self.features[rows]),
+            frames=frames,
+        )
 
 
 @dataclass(frozen=True)

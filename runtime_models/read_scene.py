@@ -16,7 +16,7 @@ from shapeshift.runtime_models.model import (
     SplatLayers,
 )
 from shapeshift.runtime_models.package.lint_package import refuse_filling
-from shapeshift.runtime_models.package.package_files import ANCHORS, FORMAT, MANIFEST
+from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, format_name
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.refit_encoding import encoding_findings
 from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold, read_scaffold
@@ -146,7 +146,7 @@ def describe(model: Model, path: str | Path) -> dict:
     anchored = isinstance(model, AnchorModel)
     plain = isinstance(model, SplatLayers)
     facts = {
-        "format": FORMAT if anchored else model.provenance.get("format", "splats"),
+        "format": format_name(model) if anchored else model.provenance.get("format", "splats"),
         "anchors": 0 if plain else len(model.anchors),
         "splats": model.splat_count,
         "sh_degree": round(model.sh.shape[1] ** 0.5) - 1 if plain else None,

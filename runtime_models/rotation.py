@@ -20,6 +20,19 @@ def normalize(wxyz: np.ndarray) -> np.ndarray:
     return out
 
 
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(N, 4) quaternions of the rotations b (N, 4), then a (N, 4)."""
+    w, x, y, z = np.moveaxis(a, -1, 0)
+    s, i, j, k = np.moveaxis(b, -1, 0)
+    columns = (
+        w * s - x * i - y * j - z * k,
+        w * i + x * s + y * k - z * j,
+        w * j - x * k + y * s + z * i,
+        w * k + x * j - y * i + z * s,
+    )
+    return np.stack(columns, axis=-1)
+
+
 def rotation_matrices(wxyz: np.ndarray) -> np.ndarray:
     """(N, 3, 3) of unit quaternions (N, 4)."""
     w, x, y, z = np.moveaxis(wxyz, -1, 0)

@@ -154,6 +154,19 @@ class View:
         """The same field of view in another number of pixels."""
         return replace(self, size=size)
 
+    def divided(self, factor: int) -> "View":
+        """With 1 / factor of the pixels a side; what is less than a whole one at the right and at
+        the bottom is cut off.
+        """
+        left, right, down, up = self.tangents
+        (width, height), size = self.size, tuple(max(side // factor, 1) for side in self.size)
+        across, below = (min(side, factor) * new for side, new in zip(self.size, size, strict=True))
+        if across < width:
+            right = left + (right - left) * across / width
+        if below < height:
+            down = up - (up - down) * below / height
+        return View(self.world_from_eye, (left, right, down, up), self.near, self.far, size)
+
 
 def look_at(eye: np.ndarray, target: np.ndarray, up: tuple = (0.0, 1.0, 0.0)) -> Pose:
     """The pose of an eye at `eye` (3,) that looks at `target` (3,), metres in the world."""

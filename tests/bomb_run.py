@@ -14,6 +14,8 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
+
 sys.path[:0] = [str(Path(__file__).resolve().parents[1])]
 LONGEST_S = 60  # of processor time
 
@@ -22,6 +24,23 @@ def read_photo(path: Path) -> object:
     from shapeshift.scene.captures.photo import read_pixels
 
     return read_pixels(path)
+
+
+def read_trained(path: Path) -> object:
+    """As training does: a.png beside `path`, its mask and its lens if there are such."""
+    from shapeshift.scene.captures.capture import Photo
+    from shapeshift.scene.captures.colmap_tables import Lens
+    from shapeshift.scene.captures.photo import load_photo
+    from shapeshift.scene.captures.undistort import pinhole_of
+    from shapeshift.scene.pose import View
+
+    image, mask = path.with_name("a.png"), path.with_name("mask.png")
+    params, lens, size = json.loads(path.read_text()).get("fisheye"), None, (64, 64)
+    if params:
+        lens = Lens("OPENCV_FISHEYE", (2400, 2400), tuple(params))
+        size = pinhole_of(lens).size
+    view = View.from_pinhole(np.eye(4), (1.0, 1.0), (0.0, 0.0), size)
+    return load_photo(Photo(view, image, "RGB", mask if mask.exists() else None, lens=lens), 2)
 
 
 def read_depth(path: Path) -> object:
@@ -38,11 +57,12 @@ def readers() -> dict:
     import PIL.Image
     import PIL.PngImagePlugin
     import PIL.WebPImagePlugin
+    import pycolmap
     import scipy.spatial
     import trimesh
     import zstandard
 
-    assert all((laspy, lazrs, onnx, PIL, scipy, trimesh, zstandard))
+    assert all((laspy, lazrs, onnx, pycolmap, PIL, scipy, trimesh, zstandard))
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.scene.cameras.read_cameras import read_camera_list
     from shapeshift.scene.captures.read_capture import read_capture
@@ -52,6 +72,7 @@ def readers() -> dict:
 
     return {
         "model": read_model, "points": read_points, "capture": read_capture, "photo": read_photo,
+        "trained": read_trained,
         "depth": read_depth, "mesh": read_mesh, "scene": read_scene_file,
         "cameras": read_camera_list,
     }  # fmt: skip

@@ -296,6 +296,34 @@ def photo_as_large_as_one_may_be_whatever_its_bytes(folder: Path) -> Path:
     return put(folder / "a.png", png_of_one_colour(2896))
 
 
+@bomb("trained")
+def training_photo_of_one_colour(folder: Path) -> Path:
+    put(folder / "a.png", png_of_one_colour(11_000))
+    return put(folder / "photo.json", b"{}")
+
+
+@bomb("trained")
+def training_photo_as_large_as_one_may_be(folder: Path) -> Path:
+    put(folder / "a.png", png_of_one_colour(2896))
+    return put(folder / "photo.json", b"{}")
+
+
+@bomb("trained")
+def mask_of_one_colour(folder: Path) -> Path:
+    """Of a photo of 64 pixels; a mask may have as many as its photo, however few its bytes."""
+    put(folder / "a.png", png_of_one_colour(8))
+    put(folder / "mask.png", png_of_one_colour(11_000))
+    return put(folder / "photo.json", b"{}")
+
+
+@bomb("trained")
+def lens_that_makes_much_of_a_small_photo(folder: Path) -> Path:
+    """5.8 million pixels of one colour become 15.8 million straight ones."""
+    put(folder / "a.png", png_of_one_colour(2400))
+    params = [2400 / 2.1, 2400 / 2.1, 1200.0, 1200.0, 0.0, 0.0, 0.0, 0.0]
+    return put(folder / "photo.json", json.dumps({"fisheye": params}).encode())
+
+
 @bomb("depth")
 def depth_photo_of_one_distance(folder: Path) -> Path:
     return put(folder / "a.png", png_of_one_colour(11_000, gray=True))

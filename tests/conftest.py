@@ -1,10 +1,16 @@
 """Options of the test run: --slow (long ones too), --regenerate (write the golden images anew)."""
 
+import signal
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+
+
+# Started as a background job whose parent ignores Ctrl-C, so would the programs that are tested.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

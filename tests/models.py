@@ -13,6 +13,7 @@ from shapeshift.runtime_models.model import (
     Mlp,
     Stop,
 )
+from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import StopWeights
 
@@ -119,7 +120,8 @@ def run_in_numpy(mlp: Mlp, rows: np.ndarray) -> np.ndarray:
 
 
 def random_package(folder: Path, anchors: int, **kind) -> Path:
-    """The file of a random model in a folder."""
+    """The file of a random model in a folder, by default with an encoding as trained today."""
     path = folder / "random.shift"
+    kind.setdefault("encoding", encoding_for([stop.x for stop in STOPS]))
     write_package(make_random_model(anchors, **kind), path)
     return path

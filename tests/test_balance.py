@@ -76,7 +76,7 @@ def test_flat_pictures_are_smooth(device):
 def test_thermal_pictures_alone_become_smoother(device, tmp_path):
     capture = fit_scenes.make_shapes(tmp_path, "shared", rig=True)
     # An even encoding tells two stops apart within fewer steps than one unit a stop does.
-    plain = TrainSettings(iterations=120, grow=False, anchors=500, encoding="even")
+    plain = TrainSettings(iterations=120, grow=False, max_anchors=500, encoding="even")
     rough = {}
     for share in (0.0, 6.0):
         trainer = Trainer(device, capture, replace(plain, thermal_smooth=share))
@@ -96,7 +96,7 @@ def test_more_turns_help_the_modality_that_has_them(device, tmp_path):
     capture = fit_scenes.make_shapes(tmp_path, "shared")
     found = {}
     for balance in ("RGB=4", "Thermal=4"):
-        settings = TrainSettings(iterations=120, grow=False, anchors=500, balance=balance)
+        settings = TrainSettings(iterations=120, grow=False, max_anchors=500, balance=balance)
         trainer = Trainer(device, capture, settings)
         for _ in trainer.steps():
             pass

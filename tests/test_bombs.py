@@ -21,10 +21,10 @@ RUN = Path(__file__).with_name("bomb_run.py")
 # Written out, and not what the program believes: docs/formats.md, "Memory".
 A_BYTE, FREE = 64, 64 << 20
 BESIDE = 48 << 20  # bytes: what the allocator rounds up, code that runs for the first time
-PICTURES = ("photo", "depth")  # readers whose free amount is told in pixels
+PICTURES = ("photo", "depth", "trained")  # readers whose free amount is told in pixels
 OPEN = {  # bombs that are none any more, or files at the edge of what is taken on trust
     "frames that each repeat what is said for all", "mesh of twenty thousand materials",
-    "photo as large as one may be whatever its bytes",
+    "photo as large as one may be whatever its bytes", "training photo as large as one may be",
 }  # fmt: skip
 
 

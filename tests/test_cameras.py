@@ -111,7 +111,7 @@ HUGE = "1" + "0" * 400
 ROW = '"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]'
 GS = '"position": [0,0,0], "rotation": [1,0,0, 0,1,0, 0,0,1]'
 BROKEN = {
-    "": "is not JSON",
+    "": "is empty: it has 0 bytes",
     "[" * 100_000: "is not JSON",
     "{}": "holds no cameras",
     "[[]]": "must be a list of objects",

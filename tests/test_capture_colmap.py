@@ -111,12 +111,15 @@ def test_colmap_masks_are_found(tmp_path):
     assert read_capture(tmp_path).of("rgb", "test")[0].mask == first
 
 
-def test_a_nearly_straight_lens_is_taken_and_a_bent_one_refused(tmp_path):
+def test_a_nearly_straight_lens_is_taken_as_it_is_and_a_bent_one_is_undistorted(tmp_path):
     colmap_model(tmp_path / "ok", False, "SIMPLE_RADIAL", (20.0, 8.0, 6.0, 0.01))
-    assert len(read_capture(tmp_path / "ok").photos) == 7
+    straight = read_capture(tmp_path / "ok")
+    assert [photo.lens for photo in straight.photos] == [None] * 7 and straight.doubts == ()
     colmap_model(tmp_path / "bent", False, "SIMPLE_RADIAL", (20.0, 8.0, 6.0, 0.3))
-    with pytest.raises(BadFile, match=r"SIMPLE_RADIAL.*undistort"):
-        read_capture(tmp_path / "bent")
+    bent = read_capture(tmp_path / "bent")
+    assert {p.lens.model for p in bent.photos if p.modality == "rgb"} == {"SIMPLE_RADIAL"}
+    assert {photo.lens for photo in bent.photos if photo.modality == "thermal"} == {None}
+    assert bent.doubts == ("4 photos are undistorted as they are read (SIMPLE_RADIAL).",)
 
 
 @pytest.mark.parametrize("keep", [0, 7, 60, 300])
@@ -131,8 +134,10 @@ def test_a_cut_off_colmap_model_is_refused(tmp_path, keep):
 def test_colmap_lacks_a_table_or_an_image(tmp_path):
     colmap_model(tmp_path, False)
     (tmp_path / "images/rgb/2.png").unlink()
-    with pytest.raises(BadFile, match=r"rgb/2.png: the image file is missing"):
-        read_capture(tmp_path)
+    capture = read_capture(tmp_path)
+    assert (len(capture.photos), len(capture.doubts)) == (6, 1)
+    assert capture.doubts[0].startswith("1 of 7 photos that the capture names are not there")
+    assert "rgb/2.png" in capture.doubts[0]
     (tmp_path / "sparse/0/cameras.bin").unlink()
     with pytest.raises(BadFile, match=r"cameras\.bin is missing"):
         read_capture(tmp_path)

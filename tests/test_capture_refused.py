@@ -56,9 +56,10 @@ def wrong_size(frames, more):
     return "16x12 pixels, the capture says 32x12"
 
 
-def missing_image(frames, more):
-    frames[3]["file_path"] = "images/gone.png"
-    return r"gone.png is missing"
+def missing_images(frames, more):
+    for frame in frames:
+        frame["file_path"] = "images/gone.png"
+    return r"none of its 4 photos is there.*gone.png"
 
 
 def nameless_frame(frames, more):
@@ -86,9 +87,34 @@ def nan_focal(frames, more):
     return "'fl_x' is nan; a number"
 
 
-def bent_lens(frames, more):
-    more["k1"] = 0.4
-    return "undistort"
+def folded_lens(frames, more):
+    more["k1"] = -40
+    return "folds the photo over itself"
+
+
+def bent_k4(frames, more):
+    more["k4"] = 0.4
+    return "only fisheye lenses"
+
+
+def panorama(frames, more):
+    more["camera_model"] = "EQUIRECTANGULAR"
+    return "which no pinhole"
+
+
+def half_a_pixel(frames, more):
+    more["w"] = 16.5
+    return "not pixels"
+
+
+def odd_list(frames, more):
+    more["train_filenames"] = "images/000.png"
+    return "'train_filenames' is"
+
+
+def list_of_others(frames, more):
+    more["train_filenames"] = ["elsewhere.png"]
+    return "name none of its frames"
 
 
 def empty_modality(frames, more):
@@ -157,9 +183,10 @@ def missing_points(frames, more):
 
 @pytest.mark.parametrize("change", [spoil(c) for c in (
     no_poses, nan_pose, singular_pose, scaled_pose, mirrored_pose, ragged_pose, small_pose,
-    wrong_size, missing_image, nameless_frame, empty, no_focal, negative_focal, nan_focal,
-    bent_lens, empty_modality, unknown_modality, only_tests, odd_split, stop_outside, twin_stops,
-    odd_kind, upside_range, newer_version, no_up, odd_background, missing_points,
+    wrong_size, missing_images, nameless_frame, empty, no_focal, negative_focal, nan_focal,
+    folded_lens, bent_k4, panorama, half_a_pixel, odd_list, list_of_others, empty_modality,
+    unknown_modality, only_tests, odd_split, stop_outside, twin_stops, odd_kind, upside_range,
+    newer_version, no_up, odd_background, missing_points,
 )])  # fmt: skip
 def test_refused_in_one_sentence(tmp_path, change):
     frames, more = simple(tmp_path)

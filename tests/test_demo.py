@@ -24,7 +24,7 @@ def test_the_bundled_package_is_small_whole_and_of_these_stops():
     model = read_package(BUNDLED)
     assert model.stops == STOPS
     settings = model.provenance["settings"]
-    assert settings["anchors"] == demo.ANCHORS
+    assert settings["max_anchors"] == demo.MOST_ANCHORS
     assert (settings["between"], settings["between_share"]) == (demo.BETWEEN, demo.SHARE)
     assert settings["encoding"] == "stops" and model.encoding.d == len(STOPS)
     assert model.provenance["iterations"] == settings["iterations"] == demo.ITERATIONS

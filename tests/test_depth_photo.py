@@ -69,16 +69,29 @@ def test_what_is_no_depth_is_not_known(tmp_path):
     np.testing.assert_array_equal(got, [[0, 0, 0, 0], [1, 2, 3, 4], [0, 0, 0, 5]])
 
 
-@pytest.mark.parametrize("size", [(4, 3), (8, 6), (2, 2), (1, 1), (16, 12)])
-def test_another_size_takes_the_depth_at_each_centre(tmp_path, size):
-    values = np.arange(1, 13, dtype=np.float32).reshape(3, 4)
+@pytest.mark.parametrize("factor", [1, 2, 3, 4, 7])
+@pytest.mark.parametrize("rows", [3, 6, 12, 24])
+def test_each_pixel_takes_the_depth_at_its_centre(tmp_path, rows, factor):
+    """The photo has 16x12 pixels, its depth photo fewer, as many, or more."""
+    values = np.arange(1, rows * rows * 4 // 3 + 1, dtype=np.float32).reshape(rows, -1)
     photo = capture_of(tmp_path, "d.npy", values).photos[0]
-    got = load_depth(photo, size)
-    assert got.shape == size[::-1]
-    for y in range(size[1]):
-        for x in range(size[0]):
-            row, column = int((y + 0.5) * 3 / size[1]), int((x + 0.5) * 4 / size[0])
-            assert got[y, x] == values[row, column]
+    got = load_depth(photo, factor)
+    assert got.shape == photo.view.divided(factor).size[::-1]
+    for y, x in np.ndindex(got.shape):
+        row, column = int((y + 0.5) * factor * rows / 12), int((x + 0.5) * factor * rows / 12)
+        assert got[y, x] == values[row, column]
+
+
+def test_depth_photos_that_are_not_there_are_counted(tmp_path):
+    frames, rest = simple(tmp_path, 3)
+    save(tmp_path / "d.png", STEPS)
+    for frame, name in zip(frames, ("gone.png", "d.png", "lost.png"), strict=True):
+        frame["depth_file_path"] = name
+    write_transforms(tmp_path, frames, **rest)
+    capture = read_capture(tmp_path)
+    assert [photo.depth is None for photo in capture.photos] == [True, False, True]
+    (said,) = capture.doubts
+    assert said.startswith("2 depth photos are not there, for example of ")
 
 
 def test_our_own_form_keeps_it(tmp_path):
@@ -112,7 +125,6 @@ def test_a_frame_of_several_modalities_has_a_depth_photo_in_each_folder(tmp_path
         ("d.npy", np.array([{}]), {}, "plain numbers"),
         ("d.png", STEPS, {"depth_unit": 0}, "depth_unit"),
         ("d.png", STEPS, {"depth_unit": "mm"}, "depth_unit"),
-        ("d.png", STEPS, {"depth_path": "gone.png"}, "missing"),
         ("d.png", STEPS, {"depth_path": 7}, "depth_path"),
         ("d.png", STEPS, {"depth_path": "images/000.png"}, "16 bits"),
     ],

@@ -22,10 +22,11 @@ from shapeshift.training.evaluation.evaluate import evaluate_model, report
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.depth_loss import HOLE, DepthLoss, DepthWish
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.photos import Targets, read
+from shapeshift.training.photos import read
 from shapeshift.training.reference import decode_reference, image_loss_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
+from shapeshift.training.supervision.targets import Targets
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
 from tests.test_plain_gradients import situation as plain_situation
@@ -160,7 +161,7 @@ def depth_error(trainer: Trainer) -> float:
 
 
 def trained(device, capture, **changes) -> Trainer:
-    settings = TrainSettings(iterations=60, anchors=400, grow=False, **changes)
+    settings = TrainSettings(iterations=60, max_anchors=400, grow=False, **changes)
     trainer = Trainer(device, capture, settings)
     for _ in trainer.steps():
         pass

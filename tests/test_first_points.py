@@ -15,10 +15,10 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.first_anchors import point_sources
+from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import (
     carved,
     choose_voxel,
-    first_voxel,
     hull_points,
     initial_points,
     voxel_centres,
@@ -67,15 +67,13 @@ def test_shapes_of_their_own_get_as_many_anchors_as_alone():
     thick = rod_photos(np.array([0.3, 0.5, 0.3]))
     thin = [replace(p, modality="bone") for p in rod_photos(np.array([0.07, 0.4, 0.06]))]
     capture = Capture(Path("rods"), (), ())
-    one, other, both = (initial_points(capture, p, RNG(0)) for p in (thick, thin, thick + thin))
+    one, both = (initial_points(capture, p, RNG(0)) for p in (thick, thick + thin))
     assert (one.origin, len(one.shapes), len(both.shapes)) == ("hull", 1, 2)
-    voxels = [first_voxel(first, 1000, RNG(0), 10**6) for first in (one, other)]
-    together = first_voxel(both, 1000, RNG(0), 10**6)
-    assert together == pytest.approx(min(voxels), rel=0.05) and voxels[1] < 0.8 * voxels[0]
-    count = len(voxel_centres(both.points, together))
-    assert count > 1500 and len(voxel_centres(other.points, together)) <= 1000
-    capped = first_voxel(both, 1000, RNG(0), 1200)
-    assert 1100 < len(voxel_centres(both.points, capped)) <= 1200
+    start = first_anchors(both, 1000, thick + thin, None)
+    assert len(start.anchors) == 1000
+    # the thick hull is empty there
+    inside = (np.abs(start.anchors) < (0.1, 0.45, 0.09)).all(axis=1)
+    assert 0.4 < inside.mean() < 0.6
 
 
 def test_cells_of_a_long_thin_hull_are_cubes():
@@ -109,7 +107,7 @@ def off_surface(p: np.ndarray) -> np.ndarray:
 
 
 def test_depth_photos_give_points_on_the_surfaces(balls, photos):
-    points, origin, _ = initial_points(balls, photos, RNG(0), "depth")
+    points, origin, *_ = initial_points(balls, photos, RNG(0), "depth")
     assert origin == "depth photos"  # the background is known: no guesses
     assert len(points) == sum(int((p.depth > 0).sum()) for p in photos)
     assert off_surface(points).max() < 2e-4  # metres: two steps of the depth photos
@@ -217,7 +215,7 @@ def test_a_chunk_table_of_nonsense_is_one_sentence(tmp_path):
 def test_a_cloud_keeps_what_photos_see_in_the_capture_s_axes(tmp_path, balls, photos):
     far = np.array([[500.0, 0, 0], [0, 500, 0]])
     write_las(tmp_path / "scan.las", np.concatenate([balls.points[::10], far]))
-    points, origin, _ = initial_points(balls, photos, RNG(0), str(tmp_path / "scan.las"))
+    points, origin, *_ = initial_points(balls, photos, RNG(0), str(tmp_path / "scan.las"))
     count = len(balls.points[::10])
     assert origin == f"scan.las ({count:,} of {count + 2:,} points)"
     np.testing.assert_allclose(points, balls.points[::10], atol=1e-3)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app import cli
+from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.runtime_models.package.write_package import write_package
 from tests.models import STOPS, make_random_model
 
@@ -25,8 +26,9 @@ def facts_of(capsys, *arguments):
 
 @pytest.mark.parametrize("name", ["scene.shift", "scene"])
 def test_a_package_as_file_and_as_folder(tmp_path, capsys, name):
-    path = tmp_path / name
-    write_package(make_random_model(30, k=4, features=8, hidden=(24, 20)), path)
+    path, encoding = tmp_path / name, encoding_for([0, 1])
+    model = make_random_model(30, k=4, features=8, hidden=(24, 20), encoding=encoding)
+    write_package(model, path)
     facts = facts_of(capsys, path)
     assert facts.keys() >= KEYS
     assert (facts["format"], facts["anchors"], facts["splats"]) == ("shapeshift 1", 30, 120)
@@ -34,7 +36,7 @@ def test_a_package_as_file_and_as_folder(tmp_path, capsys, name):
     assert facts["stops"] == [{"name": s.name, "x": s.x, "kind": s.kind} for s in STOPS]
     files = [f for f in path.rglob("*") if f.is_file()] if path.is_dir() else [path]
     assert facts["bytes"] == sum(f.stat().st_size for f in files)
-    assert facts["heads"]["offset"]["layers"] == [8 + 16, 24, 20, 12]
+    assert facts["heads"]["offset"]["layers"] == [8 + encoding.d, 24, 20, 12]
 
 
 def test_layers_of_plain_splats(data, capsys):
@@ -75,10 +77,10 @@ def test_what_is_no_scene_is_one_sentence(tmp_path, capsys):
     np.save(tmp_path / "array.npy", np.zeros(3))
     cases = {
         "none.shift": "does not exist",
-        "text.shift": "is of no known format",
+        "text.shift": "does not begin with a zip's mark",
         "short.ply": "short.ply",
         "empty": "holds nothing to show",
-        "array.npy": "is of no known format",
+        "array.npy": "is a single array of numpy",
     }
     for name, words in cases.items():
         assert info(tmp_path / name, "--json") == 2, name

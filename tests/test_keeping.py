@@ -60,7 +60,7 @@ def no_memory():
 
 def train(balls: Capture, out: Path, capsys) -> tuple[int, str]:
     words = ["train", str(balls.folder), "--out", str(out), "--iterations", str(STEPS)]
-    code = main([*words, "--anchors", "150"])
+    code = main([*words, "--max-anchors", "150"])
     return code, capsys.readouterr().err
 
 
@@ -80,7 +80,7 @@ def test_memory_that_is_not_there_is_one_sentence(balls, tmp_path, no_memory, ca
 
 
 def test_another_state_for_which_memory_lacks_changes_nothing(balls, no_memory):
-    trainer = Trainer(open_device(), balls, TrainSettings(iterations=5, anchors=150))
+    trainer = Trainer(open_device(), balls, TrainSettings(iterations=5, max_anchors=150))
     before, _ = trainer.checkpoint()
     fewer = {n: a[:-3] if n.split(".")[0] in ("anchors", "features") else a
              for n, a in trainer.adam.state().items()}  # fmt: skip
@@ -88,7 +88,8 @@ def test_another_state_for_which_memory_lacks_changes_nothing(balls, no_memory):
     with pytest.raises(RuntimeError, match="no room"):
         trainer.go_on_from(fewer)
     after, _ = trainer.checkpoint()
-    assert all(np.array_equal(before[name], after[name]) for name in before)
+    for name in before:  # of photos that were not looked at yet, NaN
+        np.testing.assert_array_equal(before[name], after[name])
 
 
 def test_numbers_that_end_in_the_last_step_are_not_kept(balls, tmp_path, at_step, capsys):
@@ -167,11 +168,10 @@ def test_few_photos_and_missing_masks_are_spoken_of(balls):
 
 
 def test_a_scene_that_shows_nothing_is_called_that(balls):
-    trainer = Trainer(open_device(), balls, TrainSettings(iterations=150, anchors=600))
-    state = trainer.adam.state()
-    assert "RGB, Thermal: the pictures are no nearer" in hopeless(trainer)
+    trainer = Trainer(open_device(), balls, TrainSettings(iterations=150, max_anchors=600))
     for _ in trainer.steps():
         pass
-    assert hopeless(trainer) == ""
-    trainer.adam.load(state)
-    assert hopeless(trainer)
+    assert hopeless(trainer) == []
+    state = trainer.adam.state()
+    trainer.adam.load(state | {"anchors.value": state["anchors.value"] + np.float32(1000)})
+    assert "RGB, Thermal: the pictures are no nearer" in hopeless(trainer)[0]

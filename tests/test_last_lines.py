@@ -50,7 +50,7 @@ def asked(tmp_path: Path, **more) -> Options:
 
 
 def test_a_short_training_says_so_and_how_to_go_on(tmp_path):
-    few, look = what_next(asked(tmp_path), 35, 20.0, False)
+    few, look = what_next(asked(tmp_path), 35, 20 / 35, False)
     assert few.startswith("35 steps are few: 2,000 are usual, about 19 minutes more on this ")
     start = len(shlex.split(program.program()))
     words = shlex.split(few.split("Go on: ")[1])[start:]
@@ -58,18 +58,18 @@ def test_a_short_training_says_so_and_how_to_go_on(tmp_path):
                      "--resume", "--iterations", "2000"]  # fmt: skip
     assert look.startswith("look: ")
     assert shlex.split(look)[1 + start :] == [str(tmp_path / "a b.shift")]
-    assert "30,000 are usual" in what_next(asked(tmp_path, preset="paper"), 35, 1.0, False)[0]
-    assert "about 6 seconds more" in what_next(asked(tmp_path), 500, 2.0, False)[0]
+    assert "30,000 are usual" in what_next(asked(tmp_path, preset="paper"), 35, 0.1, False)[0]
+    assert "about 6 seconds more" in what_next(asked(tmp_path), 500, 0.004, False)[0]
 
 
 def test_a_usual_training_only_says_how_to_look(tmp_path):
-    (line,) = what_next(asked(tmp_path), FEW_STEPS, 60.0, False)
+    (line,) = what_next(asked(tmp_path), FEW_STEPS, 0.06, False)
     assert line.startswith("look: ")
-    assert len(what_next(asked(tmp_path), FEW_STEPS - 1, 60.0, False)) == 2
+    assert len(what_next(asked(tmp_path), FEW_STEPS - 1, 0.06, False)) == 2
 
 
 def test_an_interrupted_training_says_how_to_go_on(tmp_path):
-    on, look = what_next(asked(tmp_path), 1500, 60.0, True)
+    on, look = what_next(asked(tmp_path), 1500, 0.04, True)
     assert on.startswith("go on: ") and on.endswith("--resume") and look.startswith("look: ")
 
 

@@ -97,7 +97,7 @@ def test_what_another_part_won_is_not_used_up():
 
 
 def test_settings_without_each_part():
-    settings = TrainSettings(layers=2, voxel=0.1)
+    settings = TrainSettings(layers=2)
     found = {name: part.without(settings, STOPS) for name, part in BY_NAME.items()}
     assert found["shape that follows x"].layout().fixed == SHAPE
     assert found["scale that follows x"].fixed == "scale"
@@ -107,15 +107,15 @@ def test_settings_without_each_part():
     assert found["half of the hidden units"].hidden == 16
     assert found["half of the features"].features == 8
     assert found["one splat of every anchor"].splats_per_anchor == 4
-    fewer = found["a third of the anchors"]
-    assert (fewer.anchors, fewer.max_anchors) == (4000, 8000)
-    assert fewer.voxel == pytest.approx(0.1225, abs=1e-4)
+    assert found["a third of the anchors"].max_anchors == 8000
+    assert found["anchors' own axes and sizes"].own == "color"
+    assert found["anchors' own base colours"].own == "frame"
 
 
 def test_parts_that_are_not_there_are_not_tried():
     small = TrainSettings(
         fixed="offset, color", view_dependent=False, hidden=8, features=4, splats_per_anchor=1,
-        anchors=60, max_anchors=60,
+        max_anchors=60, own="",
     )  # fmt: skip
     left = [name for name, part in BY_NAME.items() if part.without(small, STOPS)]
     assert left == ["scale that follows x", "rotation that follows x", "opacity that follows x"]

@@ -12,13 +12,14 @@ from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.gaussians import Activation, Gaussians
-from shapeshift.training.heads.networks import HeadLayout, Heads, initial_weights, padded
+from shapeshift.training.heads.networks import OWN_WIDTH, HeadLayout, Heads, initial_weights, padded
 from shapeshift.training.reference import (
     activate_reference,
     directions,
     head_inputs,
     heads_reference,
 )
+from tests.models import psi_of
 
 FORMS = ("cpu", "gpu")
 VOXEL = 0.05
@@ -62,6 +63,9 @@ LAYOUTS = [
     HeadLayout(splats=1, features=1, hidden=1, control=1, layers=3),
     HeadLayout(splats=2, features=5, hidden=130, layers=2),
     HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, own=()),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, own=("frame",)),
+    HeadLayout(splats=3, features=7, hidden=9, layers=2, own=("color",)),
     HeadLayout(splats=3, features=7, hidden=9, control=5, fixed=("offset", "scale", "rotation")),
     HeadLayout(splats=2, hidden=12, layers=2, fixed=HEADS, view_dependent=False),
 ]
@@ -176,10 +180,12 @@ def test_an_eye_at_an_anchor_is_finite(device, form):
         assert np.isfinite(device.download(array)).all()
 
 
-def activated(layout, raw, anchors):
+def activated(layout, raw, rows):
     """Splats of raw outputs (A, RAW) in float64, fields in the order of Gaussians."""
     raw = raw.astype(np.float64)
-    return activate_reference({n: raw_of(raw, layout, n) for n in HEADS}, anchors, VOXEL)
+    anchors, frames, colors = (rows[n].astype(np.float64) for n in ("anchors", "frames", "colors"))
+    by_head = {n: raw_of(raw, layout, n) for n in HEADS}
+    return activate_reference(by_head, anchors, VOXEL, frames, colors)
 
 
 @pytest.mark.parametrize("spread", [0.5, 20.0])  # 20: every activation saturates somewhere
@@ -189,18 +195,21 @@ def test_activations_and_their_gradient(device, spread):
     anchors = rng.normal(size=(21, 3)).astype(np.float32)
     raw = (spread * rng.normal(size=(21, layout.raw_at[-1]))).astype(np.float32)
     activation = Activation(device, layout, VOXEL)
-    splats = activation.forward(device.upload(raw), device.upload(anchors))
-    wanted = activated(layout, raw, anchors)
+    own = {"frames": rng.normal(0, 0.7, (21, 7)), "colors": rng.normal(size=(21, 3))}
+    rows = {"anchors": anchors} | {n: a.astype(np.float32) for n, a in own.items()}
+    there = {name: device.upload(array) for name, array in rows.items()}
+    splats = activation.forward(device.upload(raw), there)
+    wanted = activated(layout, raw, rows)
     for got, want in zip(splats.fields(), wanted, strict=True):
         assert relative(device.download(got), want) < 1e-6
     grads = [rng.normal(size=w.shape).astype(np.float32) for w in wanted]
     on_device = Gaussians(*(device.upload(g) for g in grads))
-    grad_raw, grad_anchors = activation.backward(device.upload(raw), on_device)
+    grad_raw, by_group = activation.backward(device.upload(raw), there, on_device)
     found = device.download(grad_raw)
 
     def scalar(values):
         return sum(
-            (a * g).sum() for a, g in zip(activated(layout, values, anchors), grads, strict=True)
+            (a * g).sum() for a, g in zip(activated(layout, values, rows), grads, strict=True)
         )
 
     step, real = (
@@ -219,7 +228,7 @@ def test_activations_and_their_gradient(device, spread):
     unused = np.setdiff1d(np.arange(layout.raw_at[-1]), real)
     assert not found[:, unused].any()
     summed = grads[0].reshape(21, 3, 3).sum(1)
-    np.testing.assert_allclose(device.download(grad_anchors), summed, atol=2e-6)
+    np.testing.assert_allclose(device.download(by_group["anchors"]), summed, atol=2e-6)
 
 
 @pytest.mark.parametrize(
@@ -262,16 +271,21 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     weights, anchors, features, _ = model(layout, 21)
     encoding, stops = ControlEncoding(layout.control), (Stop("RGB", 0.0), Stop("Heat", 1.0))
     state = {"weights.value": weights, "anchors.value": anchors, "features.value": features}
+    rng = np.random.default_rng(5)
+    own = {n: rng.normal(size=(21, OWN_WIDTH[n])).astype(np.float32) for n in layout.per_anchor[2:]}
+    state |= {f"{n}.value": array for n, array in own.items()}
     exported = model_of(state, layout, VOXEL, encoding, stops, {})
     files = package_files(exported, "float32")
     read = read_files(files.__getitem__, "test")
     assert {n: read.networks[n].inputs for n in HEADS} == {n: layout.parts_of(n) for n in HEADS}
     heads, activation = Heads(device, layout), Activation(device, layout, VOXEL)
     on_device = [device.upload(a) for a in (weights, anchors, features)]
+    there = {"anchors": on_device[1]} | {n: device.upload(array) for n, array in own.items()}
     colors = []
     for x in (0.0, 0.3, 1.0):
-        raw = heads.forward(*on_device, encoding.encode(x), EYE)
-        ours = activation.forward(raw, on_device[1])
+        psi = psi_of(read, x).astype(np.float32)
+        raw = heads.forward(*on_device, psi, EYE)
+        ours = activation.forward(raw, there)
         theirs = evaluate(read, x, EYE)
         for name in ("means", "scales", "opacity", "color"):
             mine = device.download(getattr(ours, name))

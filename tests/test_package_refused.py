@@ -123,7 +123,7 @@ BROKEN = {
     "file of another kind": (head("offset", file="scene.json"), "expected a .onnx in the package"),
     # manifest
     "unknown version": (edit(format="shapeshift 9"),
-                        "format 'shapeshift 9', this program reads 'shapeshift 1'"),
+                        "format 'shapeshift 9', this program reads 'shapeshift 1' and"),
     "no version": (edit(format=None), "has format None"),
     "not JSON": (write(MANIFEST, b"{"), "scene/scene.json is not JSON"),
     "not text": (write(MANIFEST, b"\xff\xfe\xfa"), "is not JSON"),

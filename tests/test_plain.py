@@ -16,12 +16,7 @@ from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
 from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name, write_layer_list
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.training.baselines.plain import (
-    PlainTrainer,
-    first_scales,
-    one_modality,
-    seen_colors,
-)
+from shapeshift.training.baselines.plain import PlainTrainer, one_modality
 from shapeshift.training.baselines.plain_density import (
     AFTER_RESET,
     SMALLER,
@@ -34,6 +29,7 @@ from shapeshift.training.baselines.plain_density import (
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.baselines.plain_step import GROUPS
 from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
 from shapeshift.training.synthetic.balls import STOPS, make_balls
 from tests.training_runs import run
 
@@ -147,8 +143,12 @@ def test_first_scales_are_the_distances_to_the_nearest():
     points = np.zeros((5, 3))
     points[:, 1] = [0, 1, 3, 7, 15]
     wanted = [[1, 3, 7], [1, 2, 6], [2, 3, 4], [4, 6, 7], [8, 12, 14]]
-    np.testing.assert_allclose(first_scales(points), np.sqrt(np.mean(np.square(wanted), axis=1)))
-    assert first_scales(points[:2]).tolist() == [1, 1] and first_scales(points[:1]).tolist() == [1]
+    np.testing.assert_allclose(
+        neighbour_distance(points), np.sqrt(np.mean(np.square(wanted), axis=1))
+    )
+    assert neighbour_distance(points[:2]).tolist() == [1, 1] and neighbour_distance(
+        points[:1]
+    ).tolist() == [1]
 
 
 def test_first_colours_are_the_photos(device, balls):

@@ -76,7 +76,7 @@ def test_a_line_a_minute_says_what_is_under_way(monkeypatch, capsys):
             time.sleep(0.12)
             tell("carving")
             time.sleep(0.12)
-        for number in progress.tracked(range(4), "photographing \\[x]"):
+        for number in progress.tracked(range(4), "photographing [x]"):
             time.sleep(0.12 if number == 2 else 0)
         with progress.progress_bar() as bar:
             bar.add_task("[/] 12 steps", total=1.0, completed=0.4, loss="loss 0.1", psnr="")

@@ -180,7 +180,7 @@ def balls(tmp_path_factory) -> Capture:
 
 def test_the_same_seed_finds_the_same_offset(balls):
     small = replace(balls, photos=balls.photos[::4])
-    settings = TrainSettings(anchors=500, downscale=2)
+    settings = TrainSettings(max_anchors=500, downscale=2)
     device, stages = open_device("cpu"), (replace(STAGES[1], tries=2),)
     first, second = (calibrate(device, small, settings, "Thermal", 40, stages) for _ in range(2))
     np.testing.assert_array_equal(first.offset, second.offset)

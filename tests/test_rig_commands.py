@@ -19,7 +19,7 @@ from shapeshift.training.calibration.extrinsics import moved_by, offset_capture,
 from shapeshift.training.synthetic.balls import make_balls
 
 PLANTED = moved_by(np.array([0.1, -0.2, 0.05, 0.1, 0.05, -0.1]))
-SMALL = {"anchors": 300, "iterations": 20, "device": "cpu"}
+SMALL = {"max_anchors": 300, "iterations": 20, "device": "cpu"}
 
 
 @pytest.fixture(scope="module")

@@ -128,10 +128,7 @@ def test_two_values_are_two_objects(renderer):
     inside = model.anchors[:, 0] < 0
     scene = scene_of(model, x=0.2, selectors=(Painted(inside, 0.9),))
     got = drawn(renderer, scene)
-    parts = [
-        replace(model, anchors=model.anchors[rows], features=model.features[rows])
-        for rows in (inside, ~inside)
-    ]
+    parts = [model.with_anchors(rows) for rows in (inside, ~inside)]
     both = Scene((SceneObject("in", parts[0], x=0.9), SceneObject("out", parts[1], x=0.2)))
     assert psnr_db(got, drawn(renderer, both)) > 80
 

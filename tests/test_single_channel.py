@@ -49,9 +49,9 @@ def test_counts_say_what_is_black_and_white(tmp_path, kind):
     else:
         counts = np.rint((celsius + KELVIN) * 100).astype(np.uint16)
         capture = capture_of(tmp_path, counts, "000.png")
-    rgb, mask = load_photo(capture.photos[0])
-    assert mask is None and rgb.dtype == np.float32
-    np.testing.assert_allclose(rgb[0, :6, 0], [0, 1, 0.5, 0, 1, 0.25], atol=1e-6)
+    rgb, mask, _ = load_photo(capture.photos[0])
+    assert mask is None and rgb.dtype == np.uint8
+    np.testing.assert_allclose(rgb[0, :6, 0], [0, 255, 127.5, 0, 255, 63.75], atol=0.5)
     assert (rgb == rgb[..., :1]).all()
     assert capture.photos[1].counts is None
     write_capture(capture)
@@ -60,8 +60,8 @@ def test_counts_say_what_is_black_and_white(tmp_path, kind):
 
 def test_what_is_no_number_is_black(tmp_path):
     values = picture([np.nan, np.inf, -np.inf, 95]).astype(np.float32)
-    rgb, _ = load_photo(capture_of(tmp_path, values, counts=[15, 95]).photos[0])
-    np.testing.assert_array_equal(rgb[0, :4, 0], [0, 1, 0, 1])
+    rgb = load_photo(capture_of(tmp_path, values, counts=[15, 95]).photos[0]).rgb
+    np.testing.assert_array_equal(rgb[0, :4, 0], [0, 255, 0, 255])
 
 
 @pytest.mark.parametrize(
@@ -88,8 +88,9 @@ def mixed(tmp_path_factory) -> Capture:
     photos, (low, high) = [], (20.0, 100.0)
     for photo in capture.photos:
         if photo.modality == "Thermal":
-            rgb, _ = load_photo(photo, (40, 40))
-            counts = np.rint((low + (high - low) * rgb[..., 0] + KELVIN) * 100)
+            grey = load_photo(photo).rgb[..., 0]
+            small = np.asarray(Image.fromarray(grey).resize((40, 40), Image.Resampling.BOX))
+            counts = np.rint((low + (high - low) * small / 255 + KELVIN) * 100)
             path = photo.path.with_name(f"counts_{photo.path.name}")
             Image.fromarray(counts.astype(np.uint16)).save(path)
             ends = ((low + KELVIN) * 100, (high + KELVIN) * 100)
@@ -102,7 +103,7 @@ def mixed(tmp_path_factory) -> Capture:
 def test_from_the_file_to_the_scene_and_its_legend(mixed, tmp_path):
     """Sixteen bits, one channel and another size train as any photo; range and unit stay."""
     out = tmp_path / "mixed.shift"
-    arguments = [mixed.folder, "--out", out, "--iterations", 150, "--anchors", 500]
+    arguments = [mixed.folder, "--out", out, "--iterations", 150, "--max-anchors", 500]
     assert cli.main(["train", *map(str, arguments)]) == 0
     model = read_model(out)
     thermal = Stop("Thermal", 1.0, "thermal", "ironbow", (20.0, 100.0), "°C")

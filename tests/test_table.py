@@ -29,7 +29,7 @@ from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
 from tests.test_vgg_distance import write_small
 
-SMALL = {"anchors": 300, "max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
+SMALL = {"max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
 
 
 @pytest.fixture(scope="module")
@@ -180,14 +180,14 @@ def test_a_model_of_all_modalities_tells_its_size_once():
     rows = [replace(made("joint", 30, 0.5), modality="RGB"), made("joint", 30, 0.5)]
     _, lines = cells([*rows, made("splats", 31, 9)])
     assert [line[0] for line in lines] == ["shape-shifting", "", "3DGS splats"]
-    assert [line[-2] for line in lines] == ["", "0.50", "9.00"]
+    assert [line[-3:-1] for line in lines] == [["", ""], ["0.50", "100"], ["9.00", "100"]]
 
 
 def test_options_go_to_the_methods_that_have_them(tmp_path):
     options = Options(tmp_path / "c", tmp_path / "o", seconds=60, seed=3, **SMALL)
     splats, joint = train_options("splats", options), train_options("joint", options)
-    assert (splats.splats, splats.anchors, splats.model) == (800, None, "splats")
-    assert (joint.splats, joint.anchors, joint.model) == (None, 300, "anchors")
+    assert (splats.splats, splats.max_anchors, splats.model) == (800, None, "splats")
+    assert (joint.splats, joint.max_anchors, joint.model) == (None, 400, "anchors")
     assert train_options("separate", options).separate
     assert splats.seed == joint.seed == 3 and splats.seconds == 60
     assert "--methods" not in command_line(replace(options, methods=("joint",)))
@@ -251,7 +251,7 @@ def test_ctrl_c_keeps_what_was_trained(balls, tmp_path, monkeypatch, capsys, kin
     monkeypatch.setattr(trainer, "one_step", interrupted)
     asked = TrainOptions(
         balls.folder, tmp_path / "out", model=kind, separate=kind == "anchors", iterations=4000,
-        grow=False, device="cpu", **({"splats": 300} if kind == "splats" else {"anchors": 100}),
+        grow=False, device="cpu", **({"splats": 300} if kind == "splats" else {"max_anchors": 100}),
     )  # fmt: skip
     assert run_training(asked) == 130
     assert "interrupted" in (told := capsys.readouterr().err) and "not trained: Thermal" in told
@@ -272,7 +272,7 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     words = [str(balls.folder), "--seconds", "0.3", "--sizes", "0.02", "--downscale", "2"]
     words += ["--out", str(tmp_path / "work"), "--csv", str(tmp_path / "rows.csv")]
     monkeypatch.setattr(
-        program, "caps", lambda size, asked: {"anchors": 60, "splats": round(99 * size)}
+        program, "caps", lambda size, asked: {"max_anchors": 60, "splats": round(99 * size)}
     )
     monkeypatch.setattr(sys, "argv", ["baselines.py", *words])
     assert program.main() == 0

@@ -32,7 +32,7 @@ from shapeshift.training.step import Step
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
 
-SETTINGS = TrainSettings(iterations=40, anchors=300, grow=False)
+SETTINGS = TrainSettings(iterations=40, max_anchors=300, grow=False)
 
 
 @pytest.fixture(scope="module")
@@ -135,10 +135,10 @@ def test_runs_of_both_forms_learn_alike_and_each_keeps_its_bits(device, as_gpu, 
     np.testing.assert_allclose(gpu, cpu, rtol=0.02)
 
 
-@pytest.mark.parametrize("growth", ["gradient", "error"])
-def test_growing_works_in_the_gpu_forms(as_gpu, balls, growth):
-    changes = {"grow": True, "grow_every": 20, "growth": growth, "iterations": 120, "coarse": 2}
-    trainer = Trainer(as_gpu, balls, replace(SETTINGS, **changes, max_anchors=400))
+def test_growing_works_in_the_gpu_forms(as_gpu, balls):
+    changes = {"grow": True, "grow_every": 20, "iterations": 120, "coarse": 2}
+    few = replace(balls, points=balls.points[::100])  # which leaves room
+    trainer = Trainer(as_gpu, few, replace(SETTINGS, **changes, max_anchors=400))
     first = trainer.anchors_count
     losses = [now.loss for now in trainer.steps() if now.loss is not None]
     assert np.isfinite(losses).all() and losses[-1] < losses[0]

@@ -1,4 +1,4 @@
-"""The whole step against finite differences in float64: every weight, feature and anchor."""
+"""The whole step against finite differences in float64: every weight and all that anchors have."""
 
 from dataclasses import replace
 
@@ -21,6 +21,8 @@ OTHERS = {
     "shape fixed": replace(LAYOUT, fixed=("offset", "scale", "rotation")),
     "colour alike from everywhere": replace(LAYOUT, view_dependent=False),
     "all at once": replace(LAYOUT, layers=2, fixed=("opacity", "color"), view_dependent=False),
+    "no frames": replace(LAYOUT, own=("color",)),
+    "no base colours": replace(LAYOUT, own=("frame",)),
 }
 VOXEL = 0.5
 SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
@@ -36,6 +38,8 @@ def situation(seed: int, layout: HeadLayout = LAYOUT):
         "anchors": rng.uniform(-0.6, 0.6, (5, 3)).astype(np.float32),
         "features": rng.normal(size=(5, 8)).astype(np.float32),
     }
+    own = {"frames": rng.normal(0, 0.5, (5, 7)), "colors": rng.normal(size=(5, 3))}
+    parameters |= {n: own[n].astype(np.float32) for n in layout.per_anchor[2:]}
     control = rng.random(4).astype(np.float32)
     eye = look_at(np.array([0.5, 0.7, 3.0]), np.zeros(3))
     view = View(eye, perspective(np.deg2rad(40), SIZE), 0.05, 100.0, SIZE)

@@ -1,4 +1,4 @@
-"""Growing: what each strategy sums up, who comes and who goes, budgets, and small photos first."""
+"""Densification: what is summed up, who comes and who goes, budgets, and small photos first."""
 
 from dataclasses import replace
 
@@ -10,10 +10,20 @@ from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.training.coarse import Coarse, smaller
-from shapeshift.training.density.density import Evidence, Newcomers, Watch, newcomers
-from shapeshift.training.density.density_budget import most_anchors, within
-from shapeshift.training.density.density_grow import change, given, useless, weakest
-from shapeshift.training.density.density_strategy import STRATEGIES
+from shapeshift.training.density.densify import (
+    LEAST_STEPS,
+    THRESHOLD,
+    Newcomers,
+    absent_as_nan,
+    change,
+    changed_state,
+    contribution,
+    newcomers,
+    transparent,
+    weakest,
+)
+from shapeshift.training.density.density import Evidence
+from shapeshift.training.density.density_budget import most_anchors
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout
@@ -28,19 +38,25 @@ RNG = np.random.default_rng
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0))
 
 
-def learned(device, watch: Watch, weight: np.ndarray | None = None):
-    """(evidence after one step, grad_record, its drawing's reference, photo) of a small scene."""
+def test_what_a_splat_gives_equals_the_float64_reference(device):
+    """One step of a small scene at the second of two stops."""
     parameters, control, view, rgba = situation(0)
     adam = Adam(device, parameters, {name: np.ones(1) for name in parameters})
     step, loss = Step(device, LAYOUT, VOXEL, adam), ImageLoss(device, SIZE)
-    target = loss.target(device.upload(rgba), BACKGROUND, weight)
-    evidence = Evidence(device, LAYOUT, len(parameters["anchors"]), watch)
-    evidence.stop = watch.stops - 1
+    target = loss.target(device.upload(rgba), BACKGROUND)
+    evidence = Evidence(device, LAYOUT, len(parameters["anchors"]), 2)
+    evidence.stop = 1
     drawing = step.draw(view, control, BACKGROUND)
     step.gradients(drawing, loss, target, 0.2, evidence=evidence)
     eye = view.world_from_eye.position
     splats = decode_reference(LAYOUT, parameters, control, eye, VOXEL)
-    return evidence, splats, camera_of(view), rgba[..., :3] / 255
+    weights = picture_weights(splats, camera_of(view)).sum(axis=(1, 2))
+    first, second = evidence.state()["evidence.given"]
+    assert not first.any() and weights.max() > 1
+    wanted = weights.reshape(-1, LAYOUT.splats).sum(1)
+    np.testing.assert_allclose(second[:, 0], wanted, rtol=1e-4, atol=1e-5)
+    views = evidence.state()["evidence.pull"][:, 1].reshape(-1, LAYOUT.splats)
+    np.testing.assert_array_equal(second[:, 1], views.max(1))
 
 
 def picture_weights(splats: tuple, camera) -> np.ndarray:
@@ -54,163 +70,151 @@ def picture_weights(splats: tuple, camera) -> np.ndarray:
     return np.array(pictures)
 
 
-@pytest.mark.parametrize("masked", [False, True])
-def test_the_share_of_the_error_equals_the_float64_reference(device, masked):
-    weight = RNG(1).random(SIZE[::-1]).astype(np.float32) if masked else None
-    watch = Watch(STRATEGIES["error"], stops=2, each=True, seen=True)
-    evidence, splats, camera, photo = learned(device, watch, weight)
-    image, _ = render_reference(splats, camera, BACKGROUND)
-    error = np.abs(image.transpose(1, 2, 0) - photo).mean(axis=2)
-    if masked:
-        error = error * weight
-    weights = picture_weights(splats, camera)
-    wanted = (weights * error).sum(axis=(1, 2)) / (SIZE[0] * SIZE[1])
-    state = evidence.state()
-    first, second = np.split(state["evidence.gradient"], 2)  # of each stop
-    assert not first.any()
-    np.testing.assert_allclose(second[:, 0], wanted, rtol=1e-4, atol=1e-7)
-    seen = state["evidence.seen"][1]
-    np.testing.assert_allclose(
-        seen[:, 0], weights.sum(axis=(1, 2)).reshape(-1, LAYOUT.splats).sum(1), rtol=1e-4, atol=1e-5
-    )
-    on_screen = second[:, 1].reshape(-1, LAYOUT.splats).max(1)
-    np.testing.assert_array_equal(seen[:, 1], on_screen)
-    assert state["evidence.stop_steps"].tolist() == [0, 1]
-
-
-@pytest.mark.parametrize("name", STRATEGIES)
-@pytest.mark.parametrize("seen", [False, True])
-def test_every_strategy_sums_what_its_row_says(device, name, seen):
+@pytest.mark.parametrize("some", [False, True])
+def test_sums_over_the_steps(device, some):
+    """All anchors, or another choice of them every step."""
     layout, anchors = HeadLayout(splats=3), 17
-    n = 3 * anchors
-    evidence = Evidence(device, layout, anchors, Watch(STRATEGIES[name], seen=seen))
-    pull, views, opacity = np.zeros(n), np.zeros(n), np.zeros(anchors)
-    gives, watched = np.zeros(anchors), np.zeros(anchors)
-    for turn in range(3):
+    evidence = Evidence(device, layout, anchors, 2)
+    pull, opacity, given = np.zeros((17, 3, 2)), np.zeros((17, 2)), np.zeros((2, 17, 2))
+    for turn in range(4):
         rng = RNG(turn)
+        rows = np.sort(rng.choice(17, 9, replace=False)) if some else np.arange(17)
+        n = 3 * len(rows)
         record, grad = rng.normal(size=(2, n, 12)).astype(np.float32)
         alpha = rng.uniform(-1, 1, n).astype(np.float32)
-        evidence.add(*map(device.upload, (record, grad, alpha)), (40, 30))
-        on = record[:, 9] > 0
-        each = {
-            "gradient": np.hypot(grad[:, 0], grad[:, 1]) * 20,
-            "absgrad": np.hypot(grad[:, 9], grad[:, 10]) * 20,
-            "error": grad[:, 9] / 1200,
-        }[name]
-        pull += np.where(on, each, 0)
-        views += on
-        opacity += np.maximum(alpha, 0).reshape(-1, 3).sum(1)
-        gives += np.where(on, grad[:, 11], 0).reshape(-1, 3).sum(1)
-        watched += on.reshape(-1, 3).any(1)
+        evidence.stop = turn % 2
+        asked = device.upload(rows.astype(np.int32)) if some else None
+        evidence.add(*map(device.upload, (record, grad, alpha)), (40, 30), asked)
+        on = (record[:, 9] > 0).reshape(-1, 3)
+        screen = np.hypot(grad[:, 9], grad[:, 10]).reshape(-1, 3) * 20
+        pull[rows] += np.stack([np.where(on, screen, 0), on], axis=-1)
+        opacity[rows] += np.stack(
+            [np.maximum(alpha, 0).reshape(-1, 3).sum(1), np.ones(len(rows))], axis=-1
+        )
+        gives = np.where(on, grad[:, 11].reshape(-1, 3), 0).sum(1)
+        given[turn % 2, rows] += np.stack([gives, on.any(1)], axis=-1)
     state = evidence.state()
-    found = state["evidence.gradient"]
-    np.testing.assert_allclose(found[:, 0], pull, rtol=1e-5, atol=1e-5)
-    np.testing.assert_array_equal(found[:, 1], views)
+    np.testing.assert_allclose(state["evidence.pull"], pull.reshape(-1, 2), rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(state["evidence.opacity"], opacity, rtol=1e-5)
-    assert ("evidence.seen" in state) == seen and state["evidence.steps"] == 3
-    if seen:
-        np.testing.assert_allclose(state["evidence.seen"][0, :, 0], gives, rtol=1e-4, atol=1e-5)
-        np.testing.assert_array_equal(state["evidence.seen"][0, :, 1], watched)
-    copy = Evidence(device, layout, anchors, Watch(STRATEGIES[name], seen=seen))
+    np.testing.assert_allclose(state["evidence.given"], given, rtol=1e-4, atol=1e-5)
+    assert state["evidence.steps"] == 4
+    copy = Evidence(device, layout, anchors, 2)
     copy.load(state)
     for key, value in copy.state().items():
         np.testing.assert_array_equal(value, state[key])
 
 
-def test_pulls_of_each_stop_grow_where_that_stop_has_the_splat():
-    anchors = np.zeros((1, 3), np.float32)
-    means = [np.array([[0.6, 0, 0]]), np.array([[-0.6, 0, 0]])]  # k = 1, another place at each stop
-    quiet, loud = np.array([[3.0, 30]]), np.array([[90.0, 30]])
-    new = newcomers(anchors, means, [quiet, loud], 0.2, 1.0)
-    assert (new.anchors[:, 0] < 0).all() and len(new.anchors)
-    both = newcomers(anchors, means, [loud], 0.2, 1.0)
-    assert (both.anchors[:, 0] < 0).any() and (both.anchors[:, 0] > 0).any()
+def pulls(*strengths: float, views: int = 30) -> np.ndarray:
+    """(N, 2) of Evidence; strengths in thresholds."""
+    return np.array([[views * THRESHOLD * s, views] for s in strengths])
 
 
-@pytest.mark.parametrize(("pull", "grids", "cells"), [
-    (1.5, 3, {1.0}), (3.0, 3, {1.0, 0.5}), (3.0, 1, {1.0}), (9.0, 3, {1.0, 0.5, 0.25}),
-    (9.0, 2, {1.0, 0.5}), (0.9, 3, set()),
-])  # fmt: skip
-def test_finer_grids_take_a_stronger_pull(pull, grids, cells):
-    """One splat between the nodes of all grids: each that its pull reaches gets its nearest."""
-    mean = np.array([[0.64, 0.0, 0.0]])
-    gradient = np.array([[pull * 30, 30]])
+def test_new_anchors_stand_free_under_the_splats_that_pull():
+    anchors = np.array([[0, 0, 0], [1, 0, 0]], np.float32)
+    sizes = np.array([0.2, 0.2])
+    means = np.array([[0.02, 0, 0], [0.6, 0, 0], [1.01, 0, 0], [1.3, 0.3, 0]])  # k = 2
+    new = newcomers(anchors, sizes, [means], pulls(3, 3, 3, 0.99))
+    np.testing.assert_allclose(new.anchors, [[0.6, 0, 0]], atol=1e-6)  # the others' cubes are taken
+    assert new.parents.tolist() == [0]
+    strong = newcomers(anchors, sizes, [means], pulls(3, 2, 3, 4))
+    assert strong.parents.tolist() == [1, 0]  # the strongest first
+    assert not len(newcomers(anchors, sizes, [means], pulls(3, 3, 3, 3, views=10)).anchors)
+
+
+def test_one_anchor_a_cube_of_the_size_that_it_will_have():
     far = np.array([[9.0, 0, 0]], np.float32)
-    new = newcomers(far, [mean], [gradient], 1.0, 1.0, grids=grids)
-    nearest = {round(0.64 / cell) * cell for cell in cells}
-    assert set(np.round(new.anchors[:, 0], 5).tolist()) == nearest
+    places = np.stack([np.linspace(0.01, 0.99, 50), np.zeros(50), np.zeros(50)], axis=1)
+    for size, cubes in ((2.0, 1), (1.0, 2), (0.5, 4), (0.25, 8)):
+        new = newcomers(far, np.array([size]), [places], pulls(*[2] * 50))
+        assert len(new.anchors) == cubes, size
 
 
-def test_a_relative_pull_counts_in_means_of_what_was_on_screen():
-    anchors = np.zeros((1, 3), np.float32)
-    means = [np.array([[0.6, 0, 0], [0, 0.6, 0], [0, 0, 0.6], [1, 1, 1]])]
-    gradient = np.array([[30.0, 30], [30, 30], [150, 30], [9999, 3]])  # the last: too rarely seen
-    for unit in (1.0, 1e-9):  # of whatever size the error is
-        new = newcomers(anchors, means, [gradient * (unit, 1)], 0.2, 2.0, relative=True)
-        assert len(new.anchors) and np.allclose(new.anchors[0], [0, 0, 0.6])
-        np.testing.assert_allclose(new.pull[0], 5 / (7 / 3) / 2, rtol=1e-6)
-    nobody = newcomers(anchors, means, [np.zeros((4, 2))], 0.2, 2.0, relative=True)
-    assert not len(nobody.anchors)
+def test_an_anchor_comes_where_the_stop_is_that_shows_the_splat():
+    anchors, sizes = np.array([[9.0, 0, 0]], np.float32), np.ones(1)
+    here, there = np.array([[0.6, 0, 0]]), np.array([[-0.6, 0, 0]])
+    both = newcomers(anchors, sizes, [here, there], pulls(2))
+    np.testing.assert_allclose(sorted(both.anchors[:, 0]), [-0.6, 0.6], rtol=1e-6)
+    absent = absent_as_nan(here, np.array([1 / 255]))
+    assert newcomers(anchors, sizes, [absent, there], pulls(2)).anchors[0, 0] < 0
+    assert not len(newcomers(anchors, sizes, [absent], pulls(2)).anchors)
 
 
-def test_at_most_so_many_newcomers():
-    new = Newcomers(np.arange(12).reshape(4, 3), np.arange(4), np.array([1.0, 5, 2, 5]))
-    assert new.at_most(2, by_pull=True).parents.tolist() == [1, 3]
-    assert new.at_most(3, by_pull=True).parents.tolist() == [1, 2, 3]
-    assert new.at_most(2, by_pull=False).parents.tolist() == [0, 1]
-    assert new.at_most(9, by_pull=True).parents.tolist() == [0, 1, 2, 3]
-    assert not len(new.at_most(-1, by_pull=False).anchors)
+def test_a_splat_very_far_away_breaks_nothing():
+    anchors, sizes = np.array([[0.0, 0, 0]], np.float32), np.full(1, 1e-3)
+    places = np.array([[1e9, 0, 0], [0.5, 0, 0], [-1e9, 0, 0]])
+    new = newcomers(anchors, sizes, [places], pulls(2, 3, 4))
+    assert np.isfinite(new.anchors).all() and new.parents.tolist() == [0] * len(new.anchors)
 
 
-def seen_state(seen: np.ndarray, steps: int = 100) -> dict[str, np.ndarray]:
-    return {
-        "evidence.opacity": np.full(seen.shape[1], 1e6),
-        "evidence.steps": np.array(steps),
-        "evidence.seen": seen,
-    }
+def test_anchors_that_show_nothing_go():
+    opacity = np.array([[0.0, 50], [100, 50], [0.4, 50], [0, 2], [0, 3]])
+    assert transparent(opacity, 100, 2).tolist() == [True, False, True, False, True]
+    assert not transparent(opacity, LEAST_STEPS - 1, 2).any()
 
 
 def test_who_contributes_at_one_stop_stays():
-    seen = np.array([
+    given = np.array([
         [[50.0, 50], [0, 50], [0.5, 50], [0, 0], [0, 2]],
         [[0.0, 50], [50, 50], [0.5, 50], [0, 0], [0, 1]],
     ])  # (stops, anchors, sum and pictures)  # fmt: skip
-    np.testing.assert_allclose(given(seen), [1, 1, 0.01, np.inf, np.inf])
-    weight = TrainSettings(prune_weight=0.1)
-    assert useless(seen_state(seen), 1, weight).tolist() == [False, False, True, False, False]
-    views = TrainSettings(prune_views=0.04)
-    assert useless(seen_state(seen), 1, views).tolist() == [False, False, False, True, True]
-    assert not useless(seen_state(seen, steps=20), 1, replace(weight, prune_views=1.0)).any()
+    np.testing.assert_allclose(contribution(given), [1, 1, 0.01, np.inf, np.inf])
 
 
 def test_the_weakest_make_room_and_the_needed_do_not():
-    seen = np.array([[[5.0, 50], [1, 50], [9, 50], [0, 2]]])
-    assert weakest(seen_state(seen), np.ones(4, bool), 2).tolist() == [1, 0]
-    assert weakest(seen_state(seen), np.array([True, False, True, True]), 4).tolist() == [0, 2]
+    given = np.array([[[5.0, 50], [1, 50], [9, 50], [0, 2]]])
+    assert weakest(given, np.ones(4, bool), 2).tolist() == [1, 0]
+    assert weakest(given, np.array([True, False, True, True]), 4).tolist() == [0, 2]
 
 
-def test_a_change_keeps_the_cap_and_replaces(device):
-    """Ten anchors in a row, the cap reached; one pulls, and the least given goes for it."""
-    layout = HeadLayout(splats=1)
-    anchors = np.array([[i, 0, 0] for i in range(10)], np.float32)
-    means = [anchors.astype(float) + np.array([0, 0.5, 0])]
-    evidence = Evidence(device, layout, 10, Watch(STRATEGIES["gradient"], seen=True))
-    gradient = np.tile(np.float32([0.001, 60]), (10, 1))
-    gradient[4] = (60, 60)
-    seen = np.stack([np.arange(10, 0, -1), np.full(10, 60)], axis=1)[None].astype(np.float32)
-    evidence.load({
-        "evidence.gradient": gradient, "evidence.opacity": np.full(10, 60, np.float32),
-        "evidence.steps": np.array(60), "evidence.seen": seen,
-        "evidence.stop_steps": np.array([60]),
-    })  # fmt: skip
-    settings = TrainSettings(grow_threshold=0.9)
-    keep, new = change(anchors, means, evidence, 0.1, 10, settings)
-    assert keep.all() and not len(new.anchors)
-    keep, new = change(anchors, means, evidence, 0.1, 11, settings)
+def forty(pulling: dict[int, float]) -> tuple:
+    """Forty anchors of one splat in a row: (anchors, sizes, means, evidence); 39 gives least."""
+    anchors = np.array([[i, 0, 0] for i in range(40)], np.float32)
+    strengths = np.full(40, 0.1)
+    strengths[list(pulling)] = list(pulling.values())
+    evidence = {
+        "evidence.pull": pulls(*strengths, views=60), "evidence.steps": np.array(60),
+        "evidence.opacity": np.full((40, 2), 60.0),
+        "evidence.given": np.stack([np.arange(40, 0, -1), np.full(40, 60)], axis=1)[None],
+    }  # fmt: skip
+    return anchors, np.full(40, 0.2), [anchors.astype(float) + np.array([0, 0.5, 0])], evidence
+
+
+def test_a_change_keeps_the_cap_and_moves_the_least_given():
+    keep, new = change(*forty({4: 9.0}), 41)
     assert keep.all() and new.parents.tolist() == [4]
     np.testing.assert_allclose(new.anchors, [[4, 0.5, 0]], atol=1e-6)
-    keep, new = change(anchors, means, evidence, 0.1, 10, replace(settings, grow_replace=0.1))
-    assert np.flatnonzero(~keep).tolist() == [9] and new.parents.tolist() == [4]
+    keep, new = change(*forty({4: 9.0}), 40)
+    assert np.flatnonzero(~keep).tolist() == [39] and new.parents.tolist() == [4]
+    keep, new = change(*forty(dict.fromkeys(range(30, 40), 2.0)), 40)  # a twentieth at most
+    assert np.flatnonzero(~keep).tolist() == [38, 39] and new.parents.tolist() == [30, 31]
+    keep, new = change(*forty({}), 40)
+    assert keep.all() and not len(new.anchors)
+
+
+def test_a_model_of_which_nothing_shows_keeps_its_anchors():
+    anchors, sizes, means, evidence = forty({})
+    evidence["evidence.opacity"] = np.tile([0.0, 60], (40, 1))
+    assert change(anchors, sizes, means, evidence, 40)[0].all()
+
+
+def test_a_change_of_the_state_keeps_the_others_moments():
+    layout = HeadLayout()
+    state = {"weights.value": np.ones(3)}
+    for name, width in (("anchors", 3), ("features", 8), ("frames", 7), ("colors", 3)):
+        for part in ("value", "mean", "square"):
+            state[f"{name}.{part}"] = RNG(0).normal(size=(4, width)).astype(np.float32)
+    new = Newcomers(np.full((2, 3), 9, np.float32), np.array([3, 0]))
+    keep = np.array([True, False, True, True])
+    out = changed_state(state, layout.per_anchor, keep, new)
+    np.testing.assert_array_equal(out["features.mean"][:3], state["features.mean"][keep])
+    for name in ("features", "colors"):
+        value = out[f"{name}.value"][3:]
+        np.testing.assert_array_equal(value, state[f"{name}.value"][[3, 0]])
+    frames, parents = out["frames.value"][3:], state["frames.value"][[3, 0]]
+    np.testing.assert_allclose(np.exp(frames[:, :3]), np.exp(parents[:, :3]) / 2, rtol=1e-6)
+    np.testing.assert_array_equal(frames[:, 3:], parents[:, 3:])
+    assert not out["anchors.square"][3:].any() and (out["anchors.value"][3:] == 9).all()
+    assert out["weights.value"] is state["weights.value"]
 
 
 @pytest.mark.parametrize("features", [1, 8, 33])
@@ -224,6 +228,8 @@ def test_a_package_within_its_megabytes(tmp_path, features, max_mb):
         "weights.value": rng.normal(size=layout.weights_at[-1]).astype(np.float32),
         "anchors.value": rng.normal(size=(most, 3)).astype(np.float32),
         "features.value": rng.normal(size=(most, -(-features // 8) * 8)).astype(np.float32),
+        "frames.value": rng.normal(size=(most, 7)).astype(np.float32),
+        "colors.value": rng.normal(size=(most, 3)).astype(np.float32),
     }  # noise, which does not compress
     model = model_of(state, layout, 0.1, encoding, STOPS, {"settings": settings.as_dict()})
     size = write_package(model, tmp_path / "a.shift")
@@ -237,19 +243,14 @@ def test_a_budget_that_holds_nothing_is_refused():
     layout, encoding = HeadLayout(), ControlEncoding(16, 1 / 15, 0.04)
     with pytest.raises(BadFile, match=r"--max-mb 0.001 leaves no room for anchors.*--hidden"):
         most_anchors(TrainSettings(max_mb=0.001), layout, encoding, STOPS)
-    with pytest.raises(BadFile, match=r"start with 9 anchors, and --max-mb 0.1 holds 8"):
-        within(np.zeros((9, 3)), 8, 0.1)
-    assert len(within(np.zeros((9, 3)), 8, None)) == 9  # --max-anchors caps growing alone
 
 
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"growth": "magic"}, "one of gradient, absgrad, error"), ({"coarse": 3}, "power of two"),
+        ({"max_anchors": 0}, "max_anchors is 0"), ({"coarse": 3}, "power of two"),
         ({"coarse": 0}, "coarse is 0"), ({"coarse_until": 1.1}, "coarse_until is 1.1"),
-        ({"max_mb": float("nan")}, "max_mb is nan"), ({"grow_threshold": 0.0}, "grow_threshold is"),
-        ({"grow_replace": 2.0}, "share"), ({"prune_weight": -1.0}, "prune_weight is -1.0"),
-        ({"prune_views": float("nan")}, "prune_views"),
+        ({"max_mb": float("nan")}, "max_mb is nan"), ({"grow_every": 0}, "grow_every is 0"),
     ],
 )  # fmt: skip
 def test_settings_of_growing_that_cannot_be_are_refused(changes, sentence):

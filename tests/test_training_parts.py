@@ -8,7 +8,6 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.density.density import Newcomers, changed_state, given_up, newcomers
 from shapeshift.training.first_anchors.initial import (
     choose_voxel,
     filler_points,
@@ -21,8 +20,9 @@ from shapeshift.training.guard import Guard
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
-from shapeshift.training.schedule import Budget, Schedule, choose_background
+from shapeshift.training.schedule import Budget, Schedule
 from shapeshift.training.settings import LONG, PAPER, SHORT, TrainSettings, preset
+from shapeshift.training.supervision.backgrounds import choose_background
 
 RNG = np.random.default_rng
 
@@ -67,7 +67,7 @@ def sphere_photos(background, alpha: bool) -> list[LoadedPhoto]:
 @pytest.mark.parametrize("alpha", [True, False])
 def test_the_visual_hull_of_a_ball_is_nearly_a_ball(tmp_path, alpha):
     capture = Capture(tmp_path, (Stop("RGB", 0.0),), (), background=(1.0, 1.0, 1.0))
-    points, origin, _ = initial_points(capture, sphere_photos((1, 1, 1), alpha), RNG(0))
+    points, origin, *_ = initial_points(capture, sphere_photos((1, 1, 1), alpha), RNG(0))
     radius = np.linalg.norm(points, axis=1)
     assert origin == "hull" and len(points) > 500
     assert 0.44 < np.percentile(radius, 5) and np.percentile(radius, 95) < 0.62
@@ -75,7 +75,7 @@ def test_the_visual_hull_of_a_ball_is_nearly_a_ball(tmp_path, alpha):
 
 def test_photos_that_tell_nothing_give_random_points_where_cameras_look(tmp_path):
     capture = Capture(tmp_path, (Stop("RGB", 0.0),), ())
-    points, origin, _ = initial_points(capture, sphere_photos((1, 1, 1), False), RNG(0))
+    points, origin, *_ = initial_points(capture, sphere_photos((1, 1, 1), False), RNG(0))
     assert origin == "random" and len(points) > 1000
     assert np.abs(points).max() < 4 and np.abs(np.median(points, axis=0)).max() < 0.2
 
@@ -105,7 +105,10 @@ def test_photos_are_made_smaller_with_their_view(tmp_path):
     capture = capture_of(tmp_path, image)
     small = load_photos(capture, "train", 3, "object")[0]
     assert small.view.size == (4, 3) and small.rgba.shape == (3, 4, 4)
-    assert small.view.tangents == capture.photos[0].view.tangents
+    left, right, down, up = capture.photos[0].view.tangents
+    np.testing.assert_allclose(
+        small.view.tangents, (left, left + (right - left) * 12 / 13, down, up)
+    )
     whole = load_photos(capture, "train", 1, "object")[0]
     np.testing.assert_array_equal(whole.rgba[..., :3], image)
     assert not whole.see_through
@@ -177,7 +180,8 @@ def test_budget_follows_whichever_ends_first():
     [
         ({"iterations": None}, "needs an end"), ({"iterations": 0}, "iterations is 0"),
         ({"seconds": float("nan")}, "seconds is nan"), ({"ssim_share": 1.1}, "0 to 1"),
-        ({"hidden": -3}, "at least 1"), ({"voxel": 0.0}, "voxel is 0.0"), ({"seed": -1}, "seed"),
+        ({"hidden": -3}, "at least 1"), ({"own": "size"}, "no 'size' of their own"),
+        ({"seed": -1}, "seed"),
         ({"rate_scale": float("inf")}, "rate_scale is inf"),
     ],
 )  # fmt: skip
@@ -189,6 +193,7 @@ def test_settings_that_cannot_be_are_refused(changes, sentence):
 def test_settings_name_the_networks():
     settings = TrainSettings(layers=2, fixed="scale, offset", view_dependent=False)
     assert settings.layout() == HeadLayout(5, 16, 32, 16, 2, ("scale", "offset"), False)
+    assert TrainSettings(own="").layout().per_anchor == ("anchors", "features")
     assert TrainSettings(**settings.as_dict()) == settings
     assert TrainSettings().layout() == HeadLayout(5)
     with pytest.raises(ValueError, match="layers is 4; networks have 1 to 3 hidden ones"):
@@ -205,41 +210,6 @@ def test_presets():
     assert preset("fast").rates(4000) is SHORT and preset("fast").rates(4001) is LONG
     with pytest.raises(ValueError, match="no preset 'slow'"):
         preset("slow")
-
-
-def test_new_anchors_stand_free_under_the_splats_that_pull():
-    anchors = np.array([[0, 0, 0], [1, 0, 0]], np.float32)
-    means = np.array([[0.02, 0, 0], [0.6, 0, 0], [1.01, 0, 0], [1.3, 0.3, 0]])  # k = 2
-    gradient = np.array([[90, 30], [90, 30], [90, 30], [9, 30]], float)  # pulls 3, 3, 3, 0.3
-    new = newcomers(anchors, [means], [gradient], voxel=0.2, threshold=1.0)
-    assert new.parents.tolist() == [0] * len(new.parents) and len(new.anchors)
-    assert np.allclose(new.anchors[0], [0.6, 0, 0])
-    assert len(np.unique(np.round(np.concatenate([anchors, new.anchors]), 4), axis=0)) == 2 + len(
-        new.anchors
-    )
-    assert not len(new.at_most(0, by_pull=True).anchors)
-    gradient[:, 1] = 5  # too rarely seen
-    assert not len(newcomers(anchors, [means], [gradient], 0.2, 1.0).anchors)
-
-
-def test_anchors_that_show_nothing_are_given_up():
-    opacity = np.array([0.0, 100.0, 0.4])
-    assert given_up(opacity, 100, 2, 0.005).tolist() == [True, False, True]
-    assert not given_up(opacity, 10, 2, 0.005).any()
-
-
-def test_changing_anchors_keeps_the_others_moments():
-    state = {"weights.value": np.ones(3)}
-    for name, width in (("anchors", 3), ("features", 8)):
-        for part in ("value", "mean", "square"):
-            state[f"{name}.{part}"] = RNG(0).normal(size=(4, width)).astype(np.float32)
-    new = Newcomers(np.full((2, 3), 9, np.float32), np.array([3, 0]))
-    keep = np.array([True, False, True, True])
-    out = changed_state(state, keep, new)
-    np.testing.assert_array_equal(out["features.mean"][:3], state["features.mean"][keep])
-    np.testing.assert_array_equal(out["features.value"][3:], state["features.value"][[3, 0]])
-    assert not out["anchors.square"][3:].any() and (out["anchors.value"][3:] == 9).all()
-    assert out["weights.value"] is state["weights.value"]
 
 
 def test_the_guard_goes_further_back_each_time():

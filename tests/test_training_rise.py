@@ -23,7 +23,7 @@ from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
 from tests.training_runs import bits, run
 
-SETTINGS = TrainSettings(iterations=450, grow=False, anchors=600)
+SETTINGS = TrainSettings(iterations=450, grow=False, max_anchors=600)
 
 
 @pytest.fixture(scope="module")

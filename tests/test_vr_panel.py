@@ -290,9 +290,9 @@ def test_the_legend_lights_up_with_its_stop_and_others_have_none():
     left, top, right, _ = (round(edge) for edge in layout.legend)
     sums = [
         panel_picture(a_panel(x, HEAT))[top + 57, left + 10 : right - 10, :3].astype(int).sum()
-        for x in (0.0, 0.5, 1.0)
+        for x in (0.0, 0.25, 0.5, 1.0)
     ]
-    assert sums[0] < sums[1] < sums[2]
+    assert sums[0] < sums[1] < sums[2] == sums[3]  # whole from half of the heat on
 
 
 def test_equal_looks_have_equal_keys_and_others_not():

@@ -172,7 +172,7 @@ def straight_pull(
     the pull moves them only by what they share with what lies between; and anchors, which every x
     has in common, are not pulled at all.
     """
-    device, splats = step.device, step.activation
+    device = step.device
     low, high = (
         [field.copy() for field in step.decode(encoding.encode(stop.x), eye).fields()]
         for stop in (way.low, way.high)
@@ -188,12 +188,8 @@ def straight_pull(
             np.float32(way.share), a, b, value, grad,
         )  # fmt: skip
         grads.append(grad)
-    grad_raw, grad_anchors = splats.backward(step.heads.raw, Gaussians(*grads))
-    adam = step.adam
-    weights, features = step.heads.backward(
-        adam["weights"], adam["anchors"], adam["features"], grad_raw, grad_anchors
-    )
-    return {"weights": weights.copy(), "features": features.copy()}
+    found = step.backward(Gaussians(*grads))
+    return {name: found[name].copy() for name in ("weights", "features")}
 
 
 def add(device, grads: dict[str, object], more: dict[str, object]) -> None:

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from shapeshift.rasterizer.project import LOW_BITS, RECORD
-from shapeshift.training.heads.networks import CHUNKS, HeadLayout, padded
+from shapeshift.training.heads.networks import CHUNKS, OWN_WIDTH, HeadLayout, padded
 
 FLOAT = 4  # bytes; every array of a step has entries of 4
 SPLAT = 14  # floats: mean 3, scale 3, quaternion 4, opacity, colour 3
-EVIDENCE = 2  # floats a splat that growing sums up
+EVIDENCE = 2  # floats a splat that densification sums up, and an anchor, twice and more
 LISTS = 12  # ints a splat that sorting and binning hold: keys, orders, places
 
 
@@ -31,9 +31,11 @@ def step_memory(layout: HeadLayout, form: str = "cpu") -> StepMemory:
     """By the shapes of the arrays; the pool that lends them rounds each up by an eighth at most."""
     features, k = padded(layout.features), layout.splats
     units = 5 * layout.layers * padded(layout.hidden) * (2 if form == "gpu" else 1)
-    by_anchor = 3 * (3 + features)  # values with their two moments
-    by_anchor += features + 3  # their gradients
-    by_anchor += units + 2 * layout.raw_at[-1] + 1  # raw outputs and gradients; evidence
+    own = sum(OWN_WIDTH[name] for name in layout.per_anchor[2:])
+    by_anchor = 3 * (3 + features + own)  # values with their two moments
+    by_anchor += 2 * (3 + features + own)  # their gradients, and those that a view shows
+    by_anchor += units + 2 * layout.raw_at[-1]  # raw outputs and gradients
+    by_anchor += 2 * EVIDENCE + 3  # of one stop; reach, rows
     by_splat = 2 * SPLAT + 2 * RECORD + 1 + LISTS + EVIDENCE
     weights = layout.weights_at[-1]
     loss_planes = {"cpu": 18, "gpu": 24}[form]  # windowed maps, and a value a pixel

@@ -1,19 +1,19 @@
-"""Photos of a capture, read once, made smaller, and handed to the loss as targets on the device."""
+"""Photos of a capture, read once and made smaller: what training and its scores know of them."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from shapeshift.runtime_models.files.memory import Memory, amount
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.pose import View
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthWish
-from shapeshift.training.losses.losses import ImageLoss, Target
 
 MOST_PIXELS = 640  # a side; larger photos are halved, thirded ... by default
-CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use
+PHOTOS = 0.5  # of the memory that files may take: what photos do as long as a run lasts
 BLACK = (0.0, 0.0, 0.0)
 
 
@@ -39,83 +39,75 @@ class LoadedPhoto:
 
 
 def choose_downscale(photos: tuple[Photo, ...]) -> int:
-    """The smallest whole factor after which no side exceeds MOST_PIXELS."""
+    """The smallest whole factor after which no side exceeds MOST_PIXELS and all fit into memory."""
     longest = max(max(photo.view.size) for photo in photos)
-    return -(-longest // MOST_PIXELS)
+    factor = -(-longest // MOST_PIXELS)
+    while factor < longest and memory_of(photos, factor) > memory_for_photos():
+        factor += 1
+    return factor
+
+
+def memory_of(photos: tuple[Photo, ...], factor: int) -> int:
+    """Bytes that photos take whose sides are divided by `factor`: see LoadedPhoto."""
+    each = (math.prod(p.view.divided(factor).size) * bytes_a_pixel(p) for p in photos)
+    return sum(each)
+
+
+def bytes_a_pixel(photo: Photo) -> int:
+    weighted = photo.mask is not None or photo.lens is not None
+    return 4 + 4 * weighted + 4 * (photo.depth is not None)
+
+
+def memory_for_photos() -> int:
+    """Bytes that all photos of a run may take together."""
+    return int(PHOTOS * Memory().most)
+
+
+def too_much(photos: tuple[Photo, ...], factor: int) -> str:
+    """Why photos of this size do not fit into memory, in words; "" where they do."""
+    needed, may = memory_of(photos, factor), memory_for_photos()
+    if needed <= may:
+        return ""
+    width, height = photos[0].view.divided(factor).size
+    return (
+        f"{len(photos):,} photos of {width}x{height} pixels would take {amount(needed)} of "
+        f"memory, photos may take {amount(may)}"
+    )
+
+
+def memory_doubts(photos: tuple[Photo, ...], factor: int) -> list[str]:
+    """A sentence where photos are smaller than usual because of memory."""
+    usual = -(-max(max(photo.view.size) for photo in photos) // MOST_PIXELS)
+    why = too_much(photos, usual) if usual < factor else ""
+    return [f"{why}: they are made {factor} times smaller; --memory GB allows more."] if why else []
 
 
 def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
     """Load one photo, made smaller by `factor`; `masks` is that of TrainSettings."""
-    width, height = photo.view.size
-    size = (max(round(width / factor), 1), max(round(height / factor), 1))
-    rgb, mask = load_photo(photo, size)
-    alpha, weight = np.ones_like(rgb[..., :1]), None
-    if mask is not None and photo.mask is None:  # the file's own alpha; colours times alpha
-        alpha = mask[..., None]
-        rgb = rgb / np.maximum(alpha, 1e-6)
-    elif mask is not None and masks == "object":
-        alpha = mask[..., None]
+    rgb, mask, lost = load_photo(photo, factor)
+    alpha, weight = np.full(rgb.shape[:2], 255, np.uint8), None
+    if mask is not None and (photo.mask is None or masks == "object"):
+        alpha = mask
     elif mask is not None and masks == "valid":
-        weight = mask.astype(np.float32)
-        if not weight.sum() > 0:
+        weight = mask.astype(np.float32) / 255
+        if not weight.any():
             raise BadFile(f"{photo.mask} is black all over: nothing of its photo would count.")
-    rgba = np.clip(np.rint(255 * np.concatenate([rgb, alpha], axis=2)), 0, 255).astype(np.uint8)
-    depth = None if photo.depth is None else load_depth(photo, size)
+    if lost is not None and lost.any():  # neither object nor background: nothing is known there
+        alpha = np.where(lost, np.uint8(255), alpha)
+        weight = np.where(lost, np.float32(0), np.float32(1) if weight is None else weight)
+    rgba = np.concatenate([rgb, alpha[..., None]], axis=2)
+    depth = None if photo.depth is None else load_depth(photo, factor)
     if depth is not None:  # nothing is known of what does not count
-        seen = rgba[..., 3] >= 128 if weight is None else weight >= 0.5
+        seen = alpha >= 128 if weight is None else (weight >= 0.5) & (alpha >= 128)
         depth = np.where(seen, depth, np.float32(0))
-    view = photo.view.resized(size)
-    masked = mask is not None
+    view, masked = photo.view.divided(factor), mask is not None
     return LoadedPhoto(view, photo.modality, rgba, weight, str(photo.path), depth, masked)
 
 
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
-    return [read(p, factor, masks) for p in capture.photos if p.split == split]
-
-
-class Targets:
-    """Makes loss targets of photos and keeps as many as fit into CACHE_BYTES."""
-
-    def __init__(self, device) -> None:
-        self.device = device
-        self.losses: dict[tuple[int, int], ImageLoss] = {}
-        self.kept: dict[tuple, Target | DepthTarget] = {}
-        self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
-        self.bytes = 0
-
-    def loss(self, photo: LoadedPhoto) -> ImageLoss:
-        """The image loss of the photo's size."""
-        size = photo.view.size
-        if size not in self.losses:
-            self.losses[size] = ImageLoss(self.device, size)
-        return self.losses[size]
-
-    def target(self, photo: LoadedPhoto, background: tuple[float, float, float]) -> Target:
-        """The photo over a background; kept unless the photo shows the background."""
-        key = (photo.modality, photo.name, photo.view.size)
-        if key in self.kept:
-            return self.kept[key]
-        rgba = self.device.upload(photo.rgba)
-        target = self.loss(photo).target(rgba, background, photo.weight)
-        if not photo.see_through and self.bytes + target.bytes <= CACHE_BYTES:
-            self.kept[key] = target
-            self.bytes += target.bytes
-        return target
-
-    def wish(self, photo: LoadedPhoto, share: float) -> DepthWish | None:
-        """What is to be learned from the photo's depth; None where it has none or share is 0."""
-        if photo.depth is None or not share > 0:
-            return None
-        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size, "depth")
-        if size not in self.depth_losses:
-            self.depth_losses[size] = DepthLoss(self.device, size)
-        loss = self.depth_losses[size]
-        target = self.kept.get(key) or loss.target(photo.depth)
-        if key not in self.kept and self.bytes + target.bytes <= CACHE_BYTES:
-            self.kept[key] = target
-            self.bytes += target.bytes
-        return DepthWish(loss, target, share) if target.known else None
-
-    def forget(self) -> None:
-        """Make all targets anew at their next use: the photos have another size now."""
-        self.kept, self.bytes = {}, 0
+    """All photos of a split.  Raises BadFile, also where they would need too much memory."""
+    mine = tuple(photo for photo in capture.photos if photo.split == split)
+    if mine and (why := too_much(mine, factor)):
+        fits = choose_downscale(capture.photos)
+        raise BadFile(f"{capture.folder}: {why}; --downscale {fits} fits, --memory GB allows more.")
+    return [read(photo, factor, masks) for photo in mine]

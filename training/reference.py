@@ -5,9 +5,10 @@ import numpy as np
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.model import HEADS
+from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
-from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.heads.networks import OWN_WIDTH, HeadLayout
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -40,16 +41,26 @@ def heads_reference(
     return out
 
 
-def activate_reference(raw: dict[str, np.ndarray], anchors: np.ndarray, voxel: float) -> tuple:
-    """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head."""
-    splats_per_anchor = raw["opacity"].shape[1]
-    offset = REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
+def activate_reference(
+    raw: dict[str, np.ndarray], anchors: np.ndarray, voxel: float,
+    frames: np.ndarray | None = None, colors: np.ndarray | None = None,
+) -> tuple:  # fmt: skip
+    """(means, scales, wxyz, opacity, color) of raw outputs (A, out) by head.
+
+    frames (A, 7) and base colours (A, 3), where anchors have such: see gaussians.cl.
+    """
+    count, k = raw["opacity"].shape
+    frames = np.tile([0.0, 0, 0, 1, 0, 0, 0], (count, 1)) if frames is None else frames
+    colors = np.zeros((count, 3)) if colors is None else colors
+    frames, base = np.repeat(frames, k, axis=0), np.repeat(colors, k, axis=0)
+    size, turn = np.exp(frames[:, :3]), normalize(frames[:, 3:])
+    offset = size * REACH * voxel * np.tanh(raw["offset"].reshape(-1, 3))
     return (
-        np.repeat(anchors, splats_per_anchor, axis=0) + offset,
-        UNIT * voxel * np.exp(np.clip(raw["scale"].reshape(-1, 3), *SCALE_CLIP)),
-        raw["rotation"].reshape(-1, 4),
+        np.repeat(anchors, k, axis=0) + (rotation_matrices(turn) @ offset[..., None])[..., 0],
+        size * UNIT * voxel * np.exp(np.clip(raw["scale"].reshape(-1, 3), *SCALE_CLIP)),
+        product(turn, raw["rotation"].reshape(-1, 4)),
         np.tanh(raw["opacity"].ravel()),
-        1 / (1 + np.exp(-raw["color"].reshape(-1, 3))),
+        1 / (1 + np.exp(-raw["color"].reshape(-1, 3) - base)),
     )
 
 
@@ -61,7 +72,9 @@ def decode_reference(
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
     networks = layout.unpack(parameters["weights"])
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
-    return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel)
+    own = (parameters.get(name) for name in OWN_WIDTH)
+    own = (None if rows is None else np.asarray(rows, np.float64) for rows in own)
+    return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel, *own)
 
 
 def image_loss_reference(image, photo, share: float, weight=None) -> float:

@@ -2,7 +2,7 @@
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,12 @@ from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettin
 from shapeshift.training.drawing import Color, Drawing
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.losses import Target
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.schedule import Budget
 from shapeshift.training.settings import Rates, TrainSettings
+from shapeshift.training.supervision.exposure import Exposures
+from shapeshift.training.supervision.targets import Targets
 
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
 PACE_STEPS = 20  # steps after which the length of a timed run is known
@@ -28,7 +31,17 @@ class Progress:
     fraction: float  # of the budget, 0..1
     loss: float | None  # every few steps
     anchors: int
+    elapsed: float  # seconds, as Run.elapsed
     fell_back: bool = False  # the guard turned the run back
+
+
+def clock_of(device: Device) -> Callable[[], float]:
+    """What tells the seconds that training takes.
+
+    Where a processor computes, processor time of all threads: seconds of one core, which do not
+    depend on what else the machine does.  The time of other devices is seen by the clock alone.
+    """
+    return time.process_time if device.kind == "cpu" else time.perf_counter
 
 
 class Run(ABC):
@@ -40,11 +53,18 @@ class Run(ABC):
     settings: TrainSettings | PlainSettings
     budget: Budget
     adam: Adam
+    targets: Targets
+    exposures: Exposures
     drawing: Drawing  # the last one
     iteration: int  # steps done
-    elapsed: float  # seconds
+    elapsed: float  # seconds that the steps took, by clock_of
     grown_at: int  # iteration of the last change of what is counted
     run_length: int | None  # iterations in all; None until a timed run's is known
+
+    @property
+    @abstractmethod
+    def splat_count(self) -> int:
+        """How many splats the model has at any stop, absent ones too."""
 
     @abstractmethod
     def warm_up(self) -> None:
@@ -61,13 +81,15 @@ class Run(ABC):
     def steps(self) -> Iterator[Progress]:
         """Train until the budget is used; yields after every step."""
         self.warm_up()
-        clock = time.perf_counter() - self.elapsed
-        self.elapsed = time.perf_counter() - clock
+        clock = clock_of(self.device)
         while self.budget.fraction(self.iteration, self.elapsed) < 1:
+            start = clock()
             loss, fell_back = self.one_step()
-            self.elapsed = time.perf_counter() - clock
-            fraction = self.budget.fraction(self.iteration, self.elapsed)
-            yield Progress(self.iteration, fraction, loss, len(self.adam[self.counted]), fell_back)
+            self.elapsed += clock() - start
+            fraction, count = self.budget.fraction(self.iteration, self.elapsed), self.counted
+            yield Progress(
+                self.iteration, fraction, loss, len(self.adam[count]), self.elapsed, fell_back
+            )
 
     @property
     def settled(self) -> bool:
@@ -81,12 +103,23 @@ class Run(ABC):
     def find_pace(self) -> None:
         """A timed run's length follows from its first steps, and its rates from the length."""
         if self.run_length is None and self.iteration == PACE_STEPS:
-            self.run_length = int(self.settings.seconds / (self.elapsed / PACE_STEPS))
+            self.run_length = int(self.settings.seconds / (self.elapsed / (PACE_STEPS - 1)))
             self.adam.set_rates(self.all_rates())
+
+    def target(self, photo: LoadedPhoto, background: Color, own: bool = True) -> Target:
+        """What the last drawing, of this photo, should have been.
+
+        own: it is of the photo's own stop, so that it tells how bright the photo is.
+        """
+        fraction = self.budget.fraction(self.iteration, self.elapsed)
+        known = self.exposures if fraction >= self.exposures.begin else None
+        image = self.drawing.frame.image if own else None
+        return self.targets.target(photo, background, known, image)
 
     def visible(self) -> float:
         """The share of all splats that the last drawing has on screen."""
-        return float((self.device.view(self.drawing.projected.record)[:, 9] > 0).mean())
+        shown = self.device.view(self.drawing.projected.record)[:, 9] > 0
+        return float(shown.sum() / self.splat_count)
 
     def psnr_of(self, drawing: Drawing, photo: LoadedPhoto, background: Color) -> float:
         """Decibels of a drawing against its photo."""

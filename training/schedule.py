@@ -11,7 +11,6 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
 MOST_TURNS = 100  # of a modality in a round
-NAMED_BACKGROUNDS = {"black": BLACK, "white": (1.0, 1.0, 1.0), "gray": (0.5, 0.5, 0.5)}
 
 
 @dataclass(frozen=True)
@@ -72,21 +71,6 @@ def turns_of(balance: dict[str, int], names: list[str]) -> tuple[int, ...]:
         order.append(int(np.argmax(due)))
         given[order[-1]] += 1
     return tuple(order)
-
-
-def choose_background(
-    setting: str, capture_background: tuple | None
-) -> tuple[float, float, float] | None:
-    """The fixed background of a run; None = random where photos show it."""
-    if setting == "auto":
-        return capture_background
-    if setting == "random":
-        return None
-    if setting not in NAMED_BACKGROUNDS:
-        raise ValueError(
-            f"There is no background '{setting}'; use auto, random, {', '.join(NAMED_BACKGROUNDS)}."
-        )
-    return NAMED_BACKGROUNDS[setting]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,7 @@ from itertools import pairwise
 
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.between import CURES
-from shapeshift.training.density.density_strategy import strategy
-from shapeshift.training.heads.networks import HeadLayout
+from shapeshift.training.heads.networks import OWN, HeadLayout
 from shapeshift.training.schedule import balance_of
 
 
@@ -21,18 +20,19 @@ class Rates:
     color: float
     feature: float
     anchor: float
+    frame: float  # of logarithms of sizes, and of quaternions
     decay: float  # what is left of every rate at the end of the run, exponentially
 
 
 # Ten seconds to minutes on a CPU: 5 times the rates that Scaffold-GS uses for 30,000 iterations.
 # Twice as much ends 0.9 and 1.2 dB lower on two scenes after 2,000 steps, half as much the same on
 # one; long runs end a little finer.
-SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, decay=0.1)
+SHORT = Rates(0.02, 0.02, 0.02, 0.01, 0.04, 0.0375, 0.01, 0.02, decay=0.1)
 LONG = replace(SHORT, decay=0.03)
 LEAST_GAP = 1 / 63  # of x between two stops: nearer ones share units of the encoding
 SHORT_RUN = 4000  # iterations
 # Paper, section 5.1; it states no decay.  Its anchor rate is in metres: 0.001, here in voxels.
-PAPER = Rates(0.001, 0.001, 0.0004, 0.0005, 0.008, 0.0075, 0.01, decay=0.1)
+PAPER = Rates(0.001, 0.001, 0.0004, 0.0005, 0.008, 0.0075, 0.01, 0.001, decay=0.1)
 
 
 def refuse_numbers(settings: object, least: dict[str, float], shares: tuple[str, ...]) -> None:
@@ -63,21 +63,12 @@ class TrainSettings:
     control: int = 16  # d of Psi
     sigma: float = 0.04  # of Psi
     encoding: str = "stops"  # Psi: one unit a stop, half a gap wide | even: `control`, `sigma`
-    voxel: float | None = None  # metres; None: from the points and `anchors`
     points: str = "auto"  # first: auto | capture | depth | hull | random | the path of a cloud
-    anchors: int = 6000  # to start with at most, each carved shape, where voxel is None
-    max_anchors: int = 12000  # cap of growing
-    max_mb: float | None = None  # the same as megabytes of the package on disk, from the start
+    max_anchors: int = 12000  # at the start, as far as there are points, and ever
+    max_mb: float | None = None  # the same as megabytes of the package on disk
+    own: str = ",".join(OWN)  # what each anchor has beside its features: frame, color
     grow: bool = True
     grow_every: int = 100  # iterations
-    growth: str = "absgrad"  # what draws newcomers: absgrad | gradient | error
-    grow_threshold: float | None = None  # of what draws them; None: that of the strategy
-    grow_grids: int = 2  # that newcomers fill: of a voxel, a half, a quarter ...
-    grow_each: bool = False  # at every stop by what its own photos say, not by the mean over all
-    grow_replace: float = 0.0  # of all anchors, so many at most make room when no more may come
-    prune_opacity: float = 0.005  # an anchor whose splats' mean opacity stays below goes
-    prune_weight: float = 0.0  # ... and one that gives less to its pictures of every stop, pixels
-    prune_views: float = 0.0  # ... and one that a smaller share of all steps had on screen
     ssim_share: float = 0.2  # of the image loss; eq. 8 read literally says 0.8, which is worse
     opacity_share: float = 0.0  # lambda_alpha of eq. 9; the paper says 0.01
     depth_share: float = 0.3  # of the depth loss, beside the image's, where photos have depth
@@ -101,16 +92,13 @@ class TrainSettings:
         """Raises ValueError naming the first number that cannot be."""
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "splats_per_anchor": 1, "features": 1,
-            "hidden": 1, "control": 2, "anchors": 1, "max_anchors": 1, "grow_every": 1,
-            "grow_grids": 1,
+            "hidden": 1, "control": 2, "max_anchors": 1, "grow_every": 1,
             "downscale": 1, "ssim_share": 0, "opacity_share": 0, "scale_share": 0,
             "depth_share": 0, "rise": 0, "revive": 0,
-            "rate_scale": 0, "voxel": 1e-6, "max_mb": 1e-6, "grow_threshold": 1e-30, "coarse": 1,
-            "coarse_until": 0, "grow_replace": 0, "prune_opacity": 0, "prune_weight": 0,
-            "prune_views": 0, "sigma": 1e-3, "between_share": 0, "between_pull": 0,
-            "thermal_smooth": 0,
+            "rate_scale": 0, "max_mb": 1e-6, "coarse": 1, "coarse_until": 0, "sigma": 1e-3,
+            "between_share": 0, "between_pull": 0, "thermal_smooth": 0,
         }  # fmt: skip
-        shares = ("ssim_share", "coarse_until", "grow_replace", "prune_views", "between_share")
+        shares = ("ssim_share", "coarse_until", "between_share")
         refuse_numbers(self, least, shares)
         if self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse is {self.coarse}; it has to be a power of two: 1, 2, 4 or 8.")
@@ -121,17 +109,19 @@ class TrainSettings:
                 f"There is no cure '{self.between}' of what lies between; use {', '.join(CURES)}."
             )
         balance_of(self.balance)
-        strategy(self.growth)
         self.layout()
         if self.iterations is None and self.seconds is None:
             raise ValueError("A run needs an end: give iterations or seconds.")
 
     def layout(self) -> HeadLayout:
         """The networks that are asked for.  Raises ValueError where there are none such."""
-        fixed = tuple(name.strip() for name in self.fixed.split(",") if name.strip())
+        fixed, own = (
+            tuple(name.strip() for name in names.split(",") if name.strip())
+            for names in (self.fixed, self.own)
+        )
         return HeadLayout(
             self.splats_per_anchor, self.features, self.hidden, self.control,
-            self.layers, fixed, self.view_dependent,
+            self.layers, fixed, self.view_dependent, own,
         )  # fmt: skip
 
     def for_stops(self, stops: tuple[Stop, ...]) -> "TrainSettings":
@@ -164,7 +154,7 @@ def preset(name: str) -> TrainSettings:
     if name == "paper":
         return replace(
             TrainSettings(), preset="paper", iterations=30000, encoding="even",
-            splats_per_anchor=10, max_anchors=100_000, anchors=100_000, opacity_share=0.01,
+            splats_per_anchor=10, max_anchors=100_000, opacity_share=0.01,
             scale_share=1e-9,
         )  # fmt: skip
     raise ValueError(f"There is no preset '{name}'; use fast or paper.")

@@ -1,37 +1,49 @@
 """The training loop: a Capture in, step after step, and at any moment an AnchorModel out."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from shapeshift.runtime_models.model import AnchorModel, BadFile, ControlEncoding
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.between import Between, Way, add, blended, own_blend, straight_pull
 from shapeshift.training.coarse import Coarse
-from shapeshift.training.density.density import Evidence, Watch
-from shapeshift.training.density.density_budget import most_anchors, within
-from shapeshift.training.density.density_grow import changed
-from shapeshift.training.density.density_strategy import strategy
+from shapeshift.training.density.densify import absent_as_nan, change, changed_state
+from shapeshift.training.density.density import Evidence
+from shapeshift.training.density.density_budget import most_anchors
 from shapeshift.training.doubts import usable
-from shapeshift.training.drawing import Color
+from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.export import model_of
-from shapeshift.training.first_anchors.initial import first_voxel, initial_points, voxel_centres
+from shapeshift.training.first_anchors.first_anchors import first_anchors
+from shapeshift.training.first_anchors.initial import initial_points
 from shapeshift.training.guard import EVERY as GUARD_EVERY
 from shapeshift.training.guard import SNAPSHOT_EVERY, Guard
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.photos import BLACK, LoadedPhoto, Targets, choose_downscale, load_photos
+from shapeshift.training.photos import (
+    BLACK,
+    LoadedPhoto,
+    choose_downscale,
+    load_photos,
+    memory_doubts,
+)
 from shapeshift.training.rise import Rise, after_fall
 from shapeshift.training.run import SETTLE, Run
-from shapeshift.training.schedule import Budget, Schedule, balance_of, choose_background, turns_of
+from shapeshift.training.schedule import Budget, Schedule, balance_of, turns_of
 from shapeshift.training.settings import Rates, TrainSettings
 from shapeshift.training.step import Step
+from shapeshift.training.supervision.backgrounds import choose_background, told_background
+from shapeshift.training.supervision.exposure import Exposures
+from shapeshift.training.supervision.targets import Targets
+from shapeshift.training.visibility import Visibility
 
-GROW_FROM, GROW_UNTIL = 0.1, 0.6  # of the run
+GROW_FROM, GROW_UNTIL = 0.05, 0.8  # of the run
 EMPTY_PHOTO = 0.002  # mean contrast below which a photo shows nothing but background
 FEATURE_SPREAD = 0.1  # standard deviation of the first features
 
 
 def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str, np.ndarray]:
-    """Rates as the optimiser takes them: one a weight, one for all anchors, one for features."""
+    """Rates as the optimiser takes them: one a weight, one for each group of what anchors have."""
     flat = np.zeros(layout.weights_at[-1], np.float32)
     heads = (rates.offset, rates.scale, rates.rotation, rates.opacity, rates.color)
     for start, stop, rate in zip(layout.weights_at, layout.weights_at[1:], heads, strict=False):
@@ -40,6 +52,8 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
         "weights": flat * layout.rate_shares(),
         "anchors": np.array([rates.anchor * voxel], np.float32),
         "features": np.array([rates.feature], np.float32),
+        "frames": np.array([rates.frame], np.float32),
+        "colors": np.array([rates.color], np.float32),
     }
 
 
@@ -70,11 +84,16 @@ class Trainer(Run):
             for split in ("train", "test")
         )
         photos, self.doubts = usable(photos, settings.masks)
+        if not settings.downscale:
+            self.doubts += memory_doubts(capture.photos, self.factor)
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:
                 raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
-        background = choose_background(settings.background, capture.background)
+        background = choose_background(settings.background, capture.background, photos)
+        if settings.background == "auto" and background != capture.background:
+            self.capture = replace(capture, background=background)  # hulls are carved out of it
+            self.doubts.append(told_background(background))
         turns = turns_of(balance_of(settings.balance), list(by_modality))
         self.schedule = Schedule(by_modality, settings.seed, background, turns)
         self.between = Between(
@@ -85,12 +104,9 @@ class Trainer(Run):
         )
         self.layout = settings.layout()
         self.coarse = Coarse(settings.coarse, settings.coarse_until, {})
-        self.watch = Watch(
-            strategy(settings.growth), len(self.stops), settings.grow_each,
-            bool(settings.grow_replace or settings.prune_weight or settings.prune_views),
-        )  # fmt: skip
         self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
         self.targets, self.photo_factor = Targets(device), 1
+        self.exposures = Exposures(device, by_modality)
         self.rise = Rise(settings.rise, 0, settings.revive)
         thermal = [stop.name for stop in self.stops if stop.kind == "thermal"]
         self.roughness = dict.fromkeys(thermal, settings.thermal_smooth)
@@ -109,24 +125,26 @@ class Trainer(Run):
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
         first = initial_points(self.capture, photos, rng, settings.points)
-        self.origin, most = first.origin, min(settings.anchors, self.most_anchors)
-        self.voxel = settings.voxel or first_voxel(first, most, rng, self.most_anchors)
-        anchors = within(
-            voxel_centres(first.points, self.voxel), self.most_anchors, settings.max_mb
-        )
-        features = np.zeros((len(anchors), padded(settings.features)), np.float32)
+        self.origin, background = first.origin, self.schedule.background
+        start = first_anchors(first, self.most_anchors, photos, background)
+        self.voxel, count = start.voxel, len(start.anchors)
+        features = np.zeros((count, padded(settings.features)), np.float32)
         features[:, : settings.features] = (
-            rng.normal(size=(len(anchors), settings.features)) * FEATURE_SPREAD
+            rng.normal(size=(count, settings.features)) * FEATURE_SPREAD
         )
-        values = {
-            "weights": initial_weights(self.layout, rng),
-            "anchors": anchors,
-            "features": features,
-        }
+        values = {"weights": initial_weights(self.layout, rng), "features": features}
+        values |= {n: getattr(start, n) for n in self.layout.per_anchor if n != "features"}
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
         self.rate_scale, self.run_length = settings.rate_scale, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
-        self.evidence = Evidence(self.device, self.layout, len(anchors), self.watch)
+        self.evidence, self.visibility = self.unwatched(count)
+
+    def unwatched(self, count: int) -> tuple[Evidence, Visibility]:
+        """For `count` anchors of which nothing is known yet: what they pull at, show and reach."""
+        return (
+            Evidence(self.device, self.layout, count, len(self.stops)),
+            Visibility(self.device, count, len(self.stops), self.layout.splats),
+        )
 
     def go_on(self, state: dict[str, np.ndarray], notes: dict) -> None:
         """Everything as it was when the checkpoint was written."""
@@ -135,11 +153,14 @@ class Trainer(Run):
         self.grown_at, self.rate_scale = notes["grown_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
         self.rise = Rise(*notes.get("rise", ()))
-        values = {n: state[f"{n}.value"] for n in ("weights", "anchors", "features")}
+        groups = ("weights", *self.layout.per_anchor)
+        values = {n: state[f"{n}.value"] for n in groups}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
-        self.evidence = Evidence(self.device, self.layout, len(values["anchors"]), self.watch)
+        self.evidence, self.visibility = self.unwatched(len(values["anchors"]))
         self.evidence.load(state)
+        self.visibility.load(state)
+        self.exposures.load(state)
 
     def checkpoint(self) -> tuple[dict[str, np.ndarray], dict]:
         """(state, notes) from which `resume` goes on to the same bits."""
@@ -150,11 +171,16 @@ class Trainer(Run):
             "settings": self.settings.as_dict(),
             "rise": [self.rise.steps, self.rise.since, self.rise.pull],
         }  # fmt: skip
-        return self.adam.state() | self.evidence.state(), notes
+        known = self.evidence.state() | self.visibility.state() | self.exposures.state()
+        return self.adam.state() | known, notes
 
     @property
     def anchors_count(self) -> int:
         return len(self.adam["anchors"])
+
+    @property
+    def splat_count(self) -> int:
+        return self.anchors_count * self.layout.splats
 
     def all_rates(self) -> dict[str, np.ndarray]:
         rates = parameter_rates(self.layout, self.rates(), self.voxel)
@@ -169,7 +195,8 @@ class Trainer(Run):
 
         On the way the guard learns what a healthy picture of every modality has on screen.
         """
-        before, evidence = self.adam.state(), self.evidence.state()
+        before = self.adam.state()
+        known = self.evidence.state() | self.visibility.state() | self.exposures.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
             whole = {(p.view.size, p.depth is None): p for p in photos}.values()
@@ -180,7 +207,9 @@ class Trainer(Run):
                 if self.between.middle is not None:
                     self.learn_at(photo, background, self.between.middle)
         self.adam.load(before)
-        self.evidence.load(evidence)
+        self.evidence.load(known)
+        self.visibility.load(known)
+        self.exposures.load(known)
 
     def next_photo(self) -> LoadedPhoto:
         """The photo of this step, as small as this part of the run has them."""
@@ -196,16 +225,27 @@ class Trainer(Run):
     ) -> dict[str, object]:
         """Gradients of how a photo differs.  control: Psi of each head, if not that of its stop."""
         settings = self.settings
-        control = self.control(photo.modality) if control is None else control
-        target = self.targets.target(photo, background)
-        self.evidence.stop = [s.name for s in self.stops].index(photo.modality)
+        at_stop, rows = control is None, None
+        self.evidence.stop = stop = [s.name for s in self.stops].index(photo.modality)
         depth = self.targets.wish(photo, settings.depth_share)
-        self.drawing = self.step.draw(photo.view, control, background, depth is not None)
+        if at_stop:
+            control, rows = self.control(photo.modality), self.rows(photo)
+        self.drawing = self.step.draw(photo.view, control, background, depth is not None, rows)
+        if at_stop:
+            self.visibility.note(stop, rows, self.step.there["anchors"], self.drawing.splats)
+        target = self.target(photo, background, at_stop)
         return self.step.gradients(
             self.drawing, self.targets.loss(photo), target, settings.ssim_share,
             settings.opacity_share, settings.scale_share, self.evidence, depth,
             self.rise.pull, self.roughness.get(photo.modality, 0.0),
         )  # fmt: skip
+
+    def rows(self, photo: LoadedPhoto):
+        """Which anchors a step from this photo runs; None: all."""
+        if self.between.often and self.between.cure == "splats":
+            return None  # its gradients are added to those of all anchors
+        stop = [s.name for s in self.stops].index(photo.modality)
+        return self.visibility.rows(stop, camera_of(photo.view), self.adam["anchors"])
 
     def learn_at(self, photo: LoadedPhoto, background: Color, way: Way | None) -> dict[str, object]:
         """From the photo, or as the run's cure of what lies between two stops has it."""
@@ -288,14 +328,14 @@ class Trainer(Run):
         looks = self.rise.steps if self.rise.since == self.iteration else 0
         self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
         self.rate_scale /= 2
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
         return True
 
     def go_on_from(self, state: dict[str, np.ndarray]) -> None:
         """Another state, of perhaps other anchors; all as it was where memory does not suffice."""
-        count = len(state["anchors.value"])
-        evidence = Evidence(self.device, self.layout, count, self.watch)
+        unwatched = self.unwatched(len(state["anchors.value"]))
         self.adam.load(state)
-        self.evidence = evidence
+        self.evidence, self.visibility = unwatched
 
     def mend(self) -> bool:
         """Back to the last good state where the run died after the guard's last look."""
@@ -306,12 +346,17 @@ class Trainer(Run):
 
     def grow(self) -> None:
         """New anchors where they are needed; anchors that show nothing go."""
-        means = [
-            self.device.download(self.step.decode(self.encoding.encode(s.x), np.zeros(3)).means)
-            for s in self.stops
-        ]
-        now, budget = self.adam.state(), self.most_anchors
-        self.go_on_from(changed(now, means, self.evidence, self.voxel, budget, self.settings))
+        means = []
+        for stop in self.stops:
+            splats = self.step.decode(self.encoding.encode(stop.x), np.zeros(3))
+            fields = map(self.device.download, (splats.means, splats.opacity))
+            means.append(absent_as_nan(*fields))
+        now, anchors = self.adam.state(), self.device.download(self.adam["anchors"])
+        sizes = np.full(len(anchors), self.voxel)
+        if "frame" in self.layout.own:
+            sizes = self.voxel * np.exp(now["frames.value"][:, :3].mean(axis=1))
+        kept, new = change(anchors, sizes, means, self.evidence.state(), self.most_anchors)
+        self.go_on_from(changed_state(now, self.layout.per_anchor, kept, new))
         self.grown_at = self.iteration
 
     def steps_to_go(self) -> int:
@@ -339,7 +384,6 @@ class Trainer(Run):
             "capture": self.capture.folder.name,
             "settings": self.settings.as_dict(),
             "iterations": self.iteration,
-            "seconds": round(self.elapsed, 3),
             "voxel_m": self.voxel,
             "first_anchors": self.origin,
             "downscale": self.factor,

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
@@ -67,8 +67,7 @@ def told_networks(model: AnchorModel) -> str:
 
 def with_anchors(model: AnchorModel, count: int) -> AnchorModel:
     """The same networks for `count` anchors: those of the model over and over."""
-    rows = np.arange(count) % len(model.anchors)
-    return replace(model, anchors=model.anchors[rows], features=model.features[rows])
+    return model.with_anchors(np.arange(count) % len(model.anchors))
 
 
 def decode_row(back_end: str, ctx, model: AnchorModel) -> DecodeRow:

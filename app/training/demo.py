@@ -11,8 +11,7 @@ from shapeshift.app.terminal import say
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 20 minutes of a core
-ANCHORS = 24000  # at the start
-MOST_ANCHORS = 36000
+MOST_ANCHORS = 30000
 BETWEEN, SHARE = "shapes", 0.5  # what lies between the stops, and in how many of the steps
 
 
@@ -58,7 +57,6 @@ def run(options: Options) -> int:
             out=package,
             seconds=options.seconds,
             iterations=None if limited else options.iterations,
-            anchors=ANCHORS,
             max_anchors=MOST_ANCHORS,
             between=BETWEEN,
             between_share=SHARE,

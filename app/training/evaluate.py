@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
-from shapeshift.app.opening import ReadingOptions, open_model
+from shapeshift.app.opening import ReadingOptions, open_capture, open_model
 from shapeshift.app.terminal import open_console, say, tell_json
 
 if TYPE_CHECKING:
@@ -45,7 +45,6 @@ def run(options: Options) -> int:
     from shapeshift.app.paths import full
     from shapeshift.app.progress import working
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.scene.document.scene_file import is_scene_file
     from shapeshift.training.calibration.extrinsics import rig_of, with_found
     from shapeshift.training.evaluation.evaluate import evaluate_model, report
@@ -58,7 +57,7 @@ def run(options: Options) -> int:
             "trained; name the model of one object."
         )
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    capture = read_capture(options.capture)
+    capture = open_capture(options.capture, options.memory)
     if options.modality is not None:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)
@@ -113,12 +112,15 @@ def print_table(result: dict) -> None:
     vgg = ["VGG distance"] if "vgg_file" in result else []
     depth = any("depth_error" in score for score in result["modalities"].values())
     more = [*vgg, *(["depth error %"] if depth else [])]
-    table = Table("modality", "PSNR dB", "median", "SSIM", *more, "photos", "splats alive")
+    table = Table(
+        "modality", "PSNR dB", "median", "fitted", "SSIM", *more, "photos", "splats alive"
+    )
     worst = {}
     for name, score in result["modalities"].items():
         photo, db = min(score["psnr_db_each"].items(), key=lambda pair: pair[1])
         worst[photo] = f"{photo} {db:.1f} dB"
-        row = [f"{score['psnr_db']:.2f}", f"{score['median_db']:.2f}", f"{score['ssim']:.4f}"]
+        row = [f"{score[key]:.2f}" for key in ("psnr_db", "median_db", "fitted_db")]
+        row.append(f"{score['ssim']:.4f}")
         row += [f"{score['vgg_distance']:.4f}"] if vgg else []
         if depth:
             row.append(f"{100 * score['depth_error']:.2f}" if "depth_error" in score else "")

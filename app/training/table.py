@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
+from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
-from shapeshift.app.training.train import INTERRUPTED, say
+from shapeshift.app.training.train import INTERRUPTED
 from shapeshift.app.training.train import Options as TrainOptions
 from shapeshift.app.training.train_options import PhotoOptions, SizeOptions
 
@@ -44,10 +46,8 @@ class MethodOptions:
     Default: not measured."""
     seed: Annotated[int | None, EXPERT] = None
     """Seed of all random numbers."""
-    anchors: int | None = None
-    """Most anchors that a model starts with."""
     max_anchors: int | None = None
-    """Most anchors that growing may reach, for each model."""
+    """Most anchors that each model may have."""
     splats: Annotated[int | None, EXPERT] = None
     """Most plain splats that a modality starts with."""
     max_splats: Annotated[int | None, EXPERT] = None
@@ -78,7 +78,6 @@ def run(options: Options) -> int:
     from shapeshift.app.charts.chart_rows import RowsFile
     from shapeshift.app.errors import UsageError
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.extrinsics import with_found
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
@@ -90,7 +89,7 @@ def run(options: Options) -> int:
         raise UsageError("--methods spz packs the files of splats; add splats before it.")
     if options.out.exists() and not options.out.is_dir():
         raise UsageError(f"{options.out} is a file; --out is a folder.")
-    capture, device = read_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
     refuse_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)
@@ -134,7 +133,7 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
             )
         if distance is not None:
             for photo in held_out:
-                refuse_small(*(max(round(side / factor), 1) for side in photo.view.size))
+                refuse_small(*photo.view.divided(factor).size)
 
 
 def offset_of(device, capture: "Capture", options: Options) -> str:
@@ -215,9 +214,7 @@ def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
 def train_options(method: str, options: Options) -> TrainOptions:
     """What `launch.py train` would be asked for."""
     shared = {f.name for f in fields(TrainOptions)} & {f.name for f in fields(options)}
-    strange = {"splats": ("anchors", "max_anchors")}.get(
-        method, ("splats", "max_splats", "sh_degree")
-    )
+    strange = {"splats": ("max_anchors",)}.get(method, ("splats", "max_splats", "sh_degree"))
     shared -= {"calibrate", *strange}  # what it finds is the same for all methods
     asked = {n: getattr(options, n) for n in shared}
     model = "splats" if method == "splats" else "anchors"

@@ -24,7 +24,7 @@ class Row:
     median_db: float  # of the photos' PSNR: one that nothing can explain does not move it
     ssim: float
     mb: float  # 1e6 bytes on disk of the file that shows this modality
-    seconds: float  # of training that file
+    seconds: float  # of training that file: of one core, where a processor computed
     steps: int
     splats: int  # that are there at this modality's stop
     photos: int  # held out
@@ -79,13 +79,24 @@ def row_of(cells: list[str]) -> str:
 def cells(rows: list[Row]) -> tuple[list[str], list[list[str]]]:
     """Column names and lines as the paper has them: a method is named where its lines begin."""
     vgg = [] if not rows or not isinstance(rows[0], VggRow) else ["VGG distance"]
-    columns = ["method", "modality", "PSNR dB", "median", "SSIM", *vgg, "splats", "MB", "seconds"]
+    columns = [
+        "method",
+        "modality",
+        "PSNR dB",
+        "median",
+        "SSIM",
+        *vgg,
+        "splats",
+        "MB",
+        "steps",
+        "seconds",
+    ]
     lines, before = [], ""
     for row in rows:
         more = [f"{row.vgg_distance:.4f}"] if vgg else []
         name, before = NAMES[row.method] if row.method != before else "", row.method
         whole = row.method != "joint" or row.modality == MEAN  # one file for all: told once
-        size = [f"{row.mb:.2f}", f"{row.seconds:.1f}"] if whole else ["", ""]
+        size = [f"{row.mb:.2f}", f"{row.steps:,}", f"{row.seconds:.1f}"] if whole else [""] * 3
         likeness = [f"{row.psnr_db:.2f}", f"{row.median_db:.2f}", f"{row.ssim:.4f}", *more]
         lines.append([name, row.modality, *likeness, f"{row.splats:,}", *size])
     return columns, lines

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, Opt
+from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say
@@ -42,15 +43,15 @@ class RunOptions:
     out: Path
     """The package to write: NAME.shift or a folder.  NAME.checkpoint.npz is written beside it."""
     seconds: float | None = None
-    """Train for this long; the learning rates follow the time."""
+    """Train for so many seconds of one core: processor time of all threads, so that nothing else
+    that runs takes from it, and two cores take half as long.  On a GPU, seconds by the clock.
+    Loading, compiling and looking at held-out photos do not count.  Learning rates follow it."""
     iterations: int | None = None
     """Train for this many steps; the same number gives the same bits."""
     preset: Literal["fast", "paper"] = "fast"
     """fast: minutes on a CPU.  paper: the numbers of the paper."""
     resume: bool = False
     """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""
-    max_anchors: int | None = None
-    """Most anchors that growing may reach."""
     max_mb: float | None = None
     """Most megabytes of the package on disk, from the start on."""
     points: Annotated[str | None, Opt(metavar="WHERE")] = None
@@ -72,29 +73,8 @@ class RunOptions:
     seed: Annotated[int | None, EXPERT] = None
     """Seed of all random numbers."""
     grow: Annotated[bool | None, EXPERT] = None
-    """Add and remove anchors between 10 % and 60 % of the run; --no-grow: keep the first ones."""
-    growth: Annotated[Literal["gradient", "absgrad", "error"] | None, EXPERT] = None
-    """What decides where anchors are added: gradient, the gradient by a splat's position on screen;
-    absgrad, the same of every pixel without its sign; error, the splat's share of the picture's
-    error."""
-    grow_threshold: Annotated[float | None, EXPERT] = None
-    """Threshold of --growth; smaller adds more anchors."""
-    grow_grids: Annotated[int | None, EXPERT] = None
-    """Voxel grids that new anchors fill: 1, the start's; 2, also one of half the width; 3, also one
-    of a quarter."""
-    grow_each: Annotated[bool | None, EXPERT] = None
-    """Decide where anchors are added for each modality by its own photos, not by the mean."""
-    grow_replace: Annotated[float | None, EXPERT] = None
-    """Share of all anchors, 0 to 1, that may be removed to make room once --max-anchors is reached:
-    those that contribute least."""
-    prune_opacity: Annotated[float | None, EXPERT] = None
-    """Remove anchors whose splats have a smaller mean opacity."""
-    prune_weight: Annotated[float | None, EXPERT] = None
-    """Remove anchors that contribute less than this to the pictures of every modality, in pixels;
-    0.1 is a useful value, 0 removes none."""
-    prune_views: Annotated[float | None, EXPERT] = None
-    """Remove anchors that are seen in a smaller share of all pictures; 0.01 is a useful value, 0
-    removes none."""
+    """Add anchors and move the least useful ones to where pictures need them, up to 80 % of the
+    run; --no-grow: keep the first ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +158,6 @@ def run(options: Options) -> int:
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
-    from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.extrinsics import with_found
     from shapeshift.training.calibration.outlier_views import hopeless, report, suspects
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
@@ -195,8 +174,7 @@ def run(options: Options) -> int:
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
     settings = settings_of(options, resume[1]["settings"] if resume else None)
-    with working("reading the capture"):
-        capture = read_capture(options.capture)
+    capture = open_capture(options.capture, options.memory)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
@@ -205,15 +183,17 @@ def run(options: Options) -> int:
         trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
     say(describe(trainer), *trainer.doubts)
     options.out.parent.mkdir(parents=True, exist_ok=True)
+    began, before = time.monotonic(), trainer.iteration
     with kept_when_memory_ends(trainer, options.out, checkpoint):
         interrupted = train(trainer, checkpoint)
+    step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
     save(trainer, options.out, checkpoint)
     if not interrupted:
         pace_package(options.out)
-    say(summary(trainer, options.out, interrupted))
+    say(summary(trainer, options.out, interrupted), *trainer.exposures.remarks())
     if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
-        say(found)
-    for line in what_next(options, trainer.iteration, trainer.elapsed, interrupted):
+        say(*found)
+    for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
     return INTERRUPTED if interrupted else 0
 
@@ -309,6 +289,7 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
 
     columns = ("{task.description}", "{task.fields[psnr]}", "{task.fields[loss]}")
     look, saved = 1 / LOOKS, time.monotonic()
+    most = "" if trainer.settings.seconds is None else f" of {trainer.settings.seconds:g}"
     with (
         interrupts() as asked,
         progress_bar(
@@ -317,7 +298,8 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
     ):  # fmt: skip
         task = bar.add_task("compiling kernels", total=1.0, psnr="", loss="")
         for now in trainer.steps():
-            text = f"{now.iteration} steps, {now.anchors:,} {trainer.unit}"
+            text = f"{now.iteration} steps, {now.elapsed:.0f}{most} {time_unit(trainer.device)}, "
+            text += f"{now.anchors:,} {trainer.unit}"
             bar.update(task, completed=min(now.fraction, 1.0), description=text)
             if now.loss is not None:
                 bar.update(task, loss=f"loss {now.loss:.4f}")
@@ -339,8 +321,11 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
     return False
 
 
-def what_next(options: Options, steps: int, seconds: float, interrupted: bool) -> list[str]:
-    """The last lines: how to train on where that was little, and how to look at the scene."""
+def what_next(options: Options, steps: int, step_s: float, interrupted: bool) -> list[str]:
+    """The last lines: how to train on where that was little, and how to look at the scene.
+
+    step_s: by the clock, which is what a person waits.
+    """
     from shapeshift.training.settings import preset
 
     again = [program(), "train", shlex.quote(full(options.capture))]
@@ -350,13 +335,18 @@ def what_next(options: Options, steps: int, seconds: float, interrupted: bool) -
     if interrupted:
         lines = [f"go on: {' '.join(again)}"]
     elif steps < FEW_STEPS:
-        more = seconds / max(steps, 1) * (usual - steps)
+        more = step_s * (usual - steps)
         took = f"{more / 60:.0f} minutes" if more >= 90 else f"{more:.0f} seconds"
         lines = [
             f"{steps} steps are few: {usual:,} are usual, about {took} more on this machine. "
             f"Go on: {' '.join(again)} --iterations {usual}"
         ]
     return [*lines, f"look: {program()} {out}"]
+
+
+def time_unit(device) -> str:
+    """What the seconds of training are: see training.run.clock_of."""
+    return "core s" if device.kind == "cpu" else "s"
 
 
 def decibels(psnr: dict[str, float]) -> str:
@@ -368,6 +358,7 @@ def summary(trainer: "Trainer", out: Path, interrupted: bool) -> str:
     quality = f"held-out photos: {psnr}" if psnr else "no photo was held out"
     state = "interrupted, --resume goes on" if interrupted else "done"
     return (
-        f"{full(out)}: {state} after {trainer.iteration} steps in {trainer.elapsed:.1f} s, "
+        f"{full(out)}: {state} after {trainer.iteration} steps in "
+        f"{trainer.elapsed:.1f} {time_unit(trainer.device)}, "
         f"{trainer.anchors_count:,} anchors; {quality}"
     )

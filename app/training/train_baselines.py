@@ -5,15 +5,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
+from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 from shapeshift.app.training.train import (
     INTERRUPTED,
     Options,
     calibrated,
     decibels,
     describe,
-    say,
     settings_of,
+    time_unit,
     train,
 )
 
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
 # Options that say where and how long, or how photos are read: they go for every kind of model.
 COMMON = {"capture", "out", "model", "separate", "resume", "preset", "device", "downscale", "masks",
-          "background", "seconds", "iterations"}  # fmt: skip
+          "background", "seconds", "iterations", "memory"}  # fmt: skip
 PAPER_ITERATIONS = 30000  # of 3DGS, and of the shape-shifting paper
 
 
@@ -56,7 +58,6 @@ class Outcome:
 
 def run_baseline(options: Options) -> int:
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.extrinsics import with_found
 
     if options.resume:
@@ -67,7 +68,7 @@ def run_baseline(options: Options) -> int:
     if options.separate and options.model == "splats":
         raise UsageError("plain splats are one model a modality already; leave out --separate.")
     settings = plain_settings(options) if options.model == "splats" else settings_of(options, None)
-    capture, device = read_capture(options.capture), open_device(options.device)
+    capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
@@ -134,7 +135,7 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
         runs[trainer.stop.name] = Run(file, trainer.elapsed, trainer.iteration)
-        say(told(trainer, trainer.count))
+        say(told(trainer, trainer.count), *trainer.exposures.remarks())
         if interrupted:
             break
     write_layer_list(layers, out)
@@ -164,7 +165,7 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
         interrupted = train(trainer, None)
         write_package(trainer.model(), files[name])
         runs[name] = Run(files[name], trainer.elapsed, trainer.iteration)
-        say(told(trainer, trainer.anchors_count))
+        say(told(trainer, trainer.anchors_count), *trainer.exposures.remarks())
         if interrupted:
             break
     return Outcome(runs, interrupted)
@@ -187,8 +188,10 @@ def describe_plain(trainer: "PlainTrainer") -> str:
 
 def told(trainer, count: int) -> str:
     psnr = decibels(trainer.held_out_psnr(most=len(trainer.held_out)))
-    return f"{trainer.iteration} steps in {trainer.elapsed:.1f} s, {count:,} {trainer.unit}; " + (
-        f"held-out photos: {psnr}" if psnr else "no photo was held out"
+    return (
+        f"{trainer.iteration} steps in {trainer.elapsed:.1f} {time_unit(trainer.device)}, "
+        f"{count:,} {trainer.unit}; "
+        + (f"held-out photos: {psnr}" if psnr else "no photo was held out")
     )
 
 

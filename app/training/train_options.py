@@ -13,18 +13,17 @@ if TYPE_CHECKING:
     from shapeshift.training.settings import TrainSettings
 
 BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
-# What a checkpoint was trained with that does not say it: these were the defaults once.
-OLD = {"encoding": "even", "growth": "gradient", "revive": 0.0}
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
     """How large an anchor model is and what its networks see."""
 
-    anchors: int | None = None
-    """Most anchors to start with; where visual hulls are carved, for each modality's own hull."""
-    voxel: Annotated[float | None, EXPERT] = None
-    """Metres between anchors at the start."""
+    max_anchors: int | None = None
+    """Most anchors; as far as there are points, a run starts with that many."""
+    own: Annotated[str | None, EXPERT] = None
+    """What each anchor has of its own beside its features: frame (sizes and axes), color (a base
+    colour), both as frame,color, or nothing as ''."""
     splats_per_anchor: Annotated[int | None, EXPERT] = None
     """Splats that the networks predict for each anchor: k in the paper."""
     features: Annotated[int | None, EXPERT] = None
@@ -59,6 +58,9 @@ class PhotoOptions:
     """Colour behind everything.  auto: the capture's own, else random where photos have masks."""
     device: Literal["cpu", "gpu"] | None = None
     """Kind of OpenCL device that must be used.  Default: the fastest that there is."""
+    memory: Annotated[float | None, EXPERT] = None
+    """GB of memory that files may take: photos half of it, for as long as the training lasts.
+    Default: three quarters of this machine's."""
 
 
 # What --help says where the preset's number is None, or where the capture decides.
@@ -66,8 +68,6 @@ DECIDED = {
     "preset": "fast",
     "seconds": "no limit, --iterations decides",
     "max_mb": "no limit",
-    "voxel": "from the first points and --anchors",
-    "grow_threshold": "gradient 2e-4, absgrad 6e-4, error 1.2 times the mean",
     "control": "one for each stop, as --encoding stops says; paper: 16",
     "sigma": "half the distance of two stops; paper: 0.04",
     "fixed": "none, all five see x",
@@ -96,6 +96,19 @@ def in_words(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def resumed(before: dict) -> "TrainSettings":
+    """The settings of a checkpoint.  Raises UsageError where it is of another version."""
+    from shapeshift.app.errors import UsageError
+    from shapeshift.training.settings import TrainSettings
+
+    if other := sorted(before.keys() ^ {f.name for f in fields(TrainSettings)}):
+        raise UsageError(
+            "--resume: the checkpoint was written by another version of this program, which "
+            f"trains in another way ({other[0]}); train anew without --resume."
+        )
+    return TrainSettings(**before)
+
+
 def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":
     """The preset with what train or fit was asked for; or a checkpoint's, with another budget.
 
@@ -111,14 +124,13 @@ def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":
     asked = {n: value for n, value in asked.items() if value is not None}
     if asked.get("points", SOURCES[0]) not in SOURCES:
         asked["points"] = str(plain(asked["points"]))
-    settings = preset(options.preset) if before is None else TrainSettings(**(OLD | before))
+    settings = preset(options.preset) if before is None else resumed(before)
     if before is not None:
-        known = settings.as_dict()  # an older checkpoint may not have all of them
-        other = sorted(n for n in asked if n not in BUDGET and asked[n] != known[n])
+        other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
         if other:
             raise UsageError(
                 f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
-                f"{known[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
+                f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
             )
     if asked.get("encoding") == "stops" and asked.keys() & {"control", "sigma"}:
         raise UsageError("--encoding stops sets --control and --sigma itself; leave them out.")

@@ -27,7 +27,10 @@ def grow_window(handle: object, times: float) -> None:
 
 def tells_places() -> bool:
     """Whether a window may know and choose where on the desktop it is."""
-    return glfw.get_platform() != glfw.PLATFORM_WAYLAND
+    # GLFW 3.3, which imgui-bundle brings and which counts where that is loaded first, cannot be
+    # asked: it is built for X11 alone.
+    ask = getattr(glfw, "get_platform", None)
+    return ask is None or ask() != glfw.PLATFORM_WAYLAND
 
 
 def _monitor_of(handle: object) -> object | None:

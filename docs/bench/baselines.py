@@ -6,7 +6,7 @@
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  Each
 budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the last
 budget, the shape-shifting model and plain splats once more at each of `--sizes`: that share of the
-anchors and splats to start with and of their caps.  Tables lie in WORK/CAPTURE/...; what is
+splats to start with and of both caps.  Tables lie in WORK/CAPTURE/...; what is
 there is not run again, so an interrupted run goes on where it was.
 """
 
@@ -36,7 +36,6 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, nargs="+", required=True)
     parser.add_argument("--sizes", type=float, nargs="*", default=[])
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
-    parser.add_argument("--anchors", type=int, default=TrainSettings().anchors)
     parser.add_argument("--max-anchors", type=int, default=TrainSettings().max_anchors)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--csv", type=Path, required=True)
@@ -75,10 +74,10 @@ def plan(
 
 
 def caps(size: float, asked: argparse.Namespace) -> dict[str, int]:
-    """Starts and caps of anchors and plain splats at a share of what was asked for."""
+    """Caps of anchors and of plain splats and the start of these, at a share of what is asked."""
     plain = PlainSettings()
     numbers = {
-        "anchors": asked.anchors, "max_anchors": asked.max_anchors,
+        "max_anchors": asked.max_anchors,
         "splats": plain.splats, "max_splats": plain.max_splats,
     }  # fmt: skip
     return {name: max(round(size * number), 1) for name, number in numbers.items()}
@@ -114,7 +113,6 @@ def command_of(asked: argparse.Namespace) -> str:
     words += [f"--sizes {' '.join(f'{s:g}' for s in asked.sizes)}"] if asked.sizes else []
     words += [f"--methods {' '.join(asked.methods)}"] if asked.methods != METHODS else []
     usual = TrainSettings()
-    words += [f"--anchors {asked.anchors}"] if asked.anchors != usual.anchors else []
     caps_differ = asked.max_anchors != usual.max_anchors
     words += [f"--max-anchors {asked.max_anchors}"] if caps_differ else []
     words += [f"--downscale {asked.downscale}"] if asked.downscale else []

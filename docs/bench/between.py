@@ -39,8 +39,8 @@ from shapeshift.training.photos import BLACK  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
 
 FREQUENCIES = "frequencies"
-EVEN = {"encoding": "even", "growth": "gradient"}
-STOPS = {"encoding": "stops", "growth": "gradient"}
+EVEN = {"encoding": "even"}
+STOPS = {"encoding": "stops"}
 WAYS = {
     "narrow": EVEN,
     "sigma 0.08": EVEN | {"sigma": 0.08},

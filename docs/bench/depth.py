@@ -41,7 +41,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
     parser.add_argument("--iterations", type=int)
-    parser.add_argument("--anchors", type=int, default=4000, help="to start with at most")
+    parser.add_argument("--max-anchors", type=int, default=4000)
     parser.add_argument(
         "--starts", nargs="+", choices=("points", "hull"), default=["points", "hull"]
     )
@@ -53,7 +53,7 @@ def main() -> None:
     if options.seconds is None and options.iterations is None:
         parser.error("a run needs an end: give --seconds or --iterations")
     settings = TrainSettings(
-        iterations=options.iterations, seconds=options.seconds, anchors=options.anchors
+        iterations=options.iterations, seconds=options.seconds, max_anchors=options.max_anchors
     )
     device = open_device()
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:

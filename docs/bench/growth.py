@@ -1,10 +1,10 @@
-"""Ways to grow: decibels against seconds, splats and bytes, from the same start.
+"""What anchors have and how they grow: decibels against seconds, splats and bytes.
 
     python3 docs/bench/growth.py CAPTURE [CAPTURE ...] --seconds 120 --out docs/bench/growth.csv
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  A way is
 a row of WAYS below: the settings of training that it changes.  Every way of a capture has the same
-photos, first anchors, seed, cap and budget, and is looked at at the same shares of the run, never
+photos, first places, seed, cap and budget, and is looked at at the same shares of the run, never
 while a growing step is fresh.  seconds are those of training alone; psnr_db is the mean over all
 held-out photos of a modality, `mean` that of the modalities; splats are those at least 1/255
 opaque, the mean over the stops.  Ways take turns within a seed, so that what else the machine does
@@ -29,26 +29,12 @@ from shapeshift.runtime_models.package.write_package import package_files, zip_f
 from shapeshift.training.train import Trainer  # noqa: E402
 
 WAYS = {
-    "none": {"growth": "gradient", "grow": False},
-    "gradient": {"growth": "gradient"},
-    "absgrad": {"growth": "absgrad"},
-    "error": {"growth": "error"},
-    "gradient each": {"growth": "gradient", "grow_each": True},
-    "absgrad each": {"growth": "absgrad", "grow_each": True},
-    "error each": {"growth": "error", "grow_each": True},
-    "absgrad replace": {"growth": "absgrad", "grow_replace": 0.03},
-    "absgrad 3 grids": {"growth": "absgrad", "grow_grids": 3},
-    "absgrad half": {"growth": "absgrad", "grow_threshold": 3e-4},
-    "absgrad each half": {"growth": "absgrad", "grow_each": True, "grow_threshold": 3e-4},
-    "absgrad coarse": {"growth": "absgrad", "coarse": 2},
-    "absgrad prune": {"growth": "absgrad", "prune_weight": 0.1},
-    "gradient replace": {"growth": "gradient", "grow_replace": 0.03},
-    "error each replace": {"growth": "error", "grow_each": True, "grow_replace": 0.03},
-    "gradient 3 grids": {"growth": "gradient", "grow_grids": 3},
-    "gradient coarse": {"growth": "gradient", "coarse": 2},
-    "gradient regularised": {"growth": "gradient", "opacity_share": 0.01, "scale_share": 1e-9},
-    "gradient rise": {"growth": "gradient", "rise": 100},
-    "gradient prune": {"growth": "gradient", "prune_weight": 0.1},
+    "default": {},
+    "no growth": {"grow": False},
+    "no frames": {"own": "color"},
+    "no base colours": {"own": "frame"},
+    "features alone": {"own": ""},
+    "coarse": {"coarse": 2},
 }
 LOOKS = (0.25, 0.5, 0.75, 1.0)  # shares of the run
 COLUMNS = (

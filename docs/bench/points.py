@@ -1,7 +1,7 @@
 """What first points are worth: `--points` by held-out PSNR, a row a source, seed and modality.
 
     python3 docs/bench/points.py CAPTURE ... [--scan CAPTURE FILE ...] --out docs/bench/points.csv
-        [--iterations 600] [--seeds 1 2] [--anchors 6000] [--densities 2000 10000 100000]
+        [--iterations 600] [--seeds 1 2] [--max-anchors 6000] [--densities 2000 10000 100000]
 
 CAPTURE is a folder of posed photos, or `workshop`: the demo's bench, made on the spot in small with
 depth photos and a scan of its surfaces (2 mm of noise).  --scan: PLY or NPZ files that together are
@@ -117,7 +117,7 @@ def asked() -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--iterations", type=int, default=600)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--anchors", type=int, default=6000)
+    parser.add_argument("--max-anchors", type=int, default=6000)
     parser.add_argument("--densities", type=int, nargs="+", default=[2_000, 10_000, 100_000])
     parser.add_argument("--downscale", type=int, help="of captures that are folders")
     return parser.parse_args()
@@ -145,7 +145,7 @@ def main() -> None:
             clouds = {} if points is None else scans_of(points, options.densities, Path(folder))
             sources = {source: source for source in SOURCES if source != "auto"} | clouds
             settings = TrainSettings(
-                iterations=options.iterations, anchors=options.anchors,
+                iterations=options.iterations, max_anchors=options.max_anchors,
                 downscale=None if name == "workshop" else options.downscale,
             )  # fmt: skip
             capture = read_capture(there)

@@ -162,7 +162,7 @@ def wrong_poses(degrees: float, whole: Capture, case: str) -> tuple[Path, list[s
     for photo in tenth(whole):
         axis = random.normal(size=3)
         turn = np.deg2rad(degrees) * axis / np.linalg.norm(axis)
-        motion = moved_by(np.concatenate([np.zeros(3), turn]))
+        motion = moved_by(np.concatenate([turn, np.zeros(3)]))
         new[photo.path] = replace(photo, view=offset_view(photo.view, motion))
     return changed_photos(whole, case, new)
 
@@ -170,8 +170,8 @@ def wrong_poses(degrees: float, whole: Capture, case: str) -> tuple[Path, list[s
 def brighter(photo: Photo, gain: float, folder: Path) -> Photo:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{photo.modality}-{photo.path.name}"
-    pixels = np.clip(gain * load_photo(photo)[0], 0, 1)
-    Image.fromarray(np.rint(255 * pixels).astype(np.uint8)).save(path)
+    pixels = np.clip(np.rint(gain * load_photo(photo).rgb), 0, 255)
+    Image.fromarray(pixels.astype(np.uint8)).save(path)
     return replace(photo, path=path)
 
 
@@ -217,7 +217,7 @@ def nan_in_photos(whole: Capture, case: str) -> tuple[Path, list[str]]:
     (whole.folder / "floats").mkdir(exist_ok=True)
     new = {}
     for photo in (photo for photo in whole.photos if photo.modality == "Thermal"):
-        pixels = load_photo(photo)[0][..., 0].astype(np.float32)
+        pixels = load_photo(photo).rgb[..., 0].astype(np.float32) / 255
         pixels.ravel()[::100] = np.nan
         path = whole.folder / "floats" / f"{photo.path.stem}.tiff"
         Image.fromarray(pixels).save(path)

@@ -64,11 +64,13 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         "weights": initial_weights(layout, rng),
         "anchors": ball(anchors, rng),
         "features": features.astype(np.float32),
+        "frames": np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (anchors, 1)),
+        "colors": np.zeros((anchors, 3), np.float32),
     }
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})
     voxel = 2 * RADIUS * np.sqrt(np.pi / anchors)  # the mean distance of neighbours
     step, loss = Step(device, layout, voxel, adam), ImageLoss(device, size)
-    evidence = Evidence(device, layout, anchors)
+    evidence = Evidence(device, layout, anchors, 1)
     rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
     target = loss.target(device.upload(rgba), (0, 0, 0))
     lens = perspective(np.deg2rad(45), size)

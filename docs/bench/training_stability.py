@@ -37,11 +37,11 @@ from shapeshift.scene.captures.write_capture import write_capture  # noqa: E402
 from shapeshift.training.evaluation.evaluate import Painter, stop_for  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
 from shapeshift.training.photos import BLACK, load_photos  # noqa: E402
-from shapeshift.training.schedule import choose_background  # noqa: E402
+from shapeshift.training.supervision.backgrounds import choose_background  # noqa: E402
 from shapeshift.training.synthetic.balls import make_balls  # noqa: E402
 
 HEAD = "| case | what was done | dB | untouched | what the program said | verdict |"
-ANCHORS = ("--anchors", "1000", "--max-anchors", "2000")
+ANCHORS = ("--max-anchors", "2000")
 MOST_SAID = 5  # sentences a row
 USUAL = (
     " held out; ",
@@ -56,16 +56,16 @@ def smaller(capture: Capture, folder: Path, side: int) -> Capture:
     """The capture written into `folder`, no photo larger than `side` pixels."""
     photos = []
     for number, photo in enumerate(capture.photos):
-        shrink = max(max(photo.view.size) / side, 1)
-        size = tuple(round(v / shrink) for v in photo.view.size)
-        rgb, mask = load_photo(photo, size)
+        factor = -(-max(photo.view.size) // side)
+        rgb, mask, _ = load_photo(photo, factor)
         paths = [folder / kind / f"{number:03}.png" for kind in ("photos", "masks")]
         for path, pixels in zip(paths, (rgb, mask), strict=True):
             if pixels is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                Image.fromarray(np.rint(255 * pixels).astype(np.uint8)).save(path)
+                Image.fromarray(pixels).save(path)
         kept = paths[1] if photo.mask is not None else None
-        photos.append(replace(photo, view=photo.view.resized(size), path=paths[0], mask=kept))
+        view = photo.view.divided(factor)
+        photos.append(replace(photo, view=view, path=paths[0], mask=kept, lens=None))
     out = replace(capture, folder=folder, photos=tuple(photos))
     write_capture(out)
     return out

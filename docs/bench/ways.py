@@ -37,7 +37,6 @@ def parser_of(doc: str, ways: dict[str, dict]) -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seconds", type=float, help="a run; or give --iterations")
     parser.add_argument("--iterations", type=int)
-    parser.add_argument("--anchors", type=int, default=4000, help="to start with at most")
     parser.add_argument("--max-anchors", type=int, default=12000)
     parser.add_argument("--downscale", type=int)
     parser.add_argument("--ways", nargs="+", choices=list(ways), default=list(ways))
@@ -56,8 +55,8 @@ def asked(parser: argparse.ArgumentParser) -> argparse.Namespace:
 def settings_of(options: argparse.Namespace) -> TrainSettings:
     """What every way of a table has in common."""
     return TrainSettings(
-        iterations=options.iterations, seconds=options.seconds, anchors=options.anchors,
-        max_anchors=options.max_anchors, downscale=options.downscale,
+        iterations=options.iterations, seconds=options.seconds, max_anchors=options.max_anchors,
+        downscale=options.downscale,
     )  # fmt: skip
 
 

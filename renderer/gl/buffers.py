@@ -138,20 +138,29 @@ class Arena:
         return sum(PARTS[name] for name in before) * self.staged
 
     def pack_staged(
-        self, start: int, count: int, anchors: moderngl.Buffer | None = None, first: int = 0
+        self,
+        start: int,
+        count: int,
+        anchors: moderngl.Buffer | None = None,
+        first: int = 0,
+        frames: moderngl.Buffer | None = None,
     ) -> None:
         """Turns `count` staged splats into rows start... of the arena: R S S^T R^T (paper eq. 1).
 
         With `anchors` (vec4 each; w = splats an anchor) staged means are offsets to be added to
-        them; `first` is the anchor of the first staged splat.
+        them; `first` is the anchor of the first staged splat.  With `frames` (2 vec4 each, as
+        layout.SLOTS says) what is staged is in the anchors' own axes and sizes.
         """
         if not count:
             return
         bind(mean_opacity=self.mean_opacity, covariance=self.covariance, staging=self.staging)
-        bind(anchors=anchors or self.staging)
+        bind(anchors=anchors or self.staging, frames=frames or self.staging)
         groups = groups_for(count, layout.WORKGROUP)
         sizes = {"count": count, "start": start, "capacity": self.staged, "first_anchor": first}
-        self.gpu.run(self._pack, groups, **sizes, is_offset=anchors is not None)
+        self.gpu.run(
+            self._pack, groups, **sizes, is_offset=anchors is not None,
+            has_frames=frames is not None,
+        )  # fmt: skip
 
     def write_geometry(
         self, i: int, means: np.ndarray, scales: np.ndarray, wxyz: np.ndarray, opacity: np.ndarray

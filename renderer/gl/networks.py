@@ -106,6 +106,11 @@ class Networks:
         rows[:, :features] = model.features
         self._anchors = gpu.upload(anchors, "the model's anchors")
         self._features = gpu.upload(rows, "the model's features")
+        self._frames: moderngl.Buffer | None = None
+        if model.frames is not None:
+            frames = np.zeros((count, 2, 4), np.float32)
+            frames[:, 0, :3], frames[:, 1] = model.frames.scales, model.frames.wxyz
+            self._frames = gpu.upload(frames, "the anchors' own axes")
         self._heads = {name: self._prepare(name) for name in HEADS}
         self._own: dict[str, _Head] = {}  # for a control an anchor, made when there is one
         self._control: moderngl.Buffer | None = None  # Psi of these
@@ -166,7 +171,7 @@ class Networks:
             n = min(at_once, count - first)
             for name, size in PARTS.items():
                 self._run(heads[name], arena.staging, arena.staging_at(name), size, first, n)
-            arena.pack_staged(start + first * k, n * k, self._anchors, first)
+            arena.pack_staged(start + first * k, n * k, self._anchors, first, self._frames)
 
     def color(self, arena: Arena, start: int, x: Controls, eye: np.ndarray) -> None:
         """The colour network at x towards an eye (3,) in the object's frame -> rows start..."""
@@ -199,6 +204,8 @@ class Networks:
             head.weights.release()
         if self._control is not None:
             self._control.release()
+        if self._frames is not None:
+            self._frames.release()
         self._anchors.release()
         self._features.release()
 

@@ -1,6 +1,5 @@
 """How much the colours of a model change with the direction that it is looked at from."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +22,7 @@ def color_slope(model: AnchorModel | SplatLayers) -> float:
     if "direction" not in model.networks["color"].inputs:
         return 0.0
     step = max(-(-len(model.anchors) // SAMPLE), 1)
-    few = replace(model, anchors=model.anchors[::step], features=model.features[::step])
+    few = model.with_anchors(slice(None, None, step))
     stops = sorted({stop.x for stop in model.stops})
     xs = stops + [(a + b) / 2 for a, b in pairwise(stops)]
     evaluator = Evaluator(few)

@@ -43,9 +43,7 @@ def compact(model: AnchorModel, alive: np.ndarray | None = None) -> tuple[Anchor
         alive[0, 0] = True
     anchors, slots = alive.any(axis=1), alive.any(axis=0)
     smaller = replace(
-        model,
-        anchors=np.ascontiguousarray(model.anchors[anchors]),
-        features=np.ascontiguousarray(model.features[anchors]),
+        model.with_anchors(anchors),
         networks={n: without_slots(model.networks[n], slots, SIZE_PER_SPLAT[n]) for n in HEADS},
         splats_per_anchor=int(slots.sum()),
     )

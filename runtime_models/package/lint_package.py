@@ -21,7 +21,7 @@ def refuse_filling(model: AnchorModel, file: str) -> None:
     A part of the anchors is decoded for it, at every stop.
     """
     step = max(-(-model.splat_count // SAMPLE), 1)
-    few = replace(model, anchors=model.anchors[::step], features=model.features[::step])
+    few = model.with_anchors(slice(None, None, step))
     evaluator = Evaluator(few)
     fullest = None
     for stop in model.stops:

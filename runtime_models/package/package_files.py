@@ -6,15 +6,21 @@ from pathlib import Path
 
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import opened_zip, read_member
-from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 FORMAT = "shapeshift 1"
+FRAMES_FORMAT = "shapeshift 2"  # the same, and anchors.npz holds the anchors' own frames
 MANIFEST = "scene.json"
 ANCHORS = "anchors.npz"
 WHOLE = f"a package is {MANIFEST}, {ANCHORS} and five ONNX files"
 
 LARGEST = {MANIFEST: 16 << 20, ANCHORS: 4 << 30}  # bytes, unpacked
 LARGEST_NETWORK = 256 << 20  # bytes; five of 64 MB would draw one frame a minute
+
+
+def format_name(model: AnchorModel) -> str:
+    """What the manifest of its package names."""
+    return FORMAT if model.frames is None else FRAMES_FORMAT
 
 
 def open_package(path: Path, memory: Account) -> Callable[[str], bytes]:

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.model import (
     ControlEncoding,
     Stop,
 )
-from shapeshift.runtime_models.package.package_files import FORMAT
+from shapeshift.runtime_models.package.package_files import FORMAT, FRAMES_FORMAT
 from shapeshift.runtime_models.stop_weights import Pace
 
 LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
@@ -42,6 +42,7 @@ class Manifest:
     provenance: dict
     pace: tuple[Pace, ...] = ()
     between_stops: str = "blend"
+    has_frames: bool = False  # whether anchors.npz holds the anchors' own frames
 
 
 def read_manifest(data: bytes, where: str) -> Manifest:
@@ -51,10 +52,10 @@ def read_manifest(data: bytes, where: str) -> Manifest:
     except (ValueError, RecursionError):
         raise BadFile(f"{where} is not JSON; export it again.") from None
     found = entries.get("format") if isinstance(entries, dict) else None
-    if found != FORMAT:
+    if found not in (FORMAT, FRAMES_FORMAT):
         raise BadFile(
-            f"{where} has format {short(found)}, this program reads {FORMAT!r}; "
-            "a newer program may be needed."
+            f"{where} has format {short(found)}, this program reads {FORMAT!r} and "
+            f"{FRAMES_FORMAT!r}; a newer program may be needed."
         )
     top = Wanted(entries, where)
     if top.get("up") != "+Y":
@@ -76,6 +77,7 @@ def read_manifest(data: bytes, where: str) -> Manifest:
         provenance.entries,
         read_pace(entries.get("pace", []), {stop.name for stop in stops}, where),
         between,
+        found == FRAMES_FORMAT,
     )
 
 

@@ -8,16 +8,26 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, unlimited
 from shapeshift.runtime_models.files.npy import read_array
 from shapeshift.runtime_models.files.zip_files import opened_zip
-from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, BadFile, Mlp
-from shapeshift.runtime_models.package.feature_codes import decode_features
+from shapeshift.runtime_models.model import (
+    HEADS,
+    SIZE_PER_SPLAT,
+    AnchorFrames,
+    AnchorModel,
+    BadFile,
+    Mlp,
+)
+from shapeshift.runtime_models.package.feature_codes import decode_features, range_of
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST, open_package
 from shapeshift.runtime_models.package.read_manifest import Manifest, read_manifest
 from shapeshift.runtime_models.package.read_onnx import read_onnx
+from shapeshift.runtime_models.rotation import normalize
 from shapeshift.runtime_models.splats.plain_splats import Reading
 
-TYPES = {"positions": ("float32",), "features": ("float32", "float16", "uint8")}
+STORED = ("float32", "float16", "uint8")
+TYPES = {"positions": ("float32",), "features": STORED}
+FRAME_TYPES = {"frame_log_scales": STORED, "frame_rotations": STORED}
+LARGEST_LOG = 20.0  # of a frame's scales: beyond it none was meant
 SHOWN = 60  # bytes of a splat that is decoded
-RANGE = "feature_range"  # there where features are bytes
 
 
 def read_package(path: str | Path, reading: Reading | None = None) -> AnchorModel:
@@ -37,7 +47,9 @@ def read_files(
         manifest = read_manifest(data, f"{package}/{MANIFEST}")
     where = f"{package}/{ANCHORS}"
     data = read(ANCHORS)
-    anchors, features = read_anchors(data, manifest.feature_width, where, memory)
+    anchors, features, frames = read_anchors(
+        data, manifest.feature_width, where, manifest.has_frames, memory
+    )
     memory.release(len(data))
     shown = len(anchors) * manifest.splats_per_anchor
     memory.charge(SHOWN * shown, f"{shown:,} splats")  # that is what they are for
@@ -47,46 +59,68 @@ def read_files(
     }
     return AnchorModel(
         anchors, features, networks, manifest.splats_per_anchor, manifest.encoding,
-        manifest.stops, manifest.provenance, (), manifest.pace, manifest.between_stops,
+        manifest.stops, manifest.provenance, (), manifest.pace, manifest.between_stops, frames,
     )  # fmt: skip
 
 
 def read_anchors(
-    data: bytes, width: int, where: str, memory: Account | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """positions (A, 3) metres and features (A, F), both float32."""
+    data: bytes,
+    width: int,
+    where: str,
+    with_frames: bool = False,
+    memory: Account | None = None,
+) -> tuple[np.ndarray, np.ndarray, AnchorFrames | None]:
+    """positions (A, 3) metres and features (A, F), both float32, and the frames where asked for."""
     memory = memory or unlimited()
-    arrays = read_arrays(data, where, memory)
-    for name, columns in (("positions", 3), ("features", width)):
-        array = arrays[name]
-        if str(array.dtype) not in TYPES[name]:
-            raise BadFile(f"{where}: {name} is {array.dtype}, expected {' or '.join(TYPES[name])}.")
-        if array.ndim != 2 or array.shape[1] != columns:
-            raise BadFile(f"{where}: {name} has shape {array.shape}, expected (A, {columns}).")
-        if len(array) == 0:
-            raise BadFile(f"{where} holds no anchors: {name} has shape {array.shape}.")
-        with memory.lend(array.size, f"the check of {name}"):
-            bad = ~np.isfinite(array).all(axis=1)  # of bytes: none
-        if bad.any():
-            raise BadFile(
-                f"{where}: {name} has NaN or Inf in {bad.sum()} of {len(array)} rows, "
-                f"first in row {int(bad.argmax())}; export it again."
-            )
-    for name in TYPES:
+    types = TYPES | (FRAME_TYPES if with_frames else {})
+    arrays = read_arrays(data, where, types, memory)
+    columns = {"positions": 3, "features": width, "frame_log_scales": 3, "frame_rotations": 4}
+    for name in types:
+        refuse_array(arrays[name], name, columns[name], types[name], where, memory)
+    for name in types:
         memory.charge(4 * arrays[name].size, f"{len(arrays[name]):,} {name}")
-    positions = np.ascontiguousarray(arrays["positions"], np.float32)
-    features = decode_features(arrays["features"], arrays.get(RANGE), where)
+    tables = [np.ascontiguousarray(arrays["positions"], np.float32)]
+    for name in list(types)[1:]:
+        tables.append(decode_features(arrays[name], arrays.get(range_of(name)), where, name))
+        if len(tables[0]) != len(tables[-1]):
+            raise BadFile(f"{where}: {len(tables[0])} positions but {len(tables[-1])} {name}.")
     memory.release(sum(array.nbytes for array in arrays.values()))
-    if len(positions) != len(features):
-        raise BadFile(f"{where}: {len(positions)} positions but {len(features)} features.")
-    return positions, features
+    if not with_frames:
+        return *tables, None
+    positions, features, log_scales, wxyz = tables
+    if not np.abs(log_scales).max() <= LARGEST_LOG:
+        raise BadFile(
+            f"{where}: frame_log_scales reach {np.abs(log_scales).max():.3g}, expected natural "
+            f"logarithms of factors, at most {LARGEST_LOG:g}; export it again."
+        )
+    return positions, features, AnchorFrames(np.exp(log_scales), normalize(wxyz))
 
 
-def read_arrays(data: bytes, where: str, memory: Account) -> dict[str, np.ndarray]:
-    """The arrays of TYPES, as stored, and RANGE where it is there; never unpickled."""
+def refuse_array(
+    array: np.ndarray, name: str, columns: int, types: tuple[str, ...], where: str, memory: Account
+) -> None:
+    """BadFile where an array of the npz is not what its place asks for."""
+    if str(array.dtype) not in types:
+        raise BadFile(f"{where}: {name} is {array.dtype}, expected {' or '.join(types)}.")
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise BadFile(f"{where}: {name} has shape {array.shape}, expected (A, {columns}).")
+    if len(array) == 0:
+        raise BadFile(f"{where} holds no anchors: {name} has shape {array.shape}.")
+    with memory.lend(array.size, f"the check of {name}"):
+        bad = ~np.isfinite(array).all(axis=1)  # of bytes: none
+    if bad.any():
+        raise BadFile(
+            f"{where}: {name} has NaN or Inf in {bad.sum()} of {len(array)} rows, "
+            f"first in row {int(bad.argmax())}; export it again."
+        )
+
+
+def read_arrays(data: bytes, where: str, types: dict, memory: Account) -> dict[str, np.ndarray]:
+    """The arrays of `types`, as stored, and the ranges of such as are bytes; never unpickled."""
+    names = (*types, *map(range_of, types))
     with opened_zip(data, where, memory) as archive:
-        arrays = {name: read_array(archive, name, where, memory) for name in (*TYPES, RANGE)}
-    for name in TYPES:
+        arrays = {name: read_array(archive, name, where, memory) for name in names}
+    for name in types:
         if arrays[name] is None:
             raise BadFile(f"{where} lacks the array '{name}'; export it again.")
     return {name: array for name, array in arrays.items() if array is not None}

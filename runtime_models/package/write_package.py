@@ -13,7 +13,13 @@ from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Stop
 from shapeshift.runtime_models.package.feature_codes import encode_features
-from shapeshift.runtime_models.package.package_files import ANCHORS, FORMAT, MANIFEST, open_package
+from shapeshift.runtime_models.package.package_files import (
+    ANCHORS,
+    FORMAT,
+    MANIFEST,
+    format_name,
+    open_package,
+)
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_onnx import write_onnx
 
@@ -44,9 +50,12 @@ def write_package(model: AnchorModel, path: str | Path, features: str = "float16
 def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
     """File name to content, the manifest first."""
     arrays = io.BytesIO()
-    np.savez_compressed(
-        arrays, positions=model.anchors, **encode_features(model.features, features)
-    )
+    tables = encode_features(model.features, features)
+    if model.frames is not None:
+        log_scales = np.log(model.frames.scales)
+        tables |= encode_features(log_scales, features, "frame_log_scales")
+        tables |= encode_features(model.frames.wxyz, features, "frame_rotations")
+    np.savez_compressed(arrays, positions=model.anchors, **tables)
     manifest = json_text(describe_model(model)).encode()
     files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
     for name in HEADS:
@@ -57,7 +66,7 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
 def describe_model(model: AnchorModel) -> dict:
     """The manifest."""
     return {
-        "format": FORMAT,
+        "format": format_name(model),
         "splats_per_anchor": model.splats_per_anchor,
         "feature_width": model.features.shape[1],
         "encoding": {

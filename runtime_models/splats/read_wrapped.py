@@ -17,6 +17,7 @@ from pathlib import Path, PurePosixPath
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import DAMAGED, KNOWN, member_names, opened_zip
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.package_files import MANIFEST
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 
 GZIP = b"\x1f\x8b"
@@ -30,7 +31,10 @@ def is_gzip(head: bytes, path: Path) -> bool:
 
 
 def is_zip_of_one(head: bytes, path: Path) -> bool:
-    return head[:2] == b"PK" and path.is_file() and len(known_in(path)) == 1
+    """A package, which is a zip with a scene.json, is none, whatever else lies in it."""
+    if head[:2] != b"PK" or not path.is_file() or MANIFEST in member_names(path):
+        return False
+    return len(known_in(path)) == 1
 
 
 def known_in(path: Path) -> list[str]:

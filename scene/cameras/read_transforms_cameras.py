@@ -21,7 +21,8 @@ from shapeshift.scene.cameras.camera_list import (
     pose_matrix,
     read_name,
 )
-from shapeshift.scene.captures.capture_rules import COLMAP_UP, CaptureWorld, image_size
+from shapeshift.scene.capture_photos import image_size
+from shapeshift.scene.captures.capture_rules import COLMAP_UP, CaptureWorld
 from shapeshift.scene.captures.read_transforms import ENDINGS, POSES, gather, opencv_axes
 from shapeshift.scene.pose import View
 

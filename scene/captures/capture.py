@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
+from shapeshift.scene.captures.colmap_tables import Lens
 from shapeshift.scene.pose import View
 
 
 @dataclass(frozen=True)
 class Photo:
-    view: View  # world frame of the program (+Y up), size of the image file
+    view: View  # world frame of the program (+Y up), size of the photo as training sees it
     path: Path
     modality: str  # a Stop's name
     mask: Path | None = None  # white where the photo counts
@@ -19,6 +20,12 @@ class Photo:
     depth: Path | None = None  # metres along the view, of the same field of view
     depth_unit: float = 0.001  # metres a step, where the depth photo holds integers
     counts: tuple[float, float] | None = None  # numbers of a grey photo that stand for 0 and 1
+    lens: Lens | None = None  # of the file, where it bends lines: the view is without it
+
+    @property
+    def file_size(self) -> tuple[int, int]:
+        """Width and height of the image file, pixels."""
+        return self.view.size if self.lens is None else self.lens.size
 
 
 @dataclass(frozen=True)
@@ -30,6 +37,7 @@ class Capture:
     point_colors: np.ndarray | None = None  # (P, 3) 0..1
     background: tuple[float, float, float] | None = None  # what lies behind; None = black
     notes: dict = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()  # what a person should know of its files, a sentence each
 
     def of(self, modality: str, split: str) -> list[Photo]:
         return [p for p in self.photos if p.modality == modality and p.split == split]

@@ -11,8 +11,8 @@ import numpy as np
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.captures.capture import Capture, Photo
-from shapeshift.scene.captures.photo import load_photo, open_image
-from shapeshift.scene.json.json_values import number_in, numbers_in, shortened, shown, text_in
+from shapeshift.scene.captures.photo import decoded, over_black
+from shapeshift.scene.json.json_values import number_in, numbers_in, shown, text_in
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
 FARTHEST = 1e12  # metres from zero: beyond that no photo was taken
@@ -53,6 +53,7 @@ class CaptureWorld:
         background: tuple | None,
         guessed: bool,
         notes: dict | None = None,
+        doubts: tuple[str, ...] = (),
     ) -> Capture:
         """The finished capture; `guessed` = nobody said what the modalities are."""
         notes = {"up_in_file": self.up} | (notes or {})
@@ -72,6 +73,7 @@ class CaptureWorld:
             colors,
             background,
             notes,
+            doubts,
         )
 
 
@@ -150,8 +152,9 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
     """Thermal stops of grey photos get a palette; false-colour photos keep their own colours."""
 
     def grey(name: str) -> bool:
-        rgb, _ = load_photo(next(p for p in photos if p.modality == name))
-        return bool((np.ptp(rgb, axis=2) == 0).all())
+        photo = next(p for p in photos if p.modality == name)
+        image, _ = decoded(photo.path, photo.counts)
+        return image.mode == "L" or bool((np.ptp(over_black(image), axis=2) == 0).all())
 
     return tuple(
         replace(s, palette="ironbow") if s.kind == "thermal" and grey(s.name) else s for s in stops
@@ -220,18 +223,6 @@ def split_every_8th(photos: list[Photo]) -> list[Photo]:
     return [replace(p, split="test" if p.path in tests else "train") for p in photos]
 
 
-def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
-    """(width, height) from the file's header, which must be what the capture claims."""
-    with open_image(path) as image:
-        size = image.size
-    if claimed is not None and claimed != size:
-        raise BadFile(
-            f"{shortened(path)}: the image has {size[0]}x{size[1]} pixels, the capture says "
-            f"{claimed[0]}x{claimed[1]}; resize the images or scale the intrinsics with them"
-        )
-    return size
-
-
 def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     """The one colour that most of the border of (nearly) all photos has exactly, else None.
 
@@ -239,13 +230,15 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
     """
     found = []
     for photo in photos[:: max(1, len(photos) // 8)][:8]:
-        rgb, mask = load_photo(photo)
-        if mask is not None:
+        image, _ = decoded(photo.path, photo.counts)
+        if photo.mask is not None or image.mode == "RGBA":
             return None
+        rgb = np.asarray(image.convert("RGB"))
         border = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]])
         colors, counts = np.unique(border, axis=0, return_counts=True)
         if counts.max() >= PLAIN_BORDER * len(border):
-            found.append(tuple(map(float, colors[counts.argmax()])))
+            color = colors[counts.argmax()].astype(np.float32) / 255
+            found.append(tuple(map(float, color)))
     if not found or Counter(found).most_common(1)[0][1] < min(4, len(photos)):
         return None
     return Counter(found).most_common(1)[0][0]

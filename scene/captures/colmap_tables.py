@@ -41,8 +41,13 @@ class Lens:
     params: tuple[float, ...]
 
     @property
+    def focals(self) -> tuple[float, ...]:
+        """The first of its parameters: one for both directions, or two."""
+        return self.params[: _focals(self.model)]
+
+    @property
     def focal(self) -> tuple[float, float]:
-        return (self.params[0], self.params[_focals(self.model) - 1])
+        return self.focals[0], self.focals[-1]
 
     @property
     def centre(self) -> tuple[float, float]:

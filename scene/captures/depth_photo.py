@@ -18,6 +18,7 @@ from shapeshift.scene.captures.photo import (
     open_image,
     quiet,
 )
+from shapeshift.scene.captures.undistort import pixels_of, straight_pixels
 from shapeshift.scene.json.json_values import is_number, shortened, shown, text_in
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
@@ -33,7 +34,7 @@ FARTHEST = 1e6  # metres: beyond that nothing was measured
 def depth_of(
     entry: dict, folder: Path, size: tuple[int, int], where: str
 ) -> tuple[Path | None, float]:
-    """The depth photo of a frame, if it names one, and metres a step of its integers."""
+    """The depth photo of a frame, if it names one that is there, and metres a step of it."""
     unit = next((entry[key] for key in UNITS if entry.get(key) is not None), MILLIMETRES)
     if not (is_number(unit) and 0 < unit <= FARTHEST):
         raise BadFile(f"{where}: '{UNITS[0]}' is {shown(unit)}; metres above 0 are wanted")
@@ -42,7 +43,7 @@ def depth_of(
         return None, float(unit)
     path = folder / name
     if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
-        raise BadFile(f"{where}: the depth photo {shortened(path)} is missing; put it there")
+        return None, float(unit)
     width, height = depth_size(path)
     if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
         raise BadFile(
@@ -66,10 +67,10 @@ def depth_size(path: Path) -> tuple[int, int]:
         return image.size
 
 
-def load_depth(photo: Photo, size: tuple[int, int] | None = None) -> np.ndarray:
+def load_depth(photo: Photo, factor: int | None = None) -> np.ndarray:
     """(H, W) float32 metres along the view of a photo that has depth; 0 where none is known.
 
-    size: (width, height) to have it in; None: as it is.
+    factor: as in load_photo, at each of whose pixels it then lies; None: as it is in its file.
     """
     path = photo.depth
     if path.suffix.lower() == ".npy":
@@ -78,18 +79,36 @@ def load_depth(photo: Photo, size: tuple[int, int] | None = None) -> np.ndarray:
             photo.depth_unit if values.dtype.kind != "f" else 1
         )
     else:
-        values = _integers(path, math.prod(photo.view.size))
+        values = _integers(path, math.prod(photo.file_size))
         values *= np.float32(photo.depth_unit)
     known = (values > 0) & (values <= FARTHEST)  # NaN is not
     values[~known] = 0
-    return values if size is None else at_centres(values, size)
+    return values if factor is None else _at_pixels(values, photo, factor)
 
 
-def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """(H, W) in another size (width, height): what lies at each new pixel's centre.
+def _at_pixels(depth: np.ndarray, photo: Photo, factor: int) -> np.ndarray:
+    """What lies at the centre of each pixel of the photo as training sees it.
 
     Means would put points between a thing and what is behind it.
     """
+    width, height = photo.view.divided(factor).size
+    x, y = ((np.arange(side) + 0.5) * factor for side in (width, height))
+    if photo.lens is not None:
+        places = straight_pixels(photo.lens, x, y)
+        across, below = (places / photo.file_size * depth.shape[::-1]).transpose(2, 0, 1)
+        inside = (across >= 0) & (below >= 0)
+        inside &= (across < depth.shape[1]) & (below < depth.shape[0])
+        column, row = (np.where(inside, at, 0).astype(int) for at in (across, below))
+        return np.where(inside, depth[row, column], np.float32(0))
+    rows, columns = (
+        np.minimum((at * old / side).astype(int), old - 1)
+        for at, old, side in zip((y, x), depth.shape, photo.view.size[::-1], strict=True)
+    )
+    return depth[np.ix_(rows, columns)]
+
+
+def at_centres(depth: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """(H, W) in another size (width, height): what lies at each new pixel's centre."""
     if size == depth.shape[::-1]:
         return depth
     rows, columns = (
@@ -129,8 +148,11 @@ def _over_points(photo: Photo, points: np.ndarray) -> np.ndarray:
     ahead = z > view.near
     x, y, z = x[ahead], y[ahead], z[ahead]
     height, width = depth.shape
-    across, down = width / view.size[0], height / view.size[1]  # its pixels a pixel of the photo
-    column, row = (fx * x / z + cx) * across, (fy * y / z + cy) * down
+    if photo.lens is None:
+        places = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1)
+    else:
+        places = np.nan_to_num(pixels_of(photo.lens, np.stack([x / z, y / z], axis=1)), nan=-1)
+    column, row = (places / photo.file_size * (width, height)).T
     inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
     seen = depth[row[inside].astype(int), column[inside].astype(int)]
     return (seen / z[inside])[seen > 0]

@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
@@ -12,6 +13,8 @@ from PIL import Image, UnidentifiedImageError
 from shapeshift.runtime_models.files.memory import GB, VARIABLE, Memory
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
 # Photos pack 2 to 16 pixels into a byte, a rendering before one colour 40, a mask a thousand: that
@@ -45,43 +48,123 @@ def quiet() -> Iterator[None]:
         yield
 
 
-def load_photo(
-    photo: Photo, size: tuple[int, int] | None = None
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """rgb (H, W, 3) float32 display sRGB 0..1 and mask (H, W) float32 0..1 or None.
+class Pixels(NamedTuple):
+    """A photo as it is trained on; all arrays have its rows and columns."""
 
-    Greyscale becomes three equal channels.  An alpha channel becomes the mask and the colours are
-    laid over black with it; a mask file takes precedence over alpha.  `size` (width, height) is
-    reached by the mean over each new pixel's area.
+    rgb: np.ndarray  # (H, W, 3) uint8 display sRGB
+    mask: np.ndarray | None  # (H, W) uint8: of the mask file, else the photo's alpha channel
+    lost: np.ndarray | None  # (H, W) bool: what an undistorted photo does not show
+
+
+def load_photo(photo: Photo, factor: int = 1) -> Pixels:
+    """The photo with its sides divided by `factor`, each pixel the mean over the area it covers.
+
+    What is less than a whole pixel at the right and at the bottom is cut off, as View.divided cuts
+    it.  Greyscale becomes three equal channels.  Where a mask file takes precedence over an alpha
+    channel, the colours are laid over black with the latter.  Of a bent lens the pixels are those
+    of its straight camera, scene.undistort.
     """
-    rgb, alpha = read_pixels(photo.path, photo.counts)
-    mask, pixels = alpha, rgb.shape[0] * rgb.shape[1]
+    if photo.lens is not None:  # what is made of it is beside it in memory
+        charge_pixels(photo.path, photo.view.size)
+    image, file_size = decoded(photo.path, photo.counts, factor)
+    mask, alpha = None, image.getchannel("A") if image.mode == "RGBA" else None
     if photo.mask is not None:
-        mask = read_pixels(photo.mask, most=pixels)[0].mean(axis=2)
-    if mask is not None and mask.shape != rgb.shape[:2]:
-        raise BadFile(
-            f"{photo.mask}: the mask has {mask.shape[1]}x{mask.shape[0]} pixels, its photo "
-            f"{rgb.shape[1]}x{rgb.shape[0]}; make them the same size"
-        )
-    if size is None or size == (rgb.shape[1], rgb.shape[0]):
-        return rgb, mask
-    return shrink(rgb, size), None if mask is None else shrink(mask[..., None], size)[..., 0]
+        image = over_black(image)
+        mask, mask_size = decoded(photo.mask, None, factor, math.prod(file_size))
+        mask = over_black(mask).convert("L")
+        if mask_size != file_size:
+            raise BadFile(
+                f"{photo.mask}: the mask has {mask_size[0]}x{mask_size[1]} pixels, its photo "
+                f"{file_size[0]}x{file_size[1]}; make them the same size"
+            )
+    image = smaller(image, file_size, photo.lens, factor)
+    if mask is not None:
+        mask = np.asarray(smaller(mask, file_size, photo.lens, factor))
+    elif alpha is not None:
+        mask = np.asarray(image.getchannel("A"))
+    gone = None
+    if photo.lens is not None:
+        gone = lost(photo.lens, image.size, factor)
+    return Pixels(np.asarray(image.convert("RGB")), mask, gone)
 
 
-def read_pixels(
-    path: Path, counts: tuple[float, float] | None = None, most: int = 0
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """rgb and alpha or None, as load_photo gives them; counts: what stands for 0 and 1.
+def over_black(image: Image.Image) -> Image.Image:
+    """An image without an alpha channel; its colours times the one that it had."""
+    if image.mode != "RGBA":
+        return image
+    return Image.alpha_composite(Image.new("RGBA", image.size, (0, 0, 0, 255)), image).convert(
+        "RGB"
+    )
+
+
+def smaller(
+    image: Image.Image, file_size: tuple[int, int], lens: Lens | None, factor: int
+) -> Image.Image:
+    """The image with the sides of its file divided by `factor`, straight where a lens is given.
+
+    image: the whole file, perhaps smaller already by a divisor of the factor.
+    """
+    done = round(file_size[0] / image.width)  # pixels of the file a pixel
+    if lens is None:
+        across, down = (max(min(factor, side) // done, 1) for side in file_size)
+        size = (max(file_size[0] // factor, 1), max(file_size[1] // factor, 1))
+        if (across, down) == (1, 1):
+            return image if size == image.size else image.crop((0, 0, *size))
+        return image.reduce((across, down), (0, 0, size[0] * across, size[1] * down))
+    size = tuple(max(side // factor, 1) for side in pinhole_of(lens).size)
+    if factor == 1:
+        return undistorted(image, lens, size)
+    # Twice as many pixels as are wanted, out of about as many: fewer would blur, more cost time.
+    more = max(factor // done // 2, 1)
+    image, twice = image.reduce(more), (2 * size[0], 2 * size[1])
+    return undistorted(image, lens, twice, factor / 2, done * more).reduce(2)
+
+
+def decoded(
+    path: Path, counts: tuple[float, float] | None, factor: int = 1, most: int = 0
+) -> tuple[Image.Image, tuple[int, int]]:
+    """An image of mode L, RGB or RGBA, and the size of the file.
 
     most: pixels that it may have however few its bytes, where a photo of as many goes with it.
+    A JPEG comes smaller by a divisor of `factor`, at most half of it: it is decoded so, which
+    costs less and is nearly the mean over the area.
     """
+    with loaded(path, factor, most) as (image, size):
+        if counts is not None or image.mode in (*GREY_16, FLOATS):
+            grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
+            return Image.fromarray(np.rint(255 * grey).astype(np.uint8)), size
+        if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+            return image.convert("RGBA"), size
+        return image.convert("L" if image.mode in ("L", "1") else "RGB"), size
+
+
+@contextmanager
+def loaded(
+    path: Path, factor: int = 1, most: int = 0
+) -> Iterator[tuple[Image.Image, tuple[int, int]]]:
+    """The image with its pixels read, see `decoded`, and the size of its file.  Raises BadFile."""
     with open_image(path) as image:
         charge_pixels(path, image.size, most)
+        width, height = image.size
+        divisor = next((d for d in (8, 4, 2) if factor % d == 0 and factor >= 2 * d), 1)
         try:
             with quiet():
+                if divisor > 1 and image.format == "JPEG":
+                    image.draft(None, (width // divisor, height // divisor))
                 image.load()
         except BROKEN as error:
             raise BadFile(f"{path}: the image is cut off ({error}); copy it again") from None
+        yield image, (width, height)
+
+
+def read_pixels(
+    path: Path, counts: tuple[float, float] | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """rgb (H, W, 3) float32 0..1 and alpha (H, W) or None, with which the colours lie over black.
+
+    counts: numbers of a grey photo that stand for 0 and 1.
+    """
+    with loaded(path) as (image, _):
         if counts is not None or image.mode in (*GREY_16, FLOATS):
             grey = shares(np.asarray(image, np.float32), image.mode, counts, path)
             return np.repeat(grey[..., None], 3, axis=2), None

@@ -1,5 +1,7 @@
 """A COLMAP folder (sparse/0 and images/, text or binary) -> Capture."""
 
+from dataclasses import replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -7,23 +9,22 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
-from shapeshift.scene.captures.capture import Capture, Photo
+from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
+from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
     counts_from,
-    image_size,
     split_every_8th,
     spread_stops,
     stops_from,
     with_counts,
 )
 from shapeshift.scene.captures.colmap_points import read_colmap_points
-from shapeshift.scene.captures.colmap_tables import Lens, find_model, read_tables
-from shapeshift.scene.captures.read_transforms import STRAIGHT, read_json
+from shapeshift.scene.captures.colmap_tables import find_model, read_tables
+from shapeshift.scene.captures.read_transforms import read_json
 from shapeshift.scene.json.json_values import shortened, shown, text_in
-from shapeshift.scene.pose import View
 
 
 def read_colmap(folder: Path) -> Capture:
@@ -36,25 +37,26 @@ def read_colmap(folder: Path) -> Capture:
     stops, modality_of = modalities(said, [i.name for i in posed], folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
-    photos = []
-    for image, world_from_camera in zip(posed, cameras, strict=True):
+    there = [(root / image.name).is_file() for image in posed]
+    missing = [str(root / i.name) for i, found in zip(posed, there, strict=True) if not found]
+    refuse_all_missing(missing, len(posed), str(model))
+    photos, rescaled = [], []
+    for image, world_from_camera in compress(zip(posed, cameras, strict=True), there):
         lens, path = lenses[image.lens], root / image.name
-        if not path.is_file():
-            raise BadFile(f"{path}: the image file is missing; put it there or drop it from COLMAP")
-        size = image_size(path, lens.size)
-        focal, centre = pinhole(lens, f"{folder}: camera {image.lens}")
+        matrix, where = world.turned(world_from_camera), f"{folder}: camera {image.lens}"
+        photo = posed_photo(path, modality_of[image.name], matrix, lens, where)
         mask = find_mask(folder, image.name)
         if mask is not None:
-            image_size(mask, size)
-        view = View.from_pinhole(world.turned(world_from_camera), focal, centre, size)
-        photos.append(Photo(view, path, modality_of[image.name], mask))
+            image_size(mask, photo.file_size)
+        photos.append(replace(photo, mask=mask))
+        rescaled += [str(path)] if photo.file_size != lens.size else []
     xyz, rgb = read_colmap_points(model / f"points3D{ending}")
     points, colors = (xyz, rgb.astype(np.float32) / 255) if len(xyz) else (None, None)
     counts = counts_from(said.get("modalities"), f"{folder}/capture.json")
     photos = with_counts(split_every_8th(photos), counts)
     background = background_from(said, f"{folder}/capture.json")
-    guessed = not said.get("modalities")
-    return world.capture(folder, stops, photos, points, colors, background, guessed)
+    guessed, doubts = not said.get("modalities"), doubts_of(len(posed), missing, photos, rescaled)
+    return world.capture(folder, stops, photos, points, colors, background, guessed, doubts=doubts)
 
 
 def modalities(
@@ -83,28 +85,6 @@ def modalities(
     if left:
         raise BadFile(f"{where}: image {left[0]} belongs to no listed modality")
     return tuple(sorted(stops, key=lambda s: s.x)), of
-
-
-def pinhole(lens: Lens, where: str) -> tuple[tuple, tuple]:
-    """(fx, fy), (cx, cy) of a camera without distortion, or with less than half a pixel."""
-    import pycolmap
-
-    width, height = lens.size
-    focal, centre = lens.focal, lens.centre
-    if not all(0 < f < np.inf for f in focal):
-        raise BadFile(f"{where} has focal lengths {focal}; both must be above 0")
-    camera = pycolmap.Camera(model=lens.model, width=width, height=height, params=lens.params)
-    x, y = np.meshgrid([0, width / 2, width], [0, height / 2, height])
-    corners = np.stack([x.ravel(), y.ravel()], axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):  # then the shift is NaN: refused
-        straight = np.concatenate([(corners - centre) / focal, np.ones((9, 1))], axis=1)
-        shift = np.abs(camera.img_from_cam(straight) - corners).max()
-    if not shift <= STRAIGHT:
-        raise BadFile(
-            f"{where} ({lens.model}) shifts corners by {shift:.1f} pixels; undistort first: "
-            "colmap image_undistorter --image_path images --input_path sparse/0 --output_path out"
-        )
-    return focal, centre
 
 
 def find_mask(folder: Path, name: str) -> Path | None:

@@ -5,37 +5,41 @@ import math
 import os
 from collections import ChainMap
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import read_json_file
 from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
     CaptureWorld,
     background_from,
     counts_from,
-    image_size,
     rigid,
     split_every_8th,
     spread_stops,
     stops_from,
     with_counts,
 )
+from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.json.json_values import is_number, shortened, shown, text_in
-from shapeshift.scene.pose import OPENCV_FROM_EYE, View
+from shapeshift.scene.pose import OPENCV_FROM_EYE
 
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG")
 POSES = ("transform_matrix", "c2w_opencv", "c2w")
 SPLITS = {"train": "train", "test": "test", "val": "test"}
 LENS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy",
         "k1", "k2", "k3", "k4", "p1", "p2", "w", "h")  # fmt: skip
-STRAIGHT = 0.5  # pixels that lens distortion may shift a corner before it matters
+# nerfstudio's lists of the photos of a split; what is in none of them is not used.
+LISTS = {"train_filenames": "train", "val_filenames": "test", "test_filenames": "test"}
+NO_PINHOLES = ("EQUIRECTANGULAR", "OMNIDIRECTIONAL", "VR180", "ORTHOPHOTO", "FISHEYE624")
 
 
 @dataclass(frozen=True)
@@ -44,10 +48,14 @@ class Shot:
 
     entry: dict
     modality: str
-    path: Path
+    path: Path  # without an ending where there is no such file
     world_from_camera: np.ndarray  # (4, 4) OpenCV axes, the file's world
     where: str  # for messages
     folder: Path  # where the names of its photos begin
+
+    @property
+    def names_depth(self) -> bool:
+        return any(self.entry.get(key) for key in DEPTH_NAMES)
 
 
 def read_transforms(*files: Path) -> Capture:
@@ -55,7 +63,10 @@ def read_transforms(*files: Path) -> Capture:
     folder, where = files[0].parent, str(files[0])
     data, entries = gather(files)
     stops = stops_of(data, entries, where)
-    shots = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
+    named = [s for i, e in enumerate(entries) for s in shots_of(e, i, data, stops, folder, where)]
+    shots = [shot for shot in named if os.path.isfile(shot.path)]
+    missing = [str(shot.path) for shot in named if not os.path.isfile(shot.path)]
+    refuse_all_missing(missing, len(named), where)
     for stop in stops:
         if not any(s.modality == stop.name for s in shots):
             raise BadFile(
@@ -67,19 +78,31 @@ def read_transforms(*files: Path) -> Capture:
         data.get("up", COLMAP_UP if opencv_axes(entries[0]) else None),
         where,
     )
-    photos = [photo_of(shot, world, folder) for shot in shots]
+    photos, rescaled, no_depth = [], [], []
+    for shot in shots:
+        lens = lens_of(shot)
+        photos.append(photo := photo_of(shot, lens, world, folder))
+        rescaled += [str(shot.path)] if photo.file_size != lens.size else []
+        no_depth += [str(shot.path)] if photo.depth is None and shot.names_depth else []
+    doubts = doubts_of(len(named), missing, photos, rescaled, no_depth)
     photos = with_counts(photos, counts_from(data.get("modalities"), where))
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors = None, None
-    name = text_in(data, "points", where) or text_in(data, "ply_file_path", where)
+    name = text_in(data, "points", where)
+    if not name and (name := text_in(data, "ply_file_path", where)):
+        if not os.path.isfile(folder / name):
+            doubts += (f"The points {shortened(folder / name)} are not there.",)
+            name = ""
     if name or (folder / "points3d.npz").is_file():
         points, colors = read_points(folder / (name or "points3d.npz"))
-    named = any(isinstance(m, dict) for m in data.get("modalities") or ())
+    described = any(isinstance(m, dict) for m in data.get("modalities") or ())
     background, notes = background_from(data, where), data.get("notes")
     if not isinstance(notes, dict | None):
         raise BadFile(f"{where}: 'notes' is {shown(notes)}; an object is wanted")
-    capture = world.capture(folder, stops, photos, points, colors, background, not named, notes)
+    capture = world.capture(
+        folder, stops, photos, points, colors, background, not described, notes, doubts
+    )
     refuse_other_units(capture, where)
     return capture
 
@@ -96,9 +119,25 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
             raise BadFile(f"{file}: 'frames' is empty; a capture needs at least one photo")
         split = {"split": file.stem.rpartition("_")[2]} if len(files) > 1 else {}
         # One after the other, not one of them: each frame would hold all that is said for all.
-        entries += [ChainMap(frame, split, data) for frame in frames]
+        entries += [ChainMap(frame, split, data) for frame in listed(frames, data, str(file))]
         everything |= data
     return everything, entries
+
+
+def listed(frames: list[dict], data: dict, where: str) -> list[dict]:
+    """The frames with the splits of nerfstudio's lists of them; all as they are without such."""
+    splits = {}
+    for key, split in LISTS.items():
+        names = data.get(key) or []
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise BadFile(f"{where}: '{key}' is {shown(names)}; a list of 'file_path's is wanted")
+        splits |= dict.fromkeys(names, split)
+    if not splits:
+        return frames
+    used = [frame for frame in frames if frame.get("file_path") in splits]
+    if not used:
+        raise BadFile(f"{where}: its lists of training and test photos name none of its frames")
+    return [frame | {"split": splits[frame["file_path"]]} for frame in used]
 
 
 def read_json(file: Path) -> dict:
@@ -157,11 +196,8 @@ def shots_of(
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
             )
-        return [Shot(entry, modality, find_image(folder / file, where), matrix, where, folder)]
-    return [
-        Shot(entry, n, find_image(folder / n / file, where), matrix, where, folder / n)
-        for n in names
-    ]
+        return [Shot(entry, modality, find_image(folder / file), matrix, where, folder)]
+    return [Shot(entry, n, find_image(folder / n / file), matrix, where, folder / n) for n in names]
 
 
 def opencv_axes(entry: dict) -> bool:
@@ -171,44 +207,44 @@ def opencv_axes(entry: dict) -> bool:
     return "opengl" not in str(entry.get("convention", "")).lower()
 
 
-def find_image(path: Path, where: str) -> Path:
+def find_image(path: Path) -> Path:
+    """The file of that name, whose ending may lack; the name as it is where there is none."""
     for ending in ENDINGS:
         if os.path.isfile(f"{path}{ending}"):  # unlike Path.is_file it takes any text for a name
             return Path(f"{path}{ending}")
-    raise BadFile(
-        f"{where}: the image file {shortened(path)} is missing; put it there or drop the frame"
-    )
+    return path
 
 
-def photo_of(shot: Shot, world: CaptureWorld, folder: Path) -> Photo:
+def photo_of(shot: Shot, lens: Lens, world: CaptureWorld, folder: Path) -> Photo:
     entry, where = shot.entry, shot.where
-    for key in LENS:
-        value = entry.get(key, 0)
-        if not (is_number(value) and abs(value) <= 1e30):
-            raise BadFile(f"{where}: '{key}' is {shown(value)}; a number is wanted")
-    claimed = (entry["w"], entry["h"]) if "w" in entry and "h" in entry else None
-    size = image_size(shot.path, claimed)
-    focal, centre = intrinsics(entry, size, where)
     split = text_in(entry, "split", where, "train")
     if split not in SPLITS:
         raise BadFile(f"{where} has split {shown(split)}; use train or test")
+    matrix = world.turned(shot.world_from_camera)
+    photo = posed_photo(shot.path, shot.modality, matrix, lens, where)
     mask, name = None, text_in(entry, "mask_path", where) or text_in(entry, "mask", where)
     if name:
         mask = folder / name
         if not os.path.isfile(mask):
             raise BadFile(f"{where}: the mask {shortened(mask)} is missing; put it there")
-        image_size(mask, size)
-    try:
-        view = View.from_pinhole(world.turned(shot.world_from_camera), focal, centre, size)
-    except ValueError as error:
-        raise BadFile(f"{where}: {error}") from None
-    depth, unit = depth_of(entry, shot.folder, size, where)
-    return Photo(view, shot.path, shot.modality, mask, SPLITS[split], depth, unit)
+        image_size(mask, photo.file_size)
+    depth, unit = depth_of(entry, shot.folder, photo.file_size, where)
+    return replace(photo, mask=mask, split=SPLITS[split], depth=depth, depth_unit=unit)
 
 
-def intrinsics(entry: dict, size: tuple[int, int], where: str) -> tuple[tuple, tuple]:
-    """(fx, fy), (cx, cy) in pixels; lenses that bend lines are refused."""
-    width, height = size
+def lens_of(shot: Shot) -> Lens:
+    """The lens as the file states it, of the size that it states; else of that of the photo."""
+    entry, where = shot.entry, shot.where
+    for key in LENS:
+        value = entry.get(key, 0)
+        if not (is_number(value) and abs(value) <= 1e30):
+            raise BadFile(f"{where}: '{key}' is {shown(value)}; a number is wanted")
+    if "w" in entry and "h" in entry:
+        width, height = size = int(entry["w"]), int(entry["h"])
+        if not (width >= 1 and height >= 1 and size == (entry["w"], entry["h"])):
+            raise BadFile(f"{where}: 'w' and 'h' are {entry['w']:g} and {entry['h']:g}, not pixels")
+    else:
+        width, height = size = image_size(shot.path, None)
     if "fl_x" in entry:
         fx = float(entry["fl_x"])
         fy = float(entry.get("fl_y", fx))
@@ -218,20 +254,19 @@ def intrinsics(entry: dict, size: tuple[int, int], where: str) -> tuple[tuple, t
             fy = focal_of(entry, "camera_angle_y", height, where)
     else:
         raise BadFile(f"{where} has no focal length; give 'fl_x' in pixels or 'camera_angle_x'")
-    if not (0 < fx < np.inf and 0 < fy < np.inf):
-        raise BadFile(f"{where} has focal lengths {fx}, {fy}; both must be above 0")
-    cx, cy = float(entry.get("cx", width / 2)), float(entry.get("cy", height / 2))
-    x, y = max(cx, width - cx) / fx, max(cy, height - cy) / fy
+    centre = float(entry.get("cx", width / 2)), float(entry.get("cy", height / 2))
     k1, k2, k3, k4, p1, p2 = (float(entry.get(k, 0)) for k in ("k1", "k2", "k3", "k4", "p1", "p2"))
-    r2 = x * x + y * y
-    bend = r2 * (abs(k1) + r2 * (abs(k2) + r2 * (abs(k3) + r2 * abs(k4))))
-    shift = fx * (math.sqrt(r2) * bend + 3 * (abs(p1) + abs(p2)) * r2)
-    if not shift <= STRAIGHT or "FISHEYE" in str(entry.get("camera_model", "")):
+    model = str(entry.get("camera_model", "")).upper()
+    if any(name in model for name in NO_PINHOLES):
+        raise BadFile(f"{where} is of camera model {model:.40}, which no pinhole can stand for")
+    if "FISHEYE" in model or entry.get("is_fisheye") is True:
+        return Lens("OPENCV_FISHEYE", size, (fx, fy, *centre, k1, k2, k3, k4))
+    if k4:
         raise BadFile(
-            f"{where} was taken through a lens that shifts its corners by {shift:.1f} pixels; "
-            "undistort the images first (colmap image_undistorter, or ns-process-data)"
+            f'{where} has k4 = {k4:g}, which only fisheye lenses have: "camera_model": '
+            '"OPENCV_FISHEYE" says that it is one'
         )
-    return (fx, fy), (cx, cy)
+    return Lens("FULL_OPENCV", size, (fx, fy, *centre, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0))
 
 
 def focal_of(entry: dict, key: str, side: int, where: str) -> float:

@@ -54,25 +54,36 @@ def counts_of(capture: Capture, modality: str) -> list[float] | None:
 
 
 def frame(photo: Photo, folder: Path) -> dict:
-    _, fx, fy, cx, cy = photo.view.pinhole()
     out = {
         "file_path": photo.path.relative_to(folder).as_posix(),
         "modality": photo.modality,
         "split": photo.split,
         "transform_matrix": photo.view.world_from_eye.matrix().tolist(),
-        "w": photo.view.size[0],
-        "h": photo.view.size[1],
-        "fl_x": fx,
-        "fl_y": fy,
-        "cx": cx,
-        "cy": cy,
+        "w": photo.file_size[0],
+        "h": photo.file_size[1],
     }
+    out |= intrinsics(photo)
     if photo.mask is not None:
         out["mask_path"] = photo.mask.relative_to(folder).as_posix()
     if photo.depth is not None:
         out["depth_path"] = photo.depth.relative_to(folder).as_posix()
         out["depth_unit"] = photo.depth_unit
     return out
+
+
+def intrinsics(photo: Photo) -> dict:
+    """Of the photo's file.  Raises ValueError for lenses that the form has no numbers for."""
+    names = ("fl_x", "fl_y", "cx", "cy")
+    if photo.lens is None:
+        return dict(zip(names, photo.view.pinhole()[1:], strict=True))
+    model, params = photo.lens.model, photo.lens.params
+    if model == "OPENCV_FISHEYE":
+        numbers = dict(zip((*names, "k1", "k2", "k3", "k4"), params, strict=True))
+        return numbers | {"camera_model": model}
+    if model not in ("OPENCV", "FULL_OPENCV") or any(params[9:]):
+        raise ValueError(f"{photo.path}: a lens of model {model} cannot be written.")
+    numbers = dict(zip((*names, "k1", "k2", "p1", "p2", "k3"), params, strict=False))
+    return numbers | {"camera_model": "OPENCV"}
 
 
 def write_points(path: Path, capture: Capture) -> None:

@@ -18,6 +18,7 @@ from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, Mlp, SplatLayers
 from shapeshift.runtime_models.rotation import covariance
 from tests.gl.conftest import f32, make_layers, make_mlp, make_model, read
+from tests.test_frames import with_frames
 
 EYE = np.array([0.3, -0.2, 2.0])
 BLOCK, GROUP = layout.DECODE_WORKGROUP, layout.WORKGROUP
@@ -61,6 +62,23 @@ def test_ten_thousand_anchors_agree_to_1e_5(gpu):
 @pytest.mark.parametrize("k", [1, 10])
 def test_sizes_around_the_work_groups(gpu, anchors, k):
     assert_as_evaluated(gpu, make_model(anchors, k=k))
+
+
+@pytest.mark.parametrize("anchors", [1, BLOCK + 1, GROUP + 1])
+@pytest.mark.parametrize("k", [1, 3])
+def test_anchors_with_axes_and_sizes_of_their_own(gpu, anchors, k):
+    assert_as_evaluated(gpu, with_frames(make_model(anchors, k=k)))
+
+
+def test_frames_of_one_model_are_not_those_of_another(gpu):
+    """The same arena holds a model with frames and one without; each has its own."""
+    models = with_frames(make_model(70)), make_model(70)
+    with Arena(gpu, [m.splat_count for m in models]) as arena, Decoder(gpu, arena, models) as made:
+        for i in (0, 1, 0):
+            made.geometry(i, 0.3)
+        found = np.split(read(arena.mean_opacity, np.float32, 4)[:, :3], 2)
+    for model, means in zip(models, found, strict=True):
+        np.testing.assert_allclose(means, Evaluator(model).geometry(0.3)[0], atol=1e-5)
 
 
 @pytest.mark.parametrize(

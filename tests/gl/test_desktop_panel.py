@@ -228,8 +228,10 @@ def test_a_stop_is_gone_to_by_its_button(viewer, hands, monkeypatch):
     widgets = Widgets(monkeypatch)
     run_frames(viewer, 2)
     hands.click(*widgets.middle("thermal"))
+    run_frames(viewer, 2, seconds=0.5)  # it is there after SHIFT_S
     assert viewer.stage.scene.objects[0].x == 1.0
     hands.click(*widgets.middle("photo"))
+    run_frames(viewer, 2, seconds=0.5)
     assert viewer.stage.scene.objects[0].x == 0.0
 
 

@@ -182,7 +182,7 @@ def test_a_scene_file_opens_with_one_object_more(display, scene_file, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--touch", "--x", "0.5"], ["--x", "touch.scene.json"]),
+        (["--touch", "--x", "Termal"], ["--x", "'Termal' is no x"]),
         (["--touch", "--up=-Z"], ["touch.scene.json", "which way is up"]),
         (["broken.scene.json"], ["object 'a'", "nothing.ply"]),
         (["broken.scene.json", "other.scene.json"], ["two scene files"]),

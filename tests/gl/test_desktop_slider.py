@@ -117,6 +117,7 @@ def test_a_click_on_a_stops_name_goes_there(viewer, hands):
     left, top, right, _ = viewer.window.covered[1]
     _, high = track_ends(viewer)
     hands.click(high - 20, top + 12 + 8)  # "thermal" ends where the track does
+    run_frames(viewer, 2, seconds=0.5)  # the way there takes SHIFT_S
     assert x_of(viewer) == 1.0
     assert left < high < right
 
@@ -129,11 +130,14 @@ def test_arrow_keys_step_and_shift_goes_to_the_next_stop(viewer, hands):
     hands.key("Left")
     assert x_of(viewer) == 0.02
     hands.key("Right", "Shift_L")
+    run_frames(viewer, 2, seconds=0.5)
     assert x_of(viewer) == 1.0
     hands.key("Right")
     hands.key("Right", "Shift_L")
+    run_frames(viewer, 2, seconds=0.5)
     assert x_of(viewer) == 1.0
     hands.key("Left", "Shift_L")
+    run_frames(viewer, 2, seconds=0.5)
     assert x_of(viewer) == 0.0
     hands.key("Left")
     assert x_of(viewer) == 0.0

@@ -24,7 +24,7 @@ def test_layers_of_the_leg_do_not_share_a_shape():
     if not (DATA / "anatomy_leg_3modal_views").is_dir():
         pytest.skip("the capture anatomy_leg_3modal_views is not here")
     capture = read_capture(DATA / "anatomy_leg_3modal_views")
-    need = need_of(capture, PARTS[:1], iterations=180, anchors=1200, downscale=5)
+    need = need_of(capture, PARTS[:1], iterations=180, max_anchors=1200, downscale=5)
     assert need.verdicts[0].word == KEPT and "bone" in need.verdicts[0].needed_by
     assert need.verdicts[0].change["bone"].mean < -1
     assert need.outlines["bone", "full"] < need.outlines["muscle", "full"]
@@ -32,7 +32,10 @@ def test_layers_of_the_leg_do_not_share_a_shape():
 
 def test_balls_in_visible_light_and_heat_do(tmp_path):
     need = need_of(
-        make_balls(tmp_path, size=64, views=16, test_views=4), PARTS, iterations=200, anchors=800
+        make_balls(tmp_path, size=64, views=16, test_views=4),
+        PARTS,
+        iterations=200,
+        max_anchors=800,
     )
     words = {verdict.part: verdict.word for verdict in need.verdicts}
     assert words["shape that follows x"] == DROPPED

@@ -21,24 +21,21 @@ from shapeshift.training.baselines.plain_density import (
 from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettings
 from shapeshift.training.baselines.plain_step import REST, PlainEvidence, PlainStep
 from shapeshift.training.drawing import Color
-from shapeshift.training.first_anchors.initial import (
-    choose_voxel,
-    initial_points,
-    pixel_of,
-    voxel_centres,
-)
+from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
+from shapeshift.training.first_anchors.initial import choose_voxel, initial_points, voxel_centres
 from shapeshift.training.guard import EVERY as GUARD_EVERY
 from shapeshift.training.guard import SNAPSHOT_EVERY, Guard
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.photos import BLACK, LoadedPhoto, Targets, choose_downscale, load_photos
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.run import SETTLE, Run
-from shapeshift.training.schedule import Budget, Schedule, choose_background
+from shapeshift.training.schedule import Budget, Schedule
+from shapeshift.training.supervision.backgrounds import choose_background
+from shapeshift.training.supervision.exposure import Exposures
+from shapeshift.training.supervision.targets import Targets
 
 GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
 DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
-NEIGHBOURS = 3  # whose distance is the first scale, as 3DGS
 FIRST_OPACITY = 0.1
-COLOR_PHOTOS = 24  # that the first colours are taken from
 
 
 def one_modality(capture: Capture, name: str) -> Capture:
@@ -50,28 +47,6 @@ def one_modality(capture: Capture, name: str) -> Capture:
     if not any(p.split == "train" for p in photos):
         raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
     return replace(capture, stops=tuple(s for s in capture.stops if s.name == name), photos=photos)
-
-
-def seen_colors(points: np.ndarray, photos: list[LoadedPhoto], background: Color) -> np.ndarray:
-    """(P, 3) the mean colour of the pixels that points (P, 3) fall on; grey where on none."""
-    total, times = np.zeros((len(points), 3)), np.zeros(len(points))
-    for photo in photos[:: -(-len(photos) // COLOR_PHOTOS)]:
-        pixel, inside = pixel_of(photo.view, points)
-        column, row = pixel[inside].astype(int).T
-        total[inside] += photo.over(background)[row, column]
-        times[inside] += 1
-    return np.where(times[:, None] > 0, total / np.maximum(times, 1)[:, None], 0.5)
-
-
-def first_scales(points: np.ndarray) -> np.ndarray:
-    """(P,) metres: root mean square distance to the nearest neighbours; of a lone point, 1."""
-    from scipy.spatial import cKDTree
-
-    near = min(NEIGHBOURS, len(points) - 1)
-    if near < 1:
-        return np.ones(len(points))
-    distance, _ = cKDTree(points).query(points, k=near + 1)
-    return np.sqrt((distance[:, 1:] ** 2).mean(axis=1))
 
 
 def group_rates(rates: PlainRates, extent: float) -> dict[str, np.ndarray]:
@@ -93,10 +68,13 @@ class PlainTrainer(Run):
         self.factor = settings.downscale or choose_downscale(capture.photos)
         photos = load_photos(capture, "train", self.factor, settings.masks)
         self.held_out = load_photos(capture, "test", self.factor, settings.masks)
-        background = choose_background(settings.background, capture.background)
+        background = choose_background(settings.background, capture.background, photos)
+        if settings.background == "auto":
+            self.capture = replace(capture, background=background)  # hulls are carved out of it
         self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
         self.extent = extent_of([p.view for p in photos])
         self.targets = Targets(device)
+        self.exposures = Exposures(device, self.schedule.photos)
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
         self.run_length, self.rate_scale = settings.iterations, settings.rate_scale
         self.adam = Adam(device, self.first_values(photos), self.all_rates())
@@ -108,7 +86,8 @@ class PlainTrainer(Run):
         """Round, faint splats at the first points, in the colours of the photos."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
-        points, self.origin, _ = initial_points(self.capture, photos, rng, settings.points)
+        first = initial_points(self.capture, photos, rng, settings.points)
+        points, self.origin = np.concatenate([first.points, first.guesses]), first.origin
         most = min(settings.splats, settings.max_splats)
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         means = voxel_centres(points, self.voxel)
@@ -116,7 +95,7 @@ class PlainTrainer(Run):
         colors = seen_colors(means, photos, self.schedule.background or BLACK)
         values = {
             "means": means,
-            "scales": np.log(first_scales(means))[:, None].repeat(3, axis=1),
+            "scales": np.log(neighbour_distance(means))[:, None].repeat(3, axis=1),
             "wxyz": np.tile([1.0, 0, 0, 0], (count, 1)),
             "opacity": np.full(count, np.log(FIRST_OPACITY / (1 - FIRST_OPACITY))),
             "base": (colors - 0.5) / C0,
@@ -127,6 +106,10 @@ class PlainTrainer(Run):
     @property
     def count(self) -> int:
         return len(self.adam["means"])
+
+    @property
+    def splat_count(self) -> int:
+        return self.count
 
     def all_rates(self) -> dict[str, np.ndarray]:
         return group_rates(self.rates(), self.extent)
@@ -152,9 +135,9 @@ class PlainTrainer(Run):
         return loss.value()
 
     def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
-        target = self.targets.target(photo, background)
         depth = self.targets.wish(photo, self.settings.depth_share)
         self.drawing = self.step.draw(photo.view, background, depth is not None)
+        target = self.target(photo, background)
         loss = self.targets.loss(photo)
         share = self.settings.ssim_share
         return self.step.gradients(self.drawing, loss, target, share, self.evidence, depth)
@@ -193,6 +176,7 @@ class PlainTrainer(Run):
         self.adam.load(self.guard.fall_back())
         self.evidence = PlainEvidence(self.device, self.count)
         self.rate_scale /= 2
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
         return True
 
     def change(self) -> None:

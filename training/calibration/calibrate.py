@@ -18,8 +18,8 @@ from shapeshift.training.calibration.extrinsics import Found, rigid, told
 from shapeshift.training.calibration.residuals import Frozen, Shape
 from shapeshift.training.first_anchors.initial import common_box
 from shapeshift.training.photos import BLACK, read
-from shapeshift.training.schedule import choose_background
 from shapeshift.training.settings import TrainSettings
+from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.train import Trainer
 
 STEPS = 2000  # of training the shape
@@ -84,7 +84,6 @@ def search(
     photos = capture.of(modality, "train")
     other = reference_of(capture, modality)
     factor, _ = factors_of(capture, modality, other.name, settings.downscale or 1)
-    behind = float(np.mean(choose_background(settings.background, capture.background) or BLACK))
     distance = distance_of([photo.view for photo in photos])
     offset, inverse, frozen, first = np.eye(4), None, None, None
     for number, stage in enumerate(stages):
@@ -93,6 +92,8 @@ def search(
             read(photo, factor * stage.smaller, settings.masks)
             for photo in photos[:: -(-len(photos) // stage.photos)]
         ]
+        background = choose_background(settings.background, capture.background, chosen)
+        behind = float(np.mean(background or BLACK))
         before, frozen = frozen, Frozen(device, shape, chosen, behind, distance)
         if before is not None:
             frozen.gray = before.gray

@@ -79,8 +79,8 @@ def drawn(trainer: Trainer, photo: LoadedPhoto) -> tuple[np.ndarray, np.ndarray]
     return image, photo.over(background)
 
 
-def hopeless(trainer: Trainer) -> str:
-    """One sentence where pictures are no nearer to the photos than a sheet of one colour is."""
+def hopeless(trainer: Trainer) -> list[str]:
+    """A sentence where pictures are no nearer to the photos than a sheet of one colour is."""
     lost = []
     for modality, photos in trainer.schedule.photos.items():
         won = []
@@ -93,12 +93,12 @@ def hopeless(trainer: Trainer) -> str:
         if not np.median(won) > 0:
             lost.append(modality)
     if not lost:
-        return ""
-    return (
+        return []
+    return [
         f"{', '.join(lost)}: the pictures are no nearer to the photos than one colour all over; "
         "train longer, take other --points (hull where the background is known), or a smaller "
         "--rate-scale, and check that photos and poses belong together."
-    )
+    ]
 
 
 def suspects(trainer: Trainer) -> list[Suspect]:
@@ -118,9 +118,9 @@ def suspects(trainer: Trainer) -> list[Suspect]:
     return out
 
 
-def report(found: list[Suspect]) -> str:
-    """All of them, a line each; empty without any."""
+def report(found: list[Suspect]) -> list[str]:
+    """A sentence for each of them, as far as anybody would read."""
     lines = [suspect.sentence() for suspect in found[:SHOWN]]
     if len(found) > SHOWN:
         lines.append(f"... and {len(found) - SHOWN} more.")
-    return "\n".join(lines)
+    return lines

@@ -5,10 +5,10 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
 from shapeshift.training.export import model_of
-from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
+from shapeshift.training.heads.networks import OWN_WIDTH, HeadLayout, initial_weights, padded
 from shapeshift.training.settings import TrainSettings
 
-POSITION_BYTES, FEATURE_BYTES = 12, 2  # of an anchor, and of each of its features
+POSITION_BYTES, NUMBER_BYTES = 12, 2  # of an anchor, and of each of its other numbers
 NOTES_BYTES = 4096  # provenance and names in the manifest
 GROWN = 1.02  # times the networks of the start: trained weights may compress less
 
@@ -22,6 +22,7 @@ def bytes_without_anchors(
         "anchors.value": np.zeros((1, 3), np.float32),
         "features.value": np.zeros((1, padded(layout.features)), np.float32),
     }
+    state |= {f"{n}.value": np.ones((1, OWN_WIDTH[n]), np.float32) for n in layout.per_anchor[2:]}
     one = model_of(state, layout, 1.0, encoding, stops, {})
     return int(GROWN * len(zip_files(package_files(one, "float16")))) + NOTES_BYTES
 
@@ -39,22 +40,11 @@ def most_anchors(
     if settings.max_mb is None:
         return settings.max_anchors
     fixed = bytes_without_anchors(layout, encoding, stops)
-    fits = int(
-        (settings.max_mb * 1e6 - fixed) // (POSITION_BYTES + FEATURE_BYTES * layout.features)
-    )
+    numbers = layout.features + sum(OWN_WIDTH[name] for name in layout.per_anchor[2:])
+    fits = int((settings.max_mb * 1e6 - fixed) // (POSITION_BYTES + NUMBER_BYTES * numbers))
     if fits < 1:
         raise BadFile(
             f"--max-mb {settings.max_mb:g} leaves no room for anchors: the networks alone take up "
             f"to {fixed / 1e6:.3f} MB; allow more, or make them smaller with --hidden."
         )
     return min(settings.max_anchors, fits)
-
-
-def within(anchors: np.ndarray, most: int, max_mb: float | None) -> np.ndarray:
-    """The anchors to start with, unless --voxel made them more than fit.  Raises BadFile."""
-    if max_mb is not None and len(anchors) > most:
-        raise BadFile(
-            f"The run would start with {len(anchors):,} anchors, and --max-mb {max_mb:g} holds "
-            f"{most:,}; give a larger --voxel or none."
-        )
-    return anchors

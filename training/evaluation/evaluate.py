@@ -1,5 +1,6 @@
 """How good a scene is: its pictures beside held-out photos of a capture."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,10 +16,14 @@ from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import BadFile, Model, Stop
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
-from shapeshift.training.drawing import camera_of
+from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.evaluation.metrics import psnr, ssim
-from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
-from shapeshift.training.schedule import choose_background
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, read
+from shapeshift.training.supervision.backgrounds import choose_background
+from shapeshift.training.supervision.exposure import fitted_psnr
+
+MOST_LOOKED_AT = 24  # held-out photos, for the colour behind them
+LIKENESS = ("psnr_db", "ssim", "vgg", "depth_error", "fitted_db")  # fields of Score: means
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,7 @@ class Score:
     each: dict[str, float]  # PSNR of every photo, dB, by its path in the capture
     vgg: float | None = None  # training.vgg_distance; None: not measured
     depth_error: float | None = None  # of photos with depth: Painter.depth_error
+    fitted_db: float | None = None  # of right halves, colours fitted on left ones: fitted_psnr
 
     @property
     def median_db(self) -> float:
@@ -124,30 +130,62 @@ def evaluate_model(
     distance: what Score.vgg is the mean of, a function of (picture, photo, weight).
     """
     factor = downscale or choose_downscale(capture.photos)
-    behind = choose_background(background, capture.background) or BLACK
-    photos = load_photos(capture, "test", factor, masks)
-    if not photos:
+    tests = [photo for photo in capture.photos if photo.split == "test"]
+    if not tests:
         raise BadFile(
             f"{capture.folder}: no photo is held out for testing; mark some with split 'test'."
         )
+    known = known_background(model, capture)
+    shown = []  # photos that tell the colour behind them: few, since only one is kept below
+    if background == "auto" and known is None:
+        few = tests[:: math.ceil(len(tests) / MOST_LOOKED_AT)]
+        shown = [read(photo, factor, masks) for photo in few]
+    behind = choose_background(background, known, shown) or BLACK
     painter, scores = Painter(device, model), {}
     for stop in capture.stops:
         alive = painter.set_control(stop_for(model, stop).x)
-        mine = [p for p in photos if p.modality == stop.name]
-        pairs = [(painter.picture(p.view, behind), p.over(behind), p.weight) for p in mine]
-        errors = [e for p in mine if (e := painter.depth_error(p)) is not None]
-        if pairs:
-            each = [float(psnr(*pair)) for pair in pairs]
-            scores[stop.name] = Score(
-                float(np.mean(each)),
-                float(np.mean([ssim(*pair) for pair in pairs])),
-                len(pairs),
-                alive,
-                {name_in(capture, p): db for p, db in zip(mine, each, strict=True)},
-                None if distance is None else float(np.mean([distance(*pair) for pair in pairs])),
-                float(np.mean(errors)) if errors else None,
-            )
+        names, found = [], []
+        for photo in capture.of(stop.name, "test"):
+            loaded = read(photo, factor, masks)  # one at a time is in memory
+            names.append(name_in(capture, loaded))
+            found.append(likeness(painter, loaded, behind, distance))
+        if found:
+            each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
+            means = {key: mean_of(found, key) for key in LIKENESS}
+            scores[stop.name] = Score(photos=len(found), alive=alive, each=each, **means)
     return scores
+
+
+def known_background(model: Model, capture: Capture) -> tuple | None:
+    """The capture's background, or the one that a training found in its photos."""
+    found = model.provenance.get("background")
+    if capture.background is not None or not isinstance(found, list | tuple):
+        return capture.background
+    good = len(found) == 3 and all(isinstance(v, int | float) and 0 <= v <= 1 for v in found)
+    return tuple(map(float, found)) if good else None
+
+
+def likeness(
+    painter: Painter, photo: LoadedPhoto, behind: Color, distance: Callable[..., float] | None
+) -> dict[str, float]:
+    """What Score has the means of, of one photo; without what it has not."""
+    picture, wanted = painter.picture(photo.view, behind), photo.over(behind)
+    found = {
+        "psnr_db": float(psnr(picture, wanted, photo.weight)),
+        "ssim": float(ssim(picture, wanted, photo.weight)),
+        "fitted_db": fitted_psnr(picture, photo, wanted),
+    }
+    if distance is not None:
+        found["vgg"] = float(distance(picture, wanted, photo.weight))
+    if (error := painter.depth_error(photo)) is not None:
+        found["depth_error"] = error
+    return found
+
+
+def mean_of(found: list[dict[str, float]], key: str) -> float | None:
+    """Over the photos that have it; None where none does."""
+    values = [of[key] for of in found if key in of]
+    return float(np.mean(values)) if values else None
 
 
 def name_in(capture: Capture, photo: LoadedPhoto) -> str:
@@ -172,6 +210,7 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
                 "median_db": round(s.median_db, 4),
                 "ssim": round(s.ssim, 5),
                 "photos": s.photos,
+                "fitted_db": None if s.fitted_db is None else round(s.fitted_db, 4),
                 "psnr_db_each": {photo: round(db, 3) for photo, db in s.each.items()},
             }
             | ({} if s.vgg is None else {"vgg_distance": round(s.vgg, 5)})

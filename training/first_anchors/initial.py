@@ -10,13 +10,14 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
 from shapeshift.training.first_anchors.point_sources import CLOUDS, cloud_points, depth_points
 from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.supervision.backgrounds import NOISE
 
 SOURCES = ("auto", "capture", "depth", "hull", "random")  # or a file: see CLOUDS
 COARSE_SIDE, FINE_SIDE = 64, 96  # grid cells along each side of a cube of the carved box's volume
 HULL_PHOTOS = 40  # a modality at most; more sharpen little and take as long as they are many
 FILLER_PHOTOS, FILLER_CELLS = 40, 16  # photos looked at, cells along each side of a photo
-BACKGROUND_NOISE = 0.03  # a photo that differs more from a known background shows the object
 RANDOM_POINTS = 20_000
+NO_POINTS = np.zeros((0, 3))
 SAMPLE = 1000  # points whose nearest neighbour is looked for
 
 
@@ -86,7 +87,8 @@ def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | Non
     if background is None:
         return None
     difference = np.abs(photo.over(background) - np.asarray(background, np.float32)).max(axis=2)
-    return difference > BACKGROUND_NOISE
+    shape = difference > NOISE
+    return shape if photo.weight is None else shape | ~(photo.weight > 0)  # unknown: not carved
 
 
 def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
@@ -178,17 +180,7 @@ class First(NamedTuple):
     points: np.ndarray  # (P, 3) metres
     origin: str  # of them, in words
     shapes: tuple[np.ndarray, ...]  # the points of each shape that stands for itself
-
-
-def first_voxel(first: First, most: int, rng: np.random.Generator, cap: int) -> float:
-    """What leaves every shape `most` anchors at most and all of them together `cap`, metres.
-
-    Where modalities have shapes of their own, each needs as many anchors as it would need alone.
-    """
-    voxel = min(choose_voxel(shape, most, rng) for shape in first.shapes)
-    if len(voxel_centres(first.points, voxel)) <= cap:
-        return voxel
-    return choose_voxel(first.points, cap, rng)
+    guesses: np.ndarray = NO_POINTS  # (G, 3) metres, for what has no points
 
 
 def initial_points(
@@ -201,14 +193,14 @@ def initial_points(
     """
     hulls = []
     if source not in SOURCES:
-        return as_one(seen_cloud(Path(source), capture, photos, rng))
+        return seen_cloud(Path(source), capture, photos, rng)
     if source in ("auto", "capture") and capture.points is not None and len(capture.points):
         points = np.asarray(capture.points, np.float64)
-        return as_one(with_guesses(points, "points", capture, photos, rng))
+        return with_guesses(points, "points", capture, photos, rng)
     if source in ("auto", "depth"):
         points = depth_points(photos, rng)
         if len(points):
-            return as_one(with_guesses(points, "depth photos", capture, photos, rng))
+            return with_guesses(points, "depth photos", capture, photos, rng)
     if source in ("auto", "hull"):
         hulls = hull_points(photos, capture.background)
     if shapes := tuple(hull for hull in hulls if len(hull)):
@@ -225,28 +217,24 @@ def initial_points(
             "hull": "has neither masks nor a known background, so that nothing can be carved",
         }[source]
         raise BadFile(f"{capture.folder} {lacking}; take other --points, or leave them out.")
-    return as_one((random_points(photos, rng), "random"))
-
-
-def as_one(found: tuple[np.ndarray, str]) -> First:
-    """Points that all modalities start from alike."""
-    points, origin = found
-    return First(points, origin, (points,))
+    points = random_points(photos, rng)
+    return First(points, "random", (points,))
 
 
 def with_guesses(
     points: np.ndarray, origin: str, capture: Capture, photos: list[LoadedPhoto],
     rng: np.random.Generator,
-) -> tuple[np.ndarray, str]:  # fmt: skip
+) -> First:  # fmt: skip
     """The points, and guesses beside them where the photos have no known background."""
     if capture.background is not None or any(p.see_through for p in photos):
-        return points, origin
-    return np.concatenate([points, filler_points(points, photos, rng)]), f"{origin} and guesses"
+        return First(points, origin, (points,))
+    guesses = filler_points(points, photos, rng)
+    return First(points, f"{origin} and guesses", (points,), guesses)
 
 
 def seen_cloud(
     path: Path, capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
-) -> tuple[np.ndarray, str]:
+) -> First:
     """What the photos see of a cloud file: scanners see farther than what was photographed."""
     if path.suffix.lower() not in CLOUDS:
         raise BadFile(

@@ -125,7 +125,7 @@ class Part:
 
     name: str
     kind: str
-    heads: tuple[str, ...] = ()
+    heads: tuple[str, ...] = ()  # or what anchors have of their own
     again: bool = False  # whether there may be more of it
 
     def without(self, settings: TrainSettings, stops: tuple[Stop, ...]) -> TrainSettings | None:
@@ -165,17 +165,20 @@ def _slot(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | 
 
 
 def _anchors(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    """Two thirds of them, at the start and at most; voxels of a surface as much larger."""
-    start, most = 2 * settings.anchors // 3, 2 * settings.max_anchors // 3
-    voxel = None if settings.voxel is None else settings.voxel * 1.5**0.5
-    if not min(start, most) >= LEAST_ANCHORS:
-        return None
-    return replace(settings, anchors=start, max_anchors=most, voxel=voxel)
+    """Two thirds of them at most."""
+    most = 2 * settings.max_anchors // 3
+    return replace(settings, max_anchors=most) if most >= LEAST_ANCHORS else None
+
+
+def _own(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    own = settings.layout().own
+    fewer = [name for name in own if name not in part.heads]
+    return replace(settings, own=",".join(fewer)) if len(fewer) < len(own) else None
 
 
 REDUCE = {
     "fix": _fix, "view": _no_view, "layer": _layer, "hidden": _hidden, "features": _features,
-    "slot": _slot, "anchors": _anchors,
+    "slot": _slot, "anchors": _anchors, "own": _own,
 }  # fmt: skip
 # What costs most to run comes first; the shape as a whole before its networks one by one.
 PARTS = (
@@ -186,6 +189,8 @@ PARTS = (
     Part("a hidden layer", "layer", again=True),
     Part("half of the hidden units", "hidden", again=True),
     Part("half of the features", "features", again=True),
+    Part("anchors' own axes and sizes", "own", ("frame",)),
+    Part("anchors' own base colours", "own", ("color",)),
     Part("one splat of every anchor", "slot", again=True),
     Part("a third of the anchors", "anchors", again=True),
 )

@@ -17,8 +17,8 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.fit.ablation import DROPPED, PARTS, Measured, Part, Verdict, judge
 from shapeshift.training.fit.view_metrics import likeness, most_pixels, shared_outlines
 from shapeshift.training.photos import BLACK, choose_downscale, load_photos
-from shapeshift.training.schedule import choose_background
 from shapeshift.training.settings import TrainSettings
+from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.train import Trainer
 
 Tell = Callable[[str, float], None]  # what is tried now, and how far it is, 0..1
@@ -71,9 +71,10 @@ class Fit:
         self.device, self.capture, self.tell = device, capture, tell
         self.tolerance_db, self.seeds, self.verdicts = tolerance_db, seeds, []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
-        self.background = choose_background(settings.background, capture.background) or BLACK
         self.held_out = load_photos(capture, "test", factor, settings.masks)
         self.photos = load_photos(capture, "train", factor, settings.masks)
+        behind = choose_background(settings.background, capture.background, self.photos)
+        self.background = behind or BLACK
         self.counts = {s.name: sum(p.modality == s.name for p in self.held_out) for s in self.stops}
         for name, count in self.counts.items():
             if not count or count * seeds < 2:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.training.heads.networks import KERNELS, HeadLayout
+from shapeshift.training.heads.networks import KERNELS, OWN_WIDTH, HeadLayout
 
 REACH = 2.0  # voxels that a splat may lie away from its anchor along each axis
 UNIT = 0.5  # voxels: the scale of a splat whose raw output is 0
@@ -30,6 +30,7 @@ class Activation:
 
     def __init__(self, device, layout: HeadLayout, voxel: float) -> None:
         self.device, self.layout = device, layout
+        self.nothing = device.zeros(1)  # in the place of what anchors do not have
         self.kernels = device.program(KERNELS / "gaussians.cl", **layout.defines())
         self.reach, self.unit = np.float32(REACH * voxel), np.float32(UNIT * voxel)
         self.count = -1
@@ -42,23 +43,33 @@ class Activation:
         self.splats = Gaussians(*(device.empty(shape) for shape in shapes))
         self.grad_raw = device.empty((count, self.layout.raw_at[-1]))
         self.grad_anchors = device.empty((count, 3))
+        self.grad_own = {
+            name: device.empty((count, OWN_WIDTH[name])) for name in self.layout.per_anchor[2:]
+        }
 
-    def forward(self, raw, anchors) -> Gaussians:
-        self.resize(len(anchors))
-        rows = self.device.kind == "cpu"  # an anchor a work-item, else a splat
-        items = self.count if rows else self.count * self.layout.splats
+    def own_of(self, rows: dict[str, object]) -> tuple:
+        """Frames and base colours of a step's anchors, or what stands in their place."""
+        return tuple(rows.get(name, self.nothing) for name in OWN_WIDTH)
+
+    def forward(self, raw, rows: dict[str, object]) -> Gaussians:
+        """`rows`: of the optimiser's groups that have a row an anchor, those of the step."""
+        self.resize(len(rows["anchors"]))
+        by_row = self.device.kind == "cpu"  # an anchor a work-item, else a splat
+        items = self.count if by_row else self.count * self.layout.splats
         self.device.launch(
-            self.kernels["activate_rows" if rows else "activate"], items, 16 if rows else 64,
-            items, self.reach, self.unit, raw, anchors, *self.splats.fields(),
+            self.kernels["activate_rows" if by_row else "activate"], items, 16 if by_row else 64,
+            items, self.reach, self.unit, raw, rows["anchors"], *self.own_of(rows),
+            *self.splats.fields(),
         )  # fmt: skip
         return self.splats
 
-    def backward(self, raw, grad: Gaussians):
-        """(grad_raw (A, RAW), grad_anchors (A, 3)) of the last `forward`."""
+    def backward(self, raw, rows: dict[str, object], grad: Gaussians) -> tuple:
+        """(grad_raw (A, RAW), by group those of `rows` but the features) of the last `forward`."""
         splats = self.splats
         self.device.launch(
             self.kernels["activate_backward"], self.count, 16,
-            self.count, self.reach, self.unit, raw, splats.scales, splats.opacity, splats.color,
-            *grad.fields(), self.grad_raw, self.grad_anchors,
+            self.count, self.reach, self.unit, raw, self.own_of(rows)[0],
+            splats.scales, splats.opacity, splats.color, *grad.fields(), self.grad_raw,
+            self.grad_anchors, *self.own_of(self.grad_own),
         )  # fmt: skip
-        return self.grad_raw, self.grad_anchors
+        return self.grad_raw, {"anchors": self.grad_anchors} | self.grad_own

@@ -14,6 +14,8 @@ MOST_LAYERS = 3
 CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
 RATED = 32  # hidden units of the networks for which the learning rates were chosen
+OWN = {"frame": "frames", "color": "colors"}  # what anchors may have, and the optimiser's group
+OWN_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
@@ -36,6 +38,7 @@ class HeadLayout:
     layers: int = 1  # hidden ones, each of that width
     fixed: tuple[str, ...] = ()  # heads that do not see Psi: what they give is shared by all stops
     view_dependent: bool = True  # whether colour sees the direction from the eye
+    own: tuple[str, ...] = tuple(OWN)  # what anchors have of their own beside their features
 
     def __post_init__(self) -> None:
         if not 1 <= self.layers <= MOST_LAYERS:
@@ -46,6 +49,14 @@ class HeadLayout:
             if name not in HEADS:
                 known = ", ".join(HEADS)
                 raise ValueError(f"There is no head '{name}' to fix; they are {known}.")
+        for name in self.own:
+            if name not in OWN:
+                raise ValueError(f"Anchors have no '{name}' of their own; use {', '.join(OWN)}.")
+
+    @property
+    def per_anchor(self) -> tuple[str, ...]:
+        """The optimiser's groups that have a row for each anchor."""
+        return ("anchors", "features", *(OWN[name] for name in self.own))
 
     def parts_of(self, name: str) -> tuple[str, ...]:
         """What a head's network takes, in the order of the exported one (eq. 5)."""
@@ -83,6 +94,7 @@ class HeadLayout:
             "WEIGHTS": self.weights_at[-1], "MAX_OUT": max(padded(n) for n in self.outs),
             "LAYERS": self.layers, "VIEW_COLOR": self.view_dependent,
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
+            "FRAMES": "frame" in self.own, "BASE_COLORS": "color" in self.own,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {
@@ -169,6 +181,8 @@ def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
         "color": rng.uniform(-1, 1, 3 * k) / np.sqrt(layout.hidden),
     }
     gain = {"offset": 1.0, "scale": 0.5, "rotation": 0.5, "opacity": 0.5, "color": 1.0}
+    if "color" in layout.own:  # the base colours are known; the network begins beside them
+        last_bias["color"], gain["color"] = np.zeros(3 * k), 0.3
     everything = replace(layout, fixed=(), view_dependent=True)
     networks = {}
     for name in HEADS:

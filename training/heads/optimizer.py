@@ -23,7 +23,7 @@ class Adam:
     def __init__(self, device, values: dict[str, np.ndarray], rates: dict[str, np.ndarray]) -> None:
         """`rates` of each group: (1,), or as many as the group has parameters."""
         self.device, self.steps = device, 0
-        self.kernel = device.program(KERNELS / "adam.cl")["adam"]
+        self.kernels = device.program(KERNELS / "adam.cl")
         self.groups = {
             name: Group(
                 device.upload(np.ascontiguousarray(value, np.float32)),
@@ -37,21 +37,45 @@ class Adam:
     def __getitem__(self, name: str):
         return self.groups[name].value
 
+    def gather(self, name: str, rows):
+        """(R, width) the `rows` (R,) of a group's values; all of them, no copy, for None."""
+        table = self.groups[name].value
+        if rows is None:
+            return table
+        count, width = len(rows), table.shape[1]
+        out = self.device.empty((count, width))
+        self.device.launch(self.kernels["gather_rows"], count, 64, count, width, rows, table, out)
+        return out
+
     def set_rates(self, rates: dict[str, np.ndarray]) -> None:
         for name, group in self.groups.items():
             group.rates = self.device.upload(np.asarray(rates[name], np.float32))
 
-    def step(self, grads: dict[str, object], rate_scale: float) -> None:
-        """One update of every group by its gradient, at `rate_scale` times its rates."""
+    def step(self, grads: dict[str, object], rate_scale: float, rows: dict | None = None) -> None:
+        """One update of every group by its gradient, at `rate_scale` times its rates.
+
+        rows: (R,) int32 on the device by group: of these groups, whose rate is one for all, only
+        those rows take the step, and their gradients are all that `grads` has.
+        """
         self.steps += 1
         correct = (np.float32(1 / (1 - b**self.steps)) for b in (BETA1, BETA2))
         first, second = correct
+        scale = np.float32(rate_scale)
         for name, group in self.groups.items():
-            count = group.value.size
+            moments = group.value, group.mean, group.square
+            chosen = None if rows is None else rows.get(name)
+            if chosen is None:
+                count = group.value.size
+                self.device.launch(
+                    self.kernels["adam"], count, 64, count, first, second, scale,
+                    int(group.rates.size > 1), group.rates, grads[name], *moments,
+                )  # fmt: skip
+                continue
+            width = group.value.shape[1]
+            count = len(chosen) * width
             self.device.launch(
-                self.kernel, count, 64, count, first, second, np.float32(rate_scale),
-                int(group.rates.size > 1), group.rates, grads[name],
-                group.value, group.mean, group.square,
+                self.kernels["adam_rows"], count, 64, count, width, chosen, first, second, scale,
+                group.rates, grads[name], *moments,
             )  # fmt: skip
 
     def state(self) -> dict[str, np.ndarray]:

@@ -9,6 +9,15 @@
 #define REST2 0.001f
 #define EPSILON 1e-15f  // as 3DGS: gradients of a mean over an image are far below the usual 1e-8
 
+inline void update(int i, float g, float correct1, float correct2, float rate,
+                   __global float *value, __global float *mean, __global float *square) {
+  float m = BETA1 * mean[i] + REST1 * g;
+  float v = BETA2 * square[i] + REST2 * g * g;
+  mean[i] = m;
+  square[i] = v;
+  value[i] -= rate * (m * correct1) / (sqrt(v * correct2) + EPSILON);
+}
+
 // rates: one for all (rate_stride 0) or one a parameter (1), times `rate_scale`.
 // correct1, correct2 are 1 / (1 - BETA^t).
 __kernel void adam(int count, float correct1, float correct2, float rate_scale, int rate_stride,
@@ -16,10 +25,24 @@ __kernel void adam(int count, float correct1, float correct2, float rate_scale, 
                    __global float *value, __global float *mean, __global float *square) {
   int i = get_global_id(0);
   if (!(i < count)) return;
-  float g = grad[i];
-  float m = BETA1 * mean[i] + REST1 * g;
-  float v = BETA2 * square[i] + REST2 * g * g;
-  mean[i] = m;
-  square[i] = v;
-  value[i] -= rate_scale * rates[i * rate_stride] * (m * correct1) / (sqrt(v * correct2) + EPSILON);
+  update(i, grad[i], correct1, correct2, rate_scale * rates[i * rate_stride], value, mean, square);
+}
+
+// The same of some rows of a table: grad has those alone, one after the other; the others rest.
+__kernel void adam_rows(int count, int width, __global const int *rows, float correct1,
+                        float correct2, float rate_scale, __global const float *rates,
+                        __global const float *grad, __global float *value, __global float *mean,
+                        __global float *square) {
+  int i = get_global_id(0);
+  if (!(i < count)) return;
+  update(rows[i / width] * width + i % width, grad[i], correct1, correct2, rate_scale * rates[0],
+         value, mean, square);
+}
+
+// The rows of a table (A, width) that are there, one after the other.  One work-item a row.
+__kernel void gather_rows(int rows_count, int width, __global const int *rows,
+                          __global const float *table, __global float *out) {
+  int i = get_global_id(0);
+  if (!(i < rows_count)) return;
+  for (int c = 0; c < width; c++) out[i * width + c] = table[rows[i] * width + c];
 }

@@ -48,12 +48,15 @@ inline float8 along_column(__global const float *plane, int x, int y, int height
   return sum;
 }
 
-// Photo bytes (H, W, 4) over a background -> target planes.  One work-item a row of a channel.
+// Photo bytes (H, W, 4), each channel times a number, over a background -> target planes.
+// One work-item a row of a channel.
 __kernel void compose_target(int width, int height, int stride, float red, float green,
-                             float blue, __global const uchar *rgba, __global float *target) {
+                             float blue, float times_red, float times_green, float times_blue,
+                             __global const uchar *rgba, __global float *target) {
   // A work-item is a row of one channel.
   int channel = get_global_id(0) / height, y = get_global_id(0) % height;
   float behind = channel == 0 ? red : channel == 1 ? green : blue;
+  float times = channel == 0 ? times_red : channel == 1 ? times_green : times_blue;
   __global float *row = target + get_global_id(0) * stride;
   for (int x = 0; x < stride; x++) {
     if (x < width) {
@@ -61,7 +64,7 @@ __kernel void compose_target(int width, int height, int stride, float red, float
       // Photos with a transparent background are composed over the one that is drawn.
       float alpha = p[3] / 255.0f;
       // Bytes -> 0..1, over the background's channel.
-      row[x] = alpha * (p[channel] / 255.0f) + (1.0f - alpha) * behind;
+      row[x] = alpha * (times * (p[channel] / 255.0f)) + (1.0f - alpha) * behind;
     } else {
       // Padding: written once, so that whole vectors can be read.
       row[x] = 0;

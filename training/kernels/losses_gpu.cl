@@ -38,13 +38,15 @@ inline float counted(float a, float b, int masked, __global const float *weight,
 }
 
 __kernel void compose_target(int width, int height, int stride, float red, float green,
-                             float blue, __global const uchar *rgba, __global float *target) {
+                             float blue, float times_red, float times_green, float times_blue,
+                             __global const uchar *rgba, __global float *target) {
   PIXEL
   const float behind = channel == 0 ? red : channel == 1 ? green : blue;
+  const float times = channel == 0 ? times_red : channel == 1 ? times_green : times_blue;
   __global const uchar *p = rgba + 4 * (y * width + x);
   // Photos with a transparent background are composed over the one that is drawn.
   const float alpha = p[3] / 255.0f;
-  target[at] = alpha * (p[channel] / 255.0f) + (1.0f - alpha) * behind;
+  target[at] = alpha * (times * (p[channel] / 255.0f)) + (1.0f - alpha) * behind;
 }
 
 __kernel void target_rows(int width, int height, int stride, __global const float *target,

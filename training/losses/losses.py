@@ -56,11 +56,12 @@ class ImageLoss:
         items, group = (3 * height, 1) if self.form == "cpu" else (3 * height * stride, 64)
         self.device.launch(self.kernels[name], items, group, width, height, stride, *arguments)
 
-    def target(self, rgba, background, weight=None) -> Target:
-        """A Target of photo bytes (H, W, 4) on the device over a background (r, g, b)."""
+    def target(self, rgba, background, weight=None, gain=(1.0, 1.0, 1.0)) -> Target:
+        """A Target of photo bytes (H, W, 4) on the device, over their gain, over a background."""
+        times = [np.float32(1 / channel) for channel in gain]
         (width, height), stride, device = self.size, self.stride, self.device
         planes, mean, square = (device.empty((3, height, stride)) for _ in range(3))
-        self.launch("compose_target", *map(np.float32, background), rgba, planes)
+        self.launch("compose_target", *map(np.float32, background), *times, rgba, planes)
         self.launch("target_rows", planes, self.blurred)
         self.launch("target_columns", self.blurred, mean, square)
         values = 3.0 * width * height

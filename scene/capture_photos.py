@@ -1,0 +1,106 @@
+"""What every reader of captures does with the file of a photo: its size, its lens, its view."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.capture import Photo
+from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.photo import open_image
+from shapeshift.scene.captures.undistort import is_straight, pinhole_of
+from shapeshift.scene.json.json_values import shortened
+from shapeshift.scene.pose import View
+
+
+def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
+    """(width, height) from the file's header, which must be what the capture claims."""
+    with open_image(path) as image:
+        size = image.size
+    if claimed is not None and claimed != size:
+        raise BadFile(
+            f"{shortened(path)}: the image has {size[0]}x{size[1]} pixels, the capture says "
+            f"{claimed[0]}x{claimed[1]}; resize the images or scale the intrinsics with them"
+        )
+    return size
+
+
+def posed_photo(
+    path: Path, modality: str, world_from_camera: np.ndarray, lens: Lens, where: str
+) -> Photo:
+    """A photo with the view of its lens' straight camera.  Raises BadFile.
+
+    world_from_camera: (4, 4) OpenCV axes, our world; lens: of the size that the capture states.
+    """
+    lens = of_size(lens, image_size(path, None), path)
+    try:
+        if is_straight(lens, where):
+            view = View.from_pinhole(world_from_camera, lens.focal, lens.centre, lens.size)
+            return Photo(view, path, modality)
+        straight = pinhole_of(lens)
+        view = View.from_pinhole(world_from_camera, straight.focal, straight.centre, straight.size)
+    except ValueError as error:
+        raise BadFile(f"{where}: {error}") from None
+    return Photo(view, path, modality, lens=lens)
+
+
+def of_size(lens: Lens, size: tuple[int, int], path: Path) -> Lens:
+    """The lens for a file of `size` pixels: photos may have been made smaller after the poses.
+
+    Raises BadFile where file and capture differ by more than that.
+    """
+    if lens.size == size:
+        return lens
+    across, down = (new / old for new, old in zip(size, lens.size, strict=True))
+    off = abs(lens.size[1] * across - size[1]), abs(lens.size[0] * down - size[0])
+    if not min(off) <= 1:  # a pixel: sides are rounded
+        image_size(path, lens.size)
+    scales = (across, down) if len(lens.focals) == 2 else ((across + down) / 2,)
+    scales = (*scales, across, down)
+    params = [value * scale for value, scale in zip(lens.params, scales, strict=False)]
+    return replace(lens, size=size, params=(*params, *lens.params[len(scales) :]))
+
+
+def doubts_of(
+    named: int,
+    missing: list[str],
+    photos: list[Photo],
+    rescaled: list[str],
+    no_depth: list[str] = (),
+) -> tuple[str, ...]:
+    """What a person should know of a capture's files, a sentence each.
+
+    named: photos that the capture names, of which the files `missing` are not there; rescaled:
+    photos of another size than it says; no_depth: photos whose depth photo is not there.
+    """
+    said = []
+    if missing:
+        said.append(
+            f"{len(missing)} of {named} photos that the capture names are not there, for example "
+            f"{shortened(missing[0])}; they are left out."
+        )
+    if rescaled:
+        said.append(
+            f"{len(rescaled)} photos have another size than the capture says, for example "
+            f"{shortened(rescaled[0])}; the intrinsics are scaled with them."
+        )
+    if no_depth:
+        said.append(
+            f"{len(no_depth)} depth photos are not there, for example of "
+            f"{shortened(no_depth[0])}; those photos are used without."
+        )
+    bent = [photo for photo in photos if photo.lens is not None]
+    if bent:
+        models = ", ".join(sorted({photo.lens.model for photo in bent}))
+        said.append(f"{len(bent)} photos are undistorted as they are read ({models}).")
+    return tuple(said)
+
+
+def refuse_all_missing(missing: list[str], named: int, where: str) -> None:
+    """Raises BadFile where none of the photos is there."""
+    if len(missing) == named:
+        raise BadFile(
+            f"{where}: none of its {named} photos is there, for example {shortened(missing[0])}; "
+            "put them beside it"
+        )

@@ -1,0 +1,110 @@
+"""What a run's seconds are, how they are told, and that no clock is in what it leaves."""
+
+import time
+from types import SimpleNamespace
+
+import pytest
+
+from shapeshift.app import cli, progress
+from shapeshift.app.training.fit import without_times
+from shapeshift.app.training.train import train
+from shapeshift.training.run import PACE_STEPS, Progress, Run
+from shapeshift.training.schedule import Budget
+from shapeshift.training.synthetic.balls import make_balls
+
+
+class Steps(Run):
+    """A run whose steps do what they are told."""
+
+    unit = counted = "anchors"
+    settled = True
+
+    def __init__(self, kind: str, step, seconds: float | None = None) -> None:
+        self.device, self.step = SimpleNamespace(kind=kind), step
+        self.settings = SimpleNamespace(seconds=seconds, rates=lambda length: length)
+        self.budget = Budget(None if seconds else 5, seconds)
+        self.adam = {"anchors": [0]}
+        self.iteration, self.elapsed, self.run_length = 0, 0.0, None
+
+    def warm_up(self) -> None:
+        burn(0.05)
+
+    def one_step(self):
+        self.step()
+        self.iteration += 1
+        return None, False
+
+    def all_rates(self) -> dict:
+        return {}
+
+    def held_out_psnr(self) -> dict:
+        return {"RGB": 20.0}
+
+
+def burn(seconds: float) -> None:
+    start = time.process_time()
+    while time.process_time() - start < seconds:
+        pass
+
+
+def idle() -> None:
+    time.sleep(0.02)
+
+
+def test_a_processor_s_seconds_are_those_that_it_computed():
+    """Waiting costs none; neither do compiling and what is done between the steps."""
+    waited = Steps("cpu", idle)
+    for _ in waited.steps():
+        burn(0.02)
+    assert waited.elapsed < 0.02
+    worked = Steps("cpu", lambda: burn(0.02))
+    told = [now.elapsed for now in worked.steps()]
+    assert 0.1 <= worked.elapsed < 0.15 and told == sorted(told) and told[-1] == worked.elapsed
+
+
+def test_other_devices_are_timed_by_the_clock():
+    waited = Steps("gpu", idle)
+    for _ in waited.steps():
+        time.sleep(0.02)
+    assert 0.1 <= waited.elapsed < 0.18  # five naps in the steps, not those between them
+
+
+def test_a_budget_of_seconds_ends_a_run():
+    worked = Steps("cpu", lambda: burn(0.01), seconds=0.1)
+    steps = sum(1 for _ in worked.steps())
+    assert 8 <= steps <= 10 and 0.1 <= worked.elapsed < 0.13
+
+
+def test_the_pace_is_that_of_the_steps_before(monkeypatch):
+    timed = Steps("cpu", lambda: None, seconds=60.0)
+    timed.iteration, timed.elapsed = PACE_STEPS, 0.1 * (PACE_STEPS - 1)
+    timed.adam = SimpleNamespace(set_rates=lambda rates: None)
+    timed.find_pace()
+    assert timed.run_length == pytest.approx(600, abs=1)
+
+
+def test_without_a_terminal_lines_say_steps_seconds_and_decibels(monkeypatch, capsys):
+    """The line a minute of every command, here one every 50 ms."""
+    monkeypatch.setattr(progress, "LINE_EVERY_S", 0.05)
+    with progress.lines("train"):
+        assert not train(Steps("cpu", lambda: time.sleep(0.2)), None)
+    said = capsys.readouterr().err.splitlines()
+    assert "train: 4 steps, 0 core s, 1 anchors, 80 %, RGB 20.00 dB (0 min)" in said
+    assert Progress(1, 0.5, None, 3, 1.0).fell_back is False
+
+
+def test_the_same_seed_gives_the_same_file_to_the_byte(tmp_path):
+    """Whatever the clock says: the second run comes later, and its checkpoint knows it."""
+    make_balls(tmp_path / "balls", 48, 8, 2)
+    files = []
+    for name in ("a", "b"):
+        out = tmp_path / name / "scene.shift"
+        words = ["train", tmp_path / "balls", "--out", out, "--iterations", 30, "--anchors", 200]
+        assert cli.main(list(map(str, words))) == 0
+        files.append(out.read_bytes())
+    assert files[0] == files[1]
+
+
+def test_a_need_report_in_a_package_has_no_times():
+    report = {"full": {"decode_ms": 1.0, "bytes": 3}, "rows": [{"saves_train_s": 2, "part": "x"}]}
+    assert without_times(report) == {"full": {"bytes": 3}, "rows": [{"part": "x"}]}

@@ -1,0 +1,147 @@
+"""Densification: anchors that show nothing go, others come where the pictures ask for them.
+
+A splat asks by its screen gradient with every pixel's part taken absolutely (AbsGS): a large splat
+over fine texture pulls, though its pixels disagree about where to go.  At the cap the anchors that
+give least to the pictures move to where the pull is strongest, as dead splats do in 3DGS-MCMC.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeshift.rasterizer.project import LEAST_ALPHA
+
+THRESHOLD = 6e-4  # mean pull in half image widths; absolute gradients are some 3 times 3DGS's 2e-4
+SHRINK = 0.5  # size of a new anchor in that of the one whose splat pulled
+EXCHANGED = 0.05  # of all anchors, at most: those that make room once the cap is reached
+LEAST_OPACITY = 0.005  # mean of an anchor's splats below which it goes
+LEAST_VIEWS = 10  # steps that must have shown a splat, or an anchor, for its sums to count
+LEAST_STEPS = 50  # before an anchor can go for its opacity ...
+LEAST_RUNS = 3  # ... and of these such as ran it: what is absent runs rarely, see visibility.py
+AXIS_BITS = 21  # of a key of a grid cell
+
+
+@dataclass(frozen=True)
+class Newcomers:
+    """New anchors, those that are wanted most first."""
+
+    anchors: np.ndarray  # (M, 3) float32 metres
+    parents: np.ndarray  # (M,) anchor whose splat pulled: all else but the size is copied from it
+
+    def first(self, count: int) -> "Newcomers":
+        return Newcomers(self.anchors[:count], self.parents[:count])
+
+
+def transparent(opacity: np.ndarray, steps: int, splats_per_anchor: int) -> np.ndarray:
+    """(A,) bool: anchors whose splats have a mean opacity below LEAST_OPACITY.
+
+    opacity: (A, 2) of Evidence over `steps`.
+    """
+    if steps < LEAST_STEPS:
+        return np.zeros(len(opacity), bool)
+    total, ran = opacity.T
+    return (ran >= LEAST_RUNS) & (total < LEAST_OPACITY * ran * splats_per_anchor)
+
+
+def contribution(given: np.ndarray) -> np.ndarray:
+    """(A,) pixels that an anchor gives to a picture that shows it, at the stop where it gives most.
+
+    given: (stops, A, 2) of Evidence; fewer than LEAST_VIEWS pictures say nothing: infinite.
+    """
+    sums, views = given[..., 0], given[..., 1]
+    each = sums / np.maximum(views, 1)
+    return np.where(views.sum(0) < LEAST_VIEWS, np.inf, each.max(0))
+
+
+def weakest(given: np.ndarray, among: np.ndarray, count: int) -> np.ndarray:
+    """Indices of at most `count` anchors `among` (A,) bool that give least to their pictures."""
+    gives = np.where(among, contribution(given), np.inf)
+    order = np.argsort(gives, kind="stable")[:count]
+    return order[np.isfinite(gives[order])]
+
+
+def cell_keys(points: np.ndarray, cell: float, origin: np.ndarray) -> np.ndarray:
+    """(P,) int64, one number a cube of side `cell`; origin lies below all points."""
+    cells = np.floor((points - origin) / cell).astype(np.int64)
+    cells = np.clip(cells, 0, (1 << AXIS_BITS) - 1)  # what lies so far out shares a cell
+    return (cells[:, 0] << 2 * AXIS_BITS) | (cells[:, 1] << AXIS_BITS) | cells[:, 2]
+
+
+def newcomers(
+    anchors: np.ndarray,  # (A, 3) metres
+    sizes: np.ndarray,  # (A,) metres
+    means: list[np.ndarray],  # (A * k, 3) metres at every stop; NaN where the splat is absent
+    pull: np.ndarray,  # (A * k, 2) of Evidence
+) -> Newcomers:
+    """New anchors under splats that pull, one in each free cube of the size it will have."""
+    views = pull[:, 1]
+    strength = np.where(views > LEAST_VIEWS, pull[:, 0] / np.maximum(views, 1), 0)
+    strongest = np.argsort(-strength, kind="stable")
+    strongest = strongest[strength[strongest] > THRESHOLD]
+    places = np.stack([mean[strongest] for mean in means], axis=1).reshape(-1, 3)
+    splats = np.repeat(strongest, len(means))  # strongest first, its stops one after the other
+    there = np.isfinite(places).all(axis=1)
+    places, splats = places[there], splats[there]
+    parents = splats // (len(pull) // max(len(anchors), 1))
+    if not len(places):
+        return Newcomers(np.zeros((0, 3), np.float32), np.zeros(0, np.int64))
+    # Sizes in steps of two, so that anchors of one step share a grid.
+    level = np.round(np.log2(SHRINK * sizes[parents])).astype(int)
+    origin = np.minimum(places.min(0), anchors.min(0))
+    kept = []
+    for step in np.unique(level):
+        mine = np.flatnonzero(level == step)
+        keys = cell_keys(places[mine], 2.0**step, origin)
+        _, first = np.unique(keys, return_index=True)
+        taken = cell_keys(anchors, 2.0**step, origin)
+        kept.append(mine[first[~np.isin(keys[first], taken)]])
+    order = np.sort(np.concatenate(kept))
+    return Newcomers(places[order].astype(np.float32), parents[order])
+
+
+def change(
+    anchors: np.ndarray, sizes: np.ndarray, means: list[np.ndarray],
+    evidence: dict[str, np.ndarray], most: int,
+) -> tuple[np.ndarray, Newcomers]:  # fmt: skip
+    """(A,) bool which anchors stay, and who comes, so that at most `most` are left.
+
+    anchors, sizes and means as of `newcomers`; evidence: the state of Evidence.
+    """
+    splats = len(means[0]) // len(anchors)
+    gone = transparent(evidence["evidence.opacity"], int(evidence["evidence.steps"]), splats)
+    if gone.all():
+        gone[:] = False
+    new = newcomers(anchors, sizes, means, evidence["evidence.pull"])
+    room = max(most - int((~gone).sum()), 0)
+    if len(new.anchors) > room:
+        swaps = min(len(new.anchors) - room, int(EXCHANGED * len(anchors)))
+        among = ~gone
+        among[new.parents[: room + swaps]] = False  # who is needed does not make room
+        freed = weakest(evidence["evidence.given"], among, swaps)
+        gone[freed] = True
+        room += len(freed)
+    return ~gone, new.first(room)
+
+
+def absent_as_nan(means: np.ndarray, opacity: np.ndarray) -> np.ndarray:
+    """(N, 3) means, NaN where a splat's opacity (N,) is not drawn."""
+    return np.where(opacity[:, None] > LEAST_ALPHA, means, np.nan)
+
+
+def changed_state(
+    state: dict[str, np.ndarray], groups: tuple[str, ...], keep: np.ndarray, new: Newcomers
+) -> dict[str, np.ndarray]:
+    """An optimiser's state with some anchors gone and others added at the end, at rest.
+
+    groups: those that have a row for each anchor.
+    """
+    out = dict(state)
+    for name in groups:
+        rows = new.anchors if name == "anchors" else state[f"{name}.value"][new.parents]
+        if name == "frames":
+            rows = rows + np.log([SHRINK] * 3 + [1] * 4)
+        for part in ("value", "mean", "square"):
+            old = state[f"{name}.{part}"][keep]
+            fresh = rows if part == "value" else np.zeros_like(rows)
+            out[f"{name}.{part}"] = np.concatenate([old, fresh]).astype(np.float32)
+    return out

@@ -1,0 +1,72 @@
+"""The colour behind everything: the capture's, one that is asked for, or one that photos show."""
+
+import numpy as np
+
+from shapeshift.training.photos import LoadedPhoto
+
+NAMED = {"black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0), "gray": (0.5, 0.5, 0.5)}
+NOISE = 0.03  # display sRGB: a photo that differs more from a known background shows the object
+EDGE = 0.02  # of a photo's sides: its outermost pixels, where a subject stands before something
+ALIKE = 0.7  # of these, in every modality, that have the colour: some photos cut their subject
+EMPTY = 0.2  # of all pixels, at least, that have it: the black rims of undistorted photos are fewer
+Background = tuple[float, float, float]
+
+
+def choose_background(
+    setting: str, capture_background: Background | None, photos: list[LoadedPhoto] | tuple = ()
+) -> Background | None:
+    """The fixed background of a run; None = random where photos show it.
+
+    auto: the capture's; where it has none, the one that its photos show.
+    """
+    if setting == "auto":
+        return shared_color(photos) if capture_background is None else capture_background
+    if setting == "random":
+        return None
+    if setting not in NAMED:
+        raise ValueError(
+            f"There is no background '{setting}'; use auto, random, {', '.join(NAMED)}."
+        )
+    return NAMED[setting]
+
+
+def shared_color(photos: list[LoadedPhoto] | tuple) -> Background | None:
+    """The one colour that all photos show about their subject; None where there is no such one.
+
+    It assumes a subject before one even colour, in the middle of most photos.  Photos with alpha or
+    an object's mask say themselves what is background.
+    """
+    if not photos or any(photo.see_through for photo in photos):
+        return None
+    rims = {}
+    for photo in photos:
+        rims.setdefault(photo.modality, []).append(rim_of(photo.rgba[..., :3]))
+    rims = {name: np.concatenate(parts) for name, parts in rims.items()}
+    color = np.median(next(iter(rims.values())), axis=0)
+    if not all(near(rim, color).mean() >= ALIKE for rim in rims.values()):
+        return None
+    empty = [near(photo.rgba[..., :3], color).mean() for photo in photos]
+    return tuple((color / 255).tolist()) if np.mean(empty) >= EMPTY else None
+
+
+def told_background(color: Background) -> str:
+    """What a person should know of a background that was found."""
+    name = "#" + "".join(f"{round(255 * value):02x}" for value in color)
+    return (
+        f"All photos show their subject before one colour, {name}, which is taken as the "
+        "background; if it belongs to the scene, train with --background random."
+    )
+
+
+def rim_of(rgb: np.ndarray) -> np.ndarray:
+    """(P, 3) the pixels along the edges of a photo (H, W, 3)."""
+    height, width = rgb.shape[:2]
+    inside = np.zeros((height, width), bool)
+    y, x = max(round(EDGE * height), 1), max(round(EDGE * width), 1)
+    inside[y : height - y, x : width - x] = True
+    return rgb[~inside]
+
+
+def near(rgb: np.ndarray, color: np.ndarray) -> np.ndarray:
+    """(...) bool which of 8-bit colours (..., 3) are this one but for noise."""
+    return (np.abs(rgb.astype(np.int16) - color) <= 255 * NOISE).all(axis=-1)

@@ -1,0 +1,145 @@
+"""How bright each photo is beside the others of its modality, found while the model learns.
+
+A camera that chooses exposure and white balance by itself shows the same thing in other colours in
+each photo.  A photo is taken to be the model's picture times a gain a channel; targets are photos
+over their gains.  The gains' median over a modality is 1, so that the model has the middle of them;
+middle and spread are medians, so that single dark photos, or wrong poses, change no other photo.
+
+A model that is not trained to the end, or cannot show everything, leaves gains of a few percent
+where there are none.  NOISE of them is taken for that, and with it a share of all gains (Wiener's
+filter): where photos do not differ by more, nothing is changed.  A model that does not show the
+photos yet, such as the fog that a run from random points begins with, says nothing of them.
+"""
+
+import numpy as np
+
+from shapeshift.training.evaluation.metrics import psnr
+from shapeshift.training.heads.networks import KERNELS
+from shapeshift.training.photos import LoadedPhoto
+
+FROM = 0.25  # of the run: before that the model shows too little
+NOISE = 0.04  # standard deviation of the gains' logarithms; docs/bench/exposure.csv
+LIKE = 0.8  # squared correlation of drawings and photos, median; docs/bench/exposure.csv
+FEWEST = 6  # known photos of a modality, and half of them: then a mean means something
+NORMAL = 1.4826  # standard deviations a median deviation, of a normal spread
+MOST = 4.0  # times brighter or darker; beyond it is no exposure
+SATURATED = 254 / 255  # as in kernels/exposure.cl
+Gain = tuple[float, float, float]  # of red, green and blue
+NONE: Gain = (1.0, 1.0, 1.0)
+
+
+class Exposures:
+    """The gains of a run's photos."""
+
+    def __init__(self, device, photos: dict[str, list[LoadedPhoto]]) -> None:
+        self.device = device
+        self.kernel = device.program(KERNELS / "exposure.cl")["exposure_rows"]
+        names = [(photo.modality, photo.name) for each in photos.values() for photo in each]
+        self.row = {name: row for row, name in enumerate(names)}
+        self.rows = {m: [self.row[m, p.name] for p in each] for m, each in photos.items()}
+        self.log_gain = np.full((len(names), 3), np.nan)  # NaN: not looked at yet
+        self.likeness = np.full(len(names), np.nan)  # squared correlation with what was drawn
+        self.begin = FROM  # share of the run from which on photos are looked at
+        self.nothing = device.zeros(1)
+
+    def look(self, photo: LoadedPhoto, image, rgba) -> None:
+        """Learn from what is drawn (3, H, W) of a photo, and its bytes; both on the device."""
+        width, height = photo.view.size
+        masked, weight = int(photo.weight is not None), self.nothing
+        if masked:
+            weight = self.device.upload(np.ascontiguousarray(photo.weight, np.float32))
+        rows = self.device.empty(6 * 3 * height)
+        self.device.launch(
+            self.kernel, 3 * height, 1, width, height, masked, image, rgba, weight, rows
+        )
+        sums = self.device.download(rows).reshape(6, 3, height).sum(axis=2, dtype=np.float64)
+        row = self.row[photo.modality, photo.name]
+        self.log_gain[row] = log_gain(product=sums[4], square=sums[3])
+        self.likeness[row] = likeness(*sums)
+
+    def forget(self, fraction: float) -> None:
+        """The picture was lost at this share of the run: begin anew, as late as from the start."""
+        self.log_gain[:], self.likeness[:] = np.nan, np.nan
+        self.begin = fraction + FROM
+
+    def spread(self, modality: str) -> float:
+        """Of the logarithms of a modality's gains, by their median deviation, as a standard one.
+
+        0 while too few of them are known, or the model shows too little of its photos.
+        """
+        known, like = (of[self.rows[modality]] for of in (self.log_gain, self.likeness))
+        seen = np.isfinite(known).all(axis=1)
+        if not (seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE):
+            return 0.0
+        away = np.abs(known[seen] - np.median(known[seen], axis=0))
+        return float(NORMAL * np.sqrt((np.median(away, axis=0) ** 2).mean()))
+
+    def gain(self, photo: LoadedPhoto) -> Gain:
+        """What the photo's colours are times the model's; NONE where all photos are alike."""
+        own = self.log_gain[self.row[photo.modality, photo.name]]
+        spread = self.spread(photo.modality)
+        if not (spread > NOISE and np.isfinite(own).all()):
+            return NONE
+        middle = np.nanmedian(self.log_gain[self.rows[photo.modality]], axis=0)
+        share = 1 - (NOISE / spread) ** 2
+        return tuple(np.exp(share * (own - middle)).tolist())
+
+    def remarks(self) -> list[str]:
+        """A sentence for each modality whose photos were evened out."""
+        return [
+            f"{name}: its photos differ in brightness by {100 * spread:.0f} % (one standard "
+            "deviation); that was evened out.  Held-out photos keep theirs: eval also scores them "
+            "with their colours fitted."
+            for name in self.rows
+            if (spread := self.spread(name)) > NOISE
+        ]
+
+    def state(self) -> dict[str, np.ndarray]:
+        known = {"log_gain": self.log_gain.copy(), "likeness": self.likeness.copy()}
+        return {f"exposure.{n}": v for n, v in (known | {"begin": np.array(self.begin)}).items()}
+
+    def load(self, state: dict[str, np.ndarray]) -> None:
+        """Of `state`; a checkpoint that has none, or that of other photos, leaves them unknown."""
+        kept = state.get("exposure.log_gain")
+        if kept is not None and kept.shape == self.log_gain.shape:
+            self.log_gain, self.begin = kept.copy(), float(state["exposure.begin"])
+            self.likeness = state["exposure.likeness"].copy()
+
+
+def log_gain(product: np.ndarray, square: np.ndarray) -> np.ndarray:
+    """Logarithm of the gains of sums of drawn * photo and drawn^2; where nothing is drawn, 0."""
+    known = (square > 0) & (product > 0)
+    ratio = np.where(known, product, 1) / np.where(known, square, 1)
+    return np.log(np.clip(ratio, 1 / MOST, MOST))
+
+
+def likeness(count, drawn, photo, drawn2, product, photo2) -> float:
+    """Squared correlation, with its sign, by sums over pixels, each (3,) a channel.
+
+    0 where either has no contrast.
+    """
+    each = np.maximum(count, 1e-9)
+    ours, own = ((b - a * a / each).sum() for a, b in ((drawn, drawn2), (photo, photo2)))
+    both = (product - drawn * photo / each).sum()
+    return float(both * abs(both) / (ours * own)) if min(ours, own) > 1e-6 * count.sum() else 0.0
+
+
+def fitted_psnr(image: np.ndarray, photo: LoadedPhoto, wanted: np.ndarray) -> float:
+    """dB of the right half of a picture (H, W, 3), its colours fitted on the left half.
+
+    wanted: the photo over the background.  What a held-out photo's own exposure costs is not the
+    model's fault; the half on which it is fitted is not scored.
+    """
+    middle = image.shape[1] // 2
+    if not middle:
+        return psnr(image, wanted, photo.weight)
+    weight = np.ones(image.shape[:2]) if photo.weight is None else photo.weight
+    counts = weight * (photo.rgba[..., 3] / 255) * (wanted < SATURATED).all(axis=2)
+    left = np.clip(image[:, :middle], 0, 1).astype(np.float64)
+    product = np.einsum("yx,yxc,yxc->c", counts[:, :middle], left, wanted[:, :middle])
+    square = np.einsum("yx,yxc,yxc->c", counts[:, :middle], left, left)
+    fitted = np.clip(image[:, middle:], 0, 1) * np.exp(log_gain(product, square))
+    right = None if photo.weight is None else photo.weight[:, middle:]
+    if right is not None and not right.any():
+        return psnr(image, wanted, photo.weight)
+    return psnr(fitted, wanted[:, middle:], right)

@@ -1,0 +1,73 @@
+"""Photos as targets of the losses, on the device; as many are kept as fit into memory."""
+
+from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthWish
+from shapeshift.training.losses.losses import ImageLoss, Target
+from shapeshift.training.photos import LoadedPhoto
+from shapeshift.training.supervision.exposure import NONE, Exposures
+
+CACHE_BYTES = 2 << 30  # of finished targets; beyond it they are made again at every use ...
+CACHE = 0.25  # ... and beyond that part of the memory that files may take
+
+
+class Targets:
+    """Makes loss targets of photos and keeps as many as fit."""
+
+    def __init__(self, device) -> None:
+        self.device = device
+        self.losses: dict[tuple[int, int], ImageLoss] = {}
+        self.kept: dict[tuple, Target | DepthTarget] = {}
+        self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
+        self.bytes, self.most = 0, min(CACHE_BYTES, int(CACHE * Memory().most))
+
+    def loss(self, photo: LoadedPhoto) -> ImageLoss:
+        """The image loss of the photo's size."""
+        size = photo.view.size
+        if size not in self.losses:
+            self.losses[size] = ImageLoss(self.device, size)
+        return self.losses[size]
+
+    def target(
+        self, photo: LoadedPhoto, background: tuple[float, float, float],
+        exposures: Exposures | None = None, image: object = None,
+    ) -> Target:  # fmt: skip
+        """The photo over a background; kept unless the photo shows the background.
+
+        exposures: what its colours are divided by, once they have looked at what is drawn of it,
+        the image (3, H, W) on the device, where there is one.
+        """
+        key = (photo.modality, photo.name, photo.view.size)
+        rgba, gain = None, NONE
+        if exposures is not None:
+            if image is not None:
+                rgba = self.device.upload(photo.rgba)
+                exposures.look(photo, image, rgba)
+            gain = exposures.gain(photo)
+        if gain == NONE and key in self.kept:
+            return self.kept[key]
+        rgba = self.device.upload(photo.rgba) if rgba is None else rgba
+        target = self.loss(photo).target(rgba, background, photo.weight, gain)
+        if gain != NONE:
+            return target
+        if not photo.see_through and self.bytes + target.bytes <= self.most:
+            self.kept[key] = target
+            self.bytes += target.bytes
+        return target
+
+    def wish(self, photo: LoadedPhoto, share: float) -> DepthWish | None:
+        """What is to be learned from the photo's depth; None where it has none or share is 0."""
+        if photo.depth is None or not share > 0:
+            return None
+        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size, "depth")
+        if size not in self.depth_losses:
+            self.depth_losses[size] = DepthLoss(self.device, size)
+        loss = self.depth_losses[size]
+        target = self.kept.get(key) or loss.target(photo.depth)
+        if key not in self.kept and self.bytes + target.bytes <= self.most:
+            self.kept[key] = target
+            self.bytes += target.bytes
+        return DepthWish(loss, target, share) if target.known else None
+
+    def forget(self) -> None:
+        """Make all targets anew at their next use: the photos have another size now."""
+        self.kept, self.bytes = {}, 0
