@@ -144,8 +144,8 @@ def test_networks_are_run_without_a_word_to_their_makers(tmp_path):
     """onnxruntime 1.31 writes an identifier into the home and reports sessions unless told."""
     code = (
         "import sys; sys.path.insert(0, 'tests'); from models import make_random_model\n"
-        "from runtime_models.write_onnx import write_onnx\n"
-        "from runtime_models.session import open_session\n"
+        "from shapeshift.runtime_models.package.write_onnx import write_onnx\n"
+        "from shapeshift.runtime_models.session import open_session\n"
         "open_session(write_onnx(make_random_model(3).networks['color'], 'color'), 1)\n"
     )
     home = {"HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}

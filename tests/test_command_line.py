@@ -162,7 +162,7 @@ def test_help_fits_any_terminal(monkeypatch, width):
 def options_of(command: str) -> type:
     from importlib import import_module
 
-    return import_module(f"app.{cli.COMMANDS[command][0]}").Options
+    return import_module(f"shapeshift.app.{cli.COMMANDS[command][0]}").Options
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)

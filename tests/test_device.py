@@ -36,7 +36,7 @@ def test_it_says_which_device_and_driver():
 
 def test_without_a_driver_one_sentence_says_what_to_install(tmp_path):
     code = """
-from rasterizer.device import NoDevice, open_device
+from shapeshift.rasterizer.device import NoDevice, open_device
 try:
     open_device()
 except NoDevice as error:
@@ -61,7 +61,7 @@ def test_a_kind_that_is_not_there_is_named():
 
 def test_nothing_happens_at_import():
     run = python(
-        "import sys, os; before = dict(os.environ); import rasterizer.raster, rasterizer.reference;"
+        "import sys, os; before = dict(os.environ); import shapeshift.rasterizer.raster, rasterizer.reference;"
         "assert 'pyopencl' not in sys.modules; assert dict(os.environ) == before"
     )
     assert run.returncode == 0, run.stderr

@@ -183,10 +183,10 @@ ONE_THREAD = """
 import sys
 from pathlib import Path
 import numpy as np
-from rasterizer.device import open_device
-from scene.read_capture import read_capture
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
 from tests.test_plain import SETTINGS, run
-from training.plain import PlainTrainer, one_modality
+from shapeshift.training.baselines.plain import PlainTrainer, one_modality
 capture = one_modality(read_capture(Path(sys.argv[1])), "RGB")
 np.savez(sys.argv[2], **run(PlainTrainer(open_device("cpu"), capture, SETTINGS), 45).adam.state())
 """

@@ -15,8 +15,8 @@ from tests.conftest import ROOT
 from tests.models import random_package
 
 WORK = """
-from app.opening import progress_after
-from app.progress import progress_bar, tracked
+from shapeshift.app.opening import progress_after
+from shapeshift.app.progress import progress_bar, tracked
 assert list(tracked(range(3), "counting")) == [0, 1, 2]
 with progress_after(0.0) as told:
     told("reading a.ply", 0.5)

@@ -70,7 +70,7 @@ def test_everything_stays_on_the_table_and_nothing_sinks_into_it(example):
 
 
 def test_the_same_run_gives_the_same_bytes(example, tmp_path):
-    script = "import sys; from app.cli import main; sys.exit(main())"
+    script = "import sys; from shapeshift.app.cli import main; sys.exit(main())"
     command = ["simulate", str(SCENE), "--script", str(SCRIPT), "--out", str(tmp_path / "again")]
     done = subprocess.run(
         [sys.executable, "-c", script, *command], cwd=ROOT, capture_output=True, timeout=120

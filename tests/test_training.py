@@ -62,11 +62,11 @@ def test_the_same_seed_gives_the_same_bits(device, balls, trained):
 ONE_THREAD = """
 import sys
 from pathlib import Path
-from rasterizer.device import open_device
-from scene.read_capture import read_capture
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
 from tests.test_training import SETTINGS, run
-from training.checkpoint import write_checkpoint
-from training.train import Trainer
+from shapeshift.training.checkpoint import write_checkpoint
+from shapeshift.training.train import Trainer
 trainer = run(Trainer(open_device("cpu"), read_capture(Path(sys.argv[1])), SETTINGS), steps=40)
 write_checkpoint(Path(sys.argv[2]), *trainer.checkpoint())
 """
@@ -154,7 +154,7 @@ def test_growing_ends_higher(device, balls):
 
 
 def train_command(*arguments) -> list[str]:
-    code = "import sys; from app.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from shapeshift.app.cli import main; sys.exit(main(sys.argv[1:]))"
     return [sys.executable, "-c", code, "train", *map(str, arguments)]
 
 

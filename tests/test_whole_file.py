@@ -137,7 +137,7 @@ def test_devices_and_pipes_are_written_to_and_stay_what_they_are(tmp_path):
     write_whole(tmp_path / "pipe", b"through")
     thread.join(10)
     assert read == [b"through"] and stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
-    code = "from runtime_models.whole_file import *; write_whole(Path('/dev/stdout'), b'said')"
+    code = "from shapeshift.runtime_models.files.whole_file import *; write_whole(Path('/dev/stdout'), b'said')"
     with (tmp_path / "said").open("wb") as out:
         subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, stdout=out)
     assert (tmp_path / "said").read_bytes() == b"said" and Path("/dev/stdout").is_symlink()
@@ -195,7 +195,7 @@ def test_the_command_line_names_the_file_that_found_no_room(tmp_path):
     write_ply(PlainSplats(*columns), tmp_path / "a.ply")
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))\n"
-        "from app.cli import main; raise SystemExit(main())"
+        "from shapeshift.app.cli import main; raise SystemExit(main())"
     )
     out = tmp_path / "b.ply"
     done = subprocess.run(
@@ -212,7 +212,7 @@ def test_the_command_line_names_the_file_that_found_no_room(tmp_path):
 SLOW = """
 import sys, time
 from pathlib import Path
-from runtime_models.whole_file import write_whole, whole_folder
+from shapeshift.runtime_models.files.whole_file import write_whole, whole_folder
 path = Path(sys.argv[1])
 def parts():
     yield b"new"
@@ -328,7 +328,7 @@ def test_a_package_in_a_folder_is_there_at_every_moment(tmp_path):
 def test_packages_survive_kill_at_random_instants(tmp_path, name):
     code = (
         "import sys; sys.path.insert(0, 'tests'); from models import make_random_model\n"
-        "from runtime_models.write_package import write_package; from pathlib import Path\n"
+        "from shapeshift.runtime_models.package.write_package import write_package; from pathlib import Path\n"
         "models = [make_random_model(count) for count in (3, 4)]; print('begun', flush=True)\n"
         "while True:\n for model in models: write_package(model, Path(sys.argv[1]))\n"
     )

@@ -6,7 +6,7 @@
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, made on the spot.  Each training
 photo is multiplied by a gain a channel, most of it common to all three, whose logarithm has the
 planted standard deviation; held-out photos stay as they are.  found is the standard deviation that
-the run found (training/supervision/exposure.py, which takes NOISE of it for its own), psnr_db that of held-out
+the run found (training/supervision/exposure.py takes NOISE of it for its own), psnr_db of held-out
 photos, fitted_db that of their right halves with the colours fitted on the left ones.  Rows with
 evened = 0 are the same runs that never look at a photo's brightness.
 """

@@ -83,7 +83,7 @@ def test_an_unknown_kind_is_refused_with_the_list():
 
 def run_with(environment: dict[str, str], kind: str) -> str:
     code = (
-        "from renderer.context import NoContext, open_context\n"
+        "from shapeshift.renderer.gl.context import NoContext, open_context\n"
         f"try: open_context({kind!r})\n"
         "except NoContext as reason: print(reason)\n"
     )

@@ -247,10 +247,10 @@ def test_harmonics_over_the_block_limit_lie_in_parts(ctx):
 COLD = """
 import time
 import numpy as np
-from renderer.context import open_context
-from renderer.buffers import Arena
-from renderer.decode import Decoder
-from renderer.gpu import Gpu
+from shapeshift.renderer.gl.context import open_context
+from shapeshift.renderer.gl.buffers import Arena
+from shapeshift.renderer.gl.decode import Decoder
+from shapeshift.renderer.gl.gpu import Gpu
 from tests.gl.conftest import make_model
 ctx = open_context()
 model = make_model(1000)

@@ -147,7 +147,7 @@ def test_a_region_a_debug_view_and_a_budget_from_the_command_line(display, scene
 
 def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_file, tmp_path):
     code = (
-        "import sys\nfrom app import cli; from app.viewer import window\n"
+        "import sys\nfrom app import cli; from shapeshift.app.viewer import window\n"
         "def crash(self, event=None):\n    raise ZeroDivisionError('the callback broke')\n"
         "window.Window._note = crash\n"
         "old = window.Window.begin_frame\n"
