@@ -207,11 +207,12 @@ def test_the_front_page_of_the_readme_runs(capture, tmp_path, monkeypatch):
 
     text = (Path(__file__).resolve().parents[1] / "README.md").read_text()
     lines = re.search(r"## From Python\n```python\n(.*?)```", text, re.S)[1]
-    assert len(lines.splitlines()) <= 5 and "seconds=60" in lines
+    assert len(lines.split("\n\n")[1].splitlines()) <= 5 and "seconds=60" in lines
     monkeypatch.chdir(tmp_path)
     shutil.copy(ss.DEMO, tmp_path / "workshop.shift")
     shutil.copytree(capture, tmp_path / "capture")
     names = {}
     exec(lines.replace("seconds=60", "seconds=1, anchors=60, points='random'"), names)
     assert names["picture"].shape == (360, 640, 3)
-    assert ss.load("scene.shift").splat_count == names["model"].splat_count
+    assert [stop.name for stop in ss.load("scene.shift").stops] == ["RGB", "Thermal"]
+    assert (tmp_path / "thermal.png").exists()
