@@ -136,6 +136,7 @@ def run(
     from shapeshift.training.checkpoint import checkpoint_path
 
     saved = time.monotonic()
+    ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, *memory_errors())
     try:
         for now in trainer.steps():
             if progress is not None and progress(now) is False and trainer.settled:
@@ -143,7 +144,7 @@ def run(
             if path is not None and time.monotonic() - saved > SAVE_EVERY_S:
                 save_on_the_way(trainer, checkpoint_path(path))
                 saved = time.monotonic()
-    except (KeyboardInterrupt, *memory_errors()):
+    except ends:
         if path is not None and trainer.iteration:
             save(trainer, path, checkpoint_path(path))
         raise

@@ -148,14 +148,14 @@ def chart(
         raise UsageError(f"frames is {frames}, expected 2 or more, or 0.")
     scene = opened(scene).at(x)
     walk = QUICK if quick else Walk()
-    stage = make_stage([scene.subject], scene.x, size, replace(walk, frames=frames or walk.frames))
+    stage = make_stage([scene.subject], None, size, replace(walk, frames=frames or walk.frames))
     with open_pair(context, drawing) as (renderers, ctx):
         pricing = Pricing(renderers, ctx, stage, scene.subject.background)
         named = settings_of(pricing.drawing, quick)
         known = {each.name: each for each in named}
         if unknown := [name for name in only if name not in known]:
             raise UsageError(f"there is no setting '{unknown[0]}'; there are {', '.join(known)}.")
-        named = [known[name] for name in only] or named
+        named = tuple(known[name] for name in only) or named
         rows = []
         for number, each in enumerate(named):
             (progress or silent)(each.name, number / len(named))

@@ -1,6 +1,6 @@
 """From where a scene is drawn, and the pictures that come of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -42,7 +42,7 @@ def choose_views(scene: "Scene", camera: Any, count: int, size: Size | None) -> 
     if isinstance(camera, str | PathLike):
         camera = read_cameras(scene, str(camera), size)
     if isinstance(camera, CameraList):  # of the file's world
-        camera = moved(camera.views, -scene.origin)
+        camera = moved(camera.views, tuple(-scene.origin))
     views = list(camera)
     if not views or not all(isinstance(view, View) for view in views):
         raise UsageError(
@@ -124,5 +124,5 @@ def spread(x: Any, count: int) -> list[Any]:
         raise UsageError(
             f"x has {len(values)} values for {count} frames; one a frame is wanted, or numbers."
         )
-    places: Sequence[float] = np.linspace(0, len(values) - 1, count)
+    places = np.linspace(0, len(values) - 1, count)
     return np.interp(places, np.arange(len(values)), values).tolist()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -134,7 +135,7 @@ def bake_scene(
     if not baked:
         raise UsageError("all objects are hidden; nothing is there to be taken.")
     splats = cut(merged(baked), sh_degree)
-    arrays = {
+    arrays: dict[str, Any] = {
         name: np.array(getattr(splats, name), np.float32)
         for name in ("means", "scales", "wxyz", "opacity", "sh")
     }
