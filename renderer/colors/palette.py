@@ -116,7 +116,7 @@ def over_background(
     for first in range(0, len(rgba), ROWS):
         part = rgba[first : first + ROWS]
         through = 1 - part[..., 3]
-        for c, behind in enumerate(np.float32(background)):
+        for c, behind in enumerate(np.asarray(background, np.float32)):
             out[first : first + ROWS, :, c] = part[..., c] + through * behind
     return out
 
