@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -48,10 +48,12 @@ def split_controls(words: tuple[str, ...]) -> list[float | str]:
 
 
 @contextmanager
-def open_renderer(context: str, drawing: str) -> Iterator[tuple[Renderer, moderngl.Context | None]]:
+def open_renderer(
+    context: str, drawing: str, tell: Callable[[str], None] = say
+) -> Iterator[tuple[Renderer, moderngl.Context | None]]:
     """(Renderer, context or None) without a window; `none` draws with OpenCL tiles and no GL.
 
-    auto goes on without GL where none is to be had, and says so, unless quads were asked for.
+    auto goes on without GL where none is to be had, and tells so, unless quads were asked for.
     """
     from shapeshift.renderer.gl.context import NoContext, open_context
 
@@ -64,7 +66,7 @@ def open_renderer(context: str, drawing: str) -> Iterator[tuple[Renderer, modern
         except NoContext as reason:
             if context != "auto" or drawing == "quads":
                 raise
-            say(f"Drawing with OpenCL alone: {reason}")
+            tell(f"Drawing with OpenCL alone: {reason}")
     try:
         with Renderer(ctx, drawing if ctx is not None else "tiles") as renderer:
             yield renderer, ctx

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class Device:
     platform: str  # name and version, e.g. "Portable Computing Language 3.1 (system)"
     kind: str  # cpu | gpu
     units: int  # compute units: how many work-groups run at once
-    pool: object = field(repr=False)
+    pool: Any = field(repr=False)  # pyopencl.tools.MemoryPool or what stands in
     programs: dict = field(default_factory=dict, repr=False)
     most_bytes: int = 0  # of one array, as the driver says; 0: it says nothing
 
@@ -99,8 +99,9 @@ class Device:
         import pyopencl as cl
 
         flags = cl.map_flags.READ
+        data: Any = array.base_data  # a buffer: the pool has no other memory
         host, _ = cl.enqueue_map_buffer(
-            self.queue, array.base_data, flags, array.offset, array.shape, array.dtype
+            self.queue, data, flags, array.offset, array.shape, array.dtype
         )
         view = np.asarray(_Mapped(host, array))
         view.flags.writeable = False

@@ -32,7 +32,7 @@ def add_heat(
     count = rows.stop - rows.start
     if not count:
         return
-    colors = None if palette is None else device.constants(np.float32(palette))
+    colors = None if palette is None else device.constants(np.asarray(palette, np.float32))
     parts = (colors, device.constants(np.ascontiguousarray(weights, np.float32)))
     device.launch(
         device.program(KERNEL)["add_heat"], count, GROUP,

@@ -7,6 +7,7 @@ import numpy as np
 from shapeshift.rasterizer.project import LEAST_ALPHA, LOW_PASS, Camera
 
 MAX_ALPHA = 0.99
+Splats = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def rotations(wxyz: np.ndarray) -> np.ndarray:
@@ -73,7 +74,7 @@ def rasterize_reference(
     return image + transmittance * np.asarray(background)[:, None, None], transmittance
 
 
-def render_reference(splats: tuple, camera: Camera, background=(0.0, 0.0, 0.0)) -> tuple:
+def render_reference(splats: Splats, camera: Camera, background=(0.0, 0.0, 0.0)) -> tuple:
     """Image and transmittance of (means, scales, wxyz, opacity, color), all float64."""
     record, depth = project_reference(*splats, camera)
     return rasterize_reference(record, depth, camera.size, background)

@@ -52,7 +52,7 @@ def shade_sh(
     if seen is not None and blocks:
         whole = np.zeros(blocks * LANES, bool)
         whole[:count] = seen
-        wanted = device.constants(whole.reshape(blocks, LANES).any(axis=1).view(np.uint8))
+        wanted = device.constants(np.asarray(whole.reshape(blocks, LANES).any(axis=1), np.uint8))
     kernel = device.program(KERNEL, COEFFICIENTS=width // 3)["shade_sh"]
     x, y, z = (float(v) for v in eye)
     device.launch(

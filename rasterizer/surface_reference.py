@@ -3,7 +3,7 @@
 import numpy as np
 
 from shapeshift.rasterizer.project import Camera
-from shapeshift.rasterizer.reference import MAX_ALPHA, project_reference, rotations
+from shapeshift.rasterizer.reference import MAX_ALPHA, Splats, project_reference, rotations
 
 REACH = 6.0  # sigmas along the view within which a splat's depth is held
 
@@ -20,7 +20,7 @@ def midpoint_depth(mean, covariance, rays, near: float) -> np.ndarray:
 
 
 def render_depth_reference(
-    splats: tuple, camera: Camera, background=(0.0, 0.0, 0.0)
+    splats: Splats, camera: Camera, background=(0.0, 0.0, 0.0)
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Image (3, H, W), transmittance and metres (H, W) of (means, scales, wxyz, opacity, color)."""
     means, scales, wxyz = splats[:3]

@@ -26,7 +26,12 @@ from shapeshift.renderer.colors.false_colors import (
     FalseColors,
     false_colors,
 )
-from shapeshift.renderer.colors.palette import apply_palette, lay_heat, palette_colors
+from shapeshift.renderer.colors.palette import (
+    apply_palette,
+    lay_heat,
+    over_background,
+    palette_colors,
+)
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
 from shapeshift.renderer.decoded_object import DecodedObject
 from shapeshift.renderer.gl.gpu import Gpu
@@ -94,11 +99,6 @@ class Renderer:
     def backends(self) -> dict[str, str]:
         """What is in use: drawing, mlps, sort."""
         return self._drawing.backends
-
-    @property
-    def stats_names(self) -> str:
-        """The same as one line of text."""
-        return ", ".join(f"{what} {name}" for what, name in self.backends.items())
 
     def update(self, scene: Scene) -> None:
         """Takes over poses and control values; decodes only what is new or has another x."""
@@ -310,9 +310,9 @@ class Renderer:
             return self._drawing.image(i)
         return lay_heat(self._drawing.image(i), self._drawing.heat(i), self._false_colors.palette)
 
-    def resolved(self, i: int = 0) -> np.ndarray:
-        """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background;
-        or its debug picture, where the frame was drawn with settings.debug.
+    def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
+        """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
+        written to `out` where there is one; or its debug picture, a new one, with settings.debug.
         """
         if self._debug:
             return bilinear(self._debug[i][0], self._sizes[i])
@@ -321,7 +321,7 @@ class Renderer:
             rgba = lay_heat(rgba, bilinear(self._drawing.heat(i), self._sizes[i]), palette)
         elif self._false_colors.way == PICTURE:
             rgba = apply_palette(rgba, palette)
-        return rgba[..., :3] + (1 - rgba[..., 3:]) * np.float32(self.settings.background)
+        return over_background(rgba, self.settings.background, out)
 
     def present(self, framebuffer: moderngl.Framebuffer, i: int = 0) -> None:
         """Fills a GL framebuffer with view i as resolved() shows it."""

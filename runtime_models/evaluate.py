@@ -19,7 +19,7 @@ from shapeshift.runtime_models.package.write_onnx import write_onnx
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.runtime_models.scaffold.evaluate_scaffold import ScaffoldEvaluator
 from shapeshift.runtime_models.session import BATCH, open_session
-from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.runtime_models.stop_weights import Controls, is_each
 
 
 def follows_eye(model: Model) -> bool:
@@ -147,7 +147,7 @@ class Evaluator:
         rows = np.flatnonzero(seen)
         out = np.zeros((model.splat_count, 3), np.float32) if out is None else out
         if rows.size:
-            mine = x if np.ndim(x) == 0 else x[rows]
+            mine = x[rows] if is_each(x) else x
             per_row = out.reshape(len(places), -1)  # a view: the splats of a row side by side
             colors = self._color(mine, rows, directions(places[rows], eye))
             per_row[rows] = colors.reshape(rows.size, -1)
@@ -207,7 +207,7 @@ class Evaluator:
 
         rows: of the anchors; x and direction are already of these rows alone.
         """
-        network, features = self._network(name, np.ndim(x) == 0), self.model.features[rows]
+        network, features = self._network(name, not is_each(x)), self.model.features[rows]
         out = self._room(name) if out is None else out
         psi = self._encoded(x)
         base = network.feature_part(self.model.features)
@@ -241,7 +241,7 @@ class Evaluator:
 
     def _encoded(self, x: Controls) -> np.ndarray:
         """Psi(x): (1, d) of one value, (A, d) of one an anchor."""
-        if np.ndim(x) == 0:
+        if not is_each(x):
             return self.model.psi(x)
         if self._own is None or not np.array_equal(self._own[0], x):  # five networks ask for it
             self._own = np.array(x), self.model.psi(x)

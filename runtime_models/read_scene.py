@@ -70,7 +70,7 @@ def read_model(path: str | Path, reading: Reading | None = None) -> Model:
         return left_whole(model, reading.most_splats, Path(path).name)
     if not (isinstance(model, SplatLayers) and 0 < reading.most_splats < model.splat_count):
         return model
-    memory = reading.within(Path(path)).memory
+    memory = reading.within(Path(path)).account
     with memory.lend(THINNING * model.splat_count, f"thinning {model.splat_count:,} splats"):
         return thin(model, reading.most_splats)
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard, overload
 
 import numpy as np
 
@@ -42,6 +42,11 @@ class StopWeights:
 
 Control = float | StopWeights  # x on the slider, 0 to 1, or a blend
 Controls = Control | np.ndarray  # of everything, or one an anchor: (A,) of x, (A, S) of weights
+
+
+def is_each(x: Controls) -> TypeGuard[np.ndarray]:
+    """Whether there is one control an anchor, and not one of everything."""
+    return np.ndim(x) > 0  # type: ignore[arg-type]  # 0 of a StopWeights
 
 
 @dataclass(frozen=True)
@@ -121,12 +126,18 @@ class StopBlend:
             for name, weight in control.parts:
                 row[self._index(name)] = weight
             return row
-        if np.ndim(control) == 2:
+        if is_each(control) and control.ndim == 2:
             return control
         xs, rows = self._table
         if not len(xs):
             return np.zeros((*np.shape(control), 0))
         return np.stack([np.interp(control, xs, column) for column in rows.T], axis=-1)
+
+    @overload
+    def between(self, start: Control, end: Control, part: float) -> Control: ...
+
+    @overload
+    def between(self, start: Controls, end: Control, part: float | np.ndarray) -> Controls: ...
 
     def between(self, start: Controls, end: Control, part: float | np.ndarray) -> Controls:
         """`part` 0..1 of the way from one control to another, one or (A,) of them, at even pace.
@@ -136,7 +147,7 @@ class StopBlend:
         if np.ndim(part) == 0 and part in (0, 1):
             return end if part else start
         if self._walks(start, end):
-            return start + (end - start) * part
+            return start + (end - start) * part  # type: ignore[operator]  # numbers: they walk
         way = self._mixed(self.weights(start), self.weights(end), part)
         if way.ndim == 2:
             return way
@@ -156,7 +167,9 @@ class StopBlend:
 
     def _walks(self, start: Controls, end: Controls) -> bool:
         """Whether all numbers between two controls mean a blend of the same two stops."""
-        if isinstance(start, StopWeights) or isinstance(end, StopWeights) or np.ndim(start) == 2:
+        if isinstance(start, StopWeights) or isinstance(end, StopWeights):
+            return False
+        if is_each(start) and start.ndim == 2:
             return False
         if self.through_numbers:
             return True
@@ -211,15 +224,14 @@ def encode_control(encoding: "ControlEncoding", blend: StopBlend, control: Contr
     A blend is that of its stops' encodings.  A number goes into the encoding as it is outside of
     the outermost stops, where there are fewer than two, and where the blend is direct.
     """
+    outside: np.ndarray | np.bool = np.False_
     if not isinstance(control, StopWeights) and np.ndim(control) < 2:
         outside = _is_outside(blend, np.asarray(control))
         if outside.all():
             return _encoded(encoding, control)
-    else:
-        outside = np.False_
     psi = blend.weights(control) @ _stop_encodings(encoding, blend.stops)
     psi = np.atleast_2d(psi).astype(np.float32)
-    if outside.any():
+    if outside.any() and is_each(control):
         psi[outside] = _encoded(encoding, control[outside])
     return psi
 
@@ -240,9 +252,7 @@ def _stop_encodings(encoding: "ControlEncoding", stops: "tuple[Stop, ...]") -> n
 
 def _encoded(encoding: "ControlEncoding", x: float | np.ndarray) -> np.ndarray:
     """(n, d) float32 Psi of numbers."""
-    if np.ndim(x) == 0:
-        return encoding.encode(float(x))[None]
-    return encode_rows(encoding, x)
+    return encode_rows(encoding, x) if is_each(x) else encoding.encode(float(x))[None]
 
 
 def encode_rows(encoding: "ControlEncoding", x: np.ndarray) -> np.ndarray:
@@ -256,9 +266,9 @@ def encode_rows(encoding: "ControlEncoding", x: np.ndarray) -> np.ndarray:
 
 def same_controls(one: Controls, other: Controls) -> bool:
     """Whether two say the same in the same way."""
-    if np.ndim(one) and np.ndim(other):
+    if is_each(one) and is_each(other):
         return np.array_equal(one, other)
-    return np.ndim(one) == np.ndim(other) and one == other
+    return not is_each(one) and not is_each(other) and one == other
 
 
 def check_control(control: Control, whose: str) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.runtime_models.model import SplatLayers, Stop
-from shapeshift.runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend
+from shapeshift.runtime_models.stop_weights import NO_STOPS, Control, Controls, StopBlend, is_each
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.selectors.selector import Selector
 
@@ -39,7 +39,7 @@ def control_of(thing: SceneObject) -> Controls:
             continue
         whole = (weights == weights[0]).all()
         x = thing.model.blend.between(x, selector.x, float(weights[0]) if whole else weights)
-    return x if np.ndim(x) == 0 else np.clip(x, 0, 1).astype(np.float32)
+    return np.clip(x, 0, 1).astype(np.float32) if is_each(x) else x
 
 
 def selector_weights(thing: SceneObject, selector: Selector) -> np.ndarray:

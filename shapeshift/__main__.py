@@ -17,6 +17,7 @@ def register_package() -> None:
     spec = importlib.util.spec_from_file_location(
         NAME, os.path.join(HERE, "__init__.py"), submodule_search_locations=[HERE]
     )
+    assert spec is not None and spec.loader is not None
     package = importlib.util.module_from_spec(spec)
     sys.modules[NAME] = package
     spec.loader.exec_module(package)

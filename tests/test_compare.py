@@ -100,10 +100,12 @@ def test_the_same_place_in_the_world_is_compared_whatever_the_zero(tmp_path, cap
     a = open_side(str(tmp_path / "a.ply"), ReadingOptions())
     (model,) = a.subject.models
     shifted = replace(model, means=model.means - np.float32([3, 0, -2]), origin=(3.0, 0.0, -2.0))
-    from shapeshift.app.commands.compare import drawn_pairs
+    from shapeshift.app.commands.compare import drawn_views
 
     options = Options("a", "b", size=SMALL)
-    for pair in drawn_pairs(options, a, SceneSide("b", Subject.of(shifted, 0.0))):
+    for pair in drawn_views(
+        options, choose_views(options, a), a, SceneSide("b", Subject.of(shifted, 0.0))
+    ):
         assert psnr(pair.a, pair.b) > 60
     views = choose_views(options, a)
     assert len(views) == 8 and views[0].size == (64, 48)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-NOT_SHIPPED = {"tests", "docs", "build", "dist", ".venv", "out"}
-SHIPPED_KINDS = ("*.py", "*.glsl", "*.comp", "*.vert", "*.frag", "*.cl", "*.shift")
+NOT_SHIPPED = {"tests", "docs", "examples", "build", "dist", ".venv", "out"}
+SHIPPED_KINDS = ("*.py", "*.glsl", "*.comp", "*.vert", "*.frag", "*.cl", "*.shift", "*.pyi")
 
 
 def test_every_folder_is_shipped():

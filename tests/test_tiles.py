@@ -304,4 +304,4 @@ def test_without_gl_there_is_nothing_to_present_with(renderer):
 def test_the_names_of_what_is_in_use(renderer):
     assert renderer.backends["drawing"].startswith("tiles (")
     assert renderer.backends["mlps"] == "onnxruntime"
-    assert "mlps onnxruntime" in renderer.stats_names
+    assert renderer.backends["mlps"] == "onnxruntime"

@@ -11,6 +11,7 @@ both stops.
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -164,7 +165,7 @@ def own_blend(
 
 def straight_pull(
     step: Step, way: Way, encoding: ControlEncoding, eye: np.ndarray, voxel: float, pull: float
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """Gradients of the pull on the splats at way.psi, by weights and features; copies.
 
     The mean over the splats of |v - ((1 - share) v_low + share v_high)|^2 summed over means and
@@ -192,7 +193,7 @@ def straight_pull(
     return {name: found[name].copy() for name in ("weights", "features")}
 
 
-def add(device, grads: dict[str, object], more: dict[str, object]) -> None:
+def add(device, grads: dict[str, Any], more: dict[str, Any]) -> None:
     """`more` to the gradients of the same name, in place."""
     kernel = device.program(KERNELS / "between.cl")["add"]
     for name, grad in more.items():

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from typing import Any
 
-from shapeshift.rasterizer.bin import bin_tiles
-from shapeshift.rasterizer.project import Camera, project, project_backward
-from shapeshift.rasterizer.raster import rasterize, rasterize_backward
+from shapeshift.rasterizer.bin import Tiles, bin_tiles
+from shapeshift.rasterizer.project import Camera, Projected, project, project_backward
+from shapeshift.rasterizer.raster import Frame, rasterize, rasterize_backward
 from shapeshift.rasterizer.surface import (
     DepthFrame,
     rasterize_depth,
@@ -28,9 +29,9 @@ class Drawing:
 
     camera: Camera
     splats: Gaussians
-    projected: object
-    tiles: object
-    frame: object
+    projected: Projected
+    tiles: Tiles
+    frame: Frame
     depth: DepthFrame | None = None  # the same frame with its depth, where that was asked for
 
 
@@ -66,7 +67,7 @@ def draw_splats(
 
 def splats_backward(
     device, drawing: Drawing, grad_image, depth: DepthWish | None = None, timed: Timed = untimed,
-    **asked: object,
+    **asked: Any,
 ) -> tuple[Gaussians, object]:  # fmt: skip
     """Gradients of the splats and (N, 12) of the records by those of the image.
 

@@ -1,6 +1,6 @@
 """Every number that a training run can be asked for; `preset` gives the two starting points."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import pairwise
 
 from shapeshift.runtime_models.model import Stop
@@ -67,7 +67,7 @@ class TrainSettings:
     max_anchors: int = 12000  # at the start, as far as there are points, and ever
     max_mb: float | None = None  # the same as megabytes of the package on disk
     own: str = ",".join(OWN)  # what each anchor has beside its features: frame, color
-    grow: bool = True
+    grow: bool = True  # add and remove anchors between 10 % and 60 % of the run
     grow_every: int = 100  # iterations
     ssim_share: float = 0.2  # of the image loss; eq. 8 read literally says 0.8, which is worse
     opacity_share: float = 0.0  # lambda_alpha of eq. 9; the paper says 0.01
@@ -158,3 +158,43 @@ def preset(name: str) -> TrainSettings:
             scale_share=1e-9,
         )  # fmt: skip
     raise ValueError(f"There is no preset '{name}'; use fast or paper.")
+
+
+BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
+
+
+def adjusted(settings: TrainSettings, asked: dict, said: str = "") -> TrainSettings:
+    """The settings with the values that were asked for, by name.
+
+    A budget of one kind takes the place of the other.  said: what stands before a name where it is
+    typed, as --.  Raises ValueError, one sentence.
+    """
+    encoding = asked.keys() & {"control", "sigma"}
+    if asked.get("encoding") == "stops" and encoding:
+        raise ValueError(
+            f"{said}encoding stops sets {said}control and {said}sigma itself; leave them out."
+        )
+    budget = {"seconds": {"iterations": None}, "iterations": {"seconds": None}}
+    given = [name for name in BUDGET if name in asked]
+    more = budget[given[0]] if len(given) == 1 else {}
+    even = {"encoding": "even"} if encoding else {}
+    return replace(settings, **(even | more | asked))
+
+
+def resumed(before: dict, asked: dict, said: str = "") -> TrainSettings:
+    """A checkpoint's settings with another budget.  Raises ValueError for anything else, and for a
+    checkpoint of another version.
+    """
+    if other := sorted(before.keys() ^ {field.name for field in fields(TrainSettings)}):
+        raise ValueError(
+            f"{said}resume: the checkpoint was written by another version of this program, which "
+            f"trains in another way ({other[0]}); train anew without {said}resume."
+        )
+    other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
+    if other:
+        raise ValueError(
+            f"{said}resume goes on with the settings of the checkpoint, where {other[0]} is "
+            f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
+        )
+    budget = {name: asked[name] for name in BUDGET if name in asked}
+    return adjusted(TrainSettings(**before), budget, said)

@@ -61,6 +61,7 @@ class Trainer(Run):
     """One run.  `steps` trains; `model` may be called between any two steps."""
 
     unit = counted = "anchors"
+    settings: TrainSettings
 
     def __init__(
         self,

@@ -123,13 +123,18 @@ def command_line() -> str:
 
 
 def check_counts(options) -> None:
-    """--frames and --sweep: two or more, since one frame has no percentiles."""
+    """--frames and --sweep, as `check_counts_of` wants them."""
+    check_counts_of("--", frames=options.frames, sweep=options.sweep)
+
+
+def check_counts_of(said: str = "", **counts: int) -> None:
+    """Two or more of each, since one frame has no percentiles.  Raises UsageError."""
     from shapeshift.app.drawing import MOST_VALUES
     from shapeshift.app.errors import UsageError
 
-    for name in ("frames", "sweep"):
-        if not 2 <= getattr(options, name) <= MOST_VALUES:
-            raise UsageError(f"--{name} is {getattr(options, name)}, expected 2 to {MOST_VALUES}.")
+    for name, count in counts.items():
+        if not 2 <= count <= MOST_VALUES:
+            raise UsageError(f"{said}{name} is {count}, expected 2 to {MOST_VALUES}.")
 
 
 def check_result_path(path: Path) -> None:

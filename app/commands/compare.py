@@ -1,7 +1,7 @@
 """launch.py compare: two scenes, two stops or two folders of pictures, in numbers and pictures."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -71,6 +71,7 @@ class Compared:
 def run(options: Options) -> int:
     from shapeshift.app.commands.compare_sides import PictureSide, SceneSide, open_side
     from shapeshift.app.errors import UsageError
+    from shapeshift.app.progress import working
 
     if options.view:
         return run_viewer(options)
@@ -86,8 +87,11 @@ def run(options: Options) -> int:
                 "pictures, and --cameras that says where they were taken from."
             )
         assert isinstance(a, SceneSide)
-        compared = drawn_pairs(options, a, b)
-    result = score(compared, (a.name, b.name), options)
+        compared = drawn_views(options, choose_views(options, a), a, b)
+    with working("comparing") as tell:
+        result = score(compared, (a.name, b.name), options, tell)
+    if options.out is not None:
+        say(f"{len(result['views'])} sheets in {full(options.out)}")
     if options.json:
         tell_json(result)
     else:
@@ -141,15 +145,14 @@ def choose_views(options: Options, a) -> list:
     return orbit_path(VIEWS, *a.subject.bounds(), size or DEFAULT_SIZE)
 
 
-def drawn_pairs(options: Options, a, b) -> Iterator[Compared]:
-    """Both from every view; B may be pictures, which are in the order of the views."""
+def drawn_views(options: Options, views: list, a, b) -> Iterator[Compared]:
+    """Both from every view of A's; B may be pictures, which are in the order of the views."""
     from shapeshift.app.commands.compare_sides import PictureSide, read_picture
     from shapeshift.app.drawing import open_renderer
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.runtime_models.model import BadFile
     from shapeshift.scene.cameras.camera_list import moved
 
-    views = choose_views(options, a)
     files = b.files if isinstance(b, PictureSide) else None
     if files is not None and len(files) != len(views):
         raise BadFile(
@@ -186,17 +189,17 @@ def artist(renderer, side, background: tuple[float, float, float]):
     return draw
 
 
-def score(compared: Iterator[Compared], names: tuple[str, str], options: Options) -> dict:
-    """What is printed; the sheets are written on the way."""
-    from shapeshift.app.progress import working
-
+def score(
+    compared: Iterator[Compared], names: tuple[str, str], options: Options,
+    tell: Callable[[str], None],
+) -> dict:  # fmt: skip
+    """What is printed; the sheets are written at the end.  tell: hears how far it is."""
     rows, kept = [], []
-    with working("comparing") as tell:
-        for pair in compared:
-            rows.append(pair.scores())
-            tell(f"comparing: {len(rows)} views done")
-            if options.out is not None:
-                kept.append(pair)
+    for pair in compared:
+        rows.append(pair.scores())
+        tell(f"comparing: {len(rows)} views done")
+        if options.out is not None:
+            kept.append(pair)
     decibels = [row["psnr_db"] for row in rows]
     numbers = [db for db in decibels if db != "equal"]
     mean = {
@@ -237,7 +240,6 @@ def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options
         save_png(sheet(pair.a, pair.b, names, amplify), both)
         difference = difference_picture(pair.a, pair.b, amplify)
         save_png(written(difference, scale_text(amplify)), alone)
-    say(f"{len(pairs)} sheets in {full(options.out)}")
     return amplify
 
 

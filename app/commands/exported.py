@@ -137,18 +137,22 @@ def chosen_rows(part: Part) -> np.ndarray | None:
     return of_label if keep is None else keep & of_label
 
 
-def check_output(path: Path, inputs: Sequence[Path], overwrite: bool) -> None:
-    """Refuses a path that is an input under any name, and what exists unless it may be replaced."""
+def check_output(path: Path, inputs: Sequence[Path], overwrite: bool, said: str = "--") -> None:
+    """Refuses a path that is an input under any name, and what exists unless it may be replaced.
+
+    said: what stands before a name where it is typed.
+    """
+    out = f"{said}out {path}"
     folders = [given.parent for given in inputs if given.name in (MANIFEST, META, TREE)]
     for given in (*inputs, *folders):
         if given.is_dir() and path.resolve().is_relative_to(given.resolve()):
-            raise UsageError(f"--out {path} lies in {given}, which is read; choose another folder.")
+            raise UsageError(f"{out} lies in {given}, which is read; choose another folder.")
         if path.exists() and os.path.samefile(path, given):
-            raise UsageError(f"--out {path} is the scene that is read; choose another name.")
+            raise UsageError(f"{out} is the scene that is read; choose another name.")
     if path.exists() and not overwrite:
-        raise UsageError(f"--out {path} exists; --overwrite replaces it.")
+        raise UsageError(f"{out} exists; {said}overwrite replaces it.")
     if path.is_dir() != is_folder(path) and path.exists():
-        raise UsageError(f"--out {path} is of another kind than what is written; choose another.")
+        raise UsageError(f"{out} is of another kind than what is written; choose another.")
 
 
 def is_folder(path: Path) -> bool:

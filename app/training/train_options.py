@@ -4,15 +4,13 @@ A command derives its Options from these.  Python puts the fields of the last ba
 stand in the reverse order of --help.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT
 
 if TYPE_CHECKING:
     from shapeshift.training.settings import TrainSettings
-
-BUDGET = ("iterations", "seconds")  # what may change when a run is resumed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,19 +94,6 @@ def in_words(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def resumed(before: dict) -> "TrainSettings":
-    """The settings of a checkpoint.  Raises UsageError where it is of another version."""
-    from shapeshift.app.errors import UsageError
-    from shapeshift.training.settings import TrainSettings
-
-    if other := sorted(before.keys() ^ {f.name for f in fields(TrainSettings)}):
-        raise UsageError(
-            "--resume: the checkpoint was written by another version of this program, which "
-            f"trains in another way ({other[0]}); train anew without --resume."
-        )
-    return TrainSettings(**before)
-
-
 def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":
     """The preset with what train or fit was asked for; or a checkpoint's, with another budget.
 
@@ -117,30 +102,16 @@ def settings_of(options: ModelOptions, before: dict | None) -> "TrainSettings":
     from shapeshift.app.errors import UsageError
     from shapeshift.app.paths import plain
     from shapeshift.training.first_anchors.initial import SOURCES
-    from shapeshift.training.settings import TrainSettings, preset
+    from shapeshift.training.settings import TrainSettings, adjusted, preset, resumed
 
     names = {f.name for f in fields(TrainSettings)} - {"preset"}
     asked = {n: getattr(options, n) for n in names & {f.name for f in fields(options)}}
     asked = {n: value for n, value in asked.items() if value is not None}
     if asked.get("points", SOURCES[0]) not in SOURCES:
         asked["points"] = str(plain(asked["points"]))
-    settings = preset(options.preset) if before is None else resumed(before)
-    if before is not None:
-        other = sorted(n for n in asked if n not in BUDGET and asked[n] != before[n])
-        if other:
-            raise UsageError(
-                f"--resume goes on with the settings of the checkpoint, where {other[0]} is "
-                f"{before[other[0]]}, not {asked[other[0]]}; leave it out or start anew."
-            )
-    if asked.get("encoding") == "stops" and asked.keys() & {"control", "sigma"}:
-        raise UsageError("--encoding stops sets --control and --sigma itself; leave them out.")
-    if before is None and asked.keys() & {"control", "sigma"}:
-        asked["encoding"] = "even"
-    if "seconds" in asked and "iterations" not in asked:
-        asked["iterations"] = None
-    elif "iterations" in asked and "seconds" not in asked:
-        asked["seconds"] = None
     try:
-        return replace(settings, **asked)
+        if before is not None:
+            return resumed(before, asked, "--")
+        return adjusted(preset(options.preset), asked, "--")
     except ValueError as error:
         raise UsageError(str(error)) from None

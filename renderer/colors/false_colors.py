@@ -110,7 +110,9 @@ def shade_of(model: Model, control: Controls) -> Shade:
     if not others.any() and len(thermal) == 1:  # what lies beyond its stop is that stop's, too
         whole = np.ones(1, np.float32)
         return Shade(None, (Heat(control_of_colors, stops[thermal[0]].palette, whole),))
-    heats = [Heat(stops[s].x, stops[s].palette, np.float32(rows[:, s])) for s in thermal]
+    heats = [
+        Heat(stops[s].x, stops[s].palette, np.asarray(rows[:, s], np.float32)) for s in thermal
+    ]
     return Shade(_without(model, rows, thermal) if others.any() else None, tuple(heats))
 
 
@@ -132,7 +134,7 @@ def _shade_of_layers(model: SplatLayers, rows: np.ndarray, thermal: list[int]) -
     heats = []
     for s in thermal:
         of_stop = np.ones(1) if pure else model.layer == s
-        heats.append(Heat(0.0, model.stops[s].palette, np.float32(of_stop)))
+        heats.append(Heat(0.0, model.stops[s].palette, np.asarray(of_stop, np.float32)))
     return Shade(None if pure else 0.0, tuple(heats))
 
 

@@ -10,6 +10,7 @@ from shapeshift.scene.scene import Scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, used on display values
 STEPS = 256
+ROWS = 32  # of a picture at a time: they stay in the cache
 
 # (place in 0..1, display sRGB): what a thermal camera shows, cold to hot; luminance only grows
 IRONBOW = (
@@ -99,6 +100,24 @@ def lay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
     false = through_palette(value / np.maximum(weight, 1e-6), name)
     out = rgba.copy()
     out[..., :3] += false * weight[..., None]
+    return out
+
+
+def over_background(
+    rgba: np.ndarray, background: tuple[float, float, float], out: np.ndarray | None = None
+) -> np.ndarray:
+    """(H, W, 3) of premultiplied (H, W, 4): what is seen before a background, display sRGB.
+
+    out: written to and given back, where there is one.  A channel and some rows at a time: the
+    loops over three numbers that numpy would make of the whole take four times as long.
+    """
+    if out is None:
+        out = np.empty((*rgba.shape[:2], 3), rgba.dtype)
+    for first in range(0, len(rgba), ROWS):
+        part = rgba[first : first + ROWS]
+        through = 1 - part[..., 3]
+        for c, behind in enumerate(np.asarray(background, np.float32)):
+            out[first : first + ROWS, :, c] = part[..., c] + through * behind
     return out
 
 

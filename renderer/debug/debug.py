@@ -37,14 +37,14 @@ REASON_TEXTS = {
     "faded": "faded away",
 }
 # Ramps from 0 to 1, display sRGB: dark to bright in equal steps for the eye.
-HEAT = np.float32(
+HEAT = np.asarray(
     [[0, 0, 0.02], [0.26, 0.04, 0.41], [0.58, 0.15, 0.40], [0.87, 0.32, 0.23], [0.99, 0.65, 0.04],
      [0.99, 1.0, 0.64]]
-)  # fmt: skip
-DISTANT = np.float32(
+, np.float32)  # fmt: skip
+DISTANT = np.asarray(
     [[0.27, 0.0, 0.33], [0.23, 0.32, 0.55], [0.13, 0.57, 0.55], [0.37, 0.79, 0.38],
      [0.99, 0.91, 0.14]]
-)  # fmt: skip
+, np.float32)  # fmt: skip
 LEGEND_STEPS = 5  # rows that stand for a ramp
 DEBUG_NAMES = tuple(name for name in DEBUG_VIEWS if name)
 MOST_LABELS = 24  # rows of a legend
@@ -116,7 +116,7 @@ def debug_image(
     reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
     told = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
-    colors = np.float32([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)])
+    colors = np.asarray([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)], np.float32)
     if settings.debug == "birdseye":
         picture, metres = birdseye(points, poses, reason, colors, view, settings)
         return picture, told | {"metres": metres}

@@ -30,7 +30,9 @@ def birdseye(
     eye = map_from_eye[:3, 3]
     centre, metres_per_pixel = fit(place[:, reason != 1], eye, view.size)
     pixel = np.stack([place[0] - np.float32(centre[0]), place[2] - np.float32(centre[1])])
-    pixel = pixel / np.float32(metres_per_pixel) + np.float32([[width / 2], [height / 2]])
+    pixel = pixel / np.asarray(metres_per_pixel, np.float32) + np.asarray(
+        [[width / 2], [height / 2]], np.float32
+    )
     picture = np.full((height, width, 3), BACKGROUND, np.float32)
     known = np.isfinite(pixel).all(axis=0)
     unit = dot_size(view.size)

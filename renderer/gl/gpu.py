@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -58,21 +59,21 @@ class Gpu:
         textures = [self.ctx.texture(size, 4, dtype=dtype) for _ in range(images)]
         return self.ctx.framebuffer(textures)
 
-    def compute(self, name: str, **defines: object) -> moderngl.ComputeShader:
+    def compute(self, name: str, **defines: Any) -> moderngl.ComputeShader:
         """The program of a .comp file, compiled once for the same defines."""
         key = (name, *sorted(defines.items()))
         if key not in self._programs:
             self._programs[key] = shader.compile_compute(self.ctx, name, **defines)
         return self._programs[key]
 
-    def program(self, vertex: str, fragment: str, **defines: object) -> moderngl.Program:
+    def program(self, vertex: str, fragment: str, **defines: Any) -> moderngl.Program:
         """The program of two stages, compiled once for the same defines."""
         key = (vertex, fragment, *sorted(defines.items()))
         if key not in self._programs:
             self._programs[key] = shader.compile_program(self.ctx, vertex, fragment, **defines)
         return self._programs[key]
 
-    def run(self, program: moderngl.ComputeShader, groups: int, **uniforms: object) -> None:
+    def run(self, program: moderngl.ComputeShader, groups: int, **uniforms: Any) -> None:
         """Sets uniforms and runs the groups; what they write is seen by all that follows."""
         for name, value in uniforms.items():
             program[name].value = value

@@ -7,7 +7,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for
 from shapeshift.runtime_models.model import SplatLayers
-from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.runtime_models.stop_weights import Controls, is_each
 
 SH_ALIGN = 64  # splats; keeps parts of the coefficients to whole work groups
 
@@ -43,7 +43,7 @@ class Layers:
         """Opacities of the layers that there are at x, or at (N,) one a splat -> rows start..."""
         model = self._model
         program, weights = self._weigh, self._weights
-        if np.ndim(x) == 0:
+        if not is_each(x):
             weights.write(model.weights(x))
         else:
             program = self._gpu.compute("weigh.comp", OWN_CONTROL=1)

@@ -11,7 +11,7 @@ from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import PARTS, Arena, bind
 from shapeshift.renderer.gl.gpu import Gpu, groups_for
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
-from shapeshift.runtime_models.stop_weights import Control, Controls
+from shapeshift.runtime_models.stop_weights import Control, Controls, is_each
 
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")  # their numbers in activation.glsl
 DIRECTION = 3  # inputs
@@ -146,7 +146,7 @@ class Networks:
 
     def _heads_for(self, x: Controls) -> dict[str, "_Head"]:
         """The networks, ready for one control or for one an anchor."""
-        if np.ndim(x) == 0:
+        if not is_each(x):
             for head in self._heads.values():
                 head.set_control(self._model, x)
             return self._heads

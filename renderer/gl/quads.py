@@ -56,8 +56,9 @@ class QuadsDrawing:
         self._most: float | None = None  # brightest colour of these; None: not known yet
         self._last = 0  # row of the counts of the view drawn last
         self.draws_heat = False  # beside the colours, from the next frame on
-        self._arena: Arena | None = None
-        self._decoder: Decoder | None = None
+        self._arena: Arena  # these two from allocate() on
+        self._decoder: Decoder
+        self._allocated: list[Arena | Decoder] = []
 
     @property
     def allocations(self) -> int:
@@ -72,6 +73,7 @@ class QuadsDrawing:
         counts, antialiased = [m.splat_count for m in models], tuple(map(is_antialiased, models))
         self._arena = Arena(self._gpu, counts, antialiased)
         self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
+        self._allocated = [self._arena, self._decoder]
         on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
         self.backends["mlps"] = f"{self._mlps}, Scaffold-GS onnxruntime" if on_cpu else self._mlps
 
@@ -269,7 +271,5 @@ class QuadsDrawing:
                 part.release()
 
     def _release_arena(self) -> None:
-        for part in (self._decoder, self._arena):
-            if part is not None:
-                part.release()
-        self._decoder = self._arena = None
+        while self._allocated:
+            self._allocated.pop().release()

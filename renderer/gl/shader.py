@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import moderngl
 
@@ -19,7 +20,7 @@ class ShaderError(RuntimeError):
     """A shader does not compile or link; the message quotes file, line and source."""
 
 
-def read_shader(name: str, folder: Path = SHADERS, **defines: object) -> Lines:
+def read_shader(name: str, folder: Path = SHADERS, **defines: Any) -> Lines:
     """Every line of one stage, includes expanded, with the file and line that it came from."""
     seen: set[str] = set()
 
@@ -42,7 +43,7 @@ def read_shader(name: str, folder: Path = SHADERS, **defines: object) -> Lines:
     return [("<defines>", i, text) for i, text in enumerate(head, start=1)] + expand(name, "Python")
 
 
-def compile_compute(ctx: moderngl.Context, name: str, **defines: object) -> moderngl.ComputeShader:
+def compile_compute(ctx: moderngl.Context, name: str, **defines: Any) -> moderngl.ComputeShader:
     """The program of one .comp file; ShaderError where it does not compile."""
     lines = read_shader(name, **defines)
     try:
@@ -52,7 +53,7 @@ def compile_compute(ctx: moderngl.Context, name: str, **defines: object) -> mode
 
 
 def compile_program(
-    ctx: moderngl.Context, vertex: str, fragment: str, folder: Path = SHADERS, **defines: object
+    ctx: moderngl.Context, vertex: str, fragment: str, folder: Path = SHADERS, **defines: Any
 ) -> moderngl.Program:
     """The program of a .vert and a .frag file; ShaderError where it does not compile or link."""
     stages = [read_shader(name, folder, **defines) for name in (vertex, fragment)]

@@ -56,7 +56,7 @@ def holds_arrays(names: list[str]) -> bool:
 def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3, or the coloured points that an .npz holds.  Raises BadFile."""
     reading = reading.within(path)
-    memory = reading.memory
+    memory = reading.account
     reading.tell(f"reading {path.name}", 0.0)
     arrays = arrays_of(path, memory)
     arrays = {role: array for role, array in arrays.items() if array is not None}

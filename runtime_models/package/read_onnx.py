@@ -208,7 +208,7 @@ class _Chain:
             if attribute.name == "value":
                 return read_tensor(attribute.t, self.name)
             if attribute.name == "value_float":
-                return np.float32(attribute.f)
+                return np.asarray(attribute.f, np.float32)
             if attribute.name == "value_floats":
                 return np.array(attribute.floats, np.float32)
         raise BadFile(f"{label} holds no plain numbers; export it again.")

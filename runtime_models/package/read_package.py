@@ -33,7 +33,7 @@ SHOWN = 60  # bytes of a splat that is decoded
 def read_package(path: str | Path, reading: Reading | None = None) -> AnchorModel:
     """The model of a package.  Raises BadFile with one sentence for every way it can be broken."""
     path, reading = Path(path), reading or Reading()
-    memory = reading.within(path).memory
+    memory = reading.within(path).account
     return read_files(open_package(path, memory), path.name, memory)
 
 

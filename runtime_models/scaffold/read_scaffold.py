@@ -63,7 +63,7 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
     """
     file = cloud_of(path)
     reading = reading.within(file.parent)
-    memory = reading.memory
+    memory = reading.account
     settings = read_settings(file.parent)
     cloud = read_cloud(file, reading)
     findings = judge_rows(cloud.good, reading, file.name)

@@ -54,10 +54,10 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
     if header.encoding == "ascii":
         raise BadFile(f"{path.name} is an ASCII PLY; export it as a binary one.")
     vertex.require((*PLACE, *SCALES), path.name)
-    k, width = count_columns(vertex.row.names, path.name)
+    k, width = count_columns(vertex.layout.names, path.name)
     count, row = vertex.count, vertex.row
     floats = 3 + width + 3 * k + 3 + 3  # of an anchor
-    reading.within(path).memory.charge(2 * 4 * count * floats, f"{count:,} anchors")
+    reading.within(path).account.charge(2 * 4 * count * floats, f"{count:,} anchors")
     cloud = Cloud(
         header,
         np.empty((count, 3), np.float32),

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,15 @@ class Reading:
         `memory` is an Account then, which its readers charge before they take any.  What is read
         out of a file that has its account already counts for that one.
         """
-        return replace(self, memory=self.begun().memory.of(path, size))
+        memory = self.begun().memory
+        assert memory is not None
+        return replace(self, memory=memory.of(path, size))
+
+    @property
+    def account(self) -> Account:
+        """The one of the file that is being read, as `within` has opened it."""
+        assert isinstance(self.memory, Account), "readers are given a reading of their file"
+        return self.memory
 
     def tell(self, what: str, part: float) -> None:
         if self.told:
@@ -76,7 +85,7 @@ class RawSplats:
 
 def empty_splats(
     count: int, coefficients: int, memory: Account, exact: bool = False
-) -> dict[str, np.ndarray]:
+) -> dict[str, Any]:
     """The arrays of RawSplats for `count` splats, charged and not filled in yet.
 
     exact: places are float64.  Raises BadFile.

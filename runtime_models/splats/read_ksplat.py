@@ -59,7 +59,7 @@ def read_raw_ksplat(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3; as in COLMAP, y down.  Raises BadFile."""
     with path.open("rb") as file:  # what is none is not read as a whole to say so
         head = file.read(HEADER_SIZE)
-    memory = reading.within(path).memory
+    memory = reading.within(path).account
     if head[:2] == VERSION:
         memory.charge(path.stat().st_size, "its bytes")
     data = path.read_bytes() if head[:2] == VERSION else head

@@ -15,7 +15,7 @@ ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("wx
 
 def read_raw_splat(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0.  Raises BadFile."""
-    size, memory = path.stat().st_size, reading.within(path).memory
+    size, memory = path.stat().st_size, reading.within(path).account
     if size == 0 or size % ROW.itemsize:
         raise BadFile(f"{path.name} has {size} bytes, expected a multiple of 32: it is cut off.")
     count = size // ROW.itemsize

@@ -62,7 +62,7 @@ def read_raw_zip_of_one(path: Path, reading: Reading) -> RawSplats:
     """The one known file in a zip.  Raises BadFile."""
     reading = reading.within(path)
     (name,) = known_in(path)
-    with opened_zip(path, path.name, reading.memory) as archive:
+    with opened_zip(path, path.name, reading.account) as archive:
         entry = archive.getinfo(name)
         if entry.compress_type not in KNOWN:
             raise BadFile(f"{path.name}: {name[:80]!r} is packed in a way that is not read.")
@@ -97,7 +97,7 @@ def unpacked_and_read(
 
     with temporary_folder() as folder:
         inner = folder / plain_name(name)
-        write_charged(inner, pieces, reading.memory)
+        write_charged(inner, pieces, reading.account)
         form = format_of(inner)
         if form is None or not form.is_whole:
             raise BadFile(f"{path.name} holds {name[:60]!r}, which is no file of splats.")

@@ -173,7 +173,7 @@ def data_from_ours() -> np.ndarray:
 
 def first_of_each(views: list[View]) -> list[int]:
     """Indices of the views that no earlier one equals."""
-    seen = {}
+    seen: dict = {}
     for i, view in enumerate(views):
         pose = view.world_from_eye
         lens = (view.tangents, view.whole, view.size)

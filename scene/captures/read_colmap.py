@@ -71,7 +71,7 @@ def modalities(
         return spread_stops(found), first
     where, entries = f"{folder}/capture.json", said["modalities"]
     stops = stops_from(entries, where)
-    of = {}
+    of: dict = {}
     for stop, entry in zip(stops, entries, strict=True):
         prefix = text_in(entry, "folder", where, stop.name).rstrip("/") + "/"
         mine = [n for n in names if n.startswith(prefix)]

@@ -56,10 +56,10 @@ def read_ply(path: Path, where: str, memory: Account) -> tuple[np.ndarray, np.nd
     """The vertices of a PLY, binary or ASCII; all that its header promises is there."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    lacking = [axis for axis in "xyz" if axis not in vertex.row.names]
+    lacking = [axis for axis in "xyz" if axis not in vertex.layout.names]
     if lacking:
         raise BadFile(f"{where}: its vertices have no {lacking[0]}; x, y and z are wanted")
-    memory.charge((POINT + vertex.row.itemsize) * vertex.count, f"{vertex.count:,} points")
+    memory.charge((POINT + vertex.layout.itemsize) * vertex.count, f"{vertex.count:,} points")
     table = read_records(path, header, vertex, begins)
     with np.errstate(over="ignore", invalid="ignore"):  # what is no number is refused by the caller
         return np.stack([table[axis].astype(np.float64) for axis in "xyz"], 1), shades_of(table)

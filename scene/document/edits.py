@@ -5,6 +5,7 @@ one can be undone.  Items that an edit does not touch stay the very same objects
 import math
 import re
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -97,7 +98,7 @@ def rename(file: SceneFile, before: str, after: str) -> SceneFile:
     return change(file, before, name=after)
 
 
-def change(file: SceneFile, name: str, /, **values: object) -> SceneFile:
+def change(file: SceneFile, name: str, /, **values: Any) -> SceneFile:
     """With other values of an object's fields; the same file where nothing is different."""
     before = wanted(file, name)
     if all(getattr(before, field) == value for field, value in values.items()):

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 from shapeshift.runtime_models.files.memory import read_json_file
 from shapeshift.runtime_models.model import BadFile
@@ -82,7 +83,7 @@ class Fields:
     def refuse(self, key: str, wanted: str) -> BadFile:
         return BadFile(f"{self.where}: '{key}' is {shown(self.data.get(key))}; {wanted} is wanted.")
 
-    def take(self, key: str, default: object = _ABSENT) -> object:
+    def take(self, key: str, default: object = _ABSENT) -> Any:
         """The value as it is; without a default it must be there."""
         self.asked.append(key)
         if key not in self.data and default is _ABSENT:

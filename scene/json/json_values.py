@@ -1,16 +1,18 @@
 """Values out of a JSON object, each of the type that it has to have; BadFile names its key."""
 
 import math
+from typing import TypeGuard
 
 from shapeshift.runtime_models.model import BadFile
 
 LONGEST_NAME = 80  # letters of a file's own words in a message
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[int | float]:
     """A finite number; true and false are none, and neither are integers beyond every float."""
-    good = isinstance(value, int | float) and not isinstance(value, bool)
-    return good and abs(value) <= 1e300 and math.isfinite(value)
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= 1e300 and math.isfinite(value)
 
 
 def text_in(entry: dict, key: str, where: str, otherwise: str = "") -> str:

@@ -9,6 +9,7 @@ stays.
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,13 +33,13 @@ class Touch:
 
     ids: tuple[int, int]
     impulse: float  # N s
-    event: object
+    event: Any
 
 
 class Tally:
     """The contacts of one step, gathered substep by substep."""
 
-    def __init__(self, world: object, ids: dict[object, int], gravity_m_s2: float) -> None:
+    def __init__(self, world: Any, ids: dict[Any, int], gravity_m_s2: float) -> None:
         self._world, self._ids, self._gravity = world, ids, gravity_m_s2
         # pair: (sum of its impulses, the largest, where that one was)
         self._hardest: dict[tuple[int, int], tuple[float, float, np.ndarray]] = {}
@@ -72,7 +73,7 @@ class Tally:
         """Every pair once, by ids."""
         return [Contact(*pair, row[0], row[2]) for pair, row in sorted(self._hardest.items())]
 
-    def _touch(self, event: object, seconds: float) -> Touch:
+    def _touch(self, event: Any, seconds: float) -> Touch:
         ids = self._ids[event.collider1], self._ids[event.collider2]
         return Touch(ids, event.total_force_magnitude * seconds, event)
 
@@ -104,7 +105,7 @@ def share_out(touches: list[Touch], gained: dict[int, Triple]) -> None:
                 ends.append(other)
 
 
-def touch_point(world: object, event: object, before: np.ndarray | None) -> np.ndarray:
+def touch_point(world: Any, event: Any, before: np.ndarray | None) -> np.ndarray:
     """(3,) metres, world: the deepest point that two colliders share."""
     position = world.colliders[event.collider1].position
     pair = world.narrow_phase.contact_pair(event.collider1, event.collider2)
@@ -115,7 +116,7 @@ def touch_point(world: object, event: object, before: np.ndarray | None) -> np.n
     return np.array([at.x, at.y, at.z])
 
 
-def any_near(world: object, pairs: list[tuple[object, object]]) -> bool:
+def any_near(world: Any, pairs: list[tuple[Any, Any]]) -> bool:
     """Whether one of these pairs of colliders touches or is about to: then faces are not merged.
 
     Merged contacts halve the cost, but let a hand push a cup 25 mm into a mesh.
@@ -124,6 +125,6 @@ def any_near(world: object, pairs: list[tuple[object, object]]) -> bool:
     return any(pair is not None and pair.find_deepest_contact() is not None for pair in found)
 
 
-def velocities(bodies: dict[int, object]) -> dict[int, tuple[float, float, float]]:
+def velocities(bodies: dict[int, Any]) -> dict[int, tuple[float, float, float]]:
     """m/s of the engine's bodies, by id."""
     return {n: (v.x, v.y, v.z) for n, v in ((n, body.linvel) for n, body in bodies.items())}

@@ -7,6 +7,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -28,15 +29,15 @@ class Hold:
     """One hand that holds one body."""
 
     body: int  # id
-    hand: object  # the engine's handle of the kinematic hand
-    joint: object  # the engine's handle of the motors between them
+    hand: Any  # the engine's handle of the kinematic hand
+    joint: Any  # the engine's handle of the motors between them
     grip: np.ndarray  # (3,) metres in the hand's frame: where it took hold
     body_grip: np.ndarray  # (3,) metres in the body's frame: the same point at the grab
     target: Pose  # where the hand shall be at the end of the next step
     trail: deque = field(default_factory=lambda: deque(maxlen=TRAIL))  # Poses, oldest first
 
 
-def motor_joint(frame_hand: object, frame_body: object, mass_kg: float) -> object:
+def motor_joint(frame_hand: Any, frame_body: Any, mass_kg: float) -> Any:
     """Six motors that pull the body's frame onto the hand's, each with a largest force."""
     from rapier3d import GenericJointBuilder, JointAxesMask, JointAxis, MotorModel
 
@@ -55,7 +56,7 @@ def motor_joint(frame_hand: object, frame_body: object, mass_kg: float) -> objec
 
 
 def take_hold(
-    world: object, number: int, body_handle: object, hand_pose: Pose, point: np.ndarray
+    world: Any, number: int, body_handle: Any, hand_pose: Pose, point: np.ndarray
 ) -> Hold:
     """Puts a kinematic hand into the world and ties a body to it at a point (3,) of the world."""
     from rapier3d import Isometry3, RigidBody
@@ -75,7 +76,7 @@ def take_hold(
     return hold
 
 
-def carry(holds: list[tuple[Hold, object]], body: object, moved: np.ndarray) -> None:
+def carry(holds: list[tuple[Hold, Any]], body: Any, moved: np.ndarray) -> None:
     """A body, the hands that hold it and where they have been jump by (4, 4) now_from_before.
 
     Velocities turn along, so that a throw right after a jump is as it was before it.
@@ -97,21 +98,21 @@ def jumped(pose: Pose, moved: np.ndarray) -> Pose:
     return Pose.from_matrix(moved @ pose.matrix())
 
 
-def lead_hands(world: object, starts: list[tuple[Hold, object]], part: float) -> None:
+def lead_hands(world: Any, starts: list[tuple[Hold, Any]], part: float) -> None:
     """Puts every hand a part 0..1 of the way from where it was at the start of a step."""
     for hold, start in starts:
         now = start.lerp_slerp(isometry(hold.target), part)
         world.rigid_bodies[hold.hand].set_next_kinematic_position(now)
 
 
-def lag(hold: Hold, hand: object, body: object) -> float:
+def lag(hold: Hold, hand: Any, body: Any) -> float:
     """Metres by which the point held is behind where its hand wants it."""
     ends = (hand.position, hold.grip), (body.position, hold.body_grip)
     there, here = (frame.transform_point(tuple(map(float, point))) for frame, point in ends)
     return math.dist((there.x, there.y, there.z), (here.x, here.y, here.z))
 
 
-def throw(hold: Hold, body: object, hz: float, most_speed: float) -> None:
+def throw(hold: Hold, body: Any, hz: float, most_speed: float) -> None:
     """Gives the body the velocity that its hand had, at the body's centre of mass."""
     linear, turning = hand_velocity(list(hold.trail), hz)
     centre = body.center_of_mass

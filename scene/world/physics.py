@@ -6,6 +6,7 @@ calls in the same order give the same bits, in every process on one kind of mach
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -62,8 +63,8 @@ class Physics:
         self.hz = checked_number(hz, "the steps a second", 10, 1000)
         self.substeps = int(checked_number(substeps, "the substeps of a step", 1, 64))
         self.findings: list[Finding] = []
-        self._handles: dict[int, object] = {}  # id: the engine's handle of a rigid body
-        self._ids: dict[object, int] = {}  # the engine's handle of a collider: id
+        self._handles: dict[int, Any] = {}  # id: the engine's handle of a rigid body
+        self._ids: dict[Any, int] = {}  # the engine's handle of a collider: id
         self._masses: dict[int, float] = {}  # kg, of bodies alone
         self._meshes: set[int] = set()  # statics that are triangle meshes
         self._holds: dict[int, Hold] = {}
@@ -139,8 +140,8 @@ class Physics:
     def _insert(
         self,
         number: int,
-        body: object,
-        shape: object,
+        body: Any,
+        shape: Any,
         mass: float | None,
         friction: float,
         restitution: float,
@@ -188,7 +189,7 @@ class Physics:
         self._world.wake_up_all()
         self._queries_stale = True
 
-    def set_velocity(self, number: int, linear: object, angular: object = (0, 0, 0)) -> None:
+    def set_velocity(self, number: int, linear: Any, angular: Any = (0, 0, 0)) -> None:
         """(3,) m/s of the centre of mass and (3,) rad/s, world axes."""
         body = self._body(number)
         line = checked_point(linear, f"the velocity of body {number}")
@@ -225,7 +226,7 @@ class Physics:
         """Whether a body has come to rest and costs nothing."""
         return self._body(number).is_sleeping
 
-    def cast_ray(self, origin: object, direction: object) -> tuple[int, float] | None:
+    def cast_ray(self, origin: Any, direction: Any) -> tuple[int, float] | None:
         """The nearest thing along a ray and its distance in metres; 0 from inside of one."""
         from rapier3d import Ray
 
@@ -238,7 +239,7 @@ class Physics:
         hit = self._queries().cast_ray(ray, MOST_REACH, True)
         return (self._ids[hit[0]], hit[1]) if hit else None
 
-    def nearest(self, point: object, within: float) -> tuple[int, float] | None:
+    def nearest(self, point: Any, within: float) -> tuple[int, float] | None:
         """The body nearest to a hand and its distance, at most `within` metres; 0 inside."""
         from rapier3d import QueryFilter
 
@@ -253,21 +254,21 @@ class Physics:
         distance = 0.0 if found[1].is_inside else math.dist(at, (p.x, p.y, p.z))
         return (self._ids[found[0]], distance) if distance <= reach else None
 
-    def _queries(self) -> object:
+    def _queries(self) -> Any:
         if self._queries_stale:
             self._world.update_query_pipeline()
             self._queries_stale = False
         return self._world.query_pipeline
 
-    def _handle(self, number: int) -> object:
+    def _handle(self, number: int) -> Any:
         if number not in self._handles:
             raise ValueError(f"there is no thing {number}; it was removed, or never added.")
         return self._handles[number]
 
-    def _collider(self, number: int) -> object:
+    def _collider(self, number: int) -> Any:
         return self._world.rigid_bodies[self._handles[number]].colliders[0]  # each has one
 
-    def _body(self, number: int) -> object:
+    def _body(self, number: int) -> Any:
         handle = self._handle(number)
         if number not in self._masses:
             raise ValueError(f"thing {number} is static; only a body moves.")
@@ -307,7 +308,7 @@ class Physics:
 
     # ---- hands
 
-    def grab(self, number: int, hand_pose: Pose, point: object) -> int:
+    def grab(self, number: int, hand_pose: Pose, point: Any) -> int:
         """A hand takes hold of a body at a point (3,) of the world; two hands may hold one body."""
         body = self._body(number)
         hand = checked_pose(hand_pose, "a hand")
@@ -333,8 +334,8 @@ class Physics:
 
     def carry(self, grab: int, moved: np.ndarray) -> None:
         """A hand jumps by (4, 4) now_from_before, rigid, with what it holds and who else does."""
-        body = self._hold(grab).body
-        holds = [(h, self._hand(h)) for h in self._holds.values() if h.body == body]
+        hands, body = self._world.rigid_bodies, self._hold(grab).body
+        holds = [(h, hands[h.hand]) for h in self._holds.values() if h.body == body]
         carry(holds, self._body(body), moved)
         self._queries_stale = True
 

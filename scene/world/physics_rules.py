@@ -1,6 +1,7 @@
 """The engine's settings, found by sweeps over the figures of tests/test_physics_figures.py."""
 
 from types import ModuleType
+from typing import Any
 
 from shapeshift.runtime_models.model import BadFile, Finding
 
@@ -26,7 +27,7 @@ def engine() -> ModuleType:
     return rapier3d
 
 
-def new_world(gravity_m_s2: float) -> object:
+def new_world(gravity_m_s2: float) -> Any:
     """An empty world of the engine in which small, light, stiff things keep apart."""
     from rapier3d import PhysicsWorld, SpringCoefficients
 
@@ -41,7 +42,7 @@ def new_world(gravity_m_s2: float) -> object:
     return world
 
 
-def stopped_bodies(world: object, handles: dict[int, object]) -> list[Finding]:
+def stopped_bodies(world: Any, handles: dict[int, Any]) -> list[Finding]:
     """The engine stops a body whose numbers are no longer finite where it last was."""
     lost = world.quarantine.bodies
     return [

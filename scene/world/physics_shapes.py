@@ -1,6 +1,7 @@
 """What enters the physics, checked at its door, and the engine's shapes of it."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ MOST_FRICTION = 10.0
 LEAST_MASS, MOST_MASS = 0.05, 5.0  # kg: any two bodies are within 1 : 100, as the solver needs
 
 
-def checked_point(values: object, what: str) -> np.ndarray:
+def checked_point(values: Any, what: str) -> np.ndarray:
     """(3,) float64 metres, finite and within FAR.  Raises ValueError."""
     point = np.asarray(values, np.float64)
     if point.shape != (3,) or not (np.abs(point) <= FAR).all():
@@ -56,20 +57,20 @@ def clamped_mass(mass_kg: float) -> tuple[float, Finding | None]:
     return held, Finding(what, 1, f"taken as {held:g} kg", repaired=True)
 
 
-def isometry(pose: Pose) -> object:
+def isometry(pose: Pose) -> Any:
     """The engine's word for a pose."""
     from rapier3d import Isometry3, Rotation3
 
     return Isometry3(tuple(map(float, pose.position)), Rotation3(*map(float, pose.wxyz)))
 
 
-def pose_of(isometry: object) -> Pose:
+def pose_of(isometry: Any) -> Pose:
     """The pose, exactly the numbers (float32) that the engine holds."""
     p, q = isometry.translation, isometry.rotation
     return Pose(np.array([p.x, p.y, p.z]), np.array([q.w, q.i, q.j, q.k]))
 
 
-def hulls_shape(hulls: object) -> object:
+def hulls_shape(hulls: Any) -> Any:
     """The engine's shape of convex pieces, each (V, 3) metres, object frame.  Raises ValueError."""
     from rapier3d import Isometry3, MeshConversionError, SharedShape
 
@@ -102,7 +103,7 @@ def thinnest_extent(points: np.ndarray) -> float:
     return float(np.ptp(centred @ axes[-1]))
 
 
-def mesh_shape(mesh: TriangleMesh) -> tuple[object, list[Finding]]:
+def mesh_shape(mesh: TriangleMesh) -> tuple[Any, list[Finding]]:
     """The engine's shape of a static triangle mesh, thickened.  Raises ValueError.
 
     Inner edges are smoothed: without, a box that slides over a flat grid of triangles stumbles.

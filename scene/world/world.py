@@ -313,7 +313,7 @@ class World:
 
     def _collide(self, contacts: list, record: Record, events: dict[str, list[Event]]) -> None:
         """Contacts to events of both sides; those that begin are told."""
-        now = {}
+        now: dict = {}
         for contact in contacts:
             pair = (contact.a, contact.b)
             before = self.impulses.get(pair, 0.0)

@@ -1,5 +1,7 @@
 """One training step of plain splats: the same projection, rasterizer and loss as the anchors'."""
 
+from typing import Any
+
 import numpy as np
 
 from shapeshift.scene.pose import View
@@ -77,7 +79,7 @@ class PlainStep:
         ssim_share: float,
         evidence: PlainEvidence | None = None,
         depth: DepthWish | None = None,
-    ) -> dict[str, object]:
+    ) -> dict[str, Any]:
         """Gradients of the loss by what the optimiser holds, under its names."""
         device, splats = self.device, drawing.splats
         grad_image = loss.compare(drawing.frame.image, target, ssim_share)

@@ -201,8 +201,11 @@ def bytes_on_disk(path: Path) -> int:
     return path.stat().st_size
 
 
-def report(path: Path, scores: dict[str, Score], started: float) -> dict:
-    """What `eval --json` writes; `started` is time.perf_counter() at the beginning."""
+def report(path: Path | None, scores: dict[str, Score], started: float) -> dict:
+    """What `eval --json` writes; `started` is time.perf_counter() at the beginning.
+
+    path: of the scene, None where it lies nowhere on disk.
+    """
     return {
         "modalities": {
             name: {
@@ -218,6 +221,6 @@ def report(path: Path, scores: dict[str, Score], started: float) -> dict:
             for name, s in scores.items()
         },
         "alive": {name: s.alive for name, s in scores.items()},
-        "bytes": bytes_on_disk(path),
+        "bytes": bytes_on_disk(path) if path else None,
         "seconds": round(time.perf_counter() - started, 3),
     }

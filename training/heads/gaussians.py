@@ -1,10 +1,14 @@
 """Raw outputs of the heads to Gaussians and back: bounded offsets, clipped scales."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.training.heads.networks import KERNELS, OWN_WIDTH, HeadLayout
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 REACH = 2.0  # voxels that a splat may lie away from its anchor along each axis
 UNIT = 0.5  # voxels: the scale of a splat whose raw output is 0
@@ -15,13 +19,13 @@ SCALE_CLIP = (-6.0, 3.0)  # of the raw output, before exp; the same numbers stan
 class Gaussians:
     """Splats of every anchor on the device, or the gradients by them; N = A * k."""
 
-    means: object  # (N, 3) metres
-    scales: object  # (N, 3) metres, one sigma
-    wxyz: object  # (N, 4) any length
-    opacity: object  # (N,) below zero = absent
-    color: object  # (N, 3) display sRGB 0..1
+    means: "Array"  # (N, 3) metres
+    scales: "Array"  # (N, 3) metres, one sigma
+    wxyz: "Array"  # (N, 4) any length
+    opacity: "Array"  # (N,) below zero = absent
+    color: "Array"  # (N, 3) display sRGB 0..1
 
-    def fields(self) -> tuple:
+    def fields(self) -> "tuple[Array, Array, Array, Array, Array]":
         return self.means, self.scales, self.wxyz, self.opacity, self.color
 
 

@@ -1,6 +1,7 @@
 """What a drawing's depth should be: a depth photo, wherever it knows one; with its gradients."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ HOLE = 0.1
 class DepthTarget:
     """A depth photo on the device."""
 
-    depth: object  # (H, W) float32 metres along the view, 0 where none is known
+    depth: Any  # (H, W) float32 metres along the view, 0 where none is known
     known: int  # how many pixels have one
 
     @property

@@ -1,6 +1,7 @@
 """What an image should be: L1 and SSIM against a photo with their gradient; eq. 9 (paper 3.3)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +16,10 @@ class Target:
     """A photo on the device with the windowed maps that stay the same from step to step."""
 
     size: tuple[int, int]  # width, height
-    planes: object  # (3, H, stride) display sRGB 0..1
-    mean: object  # (3, H, stride) windowed photo
-    square: object  # (3, H, stride) windowed photo^2
-    weight: object | None  # (H, W) 0..1, what counts; None = everything
+    planes: Any  # (3, H, stride) display sRGB 0..1
+    mean: Any  # (3, H, stride) windowed photo
+    square: Any  # (3, H, stride) windowed photo^2
+    weight: Any | None  # (H, W) 0..1, what counts; None = everything
     values: float  # how many values count: 3 * the sum of the weights
 
     @property

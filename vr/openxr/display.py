@@ -1,11 +1,12 @@
 """How often the headset's display shows a picture, where the runtime tells it."""
 
 import ctypes
+from typing import Any
 
 from shapeshift.vr.openxr.instance import DISPLAY_RATE, Instance
 
 
-def display_period(instance: Instance, session: object) -> float:
+def display_period(instance: Instance, session: Any) -> float:
     """Seconds between two pictures of the display; 0 where the runtime does not tell."""
     if DISPLAY_RATE not in instance.extensions:
         return 0.0

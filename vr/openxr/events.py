@@ -2,6 +2,7 @@
 
 import ctypes
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,9 @@ class GoingAway:
 Event = StateChanged | Recentred | ControllersChanged | GoingAway
 
 
-def take_events(xr, instance: object) -> list[Event]:
+def take_events(xr, instance: Any) -> list[Event]:
     """All that have come since the last call; those of no meaning to us are left out."""
-    events = []
+    events: list = []
     while True:
         try:
             told = xr.poll_event(instance)

@@ -4,6 +4,7 @@ The only place where OpenXR's xyzw quaternions become our wxyz and back.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -23,13 +24,13 @@ from shapeshift.vr.openxr.bindings import (
 SHORTEST_S, LONGEST_S = 0.005, 1.0  # of a pulse; runtimes take longer ones for stuck
 
 
-def pose_of(posef: object) -> Pose:
+def pose_of(posef: Any) -> Pose:
     """An xr.Posef as ours."""
     q, p = posef.orientation, posef.position
     return Pose(np.array([p.x, p.y, p.z], np.float64), np.array([q.w, q.x, q.y, q.z], np.float64))
 
 
-def posef_of(pose: Pose) -> object:
+def posef_of(pose: Pose) -> Any:
     """Ours as an xr.Posef."""
     import xr
 
@@ -43,7 +44,7 @@ class Hands:
     `refused` names the profiles that the runtime did not know: their controllers come as another.
     """
 
-    def __init__(self, instance: object) -> None:
+    def __init__(self, instance: Any) -> None:
         import xr
 
         self._instance, self._session = instance, None
@@ -62,9 +63,9 @@ class Hands:
             for name, action in self._actions.items()
             for side in SIDES
         }
-        self._spaces: dict[tuple[str, str], object] = {}
+        self._spaces: dict[tuple[str, str], Any] = {}
 
-    def _action(self, name: str, kind: object) -> object:
+    def _action(self, name: str, kind: Any) -> Any:
         import xr
 
         both = [self._paths[side] for side in SIDES]
@@ -88,7 +89,7 @@ class Hands:
             return False
         return True
 
-    def attach(self, session: object) -> None:
+    def attach(self, session: Any) -> None:
         """Once, between the session's creation and its begin."""
         import xr
 
@@ -100,7 +101,7 @@ class Hands:
                 info = xr.ActionSpaceCreateInfo(self._actions[name], self._paths[side])
                 self._spaces[name, side] = xr.create_action_space(session, info)
 
-    def read(self, play_space: object, time_ns: int, focused: bool) -> dict[str, Hand]:
+    def read(self, play_space: Any, time_ns: int, focused: bool) -> dict[str, Hand]:
         """Where the hands will be at a time of the runtime, and what is pressed now."""
         import xr
 
@@ -110,7 +111,7 @@ class Hands:
         xr.sync_actions(self._session, xr.ActionsSyncInfo(active_action_sets=wanted))
         return {side: self._hand(side, play_space, time_ns) for side in SIDES}
 
-    def _hand(self, side: str, play_space: object, time_ns: int) -> Hand:
+    def _hand(self, side: str, play_space: Any, time_ns: int) -> Hand:
         grip = self._pose("grip", side, play_space, time_ns)
         if grip is None:
             return LOST
@@ -124,7 +125,7 @@ class Hands:
         click["primary"] |= pressed
         return Hand(True, grip, aim, squeeze, trigger, stick, **click)
 
-    def _pose(self, name: str, side: str, play_space: object, time_ns: int) -> Pose | None:
+    def _pose(self, name: str, side: str, play_space: Any, time_ns: int) -> Pose | None:
         """None where the controller is off, unseen or told as no number."""
         import xr
 

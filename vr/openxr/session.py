@@ -11,6 +11,7 @@ import ctypes
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -61,7 +62,7 @@ class Session:
         self.keep = False  # read the runtime's images back into `kept`
         self.kept: list[np.ndarray] = []
         self._pending: list[Recentred] = []
-        self._open: object | None = None  # the runtime's state of the frame under way
+        self._open: Any | None = None  # the runtime's state of the frame under way
         self._views: tuple = ()  # the runtime's, of that frame
         self._start_ns: int | None = None
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
@@ -77,7 +78,7 @@ class Session:
         self.pace.display_s = display_period(instance, self._handle)
         self._make_swapchains(part, pixels)
 
-    def _create(self) -> object:
+    def _create(self) -> Any:
         xr, instance = self._xr, self._instance
         check_requirements(instance)
         binding = bind_current(instance)
@@ -283,7 +284,7 @@ def eye_size(view, part: float) -> tuple[int, int]:
     return min(wanted[0], most[0]), min(wanted[1], most[1])
 
 
-def choose_blend(xr, offered: Sequence) -> object:
+def choose_blend(xr, offered: Sequence) -> Any:
     """How the picture covers the room: wholly, or as glasses that are seen through like it best."""
     modes = [xr.EnvironmentBlendMode(int(each)) for each in offered]
     opaque = xr.EnvironmentBlendMode.OPAQUE

@@ -1,6 +1,7 @@
 """The room: which of the runtime's reference spaces play space is, and where the head is in it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ EYE_HEIGHT_M = 1.6  # of somebody who stands: where LOCAL, whose zero is the eye
 class Space:
     """A reference space of the runtime, or play space made of it."""
 
-    handle: object
+    handle: Any
     kind: str  # one of KINDS, or VIEW
 
 
@@ -35,7 +36,7 @@ def moved_by(changed: str, kind: str) -> bool:
     return changed == kind or {changed, kind} == {"LOCAL", "LOCAL_FLOOR"}
 
 
-def open_play_space(instance: Instance, session: object) -> Space:
+def open_play_space(instance: Instance, session: Any) -> Space:
     """Play space: y = 0 is the floor, as the runtime knows it or as a standing eye suggests."""
     xr = instance.xr
     offered = {kind for kind in KINDS if int(getattr(xr.ReferenceSpaceType, kind)) in
@@ -50,7 +51,7 @@ def open_play_space(instance: Instance, session: object) -> Space:
     return _open(xr, session, kind, down if kind == "LOCAL" else IDENTITY)
 
 
-def open_head_space(instance: Instance, session: object) -> Space:
+def open_head_space(instance: Instance, session: Any) -> Space:
     """Between the eyes."""
     return _open(instance.xr, session, "VIEW", IDENTITY)
 
@@ -69,6 +70,6 @@ def valid(flags, told: int) -> tuple[bool, bool]:
     return placed, bool(told & int(flags.ORIENTATION_VALID_BIT))
 
 
-def _open(xr, session: object, kind: str, pose: Pose) -> Space:
+def _open(xr, session: Any, kind: str, pose: Pose) -> Space:
     info = xr.ReferenceSpaceCreateInfo(getattr(xr.ReferenceSpaceType, kind), posef_of(pose))
     return Space(xr.create_reference_space(session, info), kind)

@@ -1,6 +1,7 @@
 """The runtime's images of one eye, and the one conversion of colour on the way into them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -50,7 +51,7 @@ class Swapchain:
     def __init__(
         self,
         instance: Instance,
-        session: object,
+        session: Any,
         ctx: moderngl.Context,
         size: tuple[int, int],
         pixels: Format,

@@ -36,7 +36,7 @@ def is_gltf(head: bytes, path: Path) -> bool:
 def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
     """The splats of all nodes of the scene, where these stand.  Raises BadFile."""
     reading = reading.within(path)
-    asset = Asset(path, reading.memory)
+    asset = Asset(path, reading.account)
     for name in asset.item(asset.json, "extensionsRequired", list, []):
         if not str(name).startswith(HARMLESS):
             raise asset.refuse(f"it needs the extension {str(name)[:60]}, which is not read here.")

@@ -84,12 +84,12 @@ def read_lcc(path: Path, reading: Reading) -> SplatLayers:
     check_mode(reading.mode)
     file = find_meta(path, ENDING)
     reading = reading.within(file.parent)
-    lcc = read_meta(file, reading.memory)
+    lcc = read_meta(file, reading.account)
     number = finest_within(lcc.counts, reading.most_splats)
     parts = [read_level(lcc, number, reading)]
     environment = lcc.folder / ENVIRONMENT
     if environment.is_file() and environment.stat().st_size:
-        parts.append(read_environment(lcc, environment, reading.memory))
+        parts.append(read_environment(lcc, environment, reading.account))
     return level_as_layers(parts, number, lcc.counts, file, reading, files_of(lcc))
 
 
@@ -191,7 +191,7 @@ def read_index(folder: Path, levels: int, memory: Account) -> np.ndarray:
 
 def read_level(lcc: Lcc, number: int, reading: Reading) -> RawSplats:
     """The splats of all cells at one level."""
-    memory, units = reading.memory, lcc.units[:, number]
+    memory, units = reading.account, lcc.units[:, number]
     units = units[units["points"] > 0]
     count = lcc.counts[number]
     raw = raw_of(count, lcc.harmonics, lcc.file.name, memory)

@@ -51,7 +51,7 @@ def read_lcc2(path: Path, reading: Reading) -> SplatLayers:
     check_mode(reading.mode)
     file = find_meta(path, ENDING)
     reading = reading.within(file.parent)
-    lcc = read_meta(file, reading.memory)
+    lcc = read_meta(file, reading.account)
     number = finest_within(lcc.counts, reading.most_splats)
     files = list(lcc.levels[number]) + ([lcc.environment] if lcc.environment else [])
     parts = []

@@ -24,9 +24,15 @@ class Element:
     count: int
     row: np.dtype | None  # a field a property; None where a property is a list or unknown
 
+    @property
+    def layout(self) -> np.dtype:
+        """The same of a table that has fields alone, as PlyHeader.find gives it."""
+        assert self.row is not None
+        return self.row
+
     def require(self, needed: tuple[str, ...], file: str) -> None:
         """Raises BadFile where a column is missing."""
-        missing = [name for name in needed if name not in (self.row.names or ())]
+        missing = [name for name in needed if name not in (self.layout.names or ())]
         if missing:
             raise BadFile(
                 f"{file} has no {missing[0]}: a point cloud or another format, not 3DGS splats; "

@@ -35,7 +35,7 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
     header = read_header(path)
     ranges, packed = chunks_and_splats(path, header)
     rest = harmonics_of(path, header, len(packed))  # (N, 3, M - 1) bytes
-    memory = reading.within(path).memory
+    memory = reading.within(path).account
     raw = RawSplats(
         **empty_splats(len(packed), 1 + rest.shape[2], memory),
         file=path.name,
@@ -88,7 +88,10 @@ def records(
         raise BadFile(f"{path.name} is an ASCII PLY, a compressed one is binary; convert it.")
     element, begins = header.find(name)
     for column in columns:
-        if column not in (element.row.names or ()) or element.row[column].newbyteorder("=") != kind:
+        if (
+            column not in (element.layout.names or ())
+            or element.layout[column].newbyteorder("=") != kind
+        ):
             raise BadFile(
                 f"{path.name}: its element {name} has no {column} of {np.dtype(kind)}, as a "
                 "compressed PLY has; export it again."

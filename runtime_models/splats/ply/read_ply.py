@@ -31,11 +31,11 @@ def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
     """Splats of a 3DGS PLY of SH degree 0 to 3, binary or ASCII.  Raises BadFile."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    shades = shades_in(vertex.row.names)
+    shades = shades_in(vertex.layout.names)
     vertex.require(SHAPES if shades else GEOMETRY, path.name)
     said = {name.rstrip(":=").lower(): value.lower() for name, value in sayings(header)}
-    memory = reading.within(path).memory
-    splats = Columns(vertex, harmonics_of(vertex.row.names, path.name), path.name, said, memory)
+    memory = reading.within(path).account
+    splats = Columns(vertex, harmonics_of(vertex.layout.names, path.name), path.name, said, memory)
     if header.encoding == "ascii":
         read_text(path, begins, splats, reading)
     else:
@@ -74,8 +74,8 @@ class Columns:
     def __init__(
         self, vertex: Element, harmonics: list[str], file: str, said: dict, memory: Account
     ) -> None:
-        names, kinds, n = vertex.row.names, vertex.row, vertex.count
-        self.row = vertex.row
+        names, kinds, n = vertex.layout.names, vertex.layout, vertex.count
+        self.row = vertex.layout
         self.count = n
         self.plain = all(kinds[name] == np.dtype("<f4") for name in names)
         self.flat = SCALES[2] not in names or said.get("splatrendermode") == "2dgs"

@@ -47,11 +47,11 @@ def read_raw_points_ply(path: Path, reading: Reading) -> RawSplats:
     """A round opaque splat for each point, binary or ASCII.  Raises BadFile, always if strict."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    lacking = [name for name in GEOMETRY if name not in vertex.row.names]
+    lacking = [name for name in GEOMETRY if name not in vertex.layout.names]
     what = f"a point cloud, no splats: it has no {', '.join(lacking)}"
     reading = reading.within(path)
-    memory = reading.memory
-    memory.charge(vertex.count * (vertex.row.itemsize + 12), f"{vertex.count:,} points")
+    memory = reading.account
+    memory.charge(vertex.count * (vertex.layout.itemsize + 12), f"{vertex.count:,} points")
     table = read_records(path, header, vertex, begins)
     places = np.stack([table[axis] for axis in PLACE], 1)  # (N, 3)
     raw = splats_of_points(places, None, path.name, reading, what)
@@ -63,7 +63,7 @@ def splats_of_points(
 ) -> RawSplats:
     """A round opaque splat for each place (N, 3), of the shades (N, 3) 0..1, else gray.
 
-    reading.memory is the file's Account; `what` is what its finding says.  Raises BadFile, always
+    reading.account is the file's Account; `what` is what its finding says.  Raises BadFile, always
     if strict.
     """
     what = what or "a point cloud, no splats: it has no scales, rotations or opacities"
@@ -73,7 +73,7 @@ def splats_of_points(
         raise BadFile(f"{file} has points of shape {places.shape!s:.40}, expected (N, 3).")
     if places.dtype not in (np.float32, np.float64):
         places = places.astype(np.float64)
-    count, memory = len(places), reading.memory
+    count, memory = len(places), reading.account
     memory.charge(count * SHOWN, f"{count:,} points")
     reading.tell(f"measuring {file}", 0.5)
     with memory.lend(count * MEASURED, f"measuring {count:,} points"):
@@ -107,7 +107,7 @@ def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) ->
             rows = min(len(pending) // width, vertex.count - done)
             part = pending[: rows * width].reshape(rows, width)
             with np.errstate(over="ignore", invalid="ignore"):
-                for i, name in enumerate(vertex.row.names):
+                for i, name in enumerate(vertex.layout.names):
                     table[name][done : done + rows] = part[:, i]
             pending, done = pending[rows * width :], done + rows
             if done == vertex.count:

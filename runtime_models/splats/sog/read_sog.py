@@ -45,7 +45,7 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
 
     Raises BadFile.
     """
-    memory = reading.within(path).memory
+    memory = reading.within(path).account
     sog = open_sog(path, memory)
     what = f"{sog.count:,} splats"
     memory.charge(GEOMETRY * sog.count, what)

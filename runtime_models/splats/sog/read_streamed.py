@@ -62,7 +62,7 @@ def folder_of(path: Path) -> Path:
 def read_streamed(path: Path, reading: Reading) -> SplatLayers:
     """The finest level within reading.most_splats, else the coarsest.  Raises BadFile."""
     reading = reading.within(folder_of(path))
-    streamed = read_tree(path, reading.memory)
+    streamed = read_tree(path, reading.account)
     return read_level(streamed, finest_within(streamed.counts, reading.most_splats), reading)
 
 
@@ -71,7 +71,7 @@ def read_sog_folder(path: Path, reading: Reading) -> SplatLayers:
     check_mode(reading.mode)
     reading = reading.within(path)
     plain = judge(read_raw_sog(path, reading), reading)
-    names = [META, *open_sog(path, reading.memory).file_names()]
+    names = [META, *open_sog(path, reading.account).file_names()]
     return join_layers([plain], (Stop(path.resolve().name, 0.0, "layer"),), reading.mode, names)
 
 
@@ -82,7 +82,7 @@ def levels(path: Path, reading: Reading) -> Iterator[SplatLayers]:
     the last.  Raises BadFile.
     """
     reading = replace(reading, memory=None)  # of each level anew: the one before goes
-    streamed = read_tree(path, reading.within(folder_of(path)).memory)
+    streamed = read_tree(path, reading.within(folder_of(path)).account)
     origin = None
     for number in steps(streamed.counts, reading.most_splats):
         level = thin(read_level(streamed, number, reading), reading.most_splats)
@@ -208,7 +208,7 @@ def files_of_sog(path: Path, reading: Reading) -> list[Path]:
     """A .sog, or a meta.json with the pictures that it names."""
     if path.name != META:
         return [path]
-    sog = open_sog(path, reading.memory)
+    sog = open_sog(path, reading.account)
     return [path, *(path.parent / name for name in sog.file_names())]
 
 

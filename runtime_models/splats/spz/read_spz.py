@@ -34,13 +34,13 @@ def has_spz_mark(head: bytes, path: Path) -> bool:
 def read_raw_spz(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3.  Raises BadFile."""
     reading = reading.within(path)
-    with reading.memory.lend(path.stat().st_size, "its bytes"):
+    with reading.account.lend(path.stat().st_size, "its bytes"):
         return read_spz_bytes(path.read_bytes(), path.name, reading)
 
 
 def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
     """The same of a file in memory; x right, y up, z back, if no extension says otherwise."""
-    memory = reading.within(Path(file), len(data)).memory
+    memory = reading.within(Path(file), len(data)).account
     spz = unpack_spz(data, file, memory)
     header = spz.header
     count, there = header.count, REST[header.degree]

@@ -61,7 +61,7 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
     """The visible splats of a scene where its prims stand, SH degree 0 to 3.  Raises BadFile."""
     refuse_without(path)
     reading = reading.within(path)
-    memory = reading.memory
+    memory = reading.account
     reading.tell(f"reading {path.name}", 0.0)
     with tempfile.TemporaryDirectory(prefix="shapeshift-", ignore_cleanup_errors=True) as folder:
         made = Path(folder, "splats.npz")

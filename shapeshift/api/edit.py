@@ -1,0 +1,113 @@
+"""What a Scene's methods do with its parts: stops, placing, regions, splats as a model."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shapeshift.app.errors import UsageError
+from shapeshift.app.subject import Subject, placed
+from shapeshift.runtime_models.model import Model, SplatLayers, Stop
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import named_stops
+from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.scene import Scene as DrawnScene
+from shapeshift.scene.scene import SceneObject
+from shapeshift.scene.selectors.selector import Selector
+
+if TYPE_CHECKING:
+    from shapeshift.api.arguments import X
+    from shapeshift.api.scene import Scene
+
+
+def stops_of(subject: Subject) -> tuple[Stop, ...]:
+    """The stops of all objects by x, as a scene file names them; one of each name."""
+    found: dict[str, Stop] = {}
+    items = {item.name: item for item in subject.file.all_items} if subject.file else {}
+    for thing in subject.scene.objects:
+        item = items.get(thing.name)
+        for stop in named_stops(item, thing.model) if item else thing.model.stops:
+            found.setdefault(stop.name, stop)
+    return tuple(sorted(found.values(), key=lambda stop: stop.x))
+
+
+def describe(scene: "Scene") -> dict[str, Any]:
+    """What Scene.info gives."""
+    from shapeshift.app.scene_files import describe_scene
+    from shapeshift.runtime_models.read_scene import describe as describe_model
+
+    if scene.subject.file is not None and scene.path is not None:
+        models = {thing.name: thing.model for thing in scene.objects}
+        return describe_scene(scene.subject.file, models, scene.path)
+    if scene.path is not None:
+        return describe_model(scene.model, scene.path)
+    facts = describe_model(scene.model, Path("."))
+    facts.pop("bytes")
+    return facts
+
+
+def changed(
+    subject: Subject,
+    thing: SceneObject,
+    position: Sequence[float] | None,
+    wxyz: Sequence[float] | None,
+    x: "X | None",
+    visible: bool | None,
+) -> Subject:
+    """With one object elsewhere, or at another x, in what is drawn and in its scene file."""
+    before, file = thing.world_from_object, subject.file
+    pose = Pose(
+        np.array(before.position if position is None else position, np.float64),
+        np.array(before.wxyz if wxyz is None else wxyz, np.float64),
+    )
+    shown = thing.visible if visible is None else visible
+    moved = replace(thing, world_from_object=pose, visible=shown)
+    if isinstance(x, str):
+        states = {item.name: item.states for item in file.all_items} if file else {}
+        (moved,) = placed([moved], x, "x", states)
+    elif x is not None:
+        moved = replace(moved, x=x if isinstance(x, StopWeights) else float(x))
+    things = tuple(moved if each is thing else each for each in subject.scene.objects)
+    if file is not None:  # as a simulation takes it
+        place = {"position": tuple(map(float, pose.position)), "wxyz": tuple(map(float, pose.wxyz))}
+        file = edits.change(file, thing.name, x=moved.x, visible=shown, **place)
+    return Subject(DrawnScene(things), file)
+
+
+def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayers:
+    """Each set of splats as a stop of its own.  Raises UsageError, ValueError."""
+    from shapeshift.runtime_models.splats.layers.read_layers import join_layers
+
+    if not layers or (names and len(names) != len(layers)):
+        raise UsageError(f"{len(layers)} sets of splats and {len(names)} names were given.")
+    last = max(len(layers) - 1, 1)
+    names = names or [f"layer {i}" for i in range(1, len(layers) + 1)]
+    kind = "layer" if len(layers) > 1 else "rgb"
+    stops = tuple(Stop(name, i / last, kind) for i, name in enumerate(names))
+    for splats in layers:  # before they are joined, where sizes would no longer be told apart
+        SplatLayers(
+            splats.means, splats.scales, splats.wxyz, splats.opacity, splats.sh,
+            np.zeros(len(splats.means), np.int32), stops[:1],
+        )  # fmt: skip
+    return join_layers(list(layers), stops, "exclusive", [])
+
+
+def regions_of(
+    regions: Sequence["str | Selector"], model: Model, view: View
+) -> tuple[Selector, ...]:
+    """Selectors of texts and of themselves; a text's lens looks along the view.  UsageError."""
+    from shapeshift.scene.selectors.read_selector import read_selector
+
+    try:
+        return tuple(
+            read_selector(region, model.stops, view.world_from_eye)
+            if isinstance(region, str)
+            else region
+            for region in regions
+        )
+    except ValueError as error:
+        raise UsageError(f"region {error}") from None

@@ -1,0 +1,212 @@
+"""Photos to a scene, and a scene beside photos."""
+
+import time
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from shapeshift.api.arguments import PathText
+from shapeshift.api.load import opened
+from shapeshift.api.scene import Scene
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import plain
+from shapeshift.app.subject import Subject
+from shapeshift.runtime_models.model import AnchorModel, BadFile
+
+if TYPE_CHECKING:
+    from shapeshift.training.run import Progress
+    from shapeshift.training.settings import TrainSettings
+    from shapeshift.training.train import Trainer
+
+SAVE_EVERY_S = 60.0  # between checkpoints
+Kind = Literal["cpu", "gpu"]
+Masks = Literal["object", "valid", "ignore"]
+Background = Literal["auto", "black", "white", "gray"]
+
+
+class TrainedScene(Scene):
+    """A scene that was just trained, and how that went.
+
+    model = ss.train("capture", seconds=60); model.save("scene.shift")
+    model.psnr_db  # {"RGB": 31.2, "Thermal": 33.0}
+    """
+
+    def __init__(self, model: AnchorModel, path: Path | None, trainer: "Trainer") -> None:
+        super().__init__(Subject.of(model), path)
+        self.steps: int = trainer.iteration
+        self.seconds: float = trainer.elapsed
+        self.anchors: int = trainer.anchors_count
+        # held-out photos: decibels of each modality, {} where none is held out
+        self.psnr_db: dict[str, float] = trainer.held_out_psnr(most=len(trainer.held_out))
+        self.doubts: tuple[str, ...] = tuple(trainer.doubts)  # about the capture, in sentences
+
+
+def train(
+    capture: PathText,
+    out: PathText | None = None,
+    *,
+    seconds: float | None = None,
+    iterations: int | None = None,
+    preset: Literal["fast", "paper"] = "fast",
+    resume: bool = False,
+    device: Kind | None = None,
+    calibrate: str | None = None,
+    pace: bool = True,
+    progress: "Callable[[Progress], object] | None" = None,
+    **settings: Any,
+) -> TrainedScene:
+    """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
+
+    seconds or iterations: how long; without either the preset says.  The same iterations give the
+    same bits on one device.  out: a package, NAME.shift or a folder, that is written with its
+    checkpoint beside it, also every minute and when Ctrl-C ends the run; resume goes on from there.
+    calibrate: a modality whose cameras all sit a little beside their stated poses, as on a rig.
+    pace: measure how evenly the slider moves, a second or two a pair of stops.  progress: called
+    after every step with (iteration, fraction, loss, anchors); what gives False ends the run early,
+    and the scene is what was trained so far.  settings: any field of
+    `shapeshift.training.settings.TrainSettings`, such as anchors, max_anchors, downscale, masks.
+
+    The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
+
+        model = ss.train("capture", seconds=60, anchors=4000)
+        model.save("scene.shift"); model.render("Thermal")
+    """
+    from shapeshift.app.training.keeping import memory_for_training, refuse_place
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.runtime_models.package.write_package import refuse_foreign
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
+    from shapeshift.training.calibration.extrinsics import noted, with_found
+    from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
+    from shapeshift.training.train import Trainer
+
+    path = None if out is None else plain(str(out))
+    if path is not None:
+        refuse_place(path)
+        refuse_foreign(path)
+    elif resume:
+        raise UsageError("resume goes on from the checkpoint beside out; give out, too.")
+    before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
+    settings |= {"iterations": iterations, "seconds": seconds}
+    wished = settings_of(preset, settings, before[1]["settings"] if before else None)
+    found, on = read_capture(plain(str(capture))), open_device(device)
+    if calibrate is not None:
+        if resume:
+            raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
+        offset = calibrate_cameras(on, found, wished, calibrate, tell=lambda what, part: None)
+        wished = replace(wished, rig=noted(calibrate, offset))
+    with memory_for_training():
+        trainer = Trainer(on, with_found(found, wished.rig), wished, before)
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    run(trainer, path, progress)
+    return finished(trainer, path, pace)
+
+
+def settings_of(preset: str, asked: dict[str, Any], before: dict | None) -> "TrainSettings":
+    """The preset's numbers with those that were asked for; or a checkpoint's with another budget.
+
+    None stands for what was not asked.  Raises UsageError.
+    """
+    from shapeshift.app.command_line import nearest
+    from shapeshift.training.settings import TrainSettings, adjusted, resumed
+    from shapeshift.training.settings import preset as preset_of
+
+    asked = {name: value for name, value in asked.items() if value is not None}
+    known = [field.name for field in fields(TrainSettings) if field.name != "preset"]
+    for name in asked:
+        if name not in known:
+            meant = nearest(name, known)
+            hint = f"did you mean {meant}?" if meant else f"there are {', '.join(known)}."
+            raise UsageError(f"there is no setting '{name}' of a training; {hint}")
+    try:
+        if before is not None:
+            return resumed(before, asked)
+        return adjusted(preset_of(preset), asked)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def run(
+    trainer: "Trainer", path: Path | None, progress: "Callable[[Progress], object] | None"
+) -> None:
+    """The steps; what there is is written every minute, and when anything ends them early."""
+    from shapeshift.app.training.keeping import memory_errors, save, save_on_the_way
+    from shapeshift.training.checkpoint import checkpoint_path
+
+    saved = time.monotonic()
+    ends: tuple[type[BaseException], ...] = (KeyboardInterrupt, *memory_errors())
+    try:
+        for now in trainer.steps():
+            if progress is not None and progress(now) is False and trainer.settled:
+                break
+            if path is not None and time.monotonic() - saved > SAVE_EVERY_S:
+                save_on_the_way(trainer, checkpoint_path(path))
+                saved = time.monotonic()
+    except ends:
+        if path is not None and trainer.iteration:
+            save(trainer, path, checkpoint_path(path))
+        raise
+
+
+def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
+    """The scene of a run that has ended, written where it was asked for."""
+    from shapeshift.app.training.keeping import save
+    from shapeshift.renderer.pace import measure_pace
+    from shapeshift.runtime_models.package.write_package import write_package
+    from shapeshift.training.checkpoint import checkpoint_path
+
+    trainer.mend()
+    if path is not None:
+        save(trainer, path, checkpoint_path(path))  # before anything else can go wrong
+    model = trainer.model()
+    if pace and len(model.stops) > 1:
+        model = replace(model, pace=measure_pace(model))
+        if path is not None:
+            write_package(model, path)
+    return TrainedScene(model, path, trainer)
+
+
+def evaluate(
+    scene: PathText | Scene,
+    capture: PathText,
+    *,
+    modality: str | None = None,
+    downscale: int | None = None,
+    masks: Masks = "object",
+    background: Background = "auto",
+    vgg: PathText | None = None,
+    device: Kind | None = None,
+) -> dict[str, Any]:
+    """PSNR in dB and SSIM of a scene on the held-out photos of a capture, by modality: the result
+    of `shapeshift eval --json` (every 8th photo is held out, unless the capture says which).
+
+    modality: only that one.  downscale: divide the photos' sides by this; None is what the scene
+    was trained with, else such that neither exceeds 640 pixels.  masks: what a mask means; object:
+    nothing is outside it.  vgg: an ONNX file of VGG16's first layers, for a distance of features.
+    Raises BadFile, UsageError, NoDevice.
+
+        scores = ss.evaluate("scene.shift", "capture")
+        scores["modalities"]["RGB"]["psnr_db"]
+    """
+    from shapeshift.app.training.evaluate import only, trained_downscale
+    from shapeshift.rasterizer.device import open_device
+    from shapeshift.scene.captures.read_capture import read_capture
+    from shapeshift.training.calibration.extrinsics import rig_of, with_found
+    from shapeshift.training.evaluation.evaluate import evaluate_model, report
+    from shapeshift.training.evaluation.vgg_distance import VggDistance
+
+    started = time.perf_counter()
+    scene = opened(scene)
+    if scene.subject.file is not None:
+        raise BadFile("photos are of one scene as it was trained; name the model of one object.")
+    model = scene.model
+    distance = None if vgg is None else VggDistance(plain(str(vgg)))
+    photos = read_capture(plain(str(capture)))
+    photos = photos if modality is None else only(photos, modality)
+    photos = with_found(photos, rig_of(model.provenance))
+    factor = downscale or trained_downscale(model.provenance)
+    scores = evaluate_model(open_device(device), model, photos, factor, masks, background, distance)
+    result = report(scene.path, scores, started)
+    return result if distance is None else result | {"vgg_file": distance.name}

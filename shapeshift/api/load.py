@@ -1,0 +1,78 @@
+"""Files to scenes."""
+
+from typing import Any, Literal
+
+from shapeshift.api.arguments import PathText, Progress
+from shapeshift.api.scene import Scene
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import plain
+from shapeshift.app.subject import Subject
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from shapeshift.scene.document.scene_file import is_scene_file
+
+OF_OBJECTS = ("mode", "up", "flip")  # what a scene file says for each object
+
+
+def load(
+    path: PathText,
+    *,
+    mode: Literal["", "cumulative", "exclusive"] = "",
+    up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = "",
+    flip: bool = False,
+    strict: bool = False,
+    allow_huge: bool = False,
+    max_splats: int = 0,
+    memory_gb: float = 0.0,
+    progress: Progress | None = None,
+) -> "Scene":
+    """Opens whatever the viewer opens: a package, splats of any known format, a folder of layers,
+    the folder of a training run, or a scene file of objects (docs/formats.md, docs/scene.md).
+
+    mode: how layers add up.  up: the axis of the file that points up, where its format does not
+    say; flip: half a turn after that.  strict: refuse a file that needs repair.  allow_huge: open a
+    file whose splats would lie thousands deep over every pixel.  max_splats: keep the most visible
+    ones; 0 is all.  memory_gb: what files may take while they are read; 0 is 64 bytes for each byte
+    of a file.  progress: called with (what, part 0..1) from this thread.
+
+    Raises BadFile, one sentence: what was found, what is wanted, what to do.  What was repaired is
+    in `scene.findings`.
+
+        scene = ss.load("workshop.shift")
+        scan = ss.load("scan.ply", up="+Z")
+    """
+    from shapeshift.runtime_models.read_scene import read_model
+    from shapeshift.scene.document.read_scene_file import read_scene_file
+    from shapeshift.scene.document.scene_file import read_models, scene_of
+
+    path = plain(str(path))
+    reading = Reading(
+        mode, up, flip, strict, allow_huge=allow_huge, most_splats=max_splats, told=progress,
+        memory_gb=memory_gb,
+    )  # fmt: skip
+    if not is_scene_file(path):
+        return Scene(Subject.of(read_model(path, reading)), path, up=up, flip=flip)
+    for name in OF_OBJECTS:
+        if getattr(reading, name):
+            raise UsageError(f"{name} is for one model; in {path.name} each object has its own.")
+    file = read_scene_file(path)
+    scene = scene_of(file, read_models(file, reading))
+    if not scene.objects:
+        raise BadFile(f"{path} has no object; nothing is there to be drawn.")
+    return Scene(Subject(scene, file), path)
+
+
+def info(scene: "PathText | Scene") -> dict[str, Any]:
+    """What is in a scene: format, splats, stops, networks, objects; JSON types alone.
+
+    Of a scene that lies nowhere on disk, `bytes` is missing.  Raises BadFile.
+
+        ss.info("workshop.shift")["splats"]
+        [stop["name"] for stop in ss.info(scene)["stops"]]
+    """
+    return opened(scene).info()
+
+
+def opened(scene: "PathText | Scene") -> "Scene":
+    """The scene itself, or the one in that file."""
+    return scene if isinstance(scene, Scene) else load(scene)

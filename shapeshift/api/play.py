@@ -1,0 +1,139 @@
+"""Scenes in motion, and files of cameras."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from shapeshift.api.arguments import PathText, Progress, Size, X
+from shapeshift.api.load import opened
+from shapeshift.api.scene import Scene
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import plain
+from shapeshift.app.subject import Subject
+from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
+
+HZ = 90
+AFTER_S = 2.0  # seconds that go on after the script's last line
+LONGEST_S = 24 * 3600.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """A scene file after one step of its physics."""
+
+    number: int  # steps done, from 1 on
+    seconds: float
+    row: dict[str, Any]  # what has moved, changed or touched, as `shapeshift simulate` writes it
+    scene: Scene  # as it stands then, ready to be drawn
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """Reactions of this step: object, on, reaction, from, to, x.
+
+        [event["object"] for event in step.events]
+        """
+        return list(self.row.get("events", ()))
+
+    @property
+    def contacts(self) -> list[Any]:
+        """Pairs that begin to touch: names, impulse in N s, point in metres.
+
+        step.contacts
+        """
+        return list(self.row.get("contacts", ()))
+
+
+def simulate(
+    scene: PathText | Scene,
+    script: PathText | None = None,
+    *,
+    seconds: float | None = None,
+    x: X | None = None,
+    progress: Progress | None = None,
+) -> Iterator[Step]:
+    """The objects of a scene file in motion, step by step of 1/90 s: gravity, contacts, reactions.
+
+    scene: a scene file, or one that was opened and rearranged (`with_object`).  script: JSON lines
+    of hands, grabs, rays and controls with times (docs/scene.md); None: things only fall.  seconds:
+    None is two more than the script.  x: where all sliders stand at the start.  progress: of the
+    colliders, which are made once and kept in the user's cache.  The same scene and script give the
+    same steps for ever.  Raises BadFile, UsageError before the first step.
+
+        for step in ss.simulate("room.scene.json", seconds=2):
+            print(step.seconds, step.events)
+    """
+    from shapeshift.scene.world.read_script import read_script
+    from shapeshift.scene.world.simulation import Simulation
+
+    scene = opened(scene).at(x)
+    file = scene.subject.file
+    if file is None:
+        raise UsageError(
+            "this is one model; simulate moves the objects of a NAME.scene.json (docs/scene.md)."
+        )
+    acts = read_script(plain(str(script)), file.all_items) if script is not None else ()
+    if seconds is None:
+        seconds = (acts[-1].t if acts else 0.0) + AFTER_S
+    if not 0 < seconds <= LONGEST_S:
+        raise UsageError(f"seconds is {seconds:g}; above 0 and at most a day is wanted.")
+    simulation = Simulation(world_of(scene, progress), acts)
+    return steps_of(scene, simulation, math.ceil(seconds * HZ - 1e-6))
+
+
+def world_of(scene: Scene, progress: Progress | None):
+    """The bodies and physics of a scene file, each object's x as the scene has it."""
+    from shapeshift.scene.colliders.collider_files import colliders_of
+    from shapeshift.scene.document import edits
+    from shapeshift.scene.world.world import World
+
+    file = scene.subject.file
+    assert file is not None
+    for thing in scene.objects:
+        file = edits.change(file, thing.name, x=thing.x)
+    models = {thing.name: thing.model for thing in scene.objects}
+    return World(file, models, colliders_of(file, models, progress), hz=HZ)
+
+
+def steps_of(scene: Scene, simulation: Any, steps: int) -> Iterator[Step]:
+    """The steps, made as they are asked for."""
+    for number in range(1, steps + 1):
+        row = simulation.step().row()
+        stands = Scene(Subject(simulation.world.drawn(), scene.subject.file), scene.path)
+        yield Step(number, number / HZ, row, stands)
+
+
+def cameras(
+    path: PathText,
+    *,
+    size: Size | None = None,
+    fov_y: float = 0.0,
+    up: Literal["", "+X", "-X", "+Y", "-Y", "+Z", "-Z"] = "",
+    flip: bool = False,
+    out: PathText | None = None,
+    to: Literal[
+        "ours", "inria", "transforms", "nerfstudio", "vr", "colmap-bin", "colmap-txt"
+    ] = "ours",
+) -> CameraList:
+    """The views (`.views`) and names of a file or folder of cameras in any known form.
+
+    size: width, height in pixels instead of the file's.  fov_y: radians from top to bottom, where
+    the file says nothing about the lens.  up, flip: as of `load`.  out, to: writes them in another
+    form, a file, or for COLMAP a folder; docs/cameras.md has the forms.  Raises BadFile, UsageError
+    for a file that exists.
+
+        views = ss.cameras("capture/transforms.json", size=(640, 360)).views
+        ss.cameras("run/cameras.json", out="model", to="colmap-txt")
+    """
+    from shapeshift.scene.cameras.read_cameras import read_camera_list
+    from shapeshift.scene.cameras.write_cameras import paths_of, write_cameras
+
+    if not (fov_y == 0 or 0 < fov_y < math.pi):
+        raise UsageError(f"fov_y is {fov_y}, expected radians between 0 and pi.")
+    found = read_camera_list(plain(str(path)), CameraReading(size, fov_y, up, flip))
+    if out is not None:
+        for file in paths_of(plain(str(out)), to):
+            if file.exists():
+                raise UsageError(f"{file} exists; choose another place.")
+        write_cameras(found, plain(str(out)), to)
+    return found

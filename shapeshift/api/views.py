@@ -1,0 +1,128 @@
+"""From where a scene is drawn, and the pictures that come of it."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shapeshift.api.arguments import DEFAULT_SIZE, Output, Size
+from shapeshift.api.picture import Picture
+from shapeshift.api.render import Renderer, shared_renderer
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import plain
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.stop_weights import StopWeights
+from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, moved
+from shapeshift.scene.cameras.framing import orbit_path
+from shapeshift.scene.pose import View
+from shapeshift.scene.stereo import stereo_pair
+
+if TYPE_CHECKING:
+    from shapeshift.api.scene import Scene
+
+SWEEP = "sweep"
+AROUND = ("orbit", "front")  # cameras that take their place from the scene
+OUTPUTS = ("picture", "depth", "normal", "coverage")
+WIDEST_EYES_M = 1.0
+
+
+def choose_views(scene: "Scene", camera: Any, count: int, size: Size | None) -> list[View]:
+    """What Scene.views gives."""
+    if not (isinstance(count, int | np.integer) and count >= 1):
+        raise UsageError(f"count is {count}; 1 view or more are wanted.")
+    if isinstance(camera, View):
+        return [camera.resized(size) if size else camera]
+    subject = scene.subject
+    if isinstance(camera, str) and camera in AROUND:
+        if camera == "front" or count == 1:
+            return [subject.view(size or DEFAULT_SIZE)]
+        return orbit_path(int(count), *subject.bounds(), size or DEFAULT_SIZE)
+    if isinstance(camera, str | PathLike):
+        camera = read_cameras(scene, str(camera), size)
+    if isinstance(camera, CameraList):  # of the file's world
+        camera = moved(camera.views, tuple(-scene.origin))
+    views = list(camera)
+    if not views or not all(isinstance(view, View) for view in views):
+        raise UsageError(
+            "a camera is 'orbit', 'front', 'auto', a file or folder of cameras, a View or several."
+        )
+    return [view.resized(size) if size else view for view in views]
+
+
+def read_cameras(scene: "Scene", camera: str, size: Size | None) -> CameraList:
+    """The cameras of a file, or with `auto` those that lie with the scene's own."""
+    from shapeshift.scene.cameras.read_cameras import find_cameras, find_floor, read_camera_list
+
+    path = plain(camera)
+    if camera == "auto":
+        beside = scene.path and (find_cameras(scene.path) or find_floor(scene.path))
+        if not beside:
+            raise UsageError("no cameras lie with this scene; give camera= a file of them.")
+        path = beside
+    up, flip = scene.turned
+    return read_camera_list(path, CameraReading(size, 0.0, up, flip))
+
+
+def picture_of(
+    scene: "Scene",
+    view: View,
+    background: tuple[float, float, float] | None,
+    eye_distance: float,
+    output: Output,
+    settings: RenderSettings | None,
+    drawing: Any,
+    context: Any,
+) -> Picture:
+    """What Scene.render gives, of one view."""
+    if output not in OUTPUTS:
+        raise UsageError(f"output is '{output}'; choose {', '.join(OUTPUTS)}.")
+    if not 0 <= eye_distance < WIDEST_EYES_M:
+        raise UsageError(f"eye_distance is {eye_distance}; metres from 0 to 1 are wanted.")
+    if settings is not None and background is not None:
+        settings = replace(settings, background=background)
+    behind = background or scene.subject.background
+    eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
+    with shared_renderer(drawing, context, settings, behind) as renderer:
+        parts = draw_eyes(renderer, scene, eyes, output)
+    picture = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+    return picture.view(Picture)
+
+
+def draw_eyes(
+    renderer: Renderer, scene: "Scene", eyes: list[View], output: Output
+) -> list[np.ndarray]:
+    """(H, W, 3) or (H, W) of each eye."""
+    if output == "picture":
+        return renderer.render_views(scene, eyes)
+    surfaces = [renderer.surface(scene, eye) for eye in eyes]
+    if output == "coverage":
+        return [surface.coverage for surface in surfaces]
+    return [s.depth() if output == "depth" else s.normals() for s in surfaces]
+
+
+def film(
+    scene: "Scene", x: Any, camera: Any, count: int, size: Size | None, how: dict[str, Any]
+) -> Iterator[Picture]:
+    """What Scene.frames gives; what cannot be is refused before the first picture."""
+    views = choose_views(scene, camera, count, size)
+    scenes = [scene.at(each) for each in spread(x, len(views))]
+    return (each.render(None, view, **how) for each, view in zip(scenes, views, strict=True))
+
+
+def spread(x: Any, count: int) -> list[Any]:
+    """One x a frame.  Raises UsageError."""
+    if isinstance(x, str) and x == SWEEP:
+        return np.linspace(0, 1, count).tolist()
+    if x is None or isinstance(x, str | StopWeights) or np.ndim(x) == 0:
+        return [x] * count
+    values = list(x)
+    if len(values) == count:
+        return values
+    if not values or not all(isinstance(v, int | float | np.number) for v in values):
+        raise UsageError(
+            f"x has {len(values)} values for {count} frames; one a frame is wanted, or numbers."
+        )
+    places = np.linspace(0, len(values) - 1, count)
+    return np.interp(places, np.arange(len(values)), values).tolist()

@@ -1,0 +1,142 @@
+"""Scenes into files of other programs and of our own, and into arrays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shapeshift.api.arguments import PathText, Progress, X
+from shapeshift.api.edit import regions_of
+from shapeshift.api.load import opened
+from shapeshift.api.scene import Scene
+from shapeshift.app.commands.exported import Look, Part, bake_part, check_output, is_folder
+from shapeshift.app.commands.exported import export as export_parts
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import plain
+from shapeshift.runtime_models.model import AnchorModel, Finding
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.write_plain import cut, merged, writer_of
+from shapeshift.scene.selectors.selector import Selector
+
+PACKAGE = ".shift"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: its path, its bytes on disk, its splats, and what was lost on the way.
+
+    written = scene.export("heat.spz", x="Thermal")
+    print(written.path, written.bytes)
+    """
+
+    path: Path
+    bytes: int
+    splats: int  # of a package: at every x
+    findings: tuple[Finding, ...] = ()  # what the format had no place for, what was cut
+
+
+def export(
+    scene: PathText | Scene,
+    out: PathText,
+    *,
+    x: X | None = None,
+    sh_degree: int = 3,
+    palette: bool = True,
+    only: Sequence[Selector] = (),
+    object: str | None = None,
+    label: int | None = None,
+    eye: Sequence[float] | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> Exported:
+    """Writes a scene as it is shown at one x for other programs, all or nothing.
+
+    out: its ending is the format: .ply, .compressed.ply, .spz, .glb, .splat, .usdz; .shift or a
+    folder is our own package, which holds every x.  x: as of `Scene.at`.  sh_degree: 0 to 3, of the
+    colours' spherical harmonics.  palette: thermal stops in their false colours.  only: what lies
+    in one of these regions (their x means nothing here).  object, label: that object alone.  eye:
+    (3,) metres, for scenes whose shape depends on it.  overwrite: replace an earlier file, never
+    what is read.  progress: called with (what, part 0..1).
+
+    Raises UsageError, BadFile; OSError where it cannot be written.
+
+        ss.export("workshop.shift", "heat.spz", x="Thermal")
+        ss.export(scene, "part.ply", only=[ss.Sphere(centre=(0, 1, 0), radius=0.5, x=0)])
+    """
+    scene, out = opened(scene), plain(str(out))
+    if is_folder(out) or out.suffix.lower() == PACKAGE:
+        if x is not None or only or object is not None or label is not None or eye is not None:
+            raise UsageError("a package holds every x and every part; give out= another ending.")
+        return save(scene, out, overwrite)
+    writer_of(out)  # before any work
+    check_output(out, [scene.path] if scene.path and scene.path.exists() else [], overwrite, "")
+    things = scene.at(x).objects
+    if object is not None:
+        things = (scene.at(x).object(object),)
+    view = scene.subject.view((640, 360))
+    if scene.subject.file is None and scene.path is not None:
+        things = tuple(replace(thing, name=scene.path.stem or "scene") for thing in things)
+    parts = [
+        Part(thing, regions_of(only, thing.model, view) or None, label)
+        for thing in things
+        if thing.visible or object is not None
+    ]
+    if not parts:
+        raise UsageError("all objects are hidden; name one of them: object=.")
+    look = look_of(sh_degree, palette, eye, tuple(map(float, scene.origin)))
+    splats = export_parts(parts, look, out, progress or (lambda what, part: None))
+    return Exported(out, out.stat().st_size, len(splats.means), splats.findings)
+
+
+def save(scene: Scene, path: PathText, overwrite: bool) -> Exported:
+    """What Scene.save does."""
+    from shapeshift.runtime_models.package.write_package import write_package
+
+    path = plain(str(path))
+    subject = scene.subject
+    if subject.file is not None or not isinstance(subject.scene.objects[0].model, AnchorModel):
+        what = "objects of a scene file" if subject.file is not None else "plain splats"
+        raise UsageError(
+            f"{what} cannot become a package, which is anchors and five networks; export them as "
+            ".ply, .spz or .glb."
+        )
+    if not (is_folder(path) or path.suffix.lower() == PACKAGE):
+        raise UsageError(f"{path} has no ending of a package; name it NAME.shift or a folder.")
+    check_output(path, [scene.path] if scene.path and scene.path.exists() else [], overwrite, "")
+    model = scene.model
+    assert isinstance(model, AnchorModel)
+    halves = np.array_equal(model.features.astype(np.float16), model.features)
+    size = write_package(model, path, "float16" if halves else "float32")
+    return Exported(path, size, model.splat_count)
+
+
+def look_of(
+    sh_degree: int, palette: bool, eye: Sequence[float] | None, origin: tuple = (0.0, 0.0, 0.0)
+) -> Look:
+    """How splats are baked.  Raises UsageError."""
+    if sh_degree not in range(4):
+        raise UsageError(f"sh_degree is {sh_degree}, expected 0 to 3.")
+    if eye is None:
+        return Look(sh_degree, palette, None, origin)
+    place = tuple(map(float, eye))
+    if len(place) != 3 or not np.isfinite(place).all():
+        raise UsageError(f"eye is {place}; three numbers in metres are wanted.")
+    return Look(sh_degree, palette, (place[0], place[1], place[2]), origin)
+
+
+def bake_scene(
+    scene: Scene, sh_degree: int, palette: bool, eye: Sequence[float] | None
+) -> PlainSplats:
+    """What Scene.splats gives: arrays that nothing else holds."""
+    look = look_of(sh_degree, palette, eye)
+    baked = [bake_part(Part(thing), look) for thing in scene.objects if thing.visible]
+    if not baked:
+        raise UsageError("all objects are hidden; nothing is there to be taken.")
+    splats = cut(merged(baked), sh_degree)
+    arrays: dict[str, Any] = {
+        name: np.array(getattr(splats, name), np.float32)
+        for name in ("means", "scales", "wxyz", "opacity", "sh")
+    }
+    return replace(splats, **arrays)
