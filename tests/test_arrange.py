@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.headset.worn_panel import sliders_of
+from shapeshift.app.headset.wrist_menu import sliders_of
 from shapeshift.app.viewer import arrange
 from shapeshift.app.viewer.files import opened_scene
 from shapeshift.app.viewer.opened import Found, Source, read_files

@@ -12,8 +12,7 @@ from shapeshift.app.panels.open_row import OpenRow
 from shapeshift.app.panels.path_box import PathBox
 from shapeshift.app.panels.theme import Box
 from shapeshift.app.paths import DEMO, TOUCH, config_folder
-from shapeshift.app.scene_files import file_at
-from shapeshift.app.subject import placed
+from shapeshift.app.subject import file_at, placed
 from shapeshift.app.viewer.controls import Camera
 from shapeshift.app.viewer.document import Document, document_from, document_of
 from shapeshift.app.viewer.first_look import FirstLook

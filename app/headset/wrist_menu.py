@@ -1,8 +1,9 @@
 """The panel of a headset with its scene: what it tells of the world, and its wishes granted."""
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
+from shapeshift.app.headset.xr_user import XrState
 from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.world.follow import put_back
 from shapeshift.scene.world.world import World
@@ -23,31 +24,38 @@ from shapeshift.vr.panel.panel_state import (
     Wish,
 )
 
-if TYPE_CHECKING:
-    from shapeshift.app.headset.wearing import Wearing
-
 HINT = "menu button or palm up: open, close    stick: slide"
 
 
-class WornPanel:
+@dataclass(frozen=True)
+class MenuActions:
+    """What the menu asks of the session that it is in."""
+
+    recentre: Callable[[Frame], None]
+    leave: Callable[[str], None]  # why
+    pulse: Callable[[str, float, float], None]  # side, strength, seconds
+
+
+class WristMenu:
     """Keeps the panel between frames; `carried` is what is drawn."""
 
-    def __init__(self, hand: str = "left") -> None:
+    def __init__(self, state: XrState, actions: MenuActions, hand: str = "left") -> None:
+        self._state, self._actions = state, actions
         self.carried = Carried(home=hand)
         self._held: dict[str, str | None] = {}
 
-    def act(self, wearing: "Wearing", frame: Frame, seconds: float) -> Frame:
+    def act(self, frame: Frame, seconds: float) -> Frame:
         """What hands do to the panel, and what it wishes; the frame with what it leaves of them."""
-        facts = facts_of(wearing, HINT)
-        self._follow_hands(wearing, facts)
+        facts = facts_of(self._state, HINT)
+        self._follow_hands(facts)
         self.carried, wishes, hands = carry(self.carried, facts, frame, seconds)
         for wish in wishes:
-            grant(wish, wearing, frame)
+            grant(wish, self._state, self._actions, frame)
         return replace(frame, hands=hands)
 
-    def _follow_hands(self, wearing: "Wearing", facts: Facts) -> None:
+    def _follow_hands(self, facts: Facts) -> None:
         """The slider of what a hand takes is the one that is shown."""
-        held = dict(wearing.person.touched.held)
+        held = dict(self._state.user.touched.held)
         names = {slider.name for slider in facts.sliders}
         for side, name in held.items():
             if name in names and self._held.get(side) != name:
@@ -56,10 +64,10 @@ class WornPanel:
         self._held = held
 
 
-def facts_of(wearing: "Wearing", note: str = "") -> Facts:
+def facts_of(state: XrState, note: str = "") -> Facts:
     """What the panel tells in this frame."""
-    scale, floor = wearing.standing.scale, wearing.floor_shown
-    return Facts(sliders_of(wearing.world), wearing.pacing.quality, scale, note, floor)
+    scale, floor = state.standing.scale, state.floor_shown
+    return Facts(sliders_of(state.world), state.pacing.quality, scale, note, floor)
 
 
 def sliders_of(world: World) -> tuple[Slider, ...]:
@@ -71,23 +79,23 @@ def sliders_of(world: World) -> tuple[Slider, ...]:
     )
 
 
-def grant(wish: Wish, wearing: "Wearing", frame: Frame) -> None:
+def grant(wish: Wish, state: XrState, actions: MenuActions, frame: Frame) -> None:
     """One wish of the panel."""
     match wish:
         case SetX(name, x):
-            wearing.world.control(name, x)
+            state.world.control(name, x)
         case SetQuality(name):
-            wearing.pacing.quality = name
+            state.pacing.quality = name
         case SetScale(scale):
-            wearing.standing = resized(wearing.standing, frame.head, scale)
-            wearing.person.jumped()
+            state.standing = resized(state.standing, frame.head, scale)
+            state.user.jumped()
         case Recentre():
-            wearing.recentre(frame)
+            actions.recentre(frame)
         case PutBack():
-            put_back(wearing.world)
+            put_back(state.world)
         case SetFloor(shown):
-            wearing.floor_shown = shown
+            state.floor_shown = shown
         case Exit():
-            wearing.leave("from the panel")
+            actions.leave("from the panel")
         case Pulse(side, strength, seconds):
-            wearing.pulse(side, strength, seconds)
+            actions.pulse(side, strength, seconds)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, open_model, progress_after, sentence
-from shapeshift.app.scene_files import file_at, open_scene_file
-from shapeshift.app.subject import control_of_text, pace_of
+from shapeshift.app.scene_files import open_scene_file
+from shapeshift.app.subject import control_of_text, file_at, pace_of
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import Model
 from shapeshift.scene.cameras.framing import (
@@ -27,7 +27,7 @@ ANY_SIZE = (640, 360)  # of a view that only says where to stand
 
 
 @dataclass(frozen=True)
-class WornScene:
+class XrScene:
     """A world, and from where it is looked at first."""
 
     world: World
@@ -42,7 +42,7 @@ class WornScene:
         return frame_points(*scene_points(self.world.drawn()))[0]
 
 
-def open_worn(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
+def open_xr(path: Path, options: ReadingOptions, x: str = "") -> XrScene:
     """Reads the scene with progress and findings on stderr.
 
     x: where the sliders stand, in words; "": as the scene says.  Raises BadFile, UsageError.
@@ -57,10 +57,10 @@ def open_worn(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
     for finding in world.findings:
         say(sentence(finding))
     eye = first_view(file, scene, ANY_SIZE).world_from_eye
-    return WornScene(world, models, eye, file.floor_y, BACKGROUND)
+    return XrScene(world, models, eye, file.floor_y, BACKGROUND)
 
 
-def open_alone(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
+def open_alone(path: Path, options: ReadingOptions, x: str = "") -> XrScene:
     """One model that nothing can touch, where its file has it."""
     model = open_model(path, options)
     first = min((stop.x for stop in model.stops), default=0.0)
@@ -70,4 +70,4 @@ def open_alone(path: Path, options: ReadingOptions, x: str = "") -> WornScene:
     world = World(file, {item.name: model}, {}, hz=HZ)
     eye = default_view(model, ANY_SIZE).world_from_eye
     background = default_background(model, BACKGROUND)
-    return WornScene(world, {item.name: model}, eye, None, background)
+    return XrScene(world, {item.name: model}, eye, None, background)

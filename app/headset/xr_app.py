@@ -5,13 +5,13 @@ from collections.abc import Sequence
 
 import moderngl
 
-from shapeshift.app.headset.headset_report import Report
+from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
-from shapeshift.app.headset.person import Person
-from shapeshift.app.headset.worn_panel import WornPanel
-from shapeshift.app.headset.worn_scene import WornScene
+from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
+from shapeshift.app.headset.xr_scene import XrScene
+from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.pose import View
@@ -22,7 +22,6 @@ from shapeshift.vr.frame import Frame
 from shapeshift.vr.glove import Capsule
 from shapeshift.vr.hints import hints
 from shapeshift.vr.locomotion.locomotion import RULES, Rules
-from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.openxr.session import Session
 from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
@@ -57,7 +56,7 @@ class Eyes:
             texture.release()
 
 
-class Wearing:
+class XrApp:
     """One session with one scene, from the first frame to the last."""
 
     def __init__(
@@ -66,7 +65,7 @@ class Wearing:
         renderer: Renderer,
         eyes: Eyes,
         mirror: Mirror | NoMirror,
-        scene: WornScene,
+        scene: XrScene,
         pacing: Pacing,
         report: Report,
         rules: Rules = RULES,
@@ -75,12 +74,11 @@ class Wearing:
         hints: bool = True,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
-        self.scene, self.world = scene, scene.world
-        self.pacing, self.report = pacing, report
-        self.person = Person(scene.world, scene.eye, scene.floor_y, rules)
-        self.panel = WornPanel(panel_hand)
-        self.standing = Standing()
-        self.floor_shown, self._hints = floor, hints
+        self.scene, self.report, self._hints = scene, report, hints
+        user = XrUser(scene.world, scene.eye, scene.floor_y, rules)
+        self.state = XrState(scene.world, pacing, user, floor_shown=floor)
+        actions = MenuActions(self.recentre, self.leave, self.pulse)
+        self.menu = WristMenu(self.state, actions, panel_hand)
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
         self._outlines, self._late = Outlines(), Late()
@@ -128,69 +126,73 @@ class Wearing:
             self.recentre(frame)
         self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
-        before = self.standing
-        left_over = self.panel.act(self, frame, seconds)
-        self.standing = self.person.act(left_over, self.standing, seconds)
-        self._clearness = clearness(self._clearness, before, self.standing, seconds)
+        before = self.state.standing
+        left_over = self.menu.act(frame, seconds)
+        self.state.standing = self.state.user.act(left_over, self.state.standing, seconds)
+        self._clearness = clearness(self._clearness, before, self.state.standing, seconds)
         if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
             self._worn_s += seconds
-        records = self.world.advance(seconds)
-        for pulse in strongest(self.person.felt(records)):
+        records = self.state.world.advance(seconds)
+        for pulse in strongest(self.state.user.felt(records)):
             self.pulse(pulse.side, pulse.strength, pulse.seconds)
         if frame.drawn:
-            views = [self.standing.view(view) for view in frame.views]
+            views = [self.state.standing.view(view) for view in frame.views]
             self._choose_quality(views)
             self.draw(views, frame.views, self._over(frame))
             self.session.submit(self.eyes.textures)
-            self.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
+            self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
             self.mirror.show(self.eyes.textures[0])
         else:
             self.mirror.rest()
-        self.report.note(self, frame, records)
+        session = self.session
+        done = DoneFrame(
+            frame, self.state, self.menu.carried, self.pulses, records, session.life, session.pace
+        )
+        self.report.note(done, self.eyes.framebuffers)
 
     def _over(self, frame: Frame) -> Drawn:
         """What is in the room over the splats."""
-        person, carried = self.person, self.panel.carried
+        person, carried = self.state.user, self.menu.carried
         outlines, cards = self._outlined(frame), self._cards(frame)
         return drawn_of(frame.hands, carried, person.comfort, person.touched, outlines, cards)
 
     def _outlined(self, frame: Frame) -> list[Capsule]:
         """Around what hands would take, or their rays act on, that do not point at the panel."""
         lines: list[Capsule] = []
-        for offer in self.person.touched.offers:
-            thing = self.world.things[offer.object]
+        for offer in self.state.user.touched.offers:
+            thing = self.state.world.things[offer.object]
             hull = self._outlines.hull(thing.collider)
-            if hull is None or offer.side in self.panel.carried.panel.hovers:
+            if hull is None or offer.side in self.menu.carried.panel.hovers:
                 continue
             pose, ink = thing.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
-            lines += outline(hull, pose, self.standing, frame.head.position, ink)
+            lines += outline(hull, pose, self.state.standing, frame.head.position, ink)
         return lines
 
     def _cards(self, frame: Frame) -> tuple[Card, ...]:
         """What buttons do, at first; and that frames are late."""
         if not self._hints:
             return ()
-        side, rules = self.panel.carried.home, self.person.rules
+        side, rules = self.menu.carried.home, self.state.user.rules
         cards = hints(frame, self._worn_s, self.session.profiles, rules, side)
         if self._late.watch(frame.seen_s, self.session.pace.dropped):
-            cards += (late_card(frame.head, self.pacing.quality),)
+            cards += (late_card(frame.head, self.state.pacing.quality),)
         return cards
 
     def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
         """Splats with one sort for both eyes, the floor behind them, the room over them."""
-        self.renderer.settings = self.pacing.settings()
+        self.renderer.settings = self.state.pacing.settings()
         start = time.perf_counter()
-        self.renderer.update(self.world.drawn())
+        self.renderer.update(self.state.world.drawn())
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
         self._drawing_ms = (time.perf_counter() - start) * 1e3
         self.session.pace.drew(self._drawing_ms)
         for i, framebuffer in enumerate(self.eyes.framebuffers):
             self.renderer.present(framebuffer, i)
-            if self.floor_shown:
+            if self.state.floor_shown:
                 grid = Grid(self._level_m, self._clearness)
                 behind, hidden = self.scene.background, self.renderer.coverage(i)
                 floor = self.eyes.floor
-                floor.draw(framebuffer, play_views[i], self.standing, hidden, grid, behind)
+                floor.draw(framebuffer, play_views[i], self.state.standing, hidden, grid, behind)
             self.eyes.overlay.draw(framebuffer, play_views[i], over)
 
     def _choose_quality(self, views: list[View]) -> None:
@@ -198,18 +200,18 @@ class Wearing:
         when it is another one.
         """
         pace = self.session.pace
-        if not (pace.settled and self.pacing.wants_measure(pace.period_s)):
+        if not (pace.settled and self.state.pacing.wants_measure(pace.period_s)):
             return
-        scene, finish = self.world.drawn(), self.mirror.ctx.finish
+        scene, finish = self.state.world.drawn(), self.mirror.ctx.finish
         chart = StereoChart(self.renderer, scene, views, self.scene.centre, finish)
-        self.pacing.measure(chart, pace.period_s)
+        self.state.pacing.measure(chart, pace.period_s)
         pace.restart()
 
     def recentre(self, frame: Frame) -> None:
         """Back to where the scene is looked at first, at the size it has now."""
-        self.standing = self.person.before_scene(frame, self.standing.scale)
-        self.person.jumped()
-        floor_y, under = self.person.floor_y, self.standing.point(underfoot(frame.head))
+        self.state.standing = self.state.user.before_scene(frame, self.state.standing.scale)
+        self.state.user.jumped()
+        floor_y, under = self.state.user.floor_y, self.state.standing.point(underfoot(frame.head))
         self._level_m = float(under[1]) if floor_y is None else floor_y
 
     def pulse(self, side: str, strength: float, seconds: float) -> None:

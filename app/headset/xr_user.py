@@ -1,8 +1,9 @@
 """The person in a headset between two frames: how they stand, move, and what their hands do."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
+from shapeshift.app.headset.pacing import Pacing
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
@@ -13,7 +14,7 @@ from shapeshift.vr.locomotion.teleport import ground_of
 from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
 
-class Person:
+class XrUser:
     """Keeps what the pure steps of vr/ hand on; `jumped` is called when a menu moved the room.
 
     `eye` is from where the scene is looked at first, world_from_eye.
@@ -57,3 +58,14 @@ class Person:
     def felt(self, records: Sequence) -> tuple[Pulse, ...]:
         """After the world's steps: what buzzes, of these and of what the hands did."""
         return (*self.touched.pulses, *feel(self.world, records))
+
+
+@dataclass
+class XrState:
+    """What changes from frame to frame, and what the parts of a session read of each other."""
+
+    world: World
+    pacing: Pacing
+    user: XrUser
+    standing: Standing = field(default_factory=Standing)
+    floor_shown: bool = True
