@@ -40,7 +40,7 @@ COMMANDS = {
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
     "train": ("training.train", "posed photos of several modalities to a scene"),
     "fit": (
-        "training.fit.fit",
+        "training.fit",
         "the smallest scene that shows a capture as well as the largest, and why",
     ),
     "eval": (

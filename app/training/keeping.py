@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import full
+from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
@@ -65,7 +66,6 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
     Raises UsageError where that cannot be; then both lie in a folder of the system's for temporary
     files, if there is room.
     """
-    from shapeshift.app.training.train import say
     from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.training.checkpoint import write_checkpoint
 

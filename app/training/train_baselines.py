@@ -6,16 +6,9 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import full
-from shapeshift.app.training.train import (
-    INTERRUPTED,
-    Options,
-    calibrated,
-    decibels,
-    describe,
-    say,
-    settings_of,
-    train,
-)
+from shapeshift.app.terminal import say
+from shapeshift.app.training.run_loop import INTERRUPTED, calibrated, decibels, describe, train
+from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture

@@ -30,15 +30,15 @@ class Writer:
 
     def write(self, splats: PlainSplats, path: Path) -> None:
         """Atomic; what the format cannot hold is lost."""
-        module = importlib.import_module(f"runtime_models.{self.function}")
+        module = importlib.import_module(f"{__package__}.{self.function}")
         getattr(module, self.function.rpartition(".")[2])(splats, path)
 
 
 WRITERS = (  # of two endings that fit a name, the longer one stands first
-    Writer("compressed PLY", ".compressed.ply", 3, "write_compressed_ply", far=False),
-    Writer("3DGS PLY", ".ply", 3, "write_ply", columns=True),
-    Writer("spz", ".spz", 3, "write_spz"),
-    Writer("glTF", ".glb", 3, "write_gltf", antialiased=False),
+    Writer("compressed PLY", ".compressed.ply", 3, "ply.write_compressed_ply", far=False),
+    Writer("3DGS PLY", ".ply", 3, "ply.write_ply", columns=True),
+    Writer("spz", ".spz", 3, "spz.write_spz"),
+    Writer("glTF", ".glb", 3, "gltf.write_gltf", antialiased=False),
     Writer(".splat", ".splat", 0, "write_splat", antialiased=False, far=False),
     Writer("USD", ".usdz", 3, "usd.write_usd", False, also=(".usd", ".usda", ".usdc")),
 )

@@ -333,9 +333,9 @@ class Physics:
 
     def carry(self, grab: int, moved: np.ndarray) -> None:
         """A hand jumps by (4, 4) now_from_before, rigid, with what it holds and who else does."""
-        body = self._hold(grab).body
-        holds = [(h, self._hand(h)) for h in self._holds.values() if h.body == body]
-        carry(holds, self._body(body), moved)
+        bodies, body = self._world.rigid_bodies, self._hold(grab).body
+        holds = [(h, bodies[h.hand]) for h in self._holds.values() if h.body == body]
+        carry(holds, bodies[self._handles[body]], moved)
         self._queries_stale = True
 
     def release(self, grab: int) -> None:
