@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture
 def viewer(monkeypatch) -> list:
     """What the viewer would be opened with; there is a display."""
-    from shapeshift.app.viewer import desktop
+    from shapeshift.app.editor import desktop
 
     opened = []
     monkeypatch.setenv("DISPLAY", ":99")

@@ -159,10 +159,10 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
 
 
 def test_the_viewer_and_the_headset_start_there(package, objects):
+    from shapeshift.app.editor.state.files.opened import read_files
+    from shapeshift.app.editor.window.files import opened_scene
     from shapeshift.app.headset.xr_scene import open_xr
     from shapeshift.app.opening import ReadingOptions
-    from shapeshift.app.viewer.files import opened_scene
-    from shapeshift.app.viewer.opened import read_files
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.scene.cameras.camera_list import CameraReading
 

@@ -198,7 +198,7 @@ def without_headset(reason: str, options: Options) -> int:
     say(f"shapeshift vr: {reason}")
     if options.frames or options.report or not has_display():
         return NO_HEADSET
-    from shapeshift.app.viewer import desktop
+    from shapeshift.app.editor import desktop
 
     say("Opening the scene in a window instead.")
     reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}

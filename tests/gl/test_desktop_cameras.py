@@ -10,8 +10,8 @@ from camera_files import NAMES, assert_same, cameras
 from desktop_stand import run_frames, until_opened
 from widgets import Widgets
 
-from shapeshift.app.viewer.recent import RecentFiles
-from shapeshift.app.viewer.window import Drag, Drop, KeyDown, Wheel
+from shapeshift.app.editor.state.user.recent import RecentFiles
+from shapeshift.app.editor.window.window import Drag, Drop, KeyDown, Wheel
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.cameras.write_cameras import write_cameras
 
@@ -45,7 +45,7 @@ def dropped(viewer, tmp_path):
 
 def test_dropped_cameras_are_stood_at_and_the_scene_stays(dropped):
     viewer = dropped
-    assert [thing.name for thing in viewer.stage.scene.objects] == ["ball"]
+    assert [thing.name for thing in viewer.state.scene.objects] == ["ball"]
     first = cameras().views[0]
     np.testing.assert_allclose(
         viewer.view().world_from_eye.matrix(), first.world_from_eye.matrix(), atol=1e-9
@@ -121,7 +121,7 @@ def test_k_keeps_views_in_one_file_of_this_start(dropped):
     assert len(read_camera_list(folder / "views-0002").views) == 4
     viewer.kept.form = "nerfstudio"  # which cannot hold pictures of several sizes
     press(viewer, glfw.KEY_K)
-    assert "camera path cannot" in viewer.stage.problem and len(viewer.kept.views) == 4
+    assert "camera path cannot" in viewer.state.problem and len(viewer.kept.views) == 4
     assert (folder / "views-0001.ours.json").read_text() == "mine"
 
 
@@ -131,7 +131,7 @@ def test_a_scene_and_its_cameras_dropped_together(viewer, tmp_path):
     write_cameras(cameras(), path, "inria")
     viewer.take(Drop((path, scene)))
     until_opened(viewer)
-    assert viewer.stage.scene.objects[0].name == "stuhl äöü"
+    assert viewer.state.scene.objects[0].name == "stuhl äöü"
     assert viewer.steps.text == "3 cameras"  # the new scene is seen whole first
     viewer.take(Drop((scene,)))
     until_opened(viewer)
@@ -161,7 +161,7 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
         viewer.take(Drop((path,)))
         until_opened(viewer)
     assert viewer.files.recent.paths == (scene, gone)
-    before = viewer.stage.scene
+    before = viewer.state.scene
     gone.unlink()
     run_frames(viewer, 2)
     click(viewer, *widgets.middle("Recent"))
@@ -170,8 +170,8 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
     assert not viewer.files.busy and viewer.window._popup
     click(viewer, *widgets.middle("one.shift"))
     until_opened(viewer)
-    assert viewer.stage.scene.objects[0].name == "one" and not viewer.stage.problem
-    assert viewer.stage.scene is not before
+    assert viewer.state.scene.objects[0].name == "one" and not viewer.state.problem
+    assert viewer.state.scene is not before
     assert not viewer.window._popup
     told = json.loads((tmp_path / "settings/recent.json").read_text())
     assert told["recent"] == [str(scene), str(gone)]
@@ -182,7 +182,7 @@ def test_a_list_that_cannot_be_kept_is_said_once(viewer, tmp_path):
     blocked.write_bytes(b"")
     viewer.files.recent = RecentFiles.read(blocked)
     viewer.files.remember(Path("a"))
-    assert "cannot be kept" in viewer.stage.problem and viewer.files.recent is None
+    assert "cannot be kept" in viewer.state.problem and viewer.files.recent is None
 
 
 def test_the_status_line_is_there_with_the_overlay(viewer):

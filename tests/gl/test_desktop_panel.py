@@ -7,9 +7,10 @@ from objects_stand import names
 from real_hands import RealHands
 from widgets import Widgets
 
-from shapeshift.app.panels import panel, performance_panel, quality_panel
-from shapeshift.app.panels.keys_sheet import GROUPS, spread
-from shapeshift.app.panels.path_box import can_browse
+from shapeshift.app.editor.panels import panel
+from shapeshift.app.editor.panels.keys_sheet import GROUPS, spread
+from shapeshift.app.editor.panels.sections import performance_panel, quality_panel
+from shapeshift.app.editor.panels.widgets.path_box import can_browse
 from shapeshift.app.paths import TOUCH
 
 pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window, viewer; touch_viewer
@@ -32,12 +33,12 @@ def unfolded(monkeypatch):
 
 def test_everything_in_the_panel_explains_itself(touch_viewer, unfolded, monkeypatch):
     viewer, widgets = touch_viewer, Widgets(monkeypatch)
-    viewer.stage.chosen = "ring"
+    viewer.state.chosen = "ring"
     for kind in ("sphere", "box", "half-space", "lens", "painted"):
-        viewer.stage.add_region(kind)
-        viewer.stage.regions.placing = False
+        viewer.state.add_region(kind)
+        viewer.state.regions.placing = False
         run_frames(viewer, 2)
-    viewer.stage.split.possible = True
+    viewer.state.split.possible = True
     run_frames(viewer, 2)
     assert len(widgets.explained) > 60
     silent = [name for name, explained in widgets.explained.items() if not explained]
@@ -78,8 +79,8 @@ def hands(viewer, display):
 
 
 def test_a_problem_stays_until_its_cross_is_clicked(viewer, hands):
-    viewer.stage.problem = "one.ply is empty."
-    viewer.stage.problem = "two.ply is empty."
+    viewer.state.problem = "one.ply is empty."
+    viewer.state.problem = "two.ply is empty."
     run_frames(viewer, 3)
     boxes = viewer.window.covered[-2:]
     assert boxes[0][3] <= boxes[1][1]  # the newer one above
@@ -116,8 +117,8 @@ def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     import inspect
     import re
 
-    from shapeshift.app.viewer import hands, objects, shell, split, touch, two_pictures
-    from shapeshift.app.viewer import window as window_module
+    from shapeshift.app.editor.window import hands, objects, shell, split, touch, two_pictures
+    from shapeshift.app.editor.window import window as window_module
 
     told = " ".join(key for rows in GROUPS.values() for key, _ in rows)
     more = (touch.KEYS, objects.KEYS, split.KEYS)
@@ -149,8 +150,8 @@ def test_groups_are_spread_over_columns_in_order():
 
 def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     viewer, widgets = splats_viewer, Widgets(monkeypatch)
-    viewer.files.read = lambda path, told: viewer.stage.read_model(path)
-    viewer.stage.chosen = "ball"
+    viewer.files.read = lambda path, told: viewer.state.read_model(path)
+    viewer.state.chosen = "ball"
     viewer.objects.delete()
     run_frames(viewer, 3)
     assert names(viewer) == [] and "The demo" in widgets.boxes
@@ -164,7 +165,7 @@ def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     until_opened(viewer)
     viewer.objects.saving.answer("Discard")
     run_frames(viewer, 2)
-    assert viewer.stage.document.path == TOUCH and len(viewer.window.covered) == 3
+    assert viewer.state.document.path == TOUCH and len(viewer.window.covered) == 3
 
 
 def test_ctrl_o_asks_for_a_path_and_opens_it(viewer, hands, tmp_path):
@@ -173,7 +174,7 @@ def test_ctrl_o_asks_for_a_path_and_opens_it(viewer, hands, tmp_path):
     hands.type(str(tmp_path / "one.shift"))
     hands.key("Return")
     until_opened(viewer)
-    assert names(viewer) == ["one"] and not viewer.stage.problem
+    assert names(viewer) == ["one"] and not viewer.state.problem
     hands.key("o", "Control_L")
     hands.key("Escape")
     assert not viewer.files._box.asking and names(viewer) == ["one"]
@@ -220,7 +221,7 @@ def test_the_buttons_of_the_camera_do_the_same(viewer, hands, monkeypatch):
     hands.click(*widgets.middle("First view"))
     run_frames(viewer, 80)
     assert not viewer.camera.flying
-    first = viewer.stage.first_view(viewer.free_size()).world_from_eye.position
+    first = viewer.state.first_view(viewer.free_size()).world_from_eye.position
     np.testing.assert_allclose(viewer.view().world_from_eye.position, first, atol=1e-3)
 
 
@@ -228,9 +229,11 @@ def test_a_stop_is_gone_to_by_its_button(viewer, hands, monkeypatch):
     widgets = Widgets(monkeypatch)
     run_frames(viewer, 2)
     hands.click(*widgets.middle("thermal"))
-    assert viewer.stage.scene.objects[0].x == 1.0
+    run_frames(viewer, 2, seconds=0.5)  # it is there after SHIFT_S
+    assert viewer.state.scene.objects[0].x == 1.0
     hands.click(*widgets.middle("photo"))
-    assert viewer.stage.scene.objects[0].x == 0.0
+    run_frames(viewer, 2, seconds=0.5)
+    assert viewer.state.scene.objects[0].x == 0.0
 
 
 def test_painting_is_undone_by_the_keyboard_and_the_slider_stays(viewer, hands):
@@ -240,11 +243,11 @@ def test_painting_is_undone_by_the_keyboard_and_the_slider_stays(viewer, hands):
     hands._key("b", True)
     hands.drag(middle, (middle[0] + 30, middle[1]))
     hands._key("b", False)
-    regions = viewer.stage.regions
+    regions = viewer.state.regions
     assert regions.items[0].painted.sum() > 0
     hands.key("Right")
     hands.key("z", "Control_L")
-    assert regions.items == () and viewer.stage.scene.objects[0].x == 0.01
+    assert regions.items == () and viewer.state.scene.objects[0].x == 0.01
     assert "paint" in viewer.messages.note
     hands.key("y", "Control_L")
     assert regions.items[0].painted.sum() > 0
@@ -259,19 +262,19 @@ def test_each_stroke_is_a_step_of_its_own(viewer, hands):
         hands._key("b", True)
         hands.drag((x + 60 * step, y), (x + 60 * step + 20, y))
         hands._key("b", False)
-        counts.append(int(viewer.stage.regions.items[0].painted.sum()))
+        counts.append(int(viewer.state.regions.items[0].painted.sum()))
     assert counts[0] < counts[1]
     hands.key("z", "Control_L")
-    assert int(viewer.stage.regions.items[0].painted.sum()) == counts[0]
+    assert int(viewer.state.regions.items[0].painted.sum()) == counts[0]
 
 
 def test_escape_leaves_what_is_nearest(viewer, hands):
-    viewer.stage.add_region("sphere")
-    viewer.stage.problem = "something."
+    viewer.state.add_region("sphere")
+    viewer.state.problem = "something."
     hands.key("F1")
     hands.key("Escape")
-    assert not viewer.shell.keys_open and viewer.stage.problem
+    assert not viewer.shell.keys_open and viewer.state.problem
     hands.key("Escape")
-    assert not viewer.stage.problem and viewer.stage.regions.placing
+    assert not viewer.state.problem and viewer.state.regions.placing
     hands.key("Escape")
-    assert not viewer.stage.regions.placing
+    assert not viewer.state.regions.placing
