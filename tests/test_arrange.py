@@ -9,8 +9,8 @@ import pytest
 
 from shapeshift.app.editor.state import arrange
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
-from shapeshift.app.editor.window.files import opened_scene
 from shapeshift.app.headset.wrist_menu import sliders_of
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.scene.cameras.camera_list import CameraReading
@@ -183,7 +183,7 @@ def test_a_hand_on_the_slider_is_a_look_that_is_saved_but_not_undone(plain):
     assert arrange.undo(plain) == "" and not plain.document.unsaved
     edit(plain, edits.hide, "b")
     arrange.steer(plain, 0, 0.7)
-    plain.go_to_stop(1)
+    arrange.all_go_to_stop(plain, 1)
     plain.advance(1.0)
     assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
     assert arrange.undo(plain) == "hide"
@@ -218,10 +218,10 @@ def test_what_is_deleted_comes_back_with_the_x_it_had(plain):
 def test_regions_are_undone_with_everything_else_in_the_order_it_was_done(plain):
     regions = plain.regions
     plain.add_region("sphere")
-    arrange.record_regions(plain)
+    plain.record_regions()
     for x in (0.1, 0.2, 0.3):  # a drag on its slider
         regions.edit(0, x=x)
-        arrange.record_regions(plain)
+        plain.record_regions()
     plain.rest()
     edit(plain, edits.hide, "b")
     regions.edit(0, name="lid")
@@ -242,10 +242,10 @@ def test_regions_are_undone_with_everything_else_in_the_order_it_was_done(plain)
 def test_strokes_are_undone_one_by_one(plain):
     regions, view = plain.regions, plain.first_view((64, 64))
     plain.paint(view, (32, 32), 0.0, False)  # nothing is under the brush: the region alone
-    arrange.record_regions(plain)
+    plain.record_regions()
     for mask in ([1, 0, 0], [1, 1, 0]):
         regions.edit(0, painted=np.array(mask, bool))
-        arrange.record_regions(plain)
+        plain.record_regions()
     plain.rest()
     regions.edit(0, painted=np.array([1, 1, 1], bool))
     assert arrange.undo(plain) == "paint painted 1" and regions.items[0].painted.sum() == 2
@@ -273,9 +273,9 @@ def test_a_region_comes_back_with_its_deleted_object(state):
 
 def test_paint_of_another_level_of_detail_is_none_after_undoing(plain):
     plain.paint(plain.first_view((64, 64)), (32, 32), 0.0, False)
-    arrange.record_regions(plain)
+    plain.record_regions()
     plain.regions.edit(0, painted=np.ones(3, bool))
-    arrange.record_regions(plain)
+    plain.record_regions()
     plain.rest()
     edit(plain, edits.hide, "b")
     finer = replace(model("a"), **{

@@ -15,10 +15,10 @@ from PIL import Image
 from shapeshift.app import cli
 from shapeshift.app.editor.panels.status_line import bytes_text, scene_words
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import told_of
 from shapeshift.app.editor.state.files.opened import Opener, means_cameras, read_files
 from shapeshift.app.editor.state.scene_objects import scene_of
 from shapeshift.app.editor.state.user.recent import FILE, MOST, RecentFiles
-from shapeshift.app.editor.window.files import told_of
 from shapeshift.app.paths import config_folder, plain, plain_path
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model

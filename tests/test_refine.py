@@ -3,7 +3,6 @@
 import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +11,10 @@ from test_streamed import COUNTS, write_streamed
 
 import shapeshift.app.editor.state.files.refine as refine
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.refine import Refiner, attach_refiner
+from shapeshift.app.editor.state.files.refine import Refiner
+from shapeshift.app.editor.state.quality_controller import QualityController
 from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.runtime_models.model import BadFile
 
@@ -37,16 +38,16 @@ class FakeViewer:
     """The part of the viewer that levels of detail touch."""
 
     def __init__(self, refiner: Refiner, paths: list[Path], most: int = 10**9) -> None:
-        self.state, self.renderer, self.hooks = (
-            EditorState(refiner.open),
-            FakeRenderer(most),
-            Hooks(),
-        )
-        self.dial = SimpleNamespace(wanted=False, measuring=False, choice=None, forgotten=0)
-        self.dial.forget = lambda: setattr(self.dial, "forgotten", self.dial.forgotten + 1)
+        self.state, self.hooks = EditorState(refiner.open), Hooks()
+        self.renderer, self.changes = FakeRenderer(most), 0
+        self.dial = QualityController()
         self.state.open(paths)
         self.renderer.update(self.state.scene)
-        attach_refiner(self, refiner)
+        attach_refiner(refiner, self.state, self.hooks, self.renderer.update, self._changed)
+
+    def _changed(self) -> None:
+        self.changes += 1
+        self.dial.scene_changed()
 
     def counts(self) -> list[int]:
         return [thing.model.splat_count for thing in self.state.scene.objects]
@@ -97,7 +98,7 @@ def test_the_coarsest_level_is_there_at_once_and_finer_ones_follow(scene):
         [source] = state.sources
         assert source.path == scene and source.facts["splats"] == 400
         assert source.model is state.scene.objects[0].model and state.findings == []
-        assert viewer.renderer.drawn == [20, 150, 400] and viewer.dial.forgotten == 2
+        assert viewer.renderer.drawn == [20, 150, 400] and viewer.changes == 2
 
 
 def test_the_budget_bounds_it(scene):

@@ -8,8 +8,8 @@ import pytest
 
 from shapeshift.app.editor.state import arrange
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source
-from shapeshift.app.editor.window.files import opened_scene
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import Pace, StopBlend
 from shapeshift.scene.control import SHIFT_S, Shift
@@ -35,7 +35,7 @@ def shown(state: EditorState) -> np.ndarray:
 
 
 def test_key_3_from_rgb_goes_to_opened_directly(state):
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     assert state.playing and shown(state).tolist() == [1, 0, 0]
     rows, places = [], []
     for _ in range(12):
@@ -49,21 +49,21 @@ def test_key_3_from_rgb_goes_to_opened_directly(state):
 
 
 def test_it_is_of_time_and_not_of_frames(state):
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     state.advance(0.3)
     at_once = shown(state)
-    state.go_to_stop(0)
+    arrange.all_go_to_stop(state, 0)
     state.finish_shifts()
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     for _ in range(30):
         state.advance(0.01)
     np.testing.assert_allclose(shown(state), at_once, atol=1e-9)
 
 
 def test_another_key_on_the_way_goes_on_from_there(state):
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     state.advance(SHIFT_S / 2)
-    state.go_to_stop(1)
+    arrange.all_go_to_stop(state, 1)
     state.advance(SHIFT_S / 2)
     np.testing.assert_allclose(shown(state), [0.25, 0.5, 0.25], atol=1e-9)
     state.advance(SHIFT_S)
@@ -71,7 +71,7 @@ def test_another_key_on_the_way_goes_on_from_there(state):
 
 
 def test_a_hand_on_the_slider_has_the_last_word(state):
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     state.advance(SHIFT_S / 2)
     arrange.steer(state, 0, 0.3)
     state.advance(SHIFT_S)
@@ -79,7 +79,7 @@ def test_a_hand_on_the_slider_has_the_last_word(state):
 
 
 def test_play_goes_on_from_a_blend_to_the_next_stop(state):
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     state.advance(SHIFT_S / 2)
     state.toggle_play()
     for _ in range(200):
@@ -90,12 +90,12 @@ def test_play_goes_on_from_a_blend_to_the_next_stop(state):
 
 def test_a_key_for_where_it_is_or_a_stop_that_is_not_there_does_nothing(state):
     for number in (0, 3, 8):
-        state.go_to_stop(number)
+        arrange.all_go_to_stop(state, number)
         assert not state.playing and state.scene.objects[0].x == 0.0
 
 
 def test_other_objects_end_a_shift_at_its_end(state):
-    state.go_to_stop(2)
+    arrange.all_go_to_stop(state, 2)
     state.advance(SHIFT_S / 2)
     file = state.document.file
     arrange.edit(state, replace(file, floor_y=0.5), "floor")

@@ -159,8 +159,8 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
 
 
 def test_the_viewer_and_the_headset_start_there(package, objects):
+    from shapeshift.app.editor.state.files.open_scene import opened_scene
     from shapeshift.app.editor.state.files.opened import read_files
-    from shapeshift.app.editor.window.files import opened_scene
     from shapeshift.app.headset.xr_scene import open_xr
     from shapeshift.app.opening import ReadingOptions
     from shapeshift.runtime_models.read_scene import read_model

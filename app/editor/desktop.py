@@ -1,83 +1,30 @@
-"""launch.py view: opens files in a window; its options, and what they ask of the viewer."""
+"""launch.py view: opens files in a window, as its options ask."""
 
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Annotated, Literal
+from dataclasses import replace
 
 import numpy as np
 
 from shapeshift.app.camera_files import camera_reading
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
 from shapeshift.app.drawing import parse_size
+from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import first_look, named_cameras, opened_scene
 from shapeshift.app.editor.state.files.opened import read_files
-from shapeshift.app.editor.state.files.refine import Refiner, attach_refiner
+from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.editor.state.user.settings import Settings
-from shapeshift.app.editor.window.files import first_look, named_cameras, opened_scene
+from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.app.editor.window.split import splitting
 from shapeshift.app.editor.window.viewer import Viewer
 from shapeshift.app.editor.window.window import Window
 from shapeshift.app.editor.window.wipe import comparing
 from shapeshift.app.errors import UsageError
-from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import DEMO, TOUCH, config_folder, plain
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.selectors.read_selector import read_selector
 from shapeshift.scene.selectors.selector import Selector
 
 WINDOW_SIZE = "1280x720"  # of the window, pixels at a text size of 1
-
-
-@dataclass(frozen=True)
-class Options(ReadingOptions):
-    """Open a scene in a window."""
-
-    scenes: Annotated[tuple[Path, ...], POSITIONAL] = ()
-    """Packages, splats of any known format, folders of layers, scene files, and files of cameras to
-    step through.  Default: the bundled demo."""
-    x: Annotated[str, CONTROL] = ""
-    """Where the slider stands at the start: a stop by its name, or a number from 0 to 1.  Default:
-    the first stop."""
-    camera: Path | None = None
-    """File or folder of cameras: starts at the first, N and P step through them (docs/cameras.md).
-    Default: the whole scene in view."""
-    size: Annotated[str, SIZE] = ""
-    """WIDTHxHEIGHT of the window in pixels.  Default: 1280x720, and as much larger as the text
-    is."""
-    select: Annotated[tuple[str, ...], REGIONS] = ()
-    """Regions with an X of their own (a stop's name or a number): sphere:x,y,z:radius:X[:border]
-    box:x,y,z:hx,hy,hz:X[:border] half:x,y,z:nx,ny,nz:X[:border] lens:degrees:X[:border].  Default:
-    none."""
-    compare: Annotated[str, Opt(metavar="SCENE")] = ""
-    """Another scene (or scene@Stop, scene@0.5) to compare with: a line parts the two pictures.
-    Default: none."""
-    touch: bool = False
-    """Open the bundled scene that can be touched, a table with three objects; without a scene."""
-    play: bool = False
-    """Let the objects of a scene file fall and be carried from the start; T switches it."""
-    pictures: Path | None = None
-    """Folder for the pictures that F12 saves and the views that K keeps; scenes and exports go
-    beside it.  Default: Shapeshift/pictures among your documents."""
-    panel: bool = True
-    """Show the panel over the picture; H switches it."""
-    target_ms: Annotated[float | None, EXPERT] = None
-    """Milliseconds that a frame may take: the setting is chosen by a chart that is measured at the
-    start.  Default: no limit, the exact picture."""
-    floor_db: Annotated[float | None, EXPERT] = None
-    """PSNR in dB against the exact picture below which --target-ms never goes.  Default: 35."""
-    fov_y: Annotated[float, EXPERT] = 0.0
-    """Degrees from top to bottom, for a camera file that says nothing about the lens; 0: not
-    known."""
-    drawing: Annotated[Literal["auto", "quads", "tiles"], EXPERT] = "auto"
-    """What draws the splats: OpenGL quads, or OpenCL tiles, which need no GPU."""
-    debug: Annotated[Literal["", "culls", "birdseye", "overdraw", "depth", "object"], EXPERT] = ""
-    """Debug view to start in; G goes through them.  Default: the picture."""
-    screenshot: Annotated[Path | None, EXPERT] = None
-    """Write a picture of the whole window to this file after --frames frames, and end.  Default:
-    the window stays."""
-    frames: Annotated[int, EXPERT] = 3
-    """How many frames to draw before the --screenshot."""
 
 
 def run(options: Options) -> int:
@@ -92,7 +39,7 @@ def run(options: Options) -> int:
     state = EditorState(refiner.open)
     paths = tuple(map(plain, options.scenes)) or ((TOUCH if options.touch else DEMO),)
     read = read_files(paths, refiner.open, camera_reading(options), None, options.reading())
-    found = named_cameras(options, read)
+    found = named_cameras(options.camera, options, read)
     if not found.sources and found.file is None:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
     scene, document = opened_scene(found, options.x)
@@ -107,13 +54,18 @@ def run(options: Options) -> int:
                 window.grow_with_text()
             own_files = OwnFiles(settings.folder)
             viewer = Viewer(window, renderer, state, options, settings, own_files)
-            attach_refiner(viewer, refiner)
+            hooks, upload = viewer.hooks, viewer.shown.upload
+            attach_refiner(refiner, state, hooks, upload, viewer.dial.scene_changed)
             viewer.files.read = refiner.open
-            viewer.files.started(found, options)
-            with comparing(viewer, options) if options.compare else splitting(
-                window, state, viewer.hooks, state.messages, lambda: viewer.layout.free,
-                lambda: Renderer(window.ctx, drawing=options.drawing),
-            ):  # fmt: skip
+            viewer.files.started(found)
+            if options.compare:
+                two = comparing(window, renderer, state, hooks, options, viewer.free)
+            else:
+                two = splitting(
+                    window, state, hooks, viewer.free,
+                    lambda: Renderer(window.ctx, drawing=options.drawing),
+                )  # fmt: skip
+            with two:
                 viewer.loop()
     return 0
 

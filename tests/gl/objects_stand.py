@@ -11,9 +11,9 @@ from desktop_stand import PlainRenderer, ball, run_frames
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.panels.outlines import pixels
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
-from shapeshift.app.editor.window.files import opened_scene
-from shapeshift.app.editor.window.touch import Touch
+from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.cameras.camera_list import CameraReading
@@ -46,7 +46,7 @@ def viewer_of(window, found: OpenedFiles, folder: Path) -> Viewer:
 @pytest.fixture
 def touch_viewer(window, touch_found, tmp_path, monkeypatch):
     """The touch scene, its world there, things holding still as in a scene of one's own."""
-    monkeypatch.setattr(Touch, "opens_playing", False)
+    monkeypatch.setattr(TouchState, "opens_playing", False)
     viewer = viewer_of(window, touch_found, tmp_path)
     yield viewer
     release(viewer)
@@ -82,7 +82,7 @@ def thing(viewer, name: str):
 
 def place_of(viewer, point) -> tuple[float, float]:
     """Logical pixels of a point (3,) of the world."""
-    view = viewer.view()
+    view = viewer.viewpoint.view()
     in_eye = (view.eye_from_world() @ np.append(point, 1.0))[:3]
     return tuple(pixels(view, in_eye, viewer.window.logical_size))
 
@@ -127,7 +127,7 @@ CTRL, SHIFT = glfw.MOD_CONTROL, glfw.MOD_SHIFT
 
 def viewer_is_over(viewer, place) -> bool:
     mouse(viewer, *place)
-    return viewer.objects.gizmo._under_mouse
+    return viewer.gizmo._under_mouse
 
 
 def until_added(viewer) -> None:

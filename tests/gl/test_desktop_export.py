@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from desktop_stand import ball, run_frames
 
-from shapeshift.app.editor.panels.sections.export_panel import EVERYTHING, REGIONS, attach_export
+from shapeshift.app.editor.state.files.exporting import EVERYTHING, REGIONS, Exporting
 from shapeshift.runtime_models.splats.formats import read_plain
 from tests.writers import EACH_WRITER
 
@@ -17,7 +17,12 @@ pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 
 @pytest.fixture
 def panel(viewer):
-    return attach_export(viewer)
+    exporting = Exporting(
+        viewer.state, viewer.viewpoint, viewer.options.pictures.parent / "exports"
+    )
+    viewer.hooks.each_frame.append(exporting.poll)
+    viewer.hooks.opened.append(exporting.forget)
+    return exporting
 
 
 def finish(viewer, panel, seconds: float = 20.0) -> None:
@@ -39,7 +44,7 @@ def test_every_format_is_written_and_said(viewer, panel, writer):
     finish(viewer, panel)
     (path,) = exported(viewer)
     assert path.name == f"ball-x0.00{writer.ending}"
-    assert path.name in viewer.messages.note and "splats" in viewer.messages.note
+    assert path.name in viewer.state.messages.note and "splats" in viewer.state.messages.note
     assert len(read_plain(path).means) == len(ball().means)
 
 
@@ -72,10 +77,10 @@ def test_inside_the_regions_and_one_object(viewer, panel):
     one = state.scene.objects[0]
     state.show(replace(state.scene, objects=(one, replace(one, name="other"))))
     panel.forget()
-    assert panel._choices()[0] == [EVERYTHING, 0, 1]
+    assert panel.choices()[0] == [EVERYTHING, 0, 1]
     state.add_region("half-space")
     state.regions.edit(0, centre=np.zeros(3), normal=np.array([0.0, 1, 0]), border=0.0)
-    assert panel._choices()[0][-1] == REGIONS
+    assert panel.choices()[0][-1] == REGIONS
     panel.what = REGIONS
     panel.start()
     finish(viewer, panel)
@@ -96,7 +101,7 @@ def test_what_goes_wrong_is_in_the_box_and_leaves_nothing(viewer, panel, monkeyp
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("shapeshift.app.editor.panels.sections.export_panel.export", full)
+    monkeypatch.setattr("shapeshift.app.editor.state.files.exporting.export", full)
     panel.start()
     finish(viewer, panel)
     assert "No space left" in viewer.state.problem and not exported(viewer)
@@ -112,7 +117,7 @@ def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
 
     go = Event()
     monkeypatch.setattr(
-        "shapeshift.app.editor.panels.sections.export_panel.export",
+        "shapeshift.app.editor.state.files.exporting.export",
         lambda *_: go.wait(20) and ball(),
     )
     panel.start()

@@ -13,8 +13,9 @@ from test_streamed import random_sog, rewrite, write_streamed
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import Source
-from shapeshift.app.editor.state.files.refine import Refiner, attach_refiner
+from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.scene_objects import scene_of
+from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures display and window
@@ -33,6 +34,12 @@ def scene(tmp_path) -> Path:
         pictures["sh0.webp"][..., :3], pictures["sh0.webp"][..., 3] = color, 255
         write_folder(folder / f"{level}_0", meta, pictures)
     return rewrite(folder, lambda meta: None)
+
+
+def attach(viewer: Viewer, refiner: Refiner) -> None:
+    """As the program does."""
+    upload, changed = viewer.shown.upload, viewer.dial.scene_changed
+    attach_refiner(refiner, viewer.state, viewer.hooks, upload, changed)
 
 
 def shares(picture: np.ndarray) -> np.ndarray:
@@ -68,15 +75,15 @@ def test_the_first_frame_is_coarse_and_the_camera_stays(window, scene, tmp_path)
         viewer.frame(0.0)
         red, green, blue = shares(window.picture())
         assert red > 0.005 and green < 0.002 and blue < 0.002
-        attach_refiner(viewer, refiner)
-        before = viewer.camera.view((900, 640))
+        attach(viewer, refiner)
+        before = viewer.viewpoint.camera.view((900, 640))
         for _ in range(200):
             run_frames(viewer, 1)
             if not viewer._polling:
                 break
         red, green, blue = shares(window.picture())
         assert green > 0.03 and red < 0.002 and blue < 0.002
-        after = viewer.camera.view((900, 640))
+        after = viewer.viewpoint.camera.view((900, 640))
         assert np.array_equal(before.world_from_eye.matrix(), after.world_from_eye.matrix())
         assert "detail 3 of 3" in [said() for said in viewer.hooks.status]
 
@@ -88,7 +95,7 @@ def test_a_streamed_scene_that_is_dropped_on_the_window_is_refined(window, scene
         sources = [Source(scene / "1_0", refiner.open(scene / "1_0"))]  # one level alone: blue
         state.take(sources, scene_of(sources))
         viewer = Viewer(window, renderer, state, options)
-        attach_refiner(viewer, refiner)
+        attach(viewer, refiner)
         run_frames(viewer, 2)
         assert not refiner.running
         viewer.files.open_soon((scene,))

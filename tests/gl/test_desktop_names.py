@@ -61,7 +61,7 @@ def test_a_scene_of_such_names_is_shown(viewer):
     model = replace(ball(100), stops=stops)
     thing = viewer.state.scene.objects[0]
     viewer.state.scene = Scene((replace(thing, name=NAMES[0], model=model, x=0.5),))
-    viewer.say(NAMES[1])
+    viewer.state.say(NAMES[1])
     viewer.state.problem = NAMES[3]
     run_frames(viewer, 4)
     viewer.window.set_title(NAMES[1])

@@ -23,7 +23,6 @@ from objects_stand import (
 
 from shapeshift.app.editor.state.arrange import place, steer
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source
-from shapeshift.app.editor.window.gizmo import MOVE, OFF, TURN
 from shapeshift.app.editor.window.window import Drop
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
@@ -53,13 +52,16 @@ def test_a_scene_file_is_open_with_its_world(viewer):
 def test_a_click_chooses_what_is_under_it_and_a_drag_turns_the_camera(viewer):
     click(viewer, (0.0, 0.061, -0.12))
     assert viewer.state.chosen == "ball"
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     click(viewer, (-0.22, 0.06, 0.05))
     assert viewer.state.chosen == "cube"
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     drag(viewer, place_of(viewer, (0.0, 0.061, -0.12)), (700, 500))
     run_frames(viewer, 60)
-    assert viewer.state.chosen == "cube" and np.abs(viewer.view().eye_from_world() - before).max()
+    assert (
+        viewer.state.chosen == "cube"
+        and np.abs(viewer.viewpoint.view().eye_from_world() - before).max()
+    )
     key(viewer, glfw.KEY_ESCAPE)
     assert viewer.state.chosen == ""
 
@@ -68,8 +70,8 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     state, start = viewer.state, np.array([0.0, 0.061, -0.12])
     click(viewer, start)
     key(viewer, glfw.KEY_M)
-    assert viewer.objects.gizmo.mode == MOVE
-    camera = viewer.view().eye_from_world()
+    assert viewer.state.handles == "move"
+    camera = viewer.viewpoint.view().eye_from_world()
     tip = place_of(viewer, (0.08, 0.061, -0.12))
     middle = place_of(viewer, start)
     held = tip if viewer_is_over(viewer, tip) else None
@@ -78,7 +80,7 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     moved = thing(viewer, "ball").world_from_object
     assert moved.position[0] > 0.05 and moved.position[1:] == pytest.approx(start[1:], abs=1e-6)
     np.testing.assert_array_equal(moved.wxyz, (1, 0, 0, 0))
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), camera)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), camera)
     item = state.document.file.items[1]
     assert item.position == pytest.approx(moved.position, abs=1e-6) and item.wxyz == (1, 0, 0, 0)
     assert tuple(moved.position) == item.position
@@ -94,13 +96,13 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     )
     key(viewer, glfw.KEY_M)
     key(viewer, glfw.KEY_M)
-    assert viewer.objects.gizmo.mode == OFF
+    assert viewer.state.handles == ""
 
 
 def test_handles_turn_it_in_its_place(viewer):
     state = viewer.state
     click(viewer, (-0.22, 0.06, 0.05))
-    viewer.objects.gizmo.mode = TURN
+    viewer.state.handles = "turn"
     run_frames(viewer, 2)
     x, y = place_of(viewer, (-0.22, 0.051, 0.05))
     low = next(y + r for r in range(20, 200, 2) if viewer_is_over(viewer, (x, y + r)))
@@ -109,7 +111,7 @@ def test_handles_turn_it_in_its_place(viewer):
     assert abs(pose.wxyz[0]) < 0.999 and np.linalg.norm(pose.wxyz) == pytest.approx(1)
     assert pose.position == pytest.approx((-0.22, 0.051, 0.05), abs=0.01)  # about its middle
     assert state.document.file.items[0].wxyz == pytest.approx(pose.wxyz, abs=1e-8)
-    viewer.objects.gizmo.mode = OFF
+    viewer.state.handles = ""
 
 
 def test_copy_delete_hide_and_rename_with_undo(viewer):
@@ -121,17 +123,17 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     assert copy.model is thing(viewer, "ball").model
     assert copy.world_from_object.position[0] > 0.05  # beside it, not in it
     assert "ball 2" in viewer.state.world.things
-    assert objects.edit(edits.rename, "ball 2", "globe", what="rename")
+    assert objects.edits.edit(edits.rename, "ball 2", "globe", what="rename")
     key(viewer, glfw.KEY_DELETE)
     assert names(viewer) == [*NAMES[:2], "ball", "ring", "plate"] or viewer.state.chosen == ""
-    assert not objects.edit(edits.rename, "ball", "cube", what="rename")
+    assert not objects.edits.edit(edits.rename, "ball", "cube", what="rename")
     assert "taken" in viewer.state.problem
     key(viewer, glfw.KEY_ESCAPE)
     while viewer.state.document.history.undoes:
         key(viewer, glfw.KEY_Z, CTRL)
     assert names(viewer) == NAMES and list(viewer.state.world.things) == NAMES
     key(viewer, glfw.KEY_Z, CTRL)
-    assert "Nothing" in viewer.messages.note
+    assert "Nothing" in viewer.state.messages.note
 
 
 def test_objects_are_added_by_dropping_while_the_box_is_open(viewer, tmp_path):
@@ -189,14 +191,14 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
     state.world.paused = True
     run_frames(viewer, 2)
     state.chosen = "ball"
-    objects.duplicate()
+    objects.edits.duplicate()
     copy = thing(viewer, "ball 2")
     assert copy.world_from_object.position[1:] == pytest.approx(
         fallen.world_from_object.position[1:], abs=1e-5
     )
     assert copy.x == 0.25  # a copy of what is seen, not of where it started
     key(viewer, glfw.KEY_Z, CTRL)
-    objects.keep_standing()
+    objects.edits.keep_standing()
     item = edits.find(state.document.file, "ball")
     assert item.x == 0.25
     assert item.position == pytest.approx(fallen.world_from_object.position, abs=1e-5)
@@ -207,20 +209,20 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
 def test_a_body_is_given_taken_and_weighed(viewer):
     objects, world = viewer.objects, viewer.state.world
     item = edits.find(viewer.state.document.file, "ball")
-    assert objects.change(item, "body", collider=None)
+    assert objects.edits.change(item, "body", collider=None)
     assert world.things["ball"].body is None
     key(viewer, glfw.KEY_Z, CTRL)
     assert world.things["ball"].body is not None
     item = edits.find(viewer.state.document.file, "ball")
-    assert objects.change(item, "mass", mass_kg=2.0)
+    assert objects.edits.change(item, "mass", mass_kg=2.0)
     assert world.physics.mass(world.things["ball"].body) == pytest.approx(2.0)
-    assert objects.change(item, "body", static=True) and not world.things["ball"].moves
+    assert objects.edits.change(item, "body", static=True) and not world.things["ball"].moves
 
 
 def test_a_collider_that_cannot_be_made_is_a_sentence(viewer):
     objects, state = viewer.objects, viewer.state
     item = edits.find(state.document.file, "ball")
-    assert objects.change(item, "body", collider="touch/none.obj")
+    assert objects.edits.change(item, "body", collider="touch/none.obj")
     end = time.monotonic() + 20
     while state.bodies.busy and time.monotonic() < end:
         run_frames(viewer, 1)
@@ -245,12 +247,12 @@ def test_an_empty_scene_is_shown_and_undone(plain):
 def test_a_long_list_and_every_part_of_the_panel_is_drawn(viewer):
     for _ in range(9):
         viewer.state.chosen = "ball"
-        viewer.objects.duplicate()
+        viewer.objects.edits.duplicate()
     run_frames(viewer, 3)
     assert len(names(viewer)) == 14 and len(viewer.state.sliders) == 1
     viewer.state.chosen = "background"
     run_frames(viewer, 2)
     viewer.state.move(1, thing(viewer, "plate").world_from_object)
     run_frames(viewer, 2)
-    viewer.objects.keep_standing()
+    viewer.objects.edits.keep_standing()
     assert viewer.state.document.file.items[0].position == (0.28, 0.005, 0.1)

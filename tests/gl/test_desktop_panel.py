@@ -84,14 +84,14 @@ def test_a_problem_stays_until_its_cross_is_clicked(viewer, hands):
     run_frames(viewer, 3)
     boxes = viewer.window.covered[-2:]
     assert boxes[0][3] <= boxes[1][1]  # the newer one above
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     left, top, right, _ = boxes[0]
     hands.drag((left + 40, top + 16), (left + 140, top + 16))  # on the sentence: no drag
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     hands.click(right - 22, top + 22)
-    assert viewer.messages.problems == ["one.ply is empty."]
+    assert viewer.state.messages.problems == ["one.ply is empty."]
     hands.key("Escape")
-    assert viewer.messages.problems == []
+    assert viewer.state.messages.problems == []
 
 
 def test_f1_opens_and_closes_the_sheet_of_all_keys(viewer, hands, monkeypatch):
@@ -152,7 +152,7 @@ def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     viewer, widgets = splats_viewer, Widgets(monkeypatch)
     viewer.files.read = lambda path, told: viewer.state.read_model(path)
     viewer.state.chosen = "ball"
-    viewer.objects.delete()
+    viewer.objects.edits.delete()
     run_frames(viewer, 3)
     assert names(viewer) == [] and "The demo" in widgets.boxes
     left, top, right, low = viewer.window.covered[3]
@@ -196,16 +196,16 @@ def test_browsing_is_offered_where_the_desktop_has_a_dialog(monkeypatch):
     ],
 )  # fmt: skip
 def test_the_numeric_keypad_looks_from_the_sides_as_in_blender(viewer, hands, key, held, side):
-    target, distance = viewer.camera.target.copy(), viewer.camera.distance
+    target, distance = viewer.viewpoint.camera.target.copy(), viewer.viewpoint.camera.distance
     hands.key(key, *held)
     run_frames(viewer, 80)
-    eye = viewer.view().world_from_eye.position
+    eye = viewer.viewpoint.view().world_from_eye.position
     np.testing.assert_allclose(eye, target + distance * np.array(side, float), atol=1e-3)
-    up = viewer.view().world_from_eye.matrix()[:3, 1]
+    up = viewer.viewpoint.view().world_from_eye.matrix()[:3, 1]
     assert up[1] > 0.99 or abs(side[1]) == 1  # level, or straight above with -Z up
     hands.drag((600, 200), (640, 200))
     run_frames(viewer, 60)
-    moved = viewer.view().world_from_eye.matrix()[:3, 2]
+    moved = viewer.viewpoint.view().world_from_eye.matrix()[:3, 2]
     assert abs(moved[1]) == pytest.approx(abs(side[1]), abs=1e-3)  # turned, not tipped over
 
 
@@ -214,15 +214,15 @@ def test_the_buttons_of_the_camera_do_the_same(viewer, hands, monkeypatch):
     run_frames(viewer, 2)
     hands.click(*widgets.middle("Top"))
     run_frames(viewer, 80)
-    assert viewer.view().world_from_eye.matrix()[1, 2] == pytest.approx(1, abs=1e-6)
+    assert viewer.viewpoint.view().world_from_eye.matrix()[1, 2] == pytest.approx(1, abs=1e-6)
     hands.click(*widgets.middle("Fly"))
-    assert viewer.camera.flying
+    assert viewer.viewpoint.camera.flying
     hands.click(*widgets.middle("Orbit"))
     hands.click(*widgets.middle("First view"))
     run_frames(viewer, 80)
-    assert not viewer.camera.flying
-    first = viewer.state.first_view(viewer.free_size()).world_from_eye.position
-    np.testing.assert_allclose(viewer.view().world_from_eye.position, first, atol=1e-3)
+    assert not viewer.viewpoint.camera.flying
+    first = viewer.state.first_view(viewer.viewpoint.free_size()).world_from_eye.position
+    np.testing.assert_allclose(viewer.viewpoint.view().world_from_eye.position, first, atol=1e-3)
 
 
 def test_a_stop_is_gone_to_by_its_button(viewer, hands, monkeypatch):
@@ -248,7 +248,7 @@ def test_painting_is_undone_by_the_keyboard_and_the_slider_stays(viewer, hands):
     hands.key("Right")
     hands.key("z", "Control_L")
     assert regions.items == () and viewer.state.scene.objects[0].x == 0.01
-    assert "paint" in viewer.messages.note
+    assert "paint" in viewer.state.messages.note
     hands.key("y", "Control_L")
     assert regions.items[0].painted.sum() > 0
 

@@ -19,7 +19,7 @@ def press(viewer, key: int, shift: bool = False) -> None:
 
 
 def middle(viewer) -> tuple[float, float]:
-    left, top, right, bottom = viewer._free
+    left, top, right, bottom = viewer.viewpoint.free
     return (left + right) / 2, (top + bottom) / 2
 
 
@@ -126,7 +126,7 @@ def test_g_goes_through_the_debug_views_and_back(viewer):
 def test_a_click_places_a_region_on_the_surface_and_a_drag_moves_it_on(viewer):
     state = viewer.state
     state.add_region("sphere")
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     x, y = middle(viewer)
     viewer.take(Press("left", x, y))
     first = state.regions.current.centre
@@ -135,10 +135,10 @@ def test_a_click_places_a_region_on_the_surface_and_a_drag_moves_it_on(viewer):
     assert np.linalg.norm(state.regions.current.centre - first) > 0.05
     viewer.take(Release("left"))
     run_frames(viewer, 3)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     viewer.take(Press("left", x, y))
     viewer.take(Drag("left", 30, 0, x + 30, y))  # now it is the camera again
-    assert viewer.camera.moving
+    assert viewer.viewpoint.camera.moving
 
 
 def test_regions_reach_the_renderer_and_change_what_is_drawn(viewer):
@@ -146,28 +146,30 @@ def test_regions_reach_the_renderer_and_change_what_is_drawn(viewer):
     state.add_region("box")
     run_frames(viewer, 2)
     assert viewer.renderer.draws == drawn + 1  # once: the scene is the same object after that
-    assert [type(s).__name__ for s in state.shown(viewer.view()).objects[0].selectors] == ["Box"]
+    assert [
+        type(s).__name__ for s in state.shown(viewer.viewpoint.view()).objects[0].selectors
+    ] == ["Box"]
     state.regions.edit(0, enabled=False)
     run_frames(viewer, 2)
     assert viewer.renderer.draws == drawn + 2
-    assert state.shown(viewer.view()).objects[0].selectors == ()
+    assert state.shown(viewer.viewpoint.view()).objects[0].selectors == ()
 
 
 def test_the_lens_follows_the_camera(viewer):
     press(viewer, glfw.KEY_L)
-    (lens,) = viewer.state.shown(viewer.view()).objects[0].selectors
+    (lens,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
     viewer.take(Drag("left", 80, 0))
     run_frames(viewer, 60)
-    (moved,) = viewer.state.shown(viewer.view()).objects[0].selectors
-    np.testing.assert_array_equal(moved.position, viewer.view().world_from_eye.position)
+    (moved,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
+    np.testing.assert_array_equal(moved.position, viewer.viewpoint.view().world_from_eye.position)
     assert moved != lens and not viewer._busy()
     press(viewer, glfw.KEY_L)
-    assert viewer.state.shown(viewer.view()).objects[0].selectors == ()
+    assert viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors == ()
 
 
 def test_holding_b_paints_what_is_in_front_and_shift_erases(viewer, monkeypatch):
     x, y = middle(viewer)
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     viewer.state.regions.brush = 80.0
     hold(monkeypatch, glfw.KEY_B)
     viewer.take(Press("left", x, y))
@@ -175,7 +177,7 @@ def test_holding_b_paints_what_is_in_front_and_shift_erases(viewer, monkeypatch)
     region = viewer.state.regions.current
     assert region.kind == "painted" and region.painted.sum() > 10
     model = viewer.state.scene.objects[0].model
-    eye = viewer.view().world_from_eye.position
+    eye = viewer.viewpoint.view().world_from_eye.position
     facing = np.einsum("ac,ac->a", model.means[region.painted], eye - model.means[region.painted])
     assert (facing > 0).all()  # none on the far side of the ball
     hold(monkeypatch, glfw.KEY_B, glfw.KEY_LEFT_SHIFT)
@@ -183,7 +185,7 @@ def test_holding_b_paints_what_is_in_front_and_shift_erases(viewer, monkeypatch)
     assert viewer.state.regions.current.painted.sum() < region.painted.sum()
     monkeypatch.undo()
     run_frames(viewer, 3)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
 
 
 def test_escape_leaves_the_region_and_hiding_keeps_it(viewer):
@@ -192,4 +194,4 @@ def test_escape_leaves_the_region_and_hiding_keeps_it(viewer):
     assert viewer.state.regions.current is None and not viewer.state.regions.placing
     press(viewer, glfw.KEY_H)
     run_frames(viewer, 2)
-    assert len(viewer.state.shown(viewer.view()).objects[0].selectors) == 1
+    assert len(viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors) == 1

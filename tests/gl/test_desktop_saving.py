@@ -33,18 +33,18 @@ def plain(splats_viewer):
 def test_what_the_program_brought_along_is_never_written_over(viewer, tmp_path, display):
     """Ctrl+S by the keyboard itself: a name is asked for, and the one proposed is one's own."""
     before = {path: path.read_bytes() for path in TOUCH.parent.rglob("*") if path.is_file()}
-    view = viewer.view().eye_from_world()
+    view = viewer.viewpoint.view().eye_from_world()
     viewer.state.chosen = "ball"
-    viewer.objects.delete()
+    viewer.objects.edits.delete()
     with RealHands(viewer, display) as hands:
         hands.key("s", "Control_L")
         assert viewer.objects.saving.asking
         hands.key("Return")  # the proposed name
     wanted = tmp_path / "scenes" / "touch.scene.json"
     assert not viewer.objects.saving.asking and not viewer.objects.unsaved
-    assert str(wanted) in viewer.messages.note  # absolute
+    assert str(wanted) in viewer.state.messages.note  # absolute
     assert [item.name for item in read_scene_file(wanted).items] == ["cube", "ring", "plate"]
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), view)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), view)
     after = {path: path.read_bytes() for path in TOUCH.parent.rglob("*") if path.is_file()}
     assert after == before
     again = read_files([wanted], None, CameraReading(), lambda *_: None)
@@ -69,7 +69,7 @@ def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
     path = tmp_path / "own.scene.json"
     assert not saving.in_place and saving.named(str(path)) and saving.in_place
     viewer.state.chosen = "ball"
-    viewer.objects.delete()
+    viewer.objects.edits.delete()
     key(viewer, glfw.KEY_S, CTRL)
     assert not saving.asking and not viewer.objects.unsaved
     assert [item.name for item in read_scene_file(path).items] == ["cube", "ring", "plate"]
@@ -79,7 +79,7 @@ def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
     assert saving.original == other
     key(viewer, glfw.KEY_S, CTRL)
     assert saving.asking and other.read_bytes() == path.read_bytes()
-    assert saving._name == str(tmp_path / "scenes" / "other.scene.json")
+    assert saving.name == str(tmp_path / "scenes" / "other.scene.json")
     saving.cancel_name()
 
 
@@ -105,7 +105,7 @@ def test_a_proposed_name_is_free(plain, tmp_path):
     for name in ("ball.scene.json", "ball 2.scene.json"):
         (folder / name).write_text("mine")
     plain.objects.saving.ask_name()
-    assert plain.objects.saving._name == str(folder / "ball 3.scene.json")
+    assert plain.objects.saving.name == str(folder / "ball 3.scene.json")
     plain.objects.saving.cancel_name()
 
 
@@ -186,7 +186,7 @@ def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
 def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
     assert viewer._may_close()
     viewer.state.chosen = "ball"
-    viewer.objects.delete()
+    viewer.objects.edits.delete()
     run_frames(viewer, 1)
     assert viewer.window._window.title.startswith("* touch.scene.json")
     assert viewer.objects.status() == "not saved"
@@ -214,18 +214,18 @@ def test_a_slider_alone_asks_nothing(viewer):
 def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
     objects, state = viewer.objects, viewer.state
     first = state.world
-    assert objects.edit(edits.ground, -0.2, what="floor")
+    assert objects.edits.edit(edits.ground, -0.2, what="floor")
     assert state.document.file.floor_y == -0.2 and state.world is not first
     assert state.world.paused and list(state.world.things) == NAMES
-    viewer.camera.turn(0.3, -0.1)
+    viewer.viewpoint.camera.turn(0.3, -0.1)
     run_frames(viewer, 60)
-    objects.look_from_here()
-    eye = viewer.view().world_from_eye.position
+    objects.edits.look_from_here()
+    eye = viewer.viewpoint.view().world_from_eye.position
     assert state.document.file.view.eye == pytest.approx(eye, abs=1e-6)
     assert objects.saving.named(str(tmp_path / "a"))
     again = state.first_view((900, 640))
     np.testing.assert_allclose(
-        again.world_from_eye.matrix(), viewer.view().world_from_eye.matrix(), atol=1e-4
+        again.world_from_eye.matrix(), viewer.viewpoint.view().world_from_eye.matrix(), atol=1e-4
     )
     key(viewer, glfw.KEY_Z, CTRL)
     key(viewer, glfw.KEY_Z, CTRL)
@@ -240,5 +240,5 @@ def test_paint_on_what_is_no_file_yet_is_asked_about_and_a_lens_is_not(plain):
     run_frames(plain, 1)
     assert plain.objects.unsaved and not plain._may_close()
     plain.objects.saving.answer("Cancel")
-    plain.objects.undo()
+    plain.objects.edits.undo()
     assert not plain.objects.unsaved and plain._may_close()

@@ -117,6 +117,7 @@ def test_a_click_on_a_stops_name_goes_there(viewer, hands):
     left, top, right, _ = viewer.window.covered[1]
     _, high = track_ends(viewer)
     hands.click(high - 20, top + 12 + 8)  # "thermal" ends where the track does
+    run_frames(viewer, 2, seconds=0.5)  # the way there takes SHIFT_S
     assert x_of(viewer) == 1.0
     assert left < high < right
 
@@ -129,11 +130,14 @@ def test_arrow_keys_step_and_shift_goes_to_the_next_stop(viewer, hands):
     hands.key("Left")
     assert x_of(viewer) == 0.02
     hands.key("Right", "Shift_L")
+    run_frames(viewer, 2, seconds=0.5)
     assert x_of(viewer) == 1.0
     hands.key("Right")
     hands.key("Right", "Shift_L")
+    run_frames(viewer, 2, seconds=0.5)
     assert x_of(viewer) == 1.0
     hands.key("Left", "Shift_L")
+    run_frames(viewer, 2, seconds=0.5)
     assert x_of(viewer) == 0.0
     hands.key("Left")
     assert x_of(viewer) == 0.0
@@ -163,13 +167,13 @@ def test_x_is_typed_as_a_number_or_a_name(viewer, hands):
 def test_typing_beside_other_keys_moves_nothing_else(viewer, hands):
     """While the number is typed, arrows and letters are the field's."""
     right, y = viewer.window.covered[1][2], knob(viewer)[1]
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     hands.click(right - 30, y)
     hands.key("Right")
     hands.key("w")
     hands.key("Escape")
     assert x_of(viewer) == 0.0
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     hands.key("Right")
     assert x_of(viewer) == 0.01
 

@@ -1,6 +1,5 @@
 """Touching in the real window: mouse and keys act on the world, the picture shows what happens."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import glfw
@@ -14,7 +13,7 @@ from shapeshift.app.editor.state.bodies import made_of
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.document import Document
 from shapeshift.app.editor.state.files.opened import Source
-from shapeshift.app.editor.window.touch import HAND
+from shapeshift.app.editor.window.touch import HAND, MouseTouch
 from shapeshift.app.editor.window.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
 from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.document.edits import History
@@ -69,7 +68,7 @@ def press_key(viewer, key: int, shift: bool = False) -> None:
 
 def on_screen(viewer, point: np.ndarray) -> tuple[float, float]:
     """Logical pixels of a point of the world."""
-    view = viewer.view()
+    view = viewer.viewpoint.view()
     clip = view.clip_from_eye() @ view.eye_from_world() @ np.append(point, 1.0)
     (x, y), (width, height) = clip[:2] / clip[3], viewer.window.logical_size
     return float((x + 1) / 2 * width), float((1 - y) / 2 * height)
@@ -86,7 +85,7 @@ def hold(viewer, name: str = "cube") -> tuple[float, float]:
 
 
 def test_a_drag_carries_what_lies_under_the_mouse(viewer):
-    before = viewer.view()
+    before = viewer.viewpoint.view()
     at = hold(viewer)
     assert viewer.state.world.held(HAND) == "cube" and viewer.state.chosen == "cube"
     for _ in range(30):
@@ -97,7 +96,7 @@ def test_a_drag_carries_what_lies_under_the_mouse(viewer):
     assert x - at[0] == pytest.approx(60, abs=6) and y - at[1] == pytest.approx(-120, abs=8)
     drawn = viewer.state.scene.objects[0].world_from_object.position
     np.testing.assert_allclose(drawn, place(viewer), atol=0.02)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before.eye_from_world())
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before.eye_from_world())
     viewer.take(Release("left"))
     assert viewer.state.world.held(HAND) is None
     run_frames(viewer, 25, seconds=0.08)
@@ -116,13 +115,13 @@ def test_a_flick_throws(viewer):
 
 def test_the_wheel_pushes_and_shift_turns(viewer, monkeypatch):
     hold(viewer)
-    distance = np.linalg.norm(place(viewer) - viewer.camera.position)
-    zoom = viewer.camera.distance
+    distance = np.linalg.norm(place(viewer) - viewer.viewpoint.camera.position)
+    zoom = viewer.viewpoint.camera.distance
     viewer.take(Drag("left", 0.0, -60.0))
     viewer.take(Wheel(4))
     run_frames(viewer, 12, seconds=0.08)
-    assert viewer.camera.distance == zoom
-    assert np.linalg.norm(place(viewer) - viewer.camera.position) > distance + 0.3
+    assert viewer.viewpoint.camera.distance == zoom
+    assert np.linalg.norm(place(viewer) - viewer.viewpoint.camera.position) > distance + 0.3
     monkeypatch.setattr(viewer.window, "held", lambda key: key == glfw.KEY_LEFT_SHIFT)
     where = place(viewer).copy()
     viewer.take(Drag("left", 100.0, 0.0))
@@ -140,12 +139,12 @@ def test_what_is_not_for_the_hand_turns_the_camera(viewer, how):
     at = {"static": on_screen(viewer, place(viewer, "post")), "elsewhere": (450.0, 20.0)}
     button = "right" if how == "right button" else "left"
     viewer.take(Press(button, *at.get(how, on_screen(viewer, place(viewer)))))
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     viewer.take(Drag(button, 40.0, 0.0))
     run_frames(viewer, 5)
     viewer.take(Release(button))
     assert viewer.state.world.held(HAND) is None
-    assert np.abs(viewer.view().eye_from_world() - before).max() > 0.01
+    assert np.abs(viewer.viewpoint.view().eye_from_world() - before).max() > 0.01
 
 
 @pytest.mark.parametrize(
@@ -213,7 +212,7 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
     world.paused = paused
     viewer.window._cursor = on_screen(viewer, place(viewer))
     press_key(viewer, glfw.KEY_X)
-    assert len(viewer.touch.marks.flashes) == 1
+    assert len(viewer.touch.flashes) == 1
     run_frames(viewer, 2)
     if paused:
         assert world.things["cube"].standing.state == "hot"
@@ -221,12 +220,12 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
     run_frames(viewer, 15)
     assert viewer.state.scene.objects[0].x == 1.0
     assert list(viewer.touch.told) == ["cube: hit by a ray, now hot"]
-    assert [label.text for label in viewer.touch.marks.labels] == ["hot"]
+    assert [label.text for label in viewer.touch.labels] == ["hot"]
     run_frames(viewer, 20, seconds=0.1)
-    assert not viewer.touch.marks.fading
+    assert not viewer.touch.fading
     viewer.window._cursor = (450.0, 5.0)  # the sky
     press_key(viewer, glfw.KEY_X)
-    assert not viewer.touch.marks.flashes
+    assert not viewer.touch.flashes
 
 
 def picture(viewer) -> np.ndarray:
@@ -269,8 +268,9 @@ def test_at_rest_the_loop_sleeps_though_things_may_move(viewer):
 
 def test_without_a_world_nothing_is_taken(viewer):
     viewer.state.bodies.world = None
+    parts = (viewer.touch, viewer.state, viewer.window, viewer.viewpoint, viewer.hands)
     for event in (KeyDown(glfw.KEY_T, False), Press("left", 450, 300), KeyDown(glfw.KEY_J, False)):
-        assert not viewer.touch.take(event)
+        assert not MouseTouch(*parts).take(event)
     run_frames(viewer, 2)
     assert viewer.touch.status() == ""
 
@@ -283,7 +283,7 @@ def new_world(viewer) -> World:
 
 def test_another_scene_waits_unless_it_is_to_play_and_another_floor_does_not(viewer):
     assert not viewer.state.world.paused
-    viewer.options = replace(viewer.options, play=False)
+    viewer.touch.play = False
     world = new_world(viewer)  # of another floor
     run_frames(viewer, 3)
     assert not world.paused and world.steps > 0

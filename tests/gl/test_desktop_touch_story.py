@@ -33,7 +33,7 @@ def glide(viewer, points: list, steps: int = 12) -> None:
 def test_a_person_plays_with_the_bundled_scene(viewer):
     world = viewer.state.world
     start = {name: place(viewer, name).copy() for name in ("cube", "ball", "ring")}
-    assert not world.paused and "Drag a thing" in viewer.messages.note
+    assert not world.paused and "Drag a thing" in viewer.state.messages.note
     run_frames(viewer, 10)
 
     rim = place(viewer, "ring") + np.array([0.06, 0.015, 0.0])
@@ -91,8 +91,8 @@ def test_steps_by_hand_and_turning_with_shift(viewer):
     for _ in range(3):
         viewer.window._on_scroll(None, 0, 1)
         run_frames(viewer, 3)
-    away = np.linalg.norm(place(viewer, "cube") - viewer.camera.position)
-    assert away > np.linalg.norm(np.array([-0.22, 0.05, 0.05]) - viewer.camera.position)
+    away = np.linalg.norm(place(viewer, "cube") - viewer.viewpoint.camera.position)
+    assert away > np.linalg.norm(np.array([-0.22, 0.05, 0.05]) - viewer.viewpoint.camera.position)
     viewer.window._on_key(None, glfw.KEY_ESCAPE, 0, glfw.PRESS, 0)
     run_frames(viewer, 2)
     assert world.held("mouse") is None

@@ -31,7 +31,9 @@ def stand(window, tmp_path, request):
     options = Options(pictures=tmp_path, panel=False, drawing=request.param)
     with Renderer(window.ctx, request.param) as one, Renderer(window.ctx, request.param) as other:
         viewer = Viewer(window, one, state, options)
-        wipe = Wipe(viewer, other, SceneSide("b", Subject.of(b, 0.0), stated=False))
+        side = SceneSide("b", Subject.of(b, 0.0), stated=False)
+        wipe = Wipe(window, (one, other), state, side, viewer.free())
+        wipe.attach(viewer.hooks)
         run_frames(viewer, 5)
         yield viewer, wipe, b
         wipe.release()
@@ -69,7 +71,7 @@ def test_each_side_of_the_line_is_exactly_its_own_picture(stand, part):
 def test_the_line_follows_mouse_and_keys_and_the_camera_stays(stand):
     viewer, wipe, _ = stand
     width = viewer.window.logical_size[0]
-    before = viewer.view()
+    before = viewer.viewpoint.view()
     viewer.take(Press("left", wipe.part * width + 4, 100))
     viewer.take(Drag("left", -90, 0, 0.25 * width, 100))
     assert wipe.part == 0.25
@@ -78,10 +80,10 @@ def test_the_line_follows_mouse_and_keys_and_the_camera_stays(stand):
     viewer.take(Release("left"))
     viewer.take(KeyDown(glfw.KEY_COMMA, False))
     assert wipe.part == pytest.approx(0.98)
-    assert str(viewer.view()) == str(before) and not viewer.camera.moving
+    assert str(viewer.viewpoint.view()) == str(before) and not viewer.viewpoint.camera.moving
     viewer.take(Press("left", 10, 100))  # far from the line: the camera's
     viewer.take(Drag("left", 30, 0, 40, 100))
-    assert viewer.camera.moving and wipe.part == pytest.approx(0.98)
+    assert viewer.viewpoint.camera.moving and wipe.part == pytest.approx(0.98)
 
 
 def test_it_can_be_switched_off(stand):
@@ -123,7 +125,9 @@ def test_a_scene_file_is_drawn_where_it_says_beside_itself_at_another_x(window, 
     options = Options(pictures=tmp_path, panel=False, drawing="quads")
     with Renderer(window.ctx, "quads") as one, Renderer(window.ctx, "quads") as other:
         viewer = Viewer(window, one, state, options)
-        wipe = Wipe(viewer, other, SceneSide("b", Subject.of(ball(50), 0.0)))
+        side = SceneSide("b", Subject.of(ball(50), 0.0))
+        wipe = Wipe(window, (one, other), state, side, viewer.free())
+        wipe.attach(viewer.hooks)
         run_frames(viewer, 2)
         assert not wipe._offset(state.scene).any()
         wipe.release()

@@ -9,13 +9,24 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import section, tip
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.layout import Layout
-from shapeshift.app.editor.window.hooks import Section
 
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
     "Touch", "Stops", "Look", "Camera", "Objects", "Regions", "Export", "Performance",
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading of the panel that folds, with what lies under it."""
+
+    name: str
+    draw: Callable[[float], None]  # called with ui_scale between imgui.begin and end
+    open_first: bool = False
+    opens: Callable[[], bool] | None = None  # True: unfold it now
+    shown: Callable[[], bool] | None = None  # False: leave it out, there is nothing in it
+    early: Callable[[], bool] | None = None  # True: second from above now, whatever its name
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
-from shapeshift.app.editor.panels.widgets.panel_rows import number, tip
+from shapeshift.app.editor.panels.widgets.panel_rows import tip
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.messages import number
 from shapeshift.app.opening import sentence
 
 Vec = imgui.ImVec2

@@ -3,56 +3,53 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.document import key_of
+from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_weights import Control
-from shapeshift.scene.control import Sweep
+from shapeshift.scene.control import Shift, Sweep
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.edits import Change, History
 from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled, object_of
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 
-if TYPE_CHECKING:
-    from shapeshift.app.editor.state.editor_state import EditorState
-    from shapeshift.app.editor.state.files.opened import Source
-
 LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
 MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told
 COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 
 
-def edit(state: "EditorState", file: SceneFile, what: str, together: str = "") -> None:
+def edit(state: EditorState, file: SceneFile, what: str, together: str = "") -> None:
     """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
-    record_regions(state)
+    state.record_regions()
     turn_to(state, state.document.history.take(file, what, together))
-    amend_regions(state)
+    state.document.amend_regions(state.regions)
 
 
-def undo(state: "EditorState") -> str:
+def undo(state: EditorState) -> str:
     """Takes the last edit back; returns what it was, "" where there was none.
 
     Looks are no edits: the camera and every slider stay where they are.
     """
-    record_regions(state)
+    state.record_regions()
     what = state.document.history.undoes
     go_back(state, state.document.history.undo())
     return what
 
 
-def redo(state: "EditorState") -> str:
-    record_regions(state)
+def redo(state: EditorState) -> str:
+    state.record_regions()
     what = state.document.history.redoes
     go_back(state, state.document.history.redo())
     return what
 
 
-def go_back(state: "EditorState", history: History) -> None:
+def go_back(state: EditorState, history: History) -> None:
     """Goes to a step that has been before, with every x as it is now."""
     now = state.document.history
     turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
@@ -60,29 +57,10 @@ def go_back(state: "EditorState", history: History) -> None:
         state.regions.restore(history.regions)
         for index, thing in enumerate(state.scene.objects):
             state.regions.fit_painted(index, thing)
-    amend_regions(state)
+    state.document.amend_regions(state.regions)
 
 
-def record_regions(state: "EditorState") -> None:
-    """Makes what was done to the regions since the last call a step of the history."""
-    regions, history = state.regions, state.document.history
-    if not regions.did:
-        amend_regions(state)
-        return
-    state.document.history = history.take(
-        history.file, regions.did, regions.together, regions.kept, regions.bytes
-    )
-    regions.did = ""
-
-
-def amend_regions(state: "EditorState") -> None:
-    """Takes regions over that nobody's hand has changed: their objects have."""
-    history = state.document.history
-    state.document.history = history.amend(history.file, state.regions.kept)
-    state.regions.did = ""
-
-
-def turn_to(state: "EditorState", history: History) -> None:
+def turn_to(state: EditorState, history: History) -> None:
     """Goes to another step of the history: only what differs is touched."""
     before = state.document.history
     state.finish_shifts()
@@ -102,7 +80,7 @@ def turn_to(state: "EditorState", history: History) -> None:
         raise
 
 
-def arrange(state: "EditorState", changed: Sequence[Change]) -> None:
+def arrange(state: EditorState, changed: Sequence[Change]) -> None:
     """The scene's objects as the file has them now; the rest goes on as it stands."""
     of = {change.after.name: change for change in changed if change.after is not None}
     was = {thing.name: index for index, thing in enumerate(state.scene.objects)}
@@ -132,8 +110,8 @@ def arrange(state: "EditorState", changed: Sequence[Change]) -> None:
 
 
 def fresh_row(
-    state: "EditorState", item: SceneItem, label: int
-) -> "tuple[SceneObject, object, Sweep, Source]":
+    state: EditorState, item: SceneItem, label: int
+) -> tuple[SceneObject, object, Sweep, Source]:
     """What the state holds of an object that was not there."""
     source = state.document.sources[key_of(item)]
     thing = object_of(item, state.in_palette(source.model), label)
@@ -154,7 +132,7 @@ def changed_thing(thing: SceneObject, item: SceneItem, change: Change | None) ->
     return replace(thing, **values)
 
 
-def steer(state: "EditorState", index: int, x: Control) -> None:
+def steer(state: EditorState, index: int, x: Control) -> None:
     """A hand moves x: where the object starts as well, unless the world is running.
 
     It is a look and no edit: undoing leaves it as it is.
@@ -167,14 +145,14 @@ def steer(state: "EditorState", index: int, x: Control) -> None:
         state.bodies.follow(state.document)
 
 
-def steer_by_hand(state: "EditorState", index: int, x: float) -> None:
+def steer_by_hand(state: EditorState, index: int, x: float) -> None:
     """The same by a slider, a key or a number: what played stops, and keys go on with this one."""
     state.sweeps[index].playing = False
     state.steered = state.scene.objects[index].name
     steer(state, index, x)
 
 
-def steered_index(state: "EditorState") -> int | None:
+def steered_index(state: EditorState) -> int | None:
     """The object whose x the arrow keys move: the chosen one, else the one moved last."""
     movable = state.movable
     names = [state.scene.objects[index].name for index in movable]
@@ -184,13 +162,13 @@ def steered_index(state: "EditorState") -> int | None:
     return movable[0] if movable else None
 
 
-def step_x(state: "EditorState", steps: int) -> None:
+def step_x(state: EditorState, steps: int) -> None:
     """The arrow keys: hundredths of x to the right, or left."""
     if (index := steered_index(state)) is not None:
         steer_by_hand(state, index, stepped(state.scene.objects[index].slider_x, steps))
 
 
-def step_stop(state: "EditorState", direction: int) -> None:
+def step_stop(state: EditorState, direction: int) -> None:
     """To the nearest stop above (1) or below (-1)."""
     if (index := steered_index(state)) is not None:
         stops = state.stops(index)
@@ -200,13 +178,31 @@ def step_stop(state: "EditorState", direction: int) -> None:
             go_to_stop(state, index, numbers[0])
 
 
-def go_to_stop(state: "EditorState", index: int, number: int) -> None:
+def go_to_stop(state: EditorState, index: int, number: int) -> None:
     """One object goes to a stop, counted from 0 by x; the arrow keys go on with that object."""
     state.steered = state.scene.objects[index].name
-    state.go_to_stop(number, index)
+    leave_for_stop(state, index, number)
 
 
-def place(state: "EditorState", index: int, pose: Pose) -> None:
+def all_go_to_stop(state: EditorState, number: int) -> None:
+    """Every object that has a stop of that number, counted from 0, goes there."""
+    for index in range(len(state.scene.objects)):
+        leave_for_stop(state, index, number)
+
+
+def leave_for_stop(state: EditorState, index: int, number: int) -> None:
+    """Straight there, to rest; where the object starts is there at once."""
+    thing, stops = state.scene.objects[index], state.stops(index)
+    if number >= len(stops):
+        return
+    state.sweeps[index].playing = False
+    if (end := stops[number].x) != thing.x:
+        steer(state, index, end)
+        state.set_x(index, thing.x)
+        state.shifts[index] = Shift(thing.x, end, thing.model.blend)
+
+
+def place(state: EditorState, index: int, pose: Pose) -> None:
     """A hand moves an object: where it starts as well, unless the world is running."""
     name = state.scene.objects[index].name
     file = edits.place(state.document.file, name, pose)
@@ -217,7 +213,7 @@ def place(state: "EditorState", index: int, pose: Pose) -> None:
         state.bodies.follow(state.document)
 
 
-def as_it_stands(state: "EditorState") -> SceneFile:
+def as_it_stands(state: EditorState) -> SceneFile:
     """The file with everything where it is now, at its x.  ValueError for what has flown off."""
     file = state.document.file
     for thing in state.scene.objects:
@@ -235,7 +231,7 @@ def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, f
     return (float(COPY_BESIDE * (high - low)), 0.0, 0.0)
 
 
-def stands_elsewhere(state: "EditorState") -> bool:
+def stands_elsewhere(state: EditorState) -> bool:
     """Whether anything is not where it starts, or at another x."""
     items = {item.name: item for item in state.document.file.all_items}
     for thing in state.scene.objects:
@@ -245,3 +241,17 @@ def stands_elsewhere(state: "EditorState") -> bool:
         if abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True))) < 1 - TURNED:
             return True
     return False
+
+
+def poll_bodies(state: EditorState) -> bool:
+    """Once a frame: a scene becomes one that can be touched; True while colliders are made."""
+    bodies, before = state.bodies, state.world
+    busy = bodies.poll(state.document)
+    if state.world is not before:
+        state.follow_world()
+    if bodies.problem:
+        state.problem, bodies.problem = bodies.problem, ""
+    if bodies.notes:
+        notes, bodies.notes = bodies.notes, []
+        state.say("\n".join(notes))
+    return busy

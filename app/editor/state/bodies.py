@@ -15,7 +15,6 @@ from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
 
 if TYPE_CHECKING:
-    from shapeshift.app.editor.window.viewer import Viewer
     from shapeshift.scene.colliders.collider import Collider
     from shapeshift.scene.world.world import World
 
@@ -177,23 +176,3 @@ def make(
         return None, f"{error} It cannot be touched."
     except MemoryError:
         return None, f"'{item.name}' needs more memory for its collider than there is."
-
-
-def attach_bodies(viewer: "Viewer") -> None:
-    """Lets a viewer's scene become one that can be touched, and says what stands in the way."""
-    state = viewer.state
-
-    def poll() -> bool:
-        bodies, before = state.bodies, state.world
-        busy = bodies.poll(state.document)
-        if state.world is not before:
-            state.follow_world()
-        if bodies.problem:
-            state.problem, bodies.problem = bodies.problem, ""
-        if bodies.notes:
-            notes, bodies.notes = bodies.notes, []
-            viewer.say("\n".join(notes))
-        return busy
-
-    viewer.hooks.each_frame.append(poll)
-    viewer.hooks.status.append(lambda: state.bodies.status)

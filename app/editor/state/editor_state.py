@@ -1,5 +1,6 @@
 """What the window shows: scene, control values over time, settings, messages; no GL, no imgui."""
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shapeshift.app.editor.state.arrange import record_regions, steer
 from shapeshift.app.editor.state.bodies import Bodies
 from shapeshift.app.editor.state.camera.first_look import FirstLook
 from shapeshift.app.editor.state.files.document import Document, document_from
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from shapeshift.scene.world.world import World
 
 BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
+HANDLES = ("", "move", "turn")  # that an object can have; "": none
 AS_FILED = ""  # the palette that the scene's own stops name
 
 
@@ -64,6 +65,10 @@ class EditorState:
         self.palette = AS_FILED
         self.regions = Regions()
         self.measure_now = False  # compare the picture with the exact one in the next frame
+        self.overlay = True  # the panel and all else over the picture is shown
+        self.handles = HANDLES[0]  # on the chosen object
+        self.save_picture = False  # into a file, of the next frame
+        self.seconds = 0.0  # that the frame which is under way lets pass
         self.messages = Messages()
         self.centre, self.radius = np.zeros(3), 1.0
         self._points = (np.zeros((0, 3)), np.zeros(0))
@@ -109,9 +114,12 @@ class EditorState:
 
     def keep_regions(self) -> None:
         """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
-        self.regions.did = ""
-        record_regions(self)
+        self.document.amend_regions(self.regions)
         self.document.saved_regions = self.regions.kept
+
+    def record_regions(self) -> None:
+        """What was done to the regions since the last call is a step of the history."""
+        self.document.record_regions(self.regions)
 
     def reframe(self) -> None:
         """Where the middle of all is now, and how far it reaches."""
@@ -264,20 +272,6 @@ class EditorState:
         objects[index] = thing
         self.scene = Scene(tuple(objects))
 
-    def go_to_stop(self, number: int, only: int | None = None) -> None:
-        """Every object that has a stop of that number, counted from 0, goes straight there and
-        rests; where it starts is there at once.
-        """
-        for index in range(len(self.scene.objects)) if only is None else [only]:
-            thing, stops = self.scene.objects[index], self.stops(index)
-            if number >= len(stops):
-                continue
-            self.sweeps[index].playing = False
-            if (end := stops[number].x) != thing.x:
-                steer(self, index, end)
-                self.set_x(index, thing.x)
-                self.shifts[index] = Shift(thing.x, end, thing.model.blend)
-
     def stops(self, index: int) -> tuple[Stop, ...]:
         """The stops of an object's slider, by x, under the names that the scene gives them."""
         thing = self.scene.objects[index]
@@ -354,6 +348,10 @@ class EditorState:
         else:
             self.messages.problems = []
 
+    def say(self, text: str, seconds: float | None = None) -> None:
+        """Shows a note for a few seconds, longer for more lines; "" takes it away."""
+        self.messages.say(text, time.perf_counter(), seconds)
+
     @property
     def playing(self) -> bool:
         return bool(self.shifts) or any(sweep.playing for sweep in self.sweeps)
@@ -362,6 +360,7 @@ class EditorState:
         """Lets playing sweeps and shifts go on; a slider moved by hand meanwhile is where a sweep
         continues.
         """
+        self.seconds = seconds
         self._advance_shifts(seconds)
         for index, sweep in enumerate(self.sweeps):
             if sweep.playing:

@@ -41,3 +41,8 @@ class Messages:
         found = bool(self.problems)
         self.problems = self.problems[:-1]
         return found
+
+
+def number(count: float) -> str:
+    """A whole number in groups of three."""
+    return f"{count:,.0f}".replace(",", "\u2009")

@@ -59,6 +59,11 @@ class QualityController:
         """Another scene: what was measured says nothing about it."""
         self._chart, self.rows, self.choice = None, (), None
 
+    def scene_changed(self) -> None:
+        """Another number of splats is drawn: what was measured once is measured again."""
+        self.wanted = self.wanted or self.measuring or self.choice is not None
+        self.forget()
+
     def step(self) -> bool:
         """Measures for a moment; True once it is complete and a choice was made."""
         until = time.perf_counter() + STEP_S

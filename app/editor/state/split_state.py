@@ -1,14 +1,10 @@
 """Which object is shown at two values of x at once, and what stands left and right of the line."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from shapeshift.app.editor.state.regions import farthest_stop
 from shapeshift.runtime_models.model import Stop
-from shapeshift.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.scene.scene import Scene, SceneObject
 
 ON_STOP = 1e-3
 
@@ -22,9 +18,8 @@ class SplitState:
     x: float = 1.0
     possible: bool = False  # whether there is anybody to draw it
 
-    def toggle(self, state: "EditorState", index: int) -> None:
+    def toggle(self, thing: SceneObject) -> None:
         """On for this object, at a thermal stop, else the one farthest from its x; or off."""
-        thing = state.scene.objects[index]
         self.on = not self.on or self.name != thing.name
         if self.name != thing.name or self.x == thing.slider_x:
             thermal = [stop.x for stop in thing.model.stops if stop.kind == "thermal"]
@@ -40,14 +35,6 @@ class SplitState:
             for thing in scene.objects
         ]
         return Scene(tuple(things))
-
-
-def told(state: "EditorState") -> tuple[str, str]:
-    """What is left and right of the line: a stop's name, else x."""
-    names = [thing.name for thing in state.scene.objects]
-    index = names.index(state.split.name)
-    stops = state.stops(index)
-    return name_of(state.scene.objects[index].slider_x, stops), name_of(state.split.x, stops)
 
 
 def name_of(x: float, stops: tuple[Stop, ...]) -> str:

@@ -1,7 +1,5 @@
 """Handles on the chosen object that move and turn it: ImGuizmo, drawn over the picture."""
 
-from typing import TYPE_CHECKING
-
 import glfw
 import numpy as np
 from imgui_bundle import imgui, imguizmo
@@ -9,40 +7,37 @@ from imgui_bundle import imgui, imguizmo
 from shapeshift.app.editor.panels.outlines import moved, on_screen
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.state.arrange import place
-from shapeshift.app.editor.window.window import DoubleClick, Drag, Event, KeyDown, Press, Release
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import HANDLES, EditorState
+from shapeshift.app.editor.window.window import (
+    DoubleClick,
+    Drag,
+    Event,
+    KeyDown,
+    Press,
+    Release,
+    Window,
+)
 from shapeshift.scene.cameras.framing import MIN_OPACITY, PERCENTILES, model_points
 from shapeshift.scene.document.scene_file import FAR_M
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import SceneObject
 
-if TYPE_CHECKING:
-    from shapeshift.app.editor.window.viewer import Viewer
-
 Matrix16 = imguizmo.im_guizmo.Matrix16
 Vec = imgui.ImVec2
 CORNER = 0.2  # of an edge of the box that shows what is chosen
-OFF, MOVE, TURN = "", "move", "turn"
-MODES = (OFF, MOVE, TURN)
+_, MOVE, TURN = HANDLES
 OPERATIONS = {
     MOVE: imguizmo.im_guizmo.OPERATION.translate,
     TURN: imguizmo.im_guizmo.OPERATION.rotate,
 }
 
 
-def attach_gizmo(viewer: "Viewer") -> "Gizmo":
-    """Adds the handles to a viewer; they see the mouse before everything else does."""
-    gizmo = Gizmo(viewer)
-    viewer.hooks.takes.insert(0, gizmo.take)
-    viewer.hooks.marks.append(gizmo.draw)
-    return gizmo
-
-
 class Gizmo:
     """Which handles are shown, and whether the mouse holds one."""
 
-    def __init__(self, viewer: "Viewer") -> None:
-        self._viewer = viewer
-        self.mode = OFF
+    def __init__(self, state: EditorState, viewpoint: Viewpoint, window: Window) -> None:
+        self._state, self._viewpoint, self._window = state, viewpoint, window
         self.holding = False
         self._shown = False  # in the last frame: only then can a handle be under the mouse
         self._box: tuple = (None, np.zeros((2, 3)))  # a model, and its corners, object frame
@@ -60,20 +55,24 @@ class Gizmo:
                 pass  # ImGuizmo has seen it itself
             case Release(button="left") if self.holding:
                 self.holding = False
-                self._viewer.state.rest()
+                self._state.rest()
             case _:
                 return False
         return True
 
+    def let_go(self) -> None:
+        """Another scene: nothing of the old one is held."""
+        self.holding = False
+
     def next_mode(self) -> None:
         """Moving, turning, none; of the only object where none is chosen."""
-        state = self._viewer.state
-        self.mode = MODES[(MODES.index(self.mode) + 1) % len(MODES)]
-        if self.mode and not state.chosen:
+        state = self._state
+        state.handles = HANDLES[(HANDLES.index(state.handles) + 1) % len(HANDLES)]
+        if state.handles and not state.chosen:
             if len(state.scene.objects) == 1:
                 state.chosen = state.scene.objects[0].name
             else:
-                self._viewer.say("Click a thing, or its name, to choose what to move.")
+                state.say("Click a thing, or its name, to choose what to move.")
 
     @property
     def _under_mouse(self) -> bool:
@@ -81,25 +80,24 @@ class Gizmo:
 
     def draw(self, ui_scale: float) -> None:
         """Shows the handles and does what the mouse does with them."""
-        viewer = self._viewer
-        state = viewer.state
+        state = self._state
         index = state.chosen_index
-        self._shown = bool(self.mode) and index is not None and not state.regions.placing
+        self._shown = bool(state.handles) and index is not None and not state.regions.placing
         if not self._shown:
             self.holding = False
         if index is None:
             return
-        thing, view = state.scene.objects[index], viewer.view()
-        if viewer.overlay and not self.holding:
+        thing, view = state.scene.objects[index], self._viewpoint.view()
+        if state.overlay and not self.holding:
             self._outline(thing, view, ui_scale)
         if self._shown:
             self._handles(index, thing, view, ui_scale)
 
     def _handles(self, index: int, thing: SceneObject, view: View, ui_scale: float) -> None:
-        viewer, gizmo = self._viewer, imguizmo.im_guizmo
+        gizmo, mode = imguizmo.im_guizmo, self._state.handles
         gizmo.begin_frame()
         gizmo.set_drawlist(imgui.get_background_draw_list())
-        gizmo.set_rect(0, 0, *viewer.window.logical_size)
+        gizmo.set_rect(0, 0, *self._window.logical_size)
         gizmo.set_gizmo_size_clip_space(0.12 * ui_scale)
         world_from_pivot, pivot = self._frame(thing)
         matrix = flat(world_from_pivot)
@@ -108,13 +106,13 @@ class Gizmo:
         changed = gizmo.manipulate(
             flat(view.eye_from_world()),
             flat(view.clip_from_eye()),
-            OPERATIONS[self.mode],
-            gizmo.MODE.world if self.mode == MOVE else gizmo.MODE.local,
+            OPERATIONS[mode],
+            gizmo.MODE.world if mode == MOVE else gizmo.MODE.local,
             matrix,
         )
         gizmo.pop_id()
         if changed and self.holding:
-            place(viewer.state, index, pose_after(thing, before, unflat(matrix), pivot))
+            place(self._state, index, pose_after(thing, before, unflat(matrix), pivot))
 
     def _frame(self, thing: SceneObject) -> tuple[np.ndarray, np.ndarray]:
         """(4, 4) world_from_pivot, and the pivot (3,) in the object: where its splats are."""
@@ -144,7 +142,7 @@ class Gizmo:
         lines = moved(corner_lines(low, high), thing.world_from_object.matrix())
         ink = theme.color(theme.ACCENT, 0.8)
         draw = imgui.get_background_draw_list()
-        for (x0, y0), (x1, y1) in on_screen(view, lines, self._viewer.window.logical_size):
+        for (x0, y0), (x1, y1) in on_screen(view, lines, self._window.logical_size):
             draw.add_line(Vec(x0, y0), Vec(x1, y1), ink, 1.5 * ui_scale)
 
 

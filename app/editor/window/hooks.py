@@ -2,25 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from shapeshift.app.editor.panels.panel import Section
 from shapeshift.app.editor.state.layout import Box
-
-if TYPE_CHECKING:
-    from shapeshift.app.editor.window.shown import FrameRequest
-    from shapeshift.app.editor.window.window import Event
-
-
-@dataclass(frozen=True)
-class Section:
-    """A heading of the panel that folds, with what lies under it."""
-
-    name: str
-    draw: Callable[[float], None]  # called with ui_scale between imgui.begin and end
-    open_first: bool = False
-    opens: Callable[[], bool] | None = None  # True: unfold it now
-    shown: Callable[[], bool] | None = None  # False: leave it out, there is nothing in it
-    early: Callable[[], bool] | None = None  # True: second from above now, whatever its name
+from shapeshift.app.editor.window.shown import FrameRequest
+from shapeshift.app.editor.window.window import Event
 
 
 @dataclass
@@ -41,10 +27,10 @@ class Hooks:
     # None for nothing
     cards: list[Callable[[Box, float], Box | None]] = field(default_factory=list)
     # over: called once the splats are on the screen, before the overlay, in every frame
-    over: list[Callable[["FrameRequest"], None]] = field(default_factory=list)
+    over: list[Callable[[FrameRequest], None]] = field(default_factory=list)
     # marks: called with ui_scale; over the picture, under the panel, not in saved pictures
     marks: list[Callable[[float], None]] = field(default_factory=list)
     # closing: asked when the window is to be closed; False = not yet
     closing: list[Callable[[], bool]] = field(default_factory=list)
     # takes: sees every event first; True = it was for this
-    takes: list[Callable[["Event"], bool]] = field(default_factory=list)
+    takes: list[Callable[[Event], bool]] = field(default_factory=list)

@@ -8,6 +8,7 @@ from shapeshift.app.charts.comparison import Comparison, is_exact, measure_error
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
@@ -50,6 +51,14 @@ class Shown:
     def forget(self) -> None:
         """The renderer has drawn something else meanwhile."""
         self._drawn = None
+
+    def upload(self, scene: Scene) -> None:
+        """Gives the device a scene that is to be shown.  Raises BadFile where it does not fit."""
+        try:
+            self._renderer.update(scene)
+        except BadFile:
+            self.forget()
+            raise
 
     def due(self, request: FrameRequest, now: float) -> bool:
         """Whether the picture has rested long enough to be compared with the exact one."""

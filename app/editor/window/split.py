@@ -3,23 +3,19 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import glfw
 
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.layout import Box
-from shapeshift.app.editor.state.messages import Messages
-from shapeshift.app.editor.state.split_state import SplitState, told
+from shapeshift.app.editor.state.split_state import SplitState, name_of
+from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.shown import FrameRequest
 from shapeshift.app.editor.window.two_pictures import TwoPictures
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import BadFile
-
-if TYPE_CHECKING:
-    from shapeshift.app.editor.state.editor_state import EditorState
-    from shapeshift.app.editor.window.hooks import Hooks
 
 KEYS = (
     ("C", "another stop right of a line, on and off"),
@@ -48,7 +44,7 @@ class Split(TwoPictures):
 
 @contextmanager
 def splitting(
-    window: Window, state: "EditorState", hooks: "Hooks", messages: Messages,
+    window: Window, state: EditorState, hooks: Hooks,
     free: Callable[[], Box], make_renderer: Callable[[], Renderer],
 ) -> Iterator[None]:  # fmt: skip
     """Adds the split view to a viewer; its renderer is made when it is first wanted."""
@@ -70,18 +66,18 @@ def splitting(
             split().draw(request)
         except BadFile as error:
             split_state.on = False
-            messages.fail(f"There is no room for a second picture: {error}")
+            state.messages.fail(f"There is no room for a second picture: {error}")
 
     def draw_marks(ui_scale: float) -> None:
         if split_state.on and made:
-            names = [f"{name}  {text}" for name, text in zip("AB", told(state), strict=True)]
+            names = [f"{name}  {text}" for name, text in zip("AB", sides_of(state), strict=True)]
             split().draw_line(names, (theme.ACCENT, theme.SECOND), ui_scale)
 
     def take(event: Event) -> bool:
         if isinstance(event, KeyDown) and event.key == glfw.KEY_C and not event.ctrl:
             index = next(iter(state.sliders), None)
             if index is not None:
-                split_state.toggle(state, index)
+                split_state.toggle(state.scene.objects[index])
             return True
         return split_state.on and bool(made) and split().take_line(event)
 
@@ -101,3 +97,11 @@ def splitting(
             thing.release()
         for renderer in made[1:]:
             renderer.close()
+
+
+def sides_of(state: EditorState) -> tuple[str, str]:
+    """What is left and right of the line: a stop's name, else x."""
+    names = [thing.name for thing in state.scene.objects]
+    index = names.index(state.split.name)
+    stops = state.stops(index)
+    return name_of(state.scene.objects[index].slider_x, stops), name_of(state.split.x, stops)

@@ -1,14 +1,17 @@
 """What touching shows over the picture: the grip, rays, reactions that fade, colliders as lines."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.outlines import pixels
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.touch_state import FLASH_S, LABEL_S, Label, TouchState
 from shapeshift.app.editor.window.shown import FrameRequest
+from shapeshift.app.editor.window.window import Window
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.lines import Lines, Wire
 from shapeshift.scene.colliders.collider import Collider
@@ -18,74 +21,43 @@ from shapeshift.scene.pose import View
 from shapeshift.scene.world.mouse_hand import pose
 from shapeshift.scene.world.rigid_object import Thing, middle_of
 
-if TYPE_CHECKING:
-    from shapeshift.app.editor.window.touch import Touch
-
 Vec = imgui.ImVec2
-LABEL_S, FLASH_S = 1.8, 0.4  # how long they are seen
 RISE = 26.0  # logical pixels that a label goes up meanwhile
 MOVES_INK, STAYS_INK = (0.35, 0.9, 0.55), (0.45, 0.65, 1.0)
 HELD_INK = theme.ACCENT
 
 
-@dataclass
-class Label:
-    """What an object has just become."""
-
-    object: str
-    text: str
-    age_s: float = 0.0
-
-
-@dataclass
-class Flash:
-    """Where a ray met something."""
-
-    point: np.ndarray  # (3,) metres, world
-    age_s: float = 0.0
-
-
 class Marks:
     """Draws them, and knows which have yet to fade."""
 
-    def __init__(self, touch: "Touch") -> None:
-        self._touch = touch
-        self.colliders = False  # the debug view of them
-        self.labels: list[Label] = []
-        self.flashes: list[Flash] = []
+    def __init__(
+        self, touch: TouchState, state: EditorState, window: Window, viewpoint: Viewpoint,
+        under: Callable[[View, tuple[float, float]], str | None],
+    ) -> None:  # fmt: skip
+        """`under` tells what could be carried that lies under a place of a view."""
+        self._touch, self._state, self._window = touch, state, window
+        self._viewpoint, self._under = viewpoint, under
         self._lines: Lines | None = None
         self._edges: dict[tuple[int, bool], tuple[Collider, np.ndarray]] = {}
 
     def forget(self) -> None:
-        self.labels.clear()
-        self.flashes.clear()
         self._edges.clear()
-
-    @property
-    def fading(self) -> bool:
-        return bool(self.labels or self.flashes)
-
-    def fade(self, seconds: float) -> None:
-        for mark in (*self.labels, *self.flashes):
-            mark.age_s += seconds
-        self.labels = [label for label in self.labels if label.age_s < LABEL_S]
-        self.flashes = [flash for flash in self.flashes if flash.age_s < FLASH_S]
 
     # ---- colliders
 
     def draw_colliders(self, request: FrameRequest) -> None:
         """Edges of what is touched, through everything: green moves, blue stays, warm is held."""
         touch = self._touch
-        if not (self.colliders and touch.world):
+        if not (touch.colliders and touch.world):
             return
-        gpu_lines = self._lines or Lines(Gpu(touch.viewer.window.ctx))
+        gpu_lines = self._lines or Lines(Gpu(self._window.ctx))
         self._lines = gpu_lines
         wires = [
             Wire(self.edges(thing), self._where(request, name), self._ink(name, thing))
             for name, thing in touch.world.things.items()
             if thing.collider is not None
         ]
-        gpu_lines.draw(touch.viewer.window.screen(), request.view, wires)
+        gpu_lines.draw(self._window.screen(), request.view, wires)
 
     def _where(self, request: FrameRequest, name: str) -> np.ndarray:
         """(4, 4) where the object is drawn, else where it stands."""
@@ -115,17 +87,16 @@ class Marks:
         touch = self._touch
         if touch.world is None:
             return
-        viewer = touch.viewer
-        view, size = viewer.view(), viewer.window.logical_size
+        view, size = self._viewpoint.view(), self._window.logical_size
         if touch.hand is not None:
             self._grip(view, size, ui_scale)
-        elif not touch.world.paused and viewer.window.on_scene:
+        elif not touch.world.paused and self._window.on_scene:
             self._could_take(view, ui_scale)
-        for flash in self.flashes:
+        for flash in touch.flashes:
             part = flash.age_s / FLASH_S
             ink = theme.color(theme.ACCENT, 1 - part)
             self._circle(view, size, flash.point, (4 + 26 * part) * ui_scale, ink, ui_scale)
-        for label in self.labels:
+        for label in touch.labels:
             self._label(label, view, size, ui_scale)
 
     def _grip(self, view: View, size: tuple, ui_scale: float) -> None:
@@ -144,13 +115,13 @@ class Marks:
 
     def _could_take(self, view: View, ui_scale: float) -> None:
         """A ring at the mouse where it would take something, with its name."""
-        cursor = self._touch.viewer.window.cursor
-        name = self._touch.under(view, cursor)
+        cursor = self._window.cursor
+        name = self._under(view, cursor)
         if name is None:
             return
         draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT, 0.8)
         draw.add_circle(Vec(*cursor), 9 * ui_scale, ink, 0, 1.5 * ui_scale)
-        if self._touch.viewer.overlay:
+        if self._state.overlay:
             draw_word(name, Vec(cursor[0] + 16 * ui_scale, cursor[1]), 0.8, ui_scale)
 
     def _circle(self, view: View, size, point, radius: float, ink: int, ui_scale: float) -> None:

@@ -1,28 +1,28 @@
 """Another scene beside the one that is open: a line parts the two pictures, likeness is told."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import glfw
 import numpy as np
 
 from shapeshift.app.charts.comparison import MOST_DB, Comparison
 from shapeshift.app.commands.compare_sides import SceneSide, open_side
+from shapeshift.app.editor.options import Options
 from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.layout import Box
+from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.shown import FrameRequest, picture_key
 from shapeshift.app.editor.window.two_pictures import TwoPictures
-from shapeshift.app.editor.window.window import Event, KeyDown
+from shapeshift.app.editor.window.window import Event, KeyDown, Window
 from shapeshift.app.errors import UsageError
 from shapeshift.app.program import program
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.cameras.camera_list import moved
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from shapeshift.app.editor.desktop import Options, Viewer
 
 KEYS = (
     (", .", "move the line of the wipe"),
@@ -31,21 +31,24 @@ KEYS = (
 
 
 @contextmanager
-def comparing(viewer: "Viewer", options: "Options") -> Iterator["Wipe | None"]:
-    """Adds a wipe to the viewer where --compare asks for one.  Raises BadFile, UsageError."""
-    if not options.compare:
-        yield None
-        return
+def comparing(
+    window: Window, renderer: Renderer, state: EditorState, hooks: Hooks, options: Options,
+    free: Callable[[], Box],
+) -> Iterator["Wipe"]:  # fmt: skip
+    """Adds a wipe over what `renderer` has drawn, in the middle of what is `free` of the window,
+    logical pixels.  Raises BadFile, UsageError.
+    """
     side = open_side(options.compare, options)
     if not isinstance(side, SceneSide):
         raise UsageError(
             f"--compare is {options.compare}, a folder of pictures; the viewer compares scenes, "
             f"`{program()} compare` also pictures."
         )
-    drawing = viewer.renderer.backends["drawing"].split()[0]
-    with Renderer(viewer.window.ctx, drawing) as renderer:
-        wipe = Wipe(viewer, renderer, side)
-        viewer.say("Drag the line, or press , and . for it; C takes it away")
+    drawing = renderer.backends["drawing"].split()[0]
+    with Renderer(window.ctx, drawing) as other:
+        wipe = Wipe(window, (renderer, other), state, side, free())
+        wipe.attach(hooks)
+        state.say("Drag the line, or press , and . for it; C takes it away")
         try:
             yield wipe
         finally:
@@ -55,16 +58,20 @@ def comparing(viewer: "Viewer", options: "Options") -> Iterator["Wipe | None"]:
 class Wipe(TwoPictures):
     """B is another scene, seen by A's camera; how alike the two are is measured at rest."""
 
-    def __init__(self, viewer: "Viewer", renderer: Renderer, side: SceneSide) -> None:
-        left, _, right, _ = viewer._free_wanted()
-        super().__init__(viewer.window, renderer, (left + right) / 2 / viewer.window.size[0])
-        self._viewer, self._side = viewer, side
+    def __init__(
+        self, window: Window, renderers: tuple[Renderer, Renderer], state: EditorState,
+        side: SceneSide, free: Box,
+    ) -> None:  # fmt: skip
+        """`renderers` are A's, which the window has, and B's."""
+        super().__init__(window, renderers[1], (free[0] + free[2]) / 2 / window.logical_size[0])
+        self._of_a, self._state, self._side = renderers[0], state, side
         self._scene = side.subject.scene
-        self._scene_file = viewer.state.document.path  # that A is; None: models
+        self._scene_file = state.document.path  # that A is; None: models
         self._comparison = Comparison()
         self._waiting = False  # the picture has not rested long enough to be measured
         self.on = True
-        hooks = viewer.hooks
+
+    def attach(self, hooks: Hooks) -> None:
         hooks.over.append(self.draw)
         hooks.marks.append(self.draw_marks)
         hooks.takes.append(self.take)
@@ -102,7 +109,7 @@ class Wipe(TwoPictures):
             *picture_key(request.scene, request.view, request.settings)[1:],
         )
         if self._comparison.due(key, time.perf_counter(), request.moving):
-            pictures = (self._viewer.renderer.resolved(0), self._renderer.resolved(0))
+            pictures = (self._of_a.resolved(0), self._renderer.resolved(0))
             self._comparison.measured(key, min(psnr(*pictures), MOST_DB))
         self._waiting = self._comparison.is_old(key)
 
@@ -123,7 +130,7 @@ class Wipe(TwoPictures):
         """The line and the two names beside it."""
         if not self.on:
             return
-        scene = self._viewer.state.scene
+        scene = self._state.scene
         of_a = scene.objects[0].name if scene.objects else ""
         of_a = self._scene_file.name if self._scene_file else of_a
         names = (f"A  {of_a}".rstrip(), f"B  {self._side.name}")

@@ -1,6 +1,6 @@
-"""The panel's section "Objects": the list, what of the chosen one can be edited, the floor."""
+"""The panel's section ObjectEdits: the list, what of the chosen one can be edited, the floor."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from imgui_bundle import imgui
@@ -9,24 +9,24 @@ from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import (
     button_row,
     choice,
-    number,
     right_aligned,
     slider,
     tip,
 )
 from shapeshift.app.editor.state.arrange import place, stands_elsewhere
-from shapeshift.app.editor.window.gizmo import MOVE, TURN
+from shapeshift.app.editor.state.editor_state import HANDLES
+from shapeshift.app.editor.state.files.saving import Saving
+from shapeshift.app.editor.state.messages import number
+from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, HULLS, SceneItem
 from shapeshift.scene.pose import Pose
-
-if TYPE_CHECKING:
-    from shapeshift.app.editor.window.objects import Objects
 
 Vec = imgui.ImVec2
 MOST_ROWS = 8  # of the list that are seen at once
 MASSES = (0.05, 5.0)  # kilograms, between which the physics holds them
 NONE = "none"  # as a collider
+_, MOVE, TURN = HANDLES
 MODES = {MOVE: "Move", TURN: "Turn"}
 DEEDS = {
     "Add": "Another file or folder as an object of this scene.",
@@ -35,14 +35,16 @@ DEEDS = {
 }
 
 
-def draw_objects(objects: "Objects", ui_scale: float) -> None:
+def draw_objects(
+    objects: ObjectEdits, saving: Saving, ask_to_add: Callable[[], None], ui_scale: float
+) -> None:
     """All of the section."""
     state = objects.state
-    _history(objects, ui_scale)
+    _history(objects, saving, ui_scale)
     _list(objects, ui_scale)
     clicked = button_row(DEEDS, ui_scale, 3)
     if clicked:
-        deeds = {"Add": objects.adding.ask, "Copy": objects.duplicate, "Delete": objects.delete}
+        deeds = {"Add": ask_to_add, "Copy": objects.duplicate, "Delete": objects.delete}
         deeds[clicked]()
     item = edits.find(state.document.file, state.chosen)
     if item is not None and state.chosen_index is not None:
@@ -55,7 +57,7 @@ def draw_objects(objects: "Objects", ui_scale: float) -> None:
         _scene(objects, ui_scale)
 
 
-def _history(objects: "Objects", ui_scale: float) -> None:
+def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
     """Undo, redo, save."""
     document = objects.state.document
     history = document.history
@@ -70,12 +72,12 @@ def _history(objects: "Objects", ui_scale: float) -> None:
         imgui.end_disabled()
         tip(what or f"Nothing to {word.lower()}.", ui_scale)
         imgui.same_line()
-    if imgui.button("Save" if objects.saving.in_place else "Save\u2026", Vec(-1, 0)):
-        objects.saving.save()
+    if imgui.button("Save" if saving.in_place else "Save\u2026", Vec(-1, 0)):
+        saving.save()
     tip("Ctrl+S writes the scene file; Ctrl+Shift+S asks for another name.", ui_scale)
 
 
-def _list(objects: "Objects", ui_scale: float) -> None:
+def _list(objects: ObjectEdits, ui_scale: float) -> None:
     """A line an object; of a long list those that are in sight."""
     count = len(objects.state.scene.objects)
     if count <= MOST_ROWS:
@@ -93,7 +95,7 @@ def _list(objects: "Objects", ui_scale: float) -> None:
     imgui.end_child()
 
 
-def _row(objects: "Objects", index: int, ui_scale: float) -> None:
+def _row(objects: ObjectEdits, index: int, ui_scale: float) -> None:
     """Seen or not, the name that chooses it, its x."""
     state = objects.state
     if index >= len(state.scene.objects):
@@ -119,17 +121,17 @@ def _row(objects: "Objects", index: int, ui_scale: float) -> None:
     imgui.pop_id()
 
 
-def _chosen(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
+def _chosen(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     """Name, handles, place and body of the chosen object."""
     if item.name != BACKGROUND:
         _rename(objects, item, ui_scale)
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     for mode, word in MODES.items():
-        lit = objects.gizmo.mode == mode
+        lit = objects.state.handles == mode
         if lit:
             imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
         if imgui.button(word, Vec((room - gap) / 2, 0)):
-            objects.gizmo.mode = "" if lit else mode
+            objects.state.handles = "" if lit else mode
         if lit:
             imgui.pop_style_color()
         tip("Handles on the thing in the picture. Key M.", ui_scale)
@@ -139,7 +141,7 @@ def _chosen(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
     _body(objects, item, ui_scale)
 
 
-def _rename(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
+def _rename(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     """The name, taken over by Enter or by leaving the field."""
     before, typed = objects.typed
     if before != item.name:
@@ -155,7 +157,7 @@ def _rename(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
         objects.edit(edits.rename, item.name, text, what=f"rename {item.name}")
 
 
-def _place(objects: "Objects", ui_scale: float) -> None:
+def _place(objects: ObjectEdits, ui_scale: float) -> None:
     """Metres, as numbers to drag; a double click types them."""
     state = objects.state
     index = state.chosen_index
@@ -170,7 +172,7 @@ def _place(objects: "Objects", ui_scale: float) -> None:
         place(state, index, Pose(np.clip(np.array(values, np.float64), -FAR_M, FAR_M), pose.wxyz))
 
 
-def _body(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
+def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     """Whether it can be touched, whether it moves, how heavy it is."""
     item = edits.find(objects.state.document.file, item.name)
     if item is None:  # renamed just now
@@ -198,7 +200,7 @@ def _body(objects: "Objects", item: SceneItem, ui_scale: float) -> None:
             objects.change(item, f"mass of {item.name}", f"mass {item.name}", mass_kg=mass)
 
 
-def _scene(objects: "Objects", ui_scale: float) -> None:
+def _scene(objects: ObjectEdits, ui_scale: float) -> None:
     """What belongs to no object: the floor, the first look, where everything starts."""
     state = objects.state
     floor_y = state.document.file.floor_y

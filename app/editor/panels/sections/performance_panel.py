@@ -9,7 +9,6 @@ from shapeshift.app.editor.panels.sections.quality_panel import draw_quality
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import (
     ms_text,
-    number,
     right_aligned,
     rows,
     subsection,
@@ -17,6 +16,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
 )
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.frame_stats import FrameStatsView
+from shapeshift.app.editor.state.messages import number
 from shapeshift.app.editor.state.quality_controller import QualityController
 from shapeshift.renderer.settings import CULL_REASONS, FrameStats
 

@@ -1,23 +1,19 @@
 """The panel's section "Touch": play, step, put back, pads of two axes, what has answered."""
 
-from typing import TYPE_CHECKING
-
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import button_row, tip
+from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.world.reactions import TwoAxes
 from shapeshift.scene.world.rigid_object import Thing
-
-if TYPE_CHECKING:
-    from shapeshift.app.editor.window.touch import Touch
 
 Vec = imgui.ImVec2
 PAD, KNOB = 120.0, 9.0  # logical pixels: a pad's height, and half of its knob
 
 
-def draw_touch(touch: "Touch", ui_scale: float) -> None:
+def draw_touch(touch: TouchState, ui_scale: float) -> None:
     """Buttons for what the keys do, the pads, and the last reactions."""
     world = touch.world
     play = "Play" if world.paused else "Pause"
@@ -30,7 +26,7 @@ def draw_touch(touch: "Touch", ui_scale: float) -> None:
     deeds = {f"{play}###play": touch.toggle, "Step": touch.step, "Put back": touch.put_back}
     if clicked:
         deeds[clicked]()
-    _, touch.marks.colliders = imgui.checkbox("show colliders", touch.marks.colliders)
+    _, touch.colliders = imgui.checkbox("show colliders", touch.colliders)
     tip("Key C. What the physics touches: green moves, blue stays.", ui_scale)
     name = pad_object(touch)
     if name is not None:
@@ -39,14 +35,14 @@ def draw_touch(touch: "Touch", ui_scale: float) -> None:
         imgui.text_disabled(line)
 
 
-def pad_object(touch: "Touch") -> str | None:
+def pad_object(touch: TouchState) -> str | None:
     """Whose pad is shown: of those that have one the chosen object, else the first."""
     names = [n for n, thing in touch.world.things.items() if thing.item.two_axes is not None]
-    chosen = touch.viewer.state.chosen
+    chosen = touch.chosen
     return chosen if chosen in names else names[0] if names else None
 
 
-def draw_pad(touch: "Touch", name: str, axes: TwoAxes, ui_scale: float) -> None:
+def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> None:
     """A square to drag in: to the sides balance -1 to 1, upwards power 0 to 1."""
     thing = touch.world.things[name]
     balance, power = touch.pads[name] = pad_of(

@@ -141,11 +141,6 @@ def button_row(tips: Mapping[str, str], ui_scale: float, columns: int) -> str:
     return clicked
 
 
-def number(count: float) -> str:
-    """A whole number in groups of three."""
-    return f"{count:,.0f}".replace(",", "\u2009")
-
-
 def ms_text(value: float) -> str:
     return f"{value:.2f}" if value < 10 else f"{value:.1f}" if value < 100 else f"{value:.0f}"
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.model import Model, Stop
 from shapeshift.scene.document import edits
@@ -62,6 +63,21 @@ class Document:
         item = replace(item_of(source), x=first_stop(source.model).x)
         self.sources[key_of(item)] = source
         return item
+
+    def record_regions(self, regions: Regions) -> None:
+        """Makes what was done to the regions since the last call a step of the history."""
+        if not regions.did:
+            self.amend_regions(regions)
+            return
+        self.history = self.history.take(
+            self.file, regions.did, regions.together, regions.kept, regions.bytes
+        )
+        regions.did = ""
+
+    def amend_regions(self, regions: Regions) -> None:
+        """Takes regions over that nobody's hand has changed: their objects have."""
+        self.history = self.history.amend(self.file, regions.kept)
+        regions.did = ""
 
     def refine(self, index: int, model: Model) -> None:
         """A finer level of detail of one object's model."""

@@ -127,42 +127,7 @@ def level_words(model: SplatLayers) -> str:
     return f"detail {of - model.provenance['level']} of {of}"
 
 
-def attach_refiner(viewer, refiner: Refiner) -> None:
-    """Lets a viewer show finer levels as they come; camera, x and settings stay."""
-    state = viewer.state
-
-    def swap() -> bool:
-        if (pair := refiner.take()) is not None:
-            before, after = pair
-            places = [i for i, thing in enumerate(state.scene.objects) if thing.model is before]
-            for index in places:
-                show(index, before, after)
-        if refiner.problem:
-            state.problem, refiner.problem = refiner.problem, ""
-        return refiner.running
-
-    def show(index: int, before: Model, after: Model) -> None:
-        place(state, index, after)
-        try:
-            viewer.renderer.update(state.scene)
-        except BadFile as error:  # more than the driver holds: the level before stays
-            place(state, index, before)
-            refiner.stop_at(before)
-            state.problem = f"no finer level can be shown: {error}"
-        dial = viewer.dial
-        dial.wanted = dial.wanted or dial.measuring or dial.choice is not None
-        dial.forget()  # what was measured, was measured on another number of splats
-
-    def follow() -> None:
-        refiner.follow([thing.model for thing in state.scene.objects])
-
-    viewer.hooks.each_frame.append(swap)
-    viewer.hooks.opened.append(follow)
-    viewer.hooks.status.append(lambda: refiner.status)
-    follow()
-
-
-def place(state: EditorState, index: int, model: SplatLayers) -> None:
+def show_level(state: EditorState, index: int, model: SplatLayers) -> None:
     """Another level for one of the state's objects, with the facts that the status line tells."""
     state.replace_model(index, model)
     path = state.sources[index].path
