@@ -9,7 +9,7 @@ from rich.progress import Progress
 from rich.segment import Segment
 from rich.text import Text
 
-from shapeshift.app.terminal import CleanStream
+from shapeshift.app.clean_stream import CleanStream
 from shapeshift.runtime_models.files.plain_text import one_line, several_lines
 
 

@@ -10,7 +10,7 @@ from shapeshift.app.terminal import clean_streams, drop_output, say, tell
 
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
-    "view": ("viewer.desktop", "open a scene in a window"),
+    "view": ("editor.desktop", "open a scene in a window"),
     "render": ("commands.render", "draw a scene into PNG files, no window needed"),
     "bench": ("commands.bench", "frame times and image error, no window needed"),
     "chart": ("charts.chart", "what each shortcut saves in time and costs in the picture"),

@@ -27,6 +27,7 @@ QUALITY_VIEWS = 3
 DRAW_PASSES = ("bin", "splat")
 MOST_DB = 200.0  # for pictures that are equal: JSON has no infinity
 PERCENTILES = (50, 95, 99)
+VERSIONS = ("numpy", "onnxruntime", "pyopencl", "moderngl")  # that matter for a time
 
 
 class Measure:
@@ -208,6 +209,14 @@ def machine(ctx) -> dict[str, object]:
         "opencl": opencl,
         **{name: version(name) for name in ("numpy", "moderngl", "onnxruntime", "pyopencl")},
     }
+
+
+def machine_line(ctx) -> str:
+    """Processor, cores, drivers and versions, as they matter for a time."""
+    told = machine(ctx) | {"gl": gl_renderer(ctx)}
+    words = [f"{told['processor']}, {told['cores']} cores", f"OpenCL {told['opencl']}",
+             f"GL {told['gl']}", *(f"{name} {told[name]}" for name in VERSIONS)]  # fmt: skip
+    return "; ".join(words)
 
 
 def processor() -> str:

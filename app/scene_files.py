@@ -39,21 +39,6 @@ def open_scene_file(
     return file, models, scene_of(file, models)
 
 
-def file_at(file: "SceneFile", models: dict[str, "Model"], text: str) -> "SceneFile":
-    """The file with each object's x where a text says, of those that have such a stop or state.
-
-    Raises UsageError where none has.
-    """
-    from shapeshift.app.subject import placed
-    from shapeshift.scene.document import edits
-    from shapeshift.scene.document.scene_file import scene_of
-
-    states = {item.name: item.states for item in file.all_items}
-    for thing in placed(scene_of(file, models).objects, text, states=states):
-        file = edits.change(file, thing.name, x=thing.x)
-    return file
-
-
 def tell_findings(models: dict[str, "Model"]) -> None:
     """What is wrong with the models, each told once however many objects have it."""
     for model in {id(model): model for model in models.values()}.values():

@@ -19,7 +19,7 @@ from shapeshift.scene.cameras.framing import (
     frame_points,
     scene_points,
 )
-from shapeshift.scene.document.scene_file import SceneFile, first_view, is_scene_file
+from shapeshift.scene.document.scene_file import SceneFile, first_view, is_scene_file, scene_of
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import carried
@@ -131,6 +131,19 @@ def placed(
         except UsageError:  # a stop that others have
             out.append(thing)
     return tuple(out)
+
+
+def file_at(file: SceneFile, models: dict[str, Model], text: str) -> SceneFile:
+    """The file with each object's x where a text says, of those that have such a stop or state.
+
+    Raises UsageError where none has.
+    """
+    from shapeshift.scene.document import edits
+
+    states = {item.name: item.states for item in file.all_items}
+    for thing in placed(scene_of(file, models).objects, text, states=states):
+        file = edits.change(file, thing.name, x=thing.x)
+    return file
 
 
 def pace_of(model: Model) -> tuple[Pace, ...]:

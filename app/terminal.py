@@ -9,52 +9,15 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
+from shapeshift.app.clean_stream import CleanStream, trusted
 from shapeshift.runtime_models.files.plain_text import json_text, one_line, several_lines
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 NAMES = {"stdout": "standard output", "stderr": "standard error"}
-
-
-class CleanStream:
-    """A stream that writes out what is unsafe, over one that takes all."""
-
-    def __init__(self, beneath: TextIO, name: str, trusting: bool = False) -> None:
-        self.beneath = beneath
-        self._name, self._trusting = name, trusting
-
-    def trusted(self) -> "CleanStream":
-        """The same for what is clean already: tables, progress, JSON."""
-        return CleanStream(self.beneath, self._name, trusting=True)
-
-    def write(self, text: str) -> int:
-        clean = text if self._trusting else several_lines(text)
-        with self._naming():
-            self.beneath.write(clean)
-        return len(text)
-
-    def writelines(self, lines) -> None:
-        for line in lines:
-            self.write(line)
-
-    def flush(self) -> None:
-        with self._naming():
-            self.beneath.flush()
-
-    @contextmanager
-    def _naming(self) -> Iterator[None]:
-        """A full disk behind a redirection is named."""
-        try:
-            yield
-        except OSError as error:
-            error.filename = error.filename or self._name
-            raise
-
-    def __getattr__(self, name: str):
-        return getattr(self.beneath, name)
 
 
 @contextmanager
@@ -106,10 +69,6 @@ def tell_json(value: object, indent: int | None = 1) -> None:
     stream = trusted(sys.stdout)
     plain = "utf" in (getattr(stream, "encoding", None) or "utf").lower()
     stream.write(json_text(value, indent, ascii_only=not plain) + "\n")
-
-
-def trusted(stream: TextIO) -> TextIO:
-    return stream.trusted() if isinstance(stream, CleanStream) else stream
 
 
 def open_console(stderr: bool = True, **more) -> "Console":

@@ -114,10 +114,10 @@ class Projected:
     scratch: TileScratch | None = None  # in the grid of the camera's image
 
     @property
-    def in_tiles(self) -> Found:
-        """`found`, where project_arena made it."""
-        assert self.found is not None
-        return self.found
+    def in_tiles(self) -> TileScratch:
+        """`scratch`, where project_arena made it."""
+        assert self.scratch is not None
+        return self.scratch
 
     def culled(self, device: Device) -> dict[str, int]:
         """How many splats each gate kept out; empty where it was not counted."""

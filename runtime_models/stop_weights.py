@@ -10,12 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, TypeGuard, overload
+from typing import TypeGuard, overload
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from shapeshift.runtime_models.model import ControlEncoding, Stop
+from shapeshift.runtime_models.stop import ControlEncoding, Stop
 
 SUM_SLACK = 1e-6  # by which weights may miss 1: what six decimals in a file leave
 
@@ -74,7 +73,7 @@ class StopBlend:
     encoding as it is, since the networks know what lies between.
     """
 
-    stops: "tuple[Stop, ...]"
+    stops: tuple[Stop, ...]
     pace: tuple[Pace, ...] = ()
     direct: bool = False
 
@@ -218,7 +217,7 @@ def _part_of(curve: np.ndarray, share: float | np.ndarray) -> np.ndarray:
     return np.interp(share, curve, np.linspace(0, 1, len(curve)))
 
 
-def encode_control(encoding: "ControlEncoding", blend: StopBlend, control: Controls) -> np.ndarray:
+def encode_control(encoding: ControlEncoding, blend: StopBlend, control: Controls) -> np.ndarray:
     """(1, d) float32 Psi of a control, (A, d) where there is one an anchor.
 
     A blend is that of its stops' encodings.  A number goes into the encoding as it is outside of
@@ -245,17 +244,17 @@ def _is_outside(blend: StopBlend, x: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _stop_encodings(encoding: "ControlEncoding", stops: "tuple[Stop, ...]") -> np.ndarray:
+def _stop_encodings(encoding: ControlEncoding, stops: tuple[Stop, ...]) -> np.ndarray:
     """(S, d) Psi at every stop."""
     return np.stack([encoding.encode(stop.x) for stop in stops]).astype(np.float64)
 
 
-def _encoded(encoding: "ControlEncoding", x: float | np.ndarray) -> np.ndarray:
+def _encoded(encoding: ControlEncoding, x: float | np.ndarray) -> np.ndarray:
     """(n, d) float32 Psi of numbers."""
     return encode_rows(encoding, x) if is_each(x) else encoding.encode(float(x))[None]
 
 
-def encode_rows(encoding: "ControlEncoding", x: np.ndarray) -> np.ndarray:
+def encode_rows(encoding: ControlEncoding, x: np.ndarray) -> np.ndarray:
     """(n, d) Psi of numbers x (n,), float32 throughout: faster than encoding.encode."""
     t = np.float32(np.arange(encoding.d) * encoding.spacing)
     away = t - np.asarray(x, np.float32)[:, None]
@@ -284,7 +283,7 @@ def told_control(control: Control) -> str:
     return f"{control:.6g}"
 
 
-def parse_control(text: str, stops: "Sequence[Stop]", pace: tuple[Pace, ...] = ()) -> Control:
+def parse_control(text: str, stops: Sequence[Stop], pace: tuple[Pace, ...] = ()) -> Control:
     """A control of a text: a stop's name in any case, a number from 0 to 1, a way or a blend.
 
     `RGB..Opened:0.5` is half of the way from one stop to another, at even pace where the scene
@@ -306,7 +305,7 @@ def parse_control(text: str, stops: "Sequence[Stop]", pace: tuple[Pace, ...] = (
     return x
 
 
-def _parse_way(word: str, known: "dict[str, Stop]", blend: StopBlend) -> Control | None:
+def _parse_way(word: str, known: dict[str, Stop], blend: StopBlend) -> Control | None:
     """A..B:part; None for what has not that form.  Names may hold dots and colons themselves."""
     ends, _, part = word.rpartition(":")
     lowered = ends.casefold()
@@ -316,7 +315,7 @@ def _parse_way(word: str, known: "dict[str, Stop]", blend: StopBlend) -> Control
     return None
 
 
-def _parse_blend(word: str, known: "dict[str, Stop]") -> StopWeights | None:
+def _parse_blend(word: str, known: dict[str, Stop]) -> StopWeights | None:
     """A:weight,B:weight,...; None for what has not that form."""
     found: dict[str, float] = {}
     rest = word
@@ -346,7 +345,7 @@ def _share(text: str, most: float = 1.0) -> float | None:
     return value if 0 <= value <= most else None
 
 
-def _wanted(word: str, stops: "Sequence[Stop]") -> str:
+def _wanted(word: str, stops: Sequence[Stop]) -> str:
     names = [stop.name for stop in stops]
     a, b = (names[0], names[-1]) if len(names) > 1 else ("A", "B")
     return (

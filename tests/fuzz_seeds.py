@@ -275,7 +275,7 @@ def with_photos(photos: dict[str, bytes], read: Callable) -> Callable:
 
 def recent_seed() -> Seed:
     """The list of recent files: a broken one counts as empty."""
-    from shapeshift.app.viewer.recent import RecentFiles
+    from shapeshift.app.editor.state.user.recent import RecentFiles
 
     recent = json.dumps({"recent": ["/a/b.ply", "C:\\c d\\\u00e9.splat"]}).encode()
     return Seed("recent files", {"recent.json": recent}, lambda path: RecentFiles.read(path.parent))

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.headset.worn_panel import sliders_of
-from shapeshift.app.viewer import arrange
-from shapeshift.app.viewer.files import opened_scene
-from shapeshift.app.viewer.opened import Found, Source, read_files
-from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.editor.state import arrange
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import opened_scene
+from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
+from shapeshift.app.headset.wrist_menu import sliders_of
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.colliders import collider_files
@@ -26,23 +26,23 @@ ROOT = Path(__file__).resolve().parents[1]
 NAMES = ["background", "cube", "ball", "ring", "plate"]
 
 
-def stage_of(found: Found) -> Stage:
-    stage = Stage(lambda path: None)
+def state_of(found: OpenedFiles) -> EditorState:
+    state = EditorState(lambda path: None)
     scene, document = opened_scene(found)
-    stage.take(found.sources, scene, None, document)
-    return stage
+    state.take(found.sources, scene, None, document)
+    return state
 
 
 @pytest.fixture(scope="module")
-def touch() -> Found:
+def touch() -> OpenedFiles:
     return read_files(
         [ROOT / "assets" / "touch.scene.json"], None, CameraReading(), lambda *_: None
     )
 
 
 @pytest.fixture
-def stage(touch) -> Stage:
-    return stage_of(touch)
+def state(touch) -> EditorState:
+    return state_of(touch)
 
 
 def model(name: str) -> SplatLayers:
@@ -55,9 +55,9 @@ def model(name: str) -> SplatLayers:
 
 
 @pytest.fixture
-def plain() -> Stage:
+def plain() -> EditorState:
     """Two files that were opened without a scene file."""
-    return stage_of(Found(tuple(Source(Path(f"/data/{n}.ply"), model(n)) for n in ("a", "b"))))
+    return state_of(OpenedFiles(tuple(Source(Path(f"/{n}.ply"), model(n)) for n in ("a", "b"))))
 
 
 def cube() -> Collider:
@@ -67,35 +67,35 @@ def cube() -> Collider:
     return Collider((corners * 0.05,), TriangleMesh(corners, faces))
 
 
-def names(stage: Stage) -> list[str]:
-    return [thing.name for thing in stage.scene.objects]
+def names(state: EditorState) -> list[str]:
+    return [thing.name for thing in state.scene.objects]
 
 
-def same_as_file(stage: Stage) -> None:
+def same_as_file(state: EditorState) -> None:
     """What is drawn is what the file says, and every row belongs to its object."""
-    items = stage.document.file.all_items
-    assert names(stage) == [item.name for item in items]
-    assert len(stage.filed) == len(stage.sweeps) == len(stage.sources) == len(items)
-    for thing, item, source in zip(stage.scene.objects, items, stage.sources, strict=True):
+    items = state.document.file.all_items
+    assert names(state) == [item.name for item in items]
+    assert len(state.filed) == len(state.sweeps) == len(state.sources) == len(items)
+    for thing, item, source in zip(state.scene.objects, items, state.sources, strict=True):
         assert (thing.x, thing.visible, thing.selectors) == (item.x, item.visible, item.selectors)
         assert tuple(thing.world_from_object.position) == item.position
-        assert source.model is thing.model is stage.document.model(item)
+        assert source.model is thing.model is state.document.model(item)
 
 
-def edit(stage: Stage, change, *values) -> None:
-    arrange.edit(stage, change(stage.document.file, *values), change.__name__)
+def edit(state: EditorState, change, *values) -> None:
+    arrange.edit(state, change(state.document.file, *values), change.__name__)
 
 
-def test_a_scene_file_is_shown_as_it_says(stage):
-    assert names(stage) == NAMES
-    same_as_file(stage)
-    assert not stage.document.unsaved
-    assert stage.first_view((640, 360)).world_from_eye.position == pytest.approx((0.05, 0.5, 0.95))
-    assert tuple(stage.first_target) == (0.02, 0.04, 0.0)
+def test_a_scene_file_is_shown_as_it_says(state):
+    assert names(state) == NAMES
+    same_as_file(state)
+    assert not state.document.unsaved
+    assert state.first_view((640, 360)).world_from_eye.position == pytest.approx((0.05, 0.5, 0.95))
+    assert tuple(state.first_target) == (0.02, 0.04, 0.0)
 
 
-def test_every_edit_is_shown_and_taken_back(stage):
-    first = stage.scene
+def test_every_edit_is_shown_and_taken_back(state):
+    first = state.scene
     pose = Pose(np.array([1.0, 2.0, 3.0]), np.array([1.0, 0, 0, 0]))
     steps = [
         (edits.remove, "cube"), (edits.duplicate, "ball", (0.1, 0.0, 0.0)),
@@ -104,20 +104,20 @@ def test_every_edit_is_shown_and_taken_back(stage):
     ]  # fmt: skip
     scenes = [first]
     for step in steps:
-        edit(stage, *step)
-        same_as_file(stage)
-        assert stage.document.unsaved
-        scenes.append(stage.scene)
-    assert names(stage) == ["ball 2", "torus", "plate"]
+        edit(state, *step)
+        same_as_file(state)
+        assert state.document.unsaved
+        scenes.append(state.scene)
+    assert names(state) == ["ball 2", "torus", "plate"]
     for scene in reversed(scenes[:-1]):
-        arrange.undo(stage)
-        same_as_file(stage)
-        assert told(stage.scene) == told(scene)
-    assert not stage.document.unsaved and arrange.undo(stage) == ""
+        arrange.undo(state)
+        same_as_file(state)
+        assert told(state.scene) == told(scene)
+    assert not state.document.unsaved and arrange.undo(state) == ""
     for scene in scenes[1:]:
-        assert arrange.redo(stage) != ""
-        same_as_file(stage)
-        assert told(stage.scene) == told(scene)
+        assert arrange.redo(state) != ""
+        same_as_file(state)
+        assert told(state.scene) == told(scene)
 
 
 def told(scene) -> list:
@@ -127,54 +127,54 @@ def told(scene) -> list:
     ]
 
 
-def test_what_an_edit_does_not_touch_stays_as_it_stands(stage):
-    stage.set_x(2, 0.6)  # as a sweep moves it
-    stage.sweeps[3].leg_s = 7.0
-    ball = stage.scene.objects[2]
-    edit(stage, edits.remove, "cube")
-    assert stage.scene.objects[1] is ball and stage.sweeps[2].leg_s == 7.0
-    edit(stage, edits.rename, "ball", "globe")
-    assert (stage.scene.objects[1].x, stage.scene.objects[1].name) == (0.6, "globe")
+def test_what_an_edit_does_not_touch_stays_as_it_stands(state):
+    state.set_x(2, 0.6)  # as a sweep moves it
+    state.sweeps[3].leg_s = 7.0
+    ball = state.scene.objects[2]
+    edit(state, edits.remove, "cube")
+    assert state.scene.objects[1] is ball and state.sweeps[2].leg_s == 7.0
+    edit(state, edits.rename, "ball", "globe")
+    assert (state.scene.objects[1].x, state.scene.objects[1].name) == (0.6, "globe")
 
 
-def test_the_chosen_object_follows_its_name(stage):
-    stage.chosen = "ring"
-    edit(stage, edits.remove, "cube")
-    assert stage.chosen_index == 2
-    edit(stage, edits.rename, "ring", "torus")
-    assert stage.chosen == "torus"
-    edit(stage, edits.remove, "torus")
-    assert stage.chosen == "" and stage.chosen_index is None
-    arrange.undo(stage)
-    arrange.undo(stage)
-    assert stage.chosen == ""
+def test_the_chosen_object_follows_its_name(state):
+    state.chosen = "ring"
+    edit(state, edits.remove, "cube")
+    assert state.chosen_index == 2
+    edit(state, edits.rename, "ring", "torus")
+    assert state.chosen == "torus"
+    edit(state, edits.remove, "torus")
+    assert state.chosen == "" and state.chosen_index is None
+    arrange.undo(state)
+    arrange.undo(state)
+    assert state.chosen == ""
 
 
-def test_a_stop_has_one_name_on_the_desktop_and_in_the_headset(stage, monkeypatch):
+def test_a_stop_has_one_name_on_the_desktop_and_in_the_headset(state, monkeypatch):
     """The cube's last stop is called "again" in its folder, and is the ring's beginning."""
     monkeypatch.setattr(collider_files, "one_collider", lambda *_: cube())
-    ready(stage)
-    worn = {slider.name: slider.stops for slider in sliders_of(stage.world)}
+    ready(state)
+    worn = {slider.name: slider.stops for slider in sliders_of(state.world)}
     assert len(worn) >= 3
-    for index, thing in enumerate(stage.scene.objects):
+    for index, thing in enumerate(state.scene.objects):
         if thing.name in worn:
-            assert stage.stops(index) == worn[thing.name]
-    assert [stop.name for stop in stage.stops(1)] == [
+            assert state.stops(index) == worn[thing.name]
+    assert [stop.name for stop in state.stops(1)] == [
         "normal", "ice", "fire", "charcoal", "normal",
     ]  # fmt: skip
 
 
-def test_regions_go_with_their_objects(stage):
+def test_regions_go_with_their_objects(state):
     inside = Sphere(centre=(0, 0, 0), radius=0.05, x=1.0)
-    stage.regions.take((inside,), 3)
-    stage.regions.take((inside,), 1)
-    edit(stage, edits.remove, "cube")
-    assert [region.index for region in stage.regions.items] == [2]
-    view = stage.first_view((64, 64))
-    assert [len(thing.selectors) for thing in stage.shown(view).objects] == [0, 0, 1, 0]
-    file = edits.change(stage.document.file, "ring", selectors=(inside,))
-    arrange.edit(stage, file, "a selector")
-    assert len(stage.shown(view).objects[2].selectors) == 2  # the file's and the region's
+    state.regions.take((inside,), 3)
+    state.regions.take((inside,), 1)
+    edit(state, edits.remove, "cube")
+    assert [region.index for region in state.regions.items] == [2]
+    view = state.first_view((64, 64))
+    assert [len(thing.selectors) for thing in state.shown(view).objects] == [0, 0, 1, 0]
+    file = edits.change(state.document.file, "ring", selectors=(inside,))
+    arrange.edit(state, file, "a selector")
+    assert len(state.shown(view).objects[2].selectors) == 2  # the file's and the region's
 
 
 def test_a_hand_on_the_slider_is_a_look_that_is_saved_but_not_undone(plain):
@@ -183,7 +183,7 @@ def test_a_hand_on_the_slider_is_a_look_that_is_saved_but_not_undone(plain):
     assert arrange.undo(plain) == "" and not plain.document.unsaved
     edit(plain, edits.hide, "b")
     arrange.steer(plain, 0, 0.7)
-    plain.go_to_stop(1)
+    arrange.all_go_to_stop(plain, 1)
     plain.advance(1.0)
     assert [thing.x for thing in plain.scene.objects] == [1.0, 1.0]
     assert arrange.undo(plain) == "hide"
@@ -218,10 +218,10 @@ def test_what_is_deleted_comes_back_with_the_x_it_had(plain):
 def test_regions_are_undone_with_everything_else_in_the_order_it_was_done(plain):
     regions = plain.regions
     plain.add_region("sphere")
-    arrange.record_regions(plain)
+    plain.record_regions()
     for x in (0.1, 0.2, 0.3):  # a drag on its slider
         regions.edit(0, x=x)
-        arrange.record_regions(plain)
+        plain.record_regions()
     plain.rest()
     edit(plain, edits.hide, "b")
     regions.edit(0, name="lid")
@@ -242,10 +242,10 @@ def test_regions_are_undone_with_everything_else_in_the_order_it_was_done(plain)
 def test_strokes_are_undone_one_by_one(plain):
     regions, view = plain.regions, plain.first_view((64, 64))
     plain.paint(view, (32, 32), 0.0, False)  # nothing is under the brush: the region alone
-    arrange.record_regions(plain)
+    plain.record_regions()
     for mask in ([1, 0, 0], [1, 1, 0]):
         regions.edit(0, painted=np.array(mask, bool))
-        arrange.record_regions(plain)
+        plain.record_regions()
     plain.rest()
     regions.edit(0, painted=np.array([1, 1, 1], bool))
     assert arrange.undo(plain) == "paint painted 1" and regions.items[0].painted.sum() == 2
@@ -255,27 +255,27 @@ def test_strokes_are_undone_one_by_one(plain):
     assert arrange.redo(plain) == "paint painted 1" and regions.items[0].painted.sum() == 2
 
 
-def test_a_region_comes_back_with_its_deleted_object(stage):
-    stage.chosen = "cube"
-    stage.regions.take((Sphere(centre=(0, 0, 0), radius=0.05, x=1.0),), 3)
-    stage.keep_regions()
-    assert stage.document.history.undoes == ""
-    edit(stage, edits.remove, "ring")
-    assert stage.regions.items == ()
-    edit(stage, edits.remove, "cube")
-    arrange.undo(stage)
-    arrange.undo(stage)
-    assert [region.index for region in stage.regions.items] == [3]
-    assert names(stage)[3] == "ring" and stage.regions.kept == stage.document.saved_regions
-    arrange.redo(stage)
-    assert stage.regions.items == ()
+def test_a_region_comes_back_with_its_deleted_object(state):
+    state.chosen = "cube"
+    state.regions.take((Sphere(centre=(0, 0, 0), radius=0.05, x=1.0),), 3)
+    state.keep_regions()
+    assert state.document.history.undoes == ""
+    edit(state, edits.remove, "ring")
+    assert state.regions.items == ()
+    edit(state, edits.remove, "cube")
+    arrange.undo(state)
+    arrange.undo(state)
+    assert [region.index for region in state.regions.items] == [3]
+    assert names(state)[3] == "ring" and state.regions.kept == state.document.saved_regions
+    arrange.redo(state)
+    assert state.regions.items == ()
 
 
 def test_paint_of_another_level_of_detail_is_none_after_undoing(plain):
     plain.paint(plain.first_view((64, 64)), (32, 32), 0.0, False)
-    arrange.record_regions(plain)
+    plain.record_regions()
     plain.regions.edit(0, painted=np.ones(3, bool))
-    arrange.record_regions(plain)
+    plain.record_regions()
     plain.rest()
     edit(plain, edits.hide, "b")
     finer = replace(model("a"), **{
@@ -303,98 +303,98 @@ def test_what_was_opened_alone_is_a_scene_that_is_not_saved(plain):
 
 
 def test_two_of_the_same_file_have_names_of_their_own():
-    stage = stage_of(Found(tuple(Source(Path("/data/a.ply"), model("a")) for _ in range(3))))
-    assert names(stage) == ["a", "a 2", "a 3"]
+    state = state_of(OpenedFiles(tuple(Source(Path("/data/a.ply"), model("a")) for _ in range(3))))
+    assert names(state) == ["a", "a 2", "a 3"]
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_is_edited_undone_and_redone_all_stay_one(stage, seed, monkeypatch):
+def test_whatever_is_edited_undone_and_redone_all_stay_one(state, seed, monkeypatch):
     """Hundreds of edits by chance: file, scene and world tell the same after each."""
     monkeypatch.setattr(collider_files, "one_collider", lambda *_: cube())
     rng = np.random.default_rng(seed)
-    ready(stage)
+    ready(state)
     for _ in range(150):
-        stage.world.paused = True
-        do_something(stage, rng)
-        ready(stage)
-        same_as_file(stage)
-        same_in_world(stage)
+        state.world.paused = True
+        do_something(state, rng)
+        ready(state)
+        same_as_file(state)
+        same_in_world(state)
         if rng.random() < 0.1:  # things fall, answer, and are put where the file says
-            stage.world.paused = False
+            state.world.paused = False
             for _ in range(5):
-                stage.world.step()
-            put_back(stage.world)
-            stage.follow_world()
-            same_as_file(stage)
+                state.world.step()
+            put_back(state.world)
+            state.follow_world()
+            same_as_file(state)
     for _ in range(500):
-        arrange.undo(stage)
-    ready(stage)
-    same_as_file(stage)
-    same_in_world(stage)
-    assert names(stage) == NAMES and not stage.document.unsaved
+        arrange.undo(state)
+    ready(state)
+    same_as_file(state)
+    same_in_world(state)
+    assert names(state) == NAMES and not state.document.unsaved
 
 
-def do_something(stage: Stage, rng: np.random.Generator) -> None:
-    file = stage.document.file
-    name = rng.choice(names(stage)) if stage.scene.objects else ""
+def do_something(state: EditorState, rng: np.random.Generator) -> None:
+    file = state.document.file
+    name = rng.choice(names(state)) if state.scene.objects else ""
     deed = rng.integers(0, 12)
     if deed < 2:
-        arrange.undo(stage)
+        arrange.undo(state)
     elif deed < 4:
-        arrange.redo(stage)
+        arrange.redo(state)
     elif not name or (deed == 4 and len(file.items) < 12):
         item = replace(edits.find(file, name), name=f"new {rng.integers(5)}") if name else None
-        item = item or stage.document.history.steps[0].file.items[0]
-        arrange.edit(stage, edits.add(file, item), "add")
+        item = item or state.document.history.steps[0].file.items[0]
+        arrange.edit(state, edits.add(file, item), "add")
     elif deed == 5:
-        arrange.edit(stage, edits.remove(file, name), "delete")
+        arrange.edit(state, edits.remove(file, name), "delete")
     elif deed == 6 and len(file.items) < 12:
-        arrange.edit(stage, edits.duplicate(file, name, tuple(rng.normal(size=3))), "copy")
+        arrange.edit(state, edits.duplicate(file, name, tuple(rng.normal(size=3))), "copy")
     elif deed == 7 and name != "background":
         wanted = f"name {rng.integers(100)}"
         if edits.find(file, wanted) is None:
-            arrange.edit(stage, edits.rename(file, name, wanted), "rename")
+            arrange.edit(state, edits.rename(file, name, wanted), "rename")
     elif deed == 8:
         turn = rng.normal(size=4)
         pose = Pose(rng.normal(size=3), turn / np.linalg.norm(turn))
-        arrange.place(stage, names(stage).index(name), pose)
+        arrange.place(state, names(state).index(name), pose)
     elif deed == 9:
-        arrange.steer(stage, names(stage).index(name), float(rng.random()))
+        arrange.steer(state, names(state).index(name), float(rng.random()))
     elif deed == 10:
         file = edits.change(file, name, collider=None if rng.random() < 0.5 else "hulls")
         if name != "background":
             file = edits.change(file, name, static=bool(rng.random() < 0.5))
-        arrange.edit(stage, file, "body")
+        arrange.edit(state, file, "body")
     else:
         file = edits.hide(file, name, bool(rng.random() < 0.5))
-        arrange.edit(stage, edits.ground(file, float(rng.random())), "hide, and another floor")
+        arrange.edit(state, edits.ground(file, float(rng.random())), "hide, and another floor")
     if rng.random() < 0.5:
-        stage.rest()
+        state.rest()
 
 
-def ready(stage: Stage) -> None:
+def ready(state: EditorState) -> None:
     end = time.monotonic() + 10
-    while stage.bodies.poll(stage.document) and time.monotonic() < end:
+    while state.bodies.poll(state.document) and time.monotonic() < end:
         time.sleep(0.0005)
-    assert stage.bodies.problem == "" and not stage.bodies.busy
+    assert state.bodies.problem == "" and not state.bodies.busy
 
 
-def same_in_world(stage: Stage) -> None:
+def same_in_world(state: EditorState) -> None:
     """The world has the same objects in the same order, places, values and bodies."""
-    items = stage.document.file.all_items
-    assert list(stage.world.things) == [item.name for item in items]
-    for item, thing in zip(items, stage.world.things.values(), strict=True):
+    items = state.document.file.all_items
+    assert list(state.world.things) == [item.name for item in items]
+    for item, thing in zip(items, state.world.things.values(), strict=True):
         assert thing.item is item and thing.standing.x == item.x
         assert (thing.body is not None) == (item.collider is not None)
         assert thing.pose.position == pytest.approx(item.position, abs=1e-5)
 
 
-def test_an_edit_that_cannot_be_leaves_all_as_it_was(stage):
-    before = stage.scene
+def test_an_edit_that_cannot_be_leaves_all_as_it_was(state):
+    before = state.scene
     wrong = edits.change(
-        stage.document.file, "ball", selectors=(Painted(np.ones(7, np.float32), 1.0),)
+        state.document.file, "ball", selectors=(Painted(np.ones(7, np.float32), 1.0),)
     )
     wrong = edits.add(wrong, replace(edits.find(wrong, "ball"), name="copy"))
     with pytest.raises(BadFile, match="paint it anew"):
-        arrange.edit(stage, wrong, "paint")
-    assert told(stage.scene) == told(before) and not stage.document.unsaved
+        arrange.edit(state, wrong, "paint")
+    assert told(state.scene) == told(before) and not state.document.unsaved

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.viewer.bodies import Bodies
-from shapeshift.app.viewer.document import Document, key_of
-from shapeshift.app.viewer.opened import Source
+from shapeshift.app.editor.state.bodies import Bodies
+from shapeshift.app.editor.state.files.document import Document, key_of
+from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.scene.colliders import collider_files
 from shapeshift.scene.colliders.collider import Collider

@@ -7,8 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from shapeshift.app.viewer.controls import DIRECTIONS, MAX_RADII, MIN_RADII, POLE, Camera, Push
-from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.editor.state.camera.camera import (
+    DIRECTIONS,
+    MAX_RADII,
+    MIN_RADII,
+    POLE,
+    Camera,
+    Push,
+)
+from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopBlend, StopWeights
 from shapeshift.scene.cameras.framing import fit_distance, orbit_path
@@ -357,27 +364,27 @@ def test_changing_how_it_plays_does_not_move_it(mode, pace, leg, rest, x, second
     sweep.seconds = seconds
     sweep.resume_at(x)
     sweep.mode, sweep.ease, sweep.leg_s, sweep.rest_s = mode, pace, leg, rest
-    sweep.resume_at(x)  # what the stage does before each step
+    sweep.resume_at(x)  # what the state does before each step
     assert sweep.x == pytest.approx(x, abs=1e-6)
     sweep.advance(1e-4)
     assert abs(sweep.x - x) < 0.02
 
 
 def test_the_stage_visits_two_stops_at_least():
-    stage = Stage(lambda path: Dummy(STOPS))
-    stage.sweeps = [Sweep.over(StopBlend(STOPS))]
-    stage.scene = Scene((SceneObject("a", Dummy(STOPS), x=0.5),))
-    stage.visit(0, 0.0, on=False)
-    assert stage.sweeps[0].xs == (0.5, 1.0)
-    stage.visit(0, 1.0, on=False)
-    assert stage.sweeps[0].xs == (0.5, 1.0) and stage.sliders == [0]
-    stage.visit(0, 0.0, on=True)
-    assert stage.sweeps[0].xs == (0.0, 0.5, 1.0)
+    state = EditorState(lambda path: Dummy(STOPS))
+    state.sweeps = [Sweep.over(StopBlend(STOPS))]
+    state.scene = Scene((SceneObject("a", Dummy(STOPS), x=0.5),))
+    state.visit(0, 0.0, on=False)
+    assert state.sweeps[0].xs == (0.5, 1.0)
+    state.visit(0, 1.0, on=False)
+    assert state.sweeps[0].xs == (0.5, 1.0) and state.sliders == [0]
+    state.visit(0, 0.0, on=True)
+    assert state.sweeps[0].xs == (0.0, 0.5, 1.0)
 
 
 @dataclass
 class Dummy:
-    """What a stage needs of a model to play it."""
+    """What a state needs of a model to play it."""
 
     stops: tuple
 

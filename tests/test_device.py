@@ -61,7 +61,8 @@ def test_a_kind_that_is_not_there_is_named():
 
 def test_nothing_happens_at_import():
     run = python(
-        "import sys, os; before = dict(os.environ); import shapeshift.rasterizer.raster, rasterizer.reference;"
+        "import sys, os; before = dict(os.environ)\n"
+        "import shapeshift.rasterizer.raster, shapeshift.rasterizer.reference\n"
         "assert 'pyopencl' not in sys.modules; assert dict(os.environ) == before"
     )
     assert run.returncode == 0, run.stderr

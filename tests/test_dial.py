@@ -2,13 +2,13 @@
 
 import pytest
 
-from shapeshift.app.viewer.dial import LEAST_SCALE, Dial
+from shapeshift.app.editor.state.quality_controller import LEAST_SCALE, QualityController
 from shapeshift.renderer.settings import RenderSettings
 
 
-def slow_dial() -> Dial:
+def slow_dial() -> QualityController:
     """A dial whose frames have been far too slow for long."""
-    dial = Dial(target_ms=10.0, dynamic=True)
+    dial = QualityController(target_ms=10.0, dynamic=True)
     dial.while_moving(RenderSettings())
     for _ in range(400):
         dial.seen(200.0, moving=True)

@@ -13,13 +13,13 @@ from camera_files import cameras
 from PIL import Image
 
 from shapeshift.app import cli
-from shapeshift.app.panels.status_line import bytes_text, scene_words
+from shapeshift.app.editor.panels.status_line import bytes_text, scene_words
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import told_of
+from shapeshift.app.editor.state.files.opened import Opener, means_cameras, read_files
+from shapeshift.app.editor.state.scene_objects import scene_of
+from shapeshift.app.editor.state.user.recent import FILE, MOST, RecentFiles
 from shapeshift.app.paths import config_folder, plain, plain_path
-from shapeshift.app.viewer.files import told_of
-from shapeshift.app.viewer.opened import Opener, means_cameras, read_files
-from shapeshift.app.viewer.recent import FILE, MOST, RecentFiles
-from shapeshift.app.viewer.scene_objects import scene_of
-from shapeshift.app.viewer.stage import Stage
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
@@ -249,16 +249,16 @@ def test_scenes_far_from_zero_stay_where_they_are_to_each_other(tmp_path):
 
 
 def test_the_status_line_says_what_is_open(tmp_path):
-    stage = Stage(read_model)
-    assert scene_words(stage) == ["nothing is open"]
+    state = EditorState(read_model)
+    assert scene_words(state) == ["nothing is open"]
     path = splats(tmp_path / "a.ply", count=1234)
     sources = read_files([path], read, CameraReading(), silent).sources
-    stage.take(sources, scene_of(sources))
-    words = scene_words(stage)
+    state.take(sources, scene_of(sources))
+    words = scene_words(state)
     assert words[1:4] == ["1\u2009234 splats", "SH 1", "1 stop"]
     assert words[-1] == bytes_text(path.stat().st_size)
-    stage.take(sources * 2, scene_of(sources * 2))
-    assert scene_words(stage)[:2] == ["2 objects", "2\u2009468 splats"]
+    state.take(sources * 2, scene_of(sources * 2))
+    assert scene_words(state)[:2] == ["2 objects", "2\u2009468 splats"]
 
 
 def test_what_was_repaired_is_told_at_opening(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from shapeshift.app.cli import main
 from shapeshift.app.headset import headset
 from shapeshift.app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
-from shapeshift.app.headset.worn_scene import BACKGROUND, open_worn
+from shapeshift.app.headset.xr_scene import BACKGROUND, open_xr
 from shapeshift.vr.openxr.instance import Lost, NoHeadset
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture
 def viewer(monkeypatch) -> list:
     """What the viewer would be opened with; there is a display."""
-    from shapeshift.app.viewer import desktop
+    from shapeshift.app.editor import desktop
 
     opened = []
     monkeypatch.setenv("DISPLAY", ":99")
@@ -104,7 +104,7 @@ def test_a_second_ctrl_c_ends_at_once_and_none_changes_nothing():
 
 
 def test_a_scene_file_is_a_world_with_a_floor():
-    scene = open_worn(DEMO, Options())
+    scene = open_xr(DEMO, Options())
     assert scene.floor_y == -0.7 and scene.background == BACKGROUND
     assert set(scene.models) == set(scene.world.things) >= {"cube", "ball", "ring", "plate"}
     np.testing.assert_allclose(scene.eye.position, (0.05, 0.5, 0.95))
@@ -113,7 +113,7 @@ def test_a_scene_file_is_a_world_with_a_floor():
 
 
 def test_a_package_alone_is_seen_and_not_touched():
-    scene = open_worn(ROOT / "assets" / "workshop.shift", Options())
+    scene = open_xr(ROOT / "assets" / "workshop.shift", Options())
     (thing,) = scene.world.drawn().objects
     assert (thing.name, scene.floor_y) == ("workshop", None)
     scene.world.advance(0.05)

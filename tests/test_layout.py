@@ -4,7 +4,7 @@ from itertools import combinations
 
 import pytest
 
-from shapeshift.app.viewer.layout import FOLDED, LEGEND, Layout, lay_out
+from shapeshift.app.editor.state.layout import FOLDED, LEGEND, Layout, lay_out
 
 SIZES = ((800, 600), (1280, 720), (1366, 768), (1920, 1080), (2560, 1440), (3840, 2160))
 SCALES = (1.0, 1.25, 1.5, 2.0)

@@ -8,7 +8,7 @@ from test_simulation import item, reaction
 from test_world import real
 from vr_frames import at, frame, hand, tilted
 
-from shapeshift.app.headset.person import Person
+from shapeshift.app.headset.xr_user import XrUser
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import resized, underfoot
 
@@ -18,11 +18,11 @@ HERE = (0.2, 1.2, -0.4)  # of the right hand
 EYE = at(0, 1.5, 2, tilted(-0.3))
 
 
-def person_with(*items, floor_y=0.0, **file) -> Person:
-    return Person(real(*items, floor_y=floor_y, **file), EYE, floor_y)
+def person_with(*items, floor_y=0.0, **file) -> XrUser:
+    return XrUser(real(*items, floor_y=floor_y, **file), EYE, floor_y)
 
 
-def run(person: Person, frames, standing=None):
+def run(person: XrUser, frames, standing=None):
     """The standing after these frames, and the buzzes of each."""
     if not person.touching.seen:
         person.act(frame(), standing or Standing(), 1 / HZ)  # with open hands first
@@ -55,7 +55,7 @@ def test_grab_carry_and_drop_onto_the_floor_changes_x():
     assert person.world.things["a"].pose.position[1] < 0.06
 
 
-def held_after(person: Person, standing: Standing) -> float:
+def held_after(person: XrUser, standing: Standing) -> float:
     """Metres from the hand to what it holds."""
     return float(
         np.linalg.norm(person.world.things["a"].pose.position - standing.point(np.array(HERE)))

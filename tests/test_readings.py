@@ -15,9 +15,9 @@ from shapeshift.app.charts.comparison import (
     shortcuts,
 )
 from shapeshift.app.charts.quick_chart import QUICK, QuickChart, turned
-from shapeshift.app.viewer.dial import Dial
-from shapeshift.app.viewer.readings import FEWEST, Meter
-from shapeshift.app.viewer.shown import Shown, Wish, rested
+from shapeshift.app.editor.state.frame_stats import FEWEST, Meter
+from shapeshift.app.editor.state.quality_controller import QualityController
+from shapeshift.app.editor.window.shown import FrameRequest, Shown, rested
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.pose import View, look_at
 from shapeshift.scene.scene import Scene
@@ -56,8 +56,8 @@ class KnownRenderer:
 EMPTY, EXACT = Scene(()), RenderSettings()
 
 
-def wish(settings=EXACT, moving=False, scene=EMPTY) -> Wish:
-    return Wish(scene, VIEW, settings, moving)
+def request(settings=EXACT, moving=False, scene=EMPTY) -> FrameRequest:
+    return FrameRequest(scene, VIEW, settings, moving)
 
 
 # The last second
@@ -119,39 +119,39 @@ def test_a_picture_is_compared_once_after_it_has_rested():
 
 
 def make_shown(drawing: str = "tiles (test)"):
-    from shapeshift.app.viewer.readings import Readings
+    from shapeshift.app.editor.state.frame_stats import FrameStatsView
 
-    renderer, readings = KnownRenderer(drawing), Readings(drawing=drawing)
+    renderer, readings = KnownRenderer(drawing), FrameStatsView(drawing=drawing)
     return renderer, readings, Shown(renderer, readings)
 
 
 def test_the_same_picture_is_drawn_once_and_a_kept_order_made_anew_at_rest():
     renderer, readings, shown = make_shown()
     kept = RenderSettings(resort_frames=4, recolor_degrees=5.0)
-    assert shown.draw(wish(kept, moving=True), None, force=False)
-    shown.read(wish(kept, moving=True), 10.0)
+    assert shown.draw(request(kept, moving=True), None, force=False)
+    shown.read(request(kept, moving=True), 10.0)
     assert renderer.drawn[-1][0] == kept and readings.stale_db == 51.0
-    assert shown.draw(wish(kept), None, force=False)
+    assert shown.draw(request(kept), None, force=False)
     assert renderer.drawn[-1][0] == RenderSettings()
-    assert not shown.draw(wish(kept), None, force=False)
-    assert not shown.draw(wish(replace(kept, background=(1, 0, 0))), None, force=False)
+    assert not shown.draw(request(kept), None, force=False)
+    assert not shown.draw(request(replace(kept, background=(1, 0, 0))), None, force=False)
     assert renderer.settings.background == (1, 0, 0) and renderer.presents == 2
-    shown.read(wish(), 20.0)
+    shown.read(request(), 20.0)
     assert readings.stale_db is None  # every frame is sorted
 
 
 def test_a_replaced_scene_is_drawn_even_when_it_is_equal():
     renderer, _, shown = make_shown()
-    shown.draw(wish(), None, force=False)
-    assert shown.draw(wish(scene=Scene(())), None, force=False)
+    shown.draw(request(), None, force=False)
+    assert shown.draw(request(scene=Scene(())), None, force=False)
     assert len(renderer.drawn) == 2
 
 
 def test_comparing_draws_two_frames_and_then_the_picture_again():
     renderer, readings, shown = make_shown()
-    rough = wish(RenderSettings(min_pixels=1.0, debug="depth"))
+    rough = request(RenderSettings(min_pixels=1.0, debug="depth"))
     shown.draw(rough, None, force=False)
-    assert not shown.due(wish(), 50.0)  # exact: there is nothing to compare
+    assert not shown.due(request(), 50.0)  # exact: there is nothing to compare
     assert not shown.due(rough, 50.0) and shown.due(rough, 50.0 + 2 * REST_S)
     shown.measure(rough)
     assert len(renderer.drawn) == 3
@@ -159,7 +159,7 @@ def test_comparing_draws_two_frames_and_then_the_picture_again():
     shown.read(rough, 60.0)
     assert readings.error_db == pytest.approx(-10 * np.log10(np.mean((0.01 * NOISE) ** 2)))
     assert not readings.error_is_old and not shown.due(rough, 99.0)
-    shown.read(wish(RenderSettings(min_pixels=2.0)), 61.0)
+    shown.read(request(RenderSettings(min_pixels=2.0)), 61.0)
     assert readings.error_is_old
 
 
@@ -167,7 +167,7 @@ def test_a_kept_order_is_judged_once_a_second_at_most():
     renderer, _, shown = make_shown()
     asked = []
     renderer.stale_order_db = lambda views: asked.append(views) or 40.0
-    kept = wish(RenderSettings(resort_frames=0, resort_degrees=5.0), moving=True)
+    kept = request(RenderSettings(resort_frames=0, resort_degrees=5.0), moving=True)
     for i in range(30):
         shown.draw(kept, None, force=True)
         shown.read(kept, 10 + i * 0.1)
@@ -212,7 +212,7 @@ def test_the_quick_chart_prices_every_setting_against_exact():
 
 
 def test_the_dial_measures_in_steps_and_chooses_again_without_measuring():
-    renderer, dial = KnownRenderer(), Dial(floor_db=20.0)
+    renderer, dial = KnownRenderer(), QualityController(floor_db=20.0)
     dial.start(renderer, Scene(()), VIEW, np.zeros(3), lambda: None)
     before = dial.progress
     while dial.measuring:
@@ -231,7 +231,7 @@ def test_the_dial_measures_in_steps_and_chooses_again_without_measuring():
 
 
 def test_measuring_can_be_stopped_and_keeps_what_was_known():
-    dial = Dial(wanted=True)
+    dial = QualityController(wanted=True)
     dial.start(KnownRenderer(), Scene(()), VIEW, np.zeros(3), lambda: None)
     assert dial.measuring and not dial.wanted
     dial.cancel()

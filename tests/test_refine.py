@@ -3,18 +3,19 @@
 import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from splat_scenes import one_splat
 from test_streamed import COUNTS, write_streamed
 
-import shapeshift.app.viewer.refine as refine
+import shapeshift.app.editor.state.files.refine as refine
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.refine import Refiner
+from shapeshift.app.editor.state.quality_controller import QualityController
+from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.app.opening import ReadingOptions
-from shapeshift.app.viewer.refine import Refiner, attach_refiner
-from shapeshift.app.viewer.sections import Hooks
-from shapeshift.app.viewer.stage import Stage
 from shapeshift.runtime_models.model import BadFile
 
 LONGEST_S = 10.0
@@ -37,19 +38,23 @@ class FakeViewer:
     """The part of the viewer that levels of detail touch."""
 
     def __init__(self, refiner: Refiner, paths: list[Path], most: int = 10**9) -> None:
-        self.stage, self.renderer, self.hooks = Stage(refiner.open), FakeRenderer(most), Hooks()
-        self.dial = SimpleNamespace(wanted=False, measuring=False, choice=None, forgotten=0)
-        self.dial.forget = lambda: setattr(self.dial, "forgotten", self.dial.forgotten + 1)
-        self.stage.open(paths)
-        self.renderer.update(self.stage.scene)
-        attach_refiner(self, refiner)
+        self.state, self.hooks = EditorState(refiner.open), Hooks()
+        self.renderer, self.changes = FakeRenderer(most), 0
+        self.dial = QualityController()
+        self.state.open(paths)
+        self.renderer.update(self.state.scene)
+        attach_refiner(refiner, self.state, self.hooks, self.renderer.update, self._changed)
+
+    def _changed(self) -> None:
+        self.changes += 1
+        self.dial.scene_changed()
 
     def counts(self) -> list[int]:
-        return [thing.model.splat_count for thing in self.stage.scene.objects]
+        return [thing.model.splat_count for thing in self.state.scene.objects]
 
     def open(self, *paths: Path) -> None:
         """As dropping files on the window does."""
-        self.stage.open(paths)
+        self.state.open(paths)
         for changed in self.hooks.opened:
             changed()
 
@@ -82,18 +87,18 @@ def test_the_coarsest_level_is_there_at_once_and_finer_ones_follow(scene):
     with Refiner(ReadingOptions()) as refiner:
         viewer = FakeViewer(refiner, [scene])
         assert viewer.counts() == [20] and viewer.status[0].startswith("detail 1 of 4")
-        stage = viewer.stage
-        stage.set_x(0, 0.25)
-        before = (stage.centre.copy(), stage.radius, stage.settings, stage.sweeps, stage.palette)
+        state = viewer.state
+        state.set_x(0, 0.25)
+        before = (state.centre.copy(), state.radius, state.settings, state.sweeps, state.palette)
         assert viewer.run() == [[20], [150], [400]]
         assert viewer.status == ["detail 4 of 4"] and not refiner.running
-        assert stage.scene.objects[0].x == 0.25 and stage.scene.objects[0].name == "scene"
-        after = (stage.centre, stage.radius, stage.settings, stage.sweeps, stage.palette)
+        assert state.scene.objects[0].x == 0.25 and state.scene.objects[0].name == "scene"
+        after = (state.centre, state.radius, state.settings, state.sweeps, state.palette)
         assert np.array_equal(before[0], after[0]) and before[1:] == after[1:]
-        [source] = stage.sources
+        [source] = state.sources
         assert source.path == scene and source.facts["splats"] == 400
-        assert source.model is stage.scene.objects[0].model and stage.findings == []
-        assert viewer.renderer.drawn == [20, 150, 400] and viewer.dial.forgotten == 2
+        assert source.model is state.scene.objects[0].model and state.findings == []
+        assert viewer.renderer.drawn == [20, 150, 400] and viewer.changes == 2
 
 
 def test_the_budget_bounds_it(scene):
@@ -134,7 +139,7 @@ def test_another_scene_ends_the_reading_of_the_one_before(tmp_path, scene):
 def test_a_level_for_a_scene_that_is_not_shown_any_more_is_dropped(scene):
     with Refiner(ReadingOptions()) as refiner:
         viewer = FakeViewer(refiner, [scene])
-        viewer.stage.open([scene / "1_0"])  # the reader was not told yet
+        viewer.state.open([scene / "1_0"])  # the reader was not told yet
         assert viewer.run() == [[COUNTS[1]]]
 
 
@@ -142,7 +147,7 @@ def test_a_level_that_the_driver_does_not_hold_leaves_the_one_before(scene):
     with Refiner(ReadingOptions()) as refiner:
         viewer = FakeViewer(refiner, [scene], most=200)
         assert viewer.run() == [[20], [150]]
-        assert "no finer level can be shown: 400 splats" in viewer.stage.problem
+        assert "no finer level can be shown: 400 splats" in viewer.state.problem
         assert not refiner.running and viewer.status == ["detail 3 of 4"]
 
 
@@ -151,10 +156,10 @@ def test_a_broken_finer_level_is_said_and_the_coarse_one_stays(scene):
     with Refiner(ReadingOptions()) as refiner:
         viewer = FakeViewer(refiner, [scene])
         assert viewer.run() == [[20], [150]]
-        assert "no finer level can be shown: 0_0/meta.json" in viewer.stage.problem
-        viewer.stage.problem = ""
+        assert "no finer level can be shown: 0_0/meta.json" in viewer.state.problem
+        viewer.state.problem = ""
         viewer.frame()
-        assert viewer.stage.problem == ""  # said once
+        assert viewer.state.problem == ""  # said once
 
 
 def test_a_budget_that_was_chosen_is_chosen_again(scene):

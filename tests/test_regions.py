@@ -7,9 +7,16 @@ import numpy as np
 import pytest
 from models import make_random_model
 
-from shapeshift.app.viewer.outlines import on_screen, segments
-from shapeshift.app.viewer.regions import KINDS, Region, Regions, brushed, region_of, selector_of
-from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.editor.panels.outlines import on_screen, segments
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.regions import (
+    KINDS,
+    Region,
+    Regions,
+    brushed,
+    region_of,
+    selector_of,
+)
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import SceneObject
@@ -199,28 +206,28 @@ def test_regions_of_a_command_are_named_and_none_is_being_edited(thing):
     assert regions.selectors(1, VIEW) == ()
 
 
-# The stage
+# The state
 
 
 def test_the_stage_makes_a_scene_anew_only_when_something_changed(thing):
-    stage = Stage(lambda path: thing.model)
-    stage.open([Path("a"), Path("b")])
+    state = EditorState(lambda path: thing.model)
+    state.open([Path("a"), Path("b")])
     other = dataclasses.replace(VIEW, world_from_eye=look_at(np.array([3.0, 0, 4]), np.zeros(3)))
-    assert stage.shown(VIEW) is stage.scene  # without regions there is nothing to add
-    stage.add_region("box")
-    first = stage.shown(VIEW)
-    assert first is stage.shown(other) and len(first.objects[0].selectors) == 1
+    assert state.shown(VIEW) is state.scene  # without regions there is nothing to add
+    state.add_region("box")
+    first = state.shown(VIEW)
+    assert first is state.shown(other) and len(first.objects[0].selectors) == 1
     assert first.objects[1].selectors == ()
-    stage.regions.edit(0, x=0.5)
-    second = stage.shown(VIEW)
+    state.regions.edit(0, x=0.5)
+    second = state.shown(VIEW)
     assert second is not first and second.objects[0].selectors[0].x == 0.5
-    stage.set_x(0, 0.3)
-    third = stage.shown(VIEW)
+    state.set_x(0, 0.3)
+    third = state.shown(VIEW)
     assert third is not second and third.objects[0].x == 0.3
-    stage.toggle_lens()
-    assert stage.shown(VIEW) is stage.shown(VIEW) is not stage.shown(other)
-    stage.show(stage.scene)
-    assert stage.regions.items == () and stage.shown(VIEW) is stage.scene
+    state.toggle_lens()
+    assert state.shown(VIEW) is state.shown(VIEW) is not state.shown(other)
+    state.show(state.scene)
+    assert state.regions.items == () and state.shown(VIEW) is state.scene
 
 
 def test_picking_sees_what_a_region_shows():
@@ -232,9 +239,9 @@ def test_picking_sees_what_a_region_shows():
         np.zeros((2, 1, 3), np.float32), np.zeros(2, np.int32),
         (Stop("there", 0.0), Stop("not there", 1.0)), mode="exclusive",
     )  # fmt: skip
-    stage = Stage(lambda path: model)
-    stage.open([Path("a")])
+    state = EditorState(lambda path: model)
+    state.open([Path("a")])
     ray = np.array([0, 0, -1.0])
-    assert stage.pick(VIEW, ray, 0.001).point[2] == pytest.approx(1)
-    stage.regions.take((HalfSpace(point=(0, 0, 0), normal=(0, 0, -1.0), x=1.0),), 0)
-    assert stage.pick(VIEW, ray, 0.001).point[2] == pytest.approx(-1)
+    assert state.pick(VIEW, ray, 0.001).point[2] == pytest.approx(1)
+    state.regions.take((HalfSpace(point=(0, 0, 0), normal=(0, 0, -1.0), x=1.0),), 0)
+    assert state.pick(VIEW, ray, 0.001).point[2] == pytest.approx(-1)

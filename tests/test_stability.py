@@ -306,7 +306,8 @@ def test_what_cannot_be_asked_for_is_refused(package, tmp_path, options, words):
 
 def test_interrupted_it_keeps_the_cases_that_are_done(package, tmp_path):
     code = (
-        "import sys; from shapeshift.app import cli; from shapeshift.app.stability_cases import table\n"
+        "import sys; from shapeshift.app import cli\n"
+        "from shapeshift.app.stability_cases import table\n"
         "def stop(stage): raise KeyboardInterrupt\n"
         "table.CASES['crowd'] = stop\n"
         f"sys.exit(cli.main(['stability', {str(package)!r}, '--out', {str(tmp_path)!r},"

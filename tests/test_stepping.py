@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from camera_files import NAMES, cameras, views
 
-from shapeshift.app.viewer.controls import Camera, Push
-from shapeshift.app.viewer.stepping import FLIGHT_S, Steps, between, fitted, picture_box
+from shapeshift.app.editor.state.camera.camera import Camera, Push
+from shapeshift.app.editor.state.camera.stepping import (
+    FLIGHT_S,
+    Steps,
+    between,
+    fitted,
+    picture_box,
+)
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.pose import Pose, look_at

@@ -4,9 +4,14 @@ import json
 
 import pytest
 
+from shapeshift.app.editor.state.user.own_files import MOST, OwnFiles
+from shapeshift.app.editor.state.user.settings import (
+    TEXT_SIZES,
+    Settings,
+    default_text_size,
+    other_text_size,
+)
 from shapeshift.app.paths import ASSETS, DEMO, WorkFolders, is_bundled
-from shapeshift.app.viewer.own_files import MOST, OwnFiles
-from shapeshift.app.viewer.settings import TEXT_SIZES, Settings, default_text_size, other_text_size
 
 
 def test_settings_come_back(tmp_path):

@@ -9,8 +9,8 @@ import pytest
 from shapeshift.app.headset.headset import DEMO, Options
 from shapeshift.app.headset.headset_report import Report
 from shapeshift.app.headset.pacing import Pacing
-from shapeshift.app.headset.wearing import LONGEST_STEP_S, Wearing
-from shapeshift.app.headset.worn_scene import open_worn
+from shapeshift.app.headset.xr_app import LONGEST_STEP_S, XrApp
+from shapeshift.app.headset.xr_scene import open_xr
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
@@ -89,82 +89,82 @@ class Played:
 
 @pytest.fixture(scope="module")
 def scene():
-    return open_worn(DEMO, Options())
+    return open_xr(DEMO, Options())
 
 
 @pytest.fixture
 def wear(scene):
-    def worn(frames: list[Frame], quality: str = "best") -> tuple[Wearing, Played]:
+    def worn(frames: list[Frame], quality: str = "best") -> tuple[XrApp, Played]:
         played = Played(frames)
         pacing, report = Pacing(scene.background, quality), Report()
-        return Wearing(played, played, played, played, scene, pacing, report), played
+        return XrApp(played, played, played, played, scene, pacing, report), played
 
     return worn
 
 
-def head_in_world(wearing: Wearing, frame: Frame) -> np.ndarray:
-    return wearing.standing.pose(frame.head).matrix()
+def head_in_world(xr_app: XrApp, frame: Frame) -> np.ndarray:
+    return xr_app.state.standing.pose(frame.head).matrix()
 
 
 def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
-    wearing, played = wear([frame_at(0.0), frame_at(PERIOD)])
-    wearing.loop()
+    xr_app, played = wear([frame_at(0.0), frame_at(PERIOD)])
+    xr_app.loop()
     eyes = ["present left", "floor by coverage 0", "overlay",
             "present right", "floor by coverage 1", "overlay"]  # fmt: skip
     assert played.asked == ["draw", *eyes, "submit", "mirror"] * 2
     assert [len(views) for views in played.views] == [2, 2]
-    assert played.settings.background == wearing.scene.background
+    assert played.settings.background == xr_app.scene.background
     left = played.views[0][0].world_from_eye
-    np.testing.assert_allclose(left.matrix(), head_in_world(wearing, frame_at(0.0)), atol=1e-9)
+    np.testing.assert_allclose(left.matrix(), head_in_world(xr_app, frame_at(0.0)), atol=1e-9)
 
 
 def test_the_floor_is_that_of_the_scene_and_clearer_while_one_moves(wear):
-    wearing, played = wear([frame_at(i * PERIOD) for i in range(3)])
-    wearing.loop()
-    assert {grid.level_m for grid in played.grids} == {wearing.scene.floor_y}
+    xr_app, played = wear([frame_at(i * PERIOD) for i in range(3)])
+    xr_app.loop()
+    assert {grid.level_m for grid in played.grids} == {xr_app.scene.floor_y}
     resting = played.grids[-1].clearness
     stick = replace(LOST, active=True, grip=HEAD, aim=HEAD, stick=(0.0, 1.0))
     hands = {"left": stick, "right": LOST}
     for i in range(3, 40):
-        wearing.frame(frame_at(i * PERIOD, hands=hands))
+        xr_app.frame(frame_at(i * PERIOD, hands=hands))
     assert played.grids[-1].clearness > 0.95 > 2 * resting
     for i in range(40, 400):
-        wearing.frame(frame_at(i * PERIOD))
+        xr_app.frame(frame_at(i * PERIOD))
     assert played.grids[-1].clearness == pytest.approx(REST, abs=0.02)
-    wearing.floor_shown, count = False, len(played.grids)
-    wearing.frame(frame_at(400 * PERIOD))
+    xr_app.state.floor_shown, count = False, len(played.grids)
+    xr_app.frame(frame_at(400 * PERIOD))
     assert len(played.grids) == count
 
 
 def test_a_scene_without_a_floor_has_it_where_one_stood_first(wear):
-    wearing, played = wear([frame_at(0.0)])
-    wearing.person.floor_y = None
-    wearing.loop()
-    feet = wearing.standing.point(HEAD.position * (1, 0, 1))[1]
+    xr_app, played = wear([frame_at(0.0)])
+    xr_app.state.user.floor_y = None
+    xr_app.loop()
+    feet = xr_app.state.standing.point(HEAD.position * (1, 0, 1))[1]
     assert played.grids[-1].level_m == pytest.approx(feet)
     up = replace(LOST, active=True, grip=HEAD, aim=HEAD, stick=(0.0, 1.0))
     for i in range(1, 60):  # flies
-        wearing.frame(frame_at(i * PERIOD, hands={"left": LOST, "right": up}))
-    assert wearing.standing.point(HEAD.position * (1, 0, 1))[1] > feet + 0.3
+        xr_app.frame(frame_at(i * PERIOD, hands={"left": LOST, "right": up}))
+    assert xr_app.state.standing.point(HEAD.position * (1, 0, 1))[1] > feet + 0.3
     assert played.grids[-1].level_m == pytest.approx(feet)
 
 
 def test_what_is_not_shown_is_not_drawn_and_the_world_goes_on(wear):
-    wearing, played = wear([frame_at(i * PERIOD, drawn=False) for i in range(5)])
-    before = wearing.world.time_s
-    wearing.loop()
+    xr_app, played = wear([frame_at(i * PERIOD, drawn=False) for i in range(5)])
+    before = xr_app.state.world.time_s
+    xr_app.loop()
     assert played.asked == ["rest"] * 5
-    assert wearing.world.time_s - before == pytest.approx(4 * PERIOD)
+    assert xr_app.state.world.time_s - before == pytest.approx(4 * PERIOD)
 
 
 def test_the_person_is_put_before_the_scene_once_the_head_is_known(wear):
     unknown = frame_at(0.0, IDENTITY, drawn=False)
-    wearing, _ = wear([unknown, frame_at(PERIOD)])
-    wearing.loop()
-    found = head_in_world(wearing, frame_at(PERIOD))
-    eye = wearing.scene.eye.matrix()
+    xr_app, _ = wear([unknown, frame_at(PERIOD)])
+    xr_app.loop()
+    found = head_in_world(xr_app, frame_at(PERIOD))
+    eye = xr_app.scene.eye.matrix()
     np.testing.assert_allclose(found[[0, 2], 3], eye[[0, 2], 3], atol=1e-9)
-    assert found[1, 3] == pytest.approx(1.6 + wearing.scene.floor_y)
+    assert found[1, 3] == pytest.approx(1.6 + xr_app.scene.floor_y)
     ahead = -found[:3, 2]
     level = -eye[:3, 2] * (1, 0, 1)
     np.testing.assert_allclose(ahead, level / np.linalg.norm(level), atol=1e-9)
@@ -173,38 +173,38 @@ def test_the_person_is_put_before_the_scene_once_the_head_is_known(wear):
 def test_who_walks_on_stays_there_and_recentring_brings_them_back(wear):
     walked = Pose(HEAD.position + np.array([1.0, 0.0, 0.5]), HEAD.wxyz)
     frames = [frame_at(0.0), frame_at(PERIOD, walked)]
-    wearing, _ = wear(frames)
-    wearing.loop()
-    start = head_in_world(wearing, frame_at(0.0))
-    away = head_in_world(wearing, frames[1])
+    xr_app, _ = wear(frames)
+    xr_app.loop()
+    start = head_in_world(xr_app, frame_at(0.0))
+    away = head_in_world(xr_app, frames[1])
     assert np.linalg.norm(away[:3, 3] - start[:3, 3]) == pytest.approx(np.hypot(1.0, 0.5))
     again = frame_at(2 * PERIOD, walked, recentred=True)
-    wearing.frame(again)
-    np.testing.assert_allclose(head_in_world(wearing, again), start, atol=1e-9)
+    xr_app.frame(again)
+    np.testing.assert_allclose(head_in_world(xr_app, again), start, atol=1e-9)
 
 
 def test_a_long_rest_is_no_long_step(wear):
-    wearing, _ = wear([frame_at(0.0), frame_at(600.0)])
+    xr_app, _ = wear([frame_at(0.0), frame_at(600.0)])
     passed = []
-    act = wearing.person.act
-    wearing.person.act = lambda frame, standing, seconds: (
+    act = xr_app.state.user.act
+    xr_app.state.user.act = lambda frame, standing, seconds: (
         passed.append(seconds) or act(frame, standing, seconds)
     )
-    wearing.loop()
+    xr_app.loop()
     assert passed == [0.0, LONGEST_STEP_S]
 
 
 @pytest.mark.parametrize("why", ["frames", "closed at the desk", "interrupted"])
 def test_the_end_is_asked_for_once_and_frames_go_on_until_it_comes(wear, why):
-    wearing, played = wear([frame_at(i * PERIOD) for i in range(20)])
-    played.closing, wearing.interrupted = why == "closed at the desk", why == "interrupted"
-    wearing.loop(3 if why == "frames" else 0)
-    assert wearing.report.ended == why
+    xr_app, played = wear([frame_at(i * PERIOD) for i in range(20)])
+    played.closing, xr_app.interrupted = why == "closed at the desk", why == "interrupted"
+    xr_app.loop(3 if why == "frames" else 0)
+    assert xr_app.report.ended == why
     assert played.asked.count("submit") == (4 if why == "frames" else 2)  # one more comes
 
 
 def test_the_window_can_be_closed_while_the_headset_rests(wear):
-    wearing, played = wear([])
+    xr_app, played = wear([])
     played.closing = True
-    wearing._rest()
-    assert played.left and wearing.report.ended == "closed at the desk"
+    xr_app._rest()
+    assert played.left and xr_app.report.ended == "closed at the desk"

@@ -137,7 +137,10 @@ def test_devices_and_pipes_are_written_to_and_stay_what_they_are(tmp_path):
     write_whole(tmp_path / "pipe", b"through")
     thread.join(10)
     assert read == [b"through"] and stat.S_ISFIFO((tmp_path / "pipe").stat().st_mode)
-    code = "from shapeshift.runtime_models.files.whole_file import *; write_whole(Path('/dev/stdout'), b'said')"
+    code = (
+        "from shapeshift.runtime_models.files.whole_file import *\n"
+        "write_whole(Path('/dev/stdout'), b'said')"
+    )
     with (tmp_path / "said").open("wb") as out:
         subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, stdout=out)
     assert (tmp_path / "said").read_bytes() == b"said" and Path("/dev/stdout").is_symlink()
@@ -328,7 +331,8 @@ def test_a_package_in_a_folder_is_there_at_every_moment(tmp_path):
 def test_packages_survive_kill_at_random_instants(tmp_path, name):
     code = (
         "import sys; sys.path.insert(0, 'tests'); from models import make_random_model\n"
-        "from shapeshift.runtime_models.package.write_package import write_package; from pathlib import Path\n"
+        "from shapeshift.runtime_models.package.write_package import write_package\n"
+        "from pathlib import Path\n"
         "models = [make_random_model(count) for count in (3, 4)]; print('begun', flush=True)\n"
         "while True:\n for model in models: write_package(model, Path(sys.argv[1]))\n"
     )

@@ -10,13 +10,19 @@ from vr_hands import HEAD, OPEN, a_frame, hand_at
 
 from shapeshift.app.headset.notices import BEGINS_S, BELOW, QUIET_S, SHOWN_S, Late, late_card
 from shapeshift.app.headset.pacing import Pacing
-from shapeshift.app.headset.person import Person
-from shapeshift.app.headset.worn_panel import HINT, WornPanel, facts_of, grant, sliders_of
+from shapeshift.app.headset.wrist_menu import (
+    HINT,
+    MenuActions,
+    WristMenu,
+    facts_of,
+    grant,
+    sliders_of,
+)
+from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.document.scene_file import SceneFile, SceneItem, named_stops
 from shapeshift.scene.world.reactions import State
 from shapeshift.scene.world.world import World
-from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.panel.carried import panel_row
 from shapeshift.vr.panel.panel_state import (
     Exit,
@@ -52,25 +58,16 @@ def a_world() -> World:
     return World(SceneFile(folder=None, items=items, gravity_m_s2=0.0), models, {})
 
 
-class Wearing(SimpleNamespace):
-    """What of app.headset.wearing.Wearing the panel meets."""
+def a_state() -> XrState:
+    world = a_world()
+    return XrState(world, Pacing((0, 0, 0)), XrUser(world, SimpleNamespace(), None))
 
-    def __init__(self) -> None:
-        world, pace = a_world(), SimpleNamespace(dropped=0)
-        super().__init__(
-            world=world, pacing=Pacing((0, 0, 0)), standing=Standing(), done=[],
-            person=Person(world, SimpleNamespace(), None), session=SimpleNamespace(pace=pace),
-            floor_shown=True,
-        )  # fmt: skip
 
-    def recentre(self, frame) -> None:
-        self.done.append("recentre")
-
-    def leave(self, why: str) -> None:
-        self.done.append(why)
-
-    def pulse(self, *felt) -> None:
-        self.done.append(felt)
+def noting(done: list) -> MenuActions:
+    """What the menu asks of its session goes into the list."""
+    return MenuActions(
+        lambda frame: done.append("recentre"), done.append, lambda *felt: done.append(felt)
+    )
 
 
 def test_sliders_are_of_what_is_seen_and_goes_somewhere():
@@ -91,63 +88,66 @@ def test_a_ring_ends_where_it_begins():
 
 
 def test_wishes_are_granted():
-    wearing, frame = Wearing(), a_frame(LEFT)
-    grant(SetX("leg", 0.7), wearing, frame)
-    assert {s.name: s.x for s in sliders_of(wearing.world)} == {"lamp": 0.0, "leg": 0.7}
-    grant(PutBack(), wearing, frame)
-    assert {s.name: s.x for s in sliders_of(wearing.world)} == {"lamp": 0.0, "leg": 0.0}
-    grant(SetQuality("fast"), wearing, frame)
-    assert wearing.pacing.quality == "fast" and wearing.pacing.settings().render_scale == 0.5
-    under = wearing.standing.point(frame.head.position * (1, 0, 1))
-    grant(SetScale(4.0), wearing, frame)
-    assert wearing.standing.scale == 4.0
-    np.testing.assert_allclose(wearing.standing.point(frame.head.position * (1, 0, 1)), under)
-    grant(SetFloor(False), wearing, frame)
-    assert not wearing.floor_shown and not facts_of(wearing).floor
+    state, frame, done = a_state(), a_frame(LEFT), []
+    actions = noting(done)
+    grant(SetX("leg", 0.7), state, actions, frame)
+    assert {s.name: s.x for s in sliders_of(state.world)} == {"lamp": 0.0, "leg": 0.7}
+    grant(PutBack(), state, actions, frame)
+    assert {s.name: s.x for s in sliders_of(state.world)} == {"lamp": 0.0, "leg": 0.0}
+    grant(SetQuality("fast"), state, actions, frame)
+    assert state.pacing.quality == "fast" and state.pacing.settings().render_scale == 0.5
+    under = state.standing.point(frame.head.position * (1, 0, 1))
+    grant(SetScale(4.0), state, actions, frame)
+    assert state.standing.scale == 4.0
+    np.testing.assert_allclose(state.standing.point(frame.head.position * (1, 0, 1)), under)
+    grant(SetFloor(False), state, actions, frame)
+    assert not state.floor_shown and not facts_of(state).floor
     for wish in (Recentre(), Pulse("left", 0.5, 0.1), Exit()):
-        grant(wish, wearing, frame)
-    assert wearing.done == ["recentre", ("left", 0.5, 0.1), "from the panel"]
+        grant(wish, state, actions, frame)
+    assert done == ["recentre", ("left", 0.5, 0.1), "from the panel"]
 
 
-def an_open_panel() -> WornPanel:
-    panel = WornPanel()
+def an_open_panel(state: XrState) -> WristMenu:
+    panel = WristMenu(state, noting([]))
     panel.carried = OPEN
     return panel
 
 
 def test_it_is_closed_at_first_and_tells_how_to_open_it():
-    wearing, panel = Wearing(), WornPanel("right")
-    panel.act(wearing, a_frame(LEFT), 0.0)
+    panel = WristMenu(a_state(), noting([]), "right")
+    panel.act(a_frame(LEFT), 0.0)
     assert not panel.carried.panel.open and panel.carried.home == "right"
     assert panel.carried.panel.facts.note == HINT and "palm up" in HINT
 
 
 def test_a_frame_shows_the_world_and_moves_it():
-    wearing, panel = Wearing(), an_open_panel()
-    panel.act(wearing, a_frame(LEFT), 0.0)
+    state = a_state()
+    panel = an_open_panel(state)
+    panel.act(a_frame(LEFT), 0.0)
     row = panel_row(panel.carried)
     assert (row["object"], row["shown"], row["hand"]) == ("lamp", "layer 0", "left")
     ends = np.array(row["slider"])
     target = ends[0] + 0.3 * (ends[1] - ends[0])
     for trigger in (0.0, 1.0):
         right = hand_at((0.25, 1.1, -0.2), target, trigger=trigger)
-        frame = panel.act(wearing, a_frame(LEFT, right), 1 / 72)
+        frame = panel.act(a_frame(LEFT, right), 1 / 72)
     assert frame.hands["right"].trigger == 0 and frame.hands["left"] == LEFT
-    assert wearing.world.things["lamp"].standing.x == pytest.approx(0.3, abs=0.01)
-    panel.act(wearing, a_frame(LEFT), 1 / 72)
+    assert state.world.things["lamp"].standing.x == pytest.approx(0.3, abs=0.01)
+    panel.act(a_frame(LEFT), 1 / 72)
     assert panel_row(panel.carried)["shown"] == "layer 0 \u2192 layer 1  60 %"
 
 
 def test_what_is_taken_in_a_hand_is_what_the_slider_is_of():
-    wearing, panel = Wearing(), an_open_panel()
-    wearing.person.touched = Touched(held={"left": None, "right": "leg"})
-    panel.act(wearing, a_frame(LEFT), 0.0)
+    state = a_state()
+    panel = an_open_panel(state)
+    state.user.touched = Touched(held={"left": None, "right": "leg"})
+    panel.act(a_frame(LEFT), 0.0)
     assert panel.carried.panel.slider.name == "leg"
     panel.carried = replace(panel.carried, panel=replace(panel.carried.panel, chosen="lamp"))
-    panel.act(wearing, a_frame(LEFT), 0.0)
+    panel.act(a_frame(LEFT), 0.0)
     assert panel.carried.panel.slider.name == "lamp"  # chosen since, while it is still held
-    wearing.person.touched = Touched(held={"left": "table", "right": None})
-    panel.act(wearing, a_frame(LEFT), 0.0)
+    state.user.touched = Touched(held={"left": "table", "right": None})
+    panel.act(a_frame(LEFT), 0.0)
     assert panel.carried.panel.slider.name == "lamp"  # a table has none
 
 

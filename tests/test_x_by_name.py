@@ -145,11 +145,11 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
     if command == "compare":
         done = run(command, f"{package}@Thermic", package)
     elif command == "vr":
-        from shapeshift.app.headset.worn_scene import open_worn
+        from shapeshift.app.headset.xr_scene import open_xr
         from shapeshift.app.opening import ReadingOptions
 
         with pytest.raises(UsageError, match=r"'Thermic' is no x of this scene"):
-            open_worn(package, ReadingOptions(), "Thermic")
+            open_xr(package, ReadingOptions(), "Thermic")
         return
     else:
         done = run(command, package, *options, "Thermic")
@@ -159,10 +159,10 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
 
 
 def test_the_viewer_and_the_headset_start_there(package, objects):
-    from shapeshift.app.headset.worn_scene import open_worn
+    from shapeshift.app.editor.state.files.open_scene import opened_scene
+    from shapeshift.app.editor.state.files.opened import read_files
+    from shapeshift.app.headset.xr_scene import open_xr
     from shapeshift.app.opening import ReadingOptions
-    from shapeshift.app.viewer.files import opened_scene
-    from shapeshift.app.viewer.opened import read_files
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.scene.cameras.camera_list import CameraReading
 
@@ -180,5 +180,5 @@ def test_the_viewer_and_the_headset_start_there(package, objects):
     assert shown(objects, x="0.25") == {"cube": 0.25, "cloud": 0.25}
     for path, x in ((package, {"random": 1.0}), (objects, {"cube": 1.0, "cloud": 0.0})):
         text = "Thermal" if path == package else "hot"
-        world = open_worn(path, ReadingOptions(), text).world
+        world = open_xr(path, ReadingOptions(), text).world
         assert {thing.name: thing.x for thing in world.drawn().objects} == x

@@ -75,9 +75,9 @@ def budget_rows(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
 
 def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
     """Where the chart of this scene, machine, size, back end and background lies."""
-    from shapeshift.app.charts.chart import machine_line
     from shapeshift.app.charts.chart_settings import SETTINGS
     from shapeshift.app.charts.chart_stage import digest
+    from shapeshift.app.measure import machine_line
     from shapeshift.runtime_models.files.user_cache import OURS, cache_base
 
     backends = sorted(renderer.backends.items())

@@ -11,7 +11,6 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say
 
 MOST_FRAMES = 1000
-PARTS = ("processor", "cores", "opencl", "gl", "numpy", "onnxruntime", "pyopencl", "moderngl")
 
 
 @dataclass(frozen=True)
@@ -98,6 +97,7 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     from shapeshift.app.charts.chart_rows import RowsFile
     from shapeshift.app.charts.chart_settings import settings_of
     from shapeshift.app.charts.chart_stage import QUICK, Walk, digest, make_stage
+    from shapeshift.app.measure import machine_line
 
     x = None
     if not (options.x or any(subject.file for subject in subjects)):
@@ -160,17 +160,6 @@ def command_line(options: Options) -> str:
             words.append(f"--{name} {shlex.quote(word)}")
     words += [f"--{name}" for name in ("quick", "decode") if getattr(options, name)]
     return " ".join([*words, "--out DIR"])
-
-
-def machine_line(ctx) -> str:
-    """Processor, cores, drivers and versions, as they matter for a time."""
-    from shapeshift.app.measure import gl_renderer, machine
-
-    told = machine(ctx) | {"gl": gl_renderer(ctx)}
-    versions = PARTS[4:]
-    words = [f"{told['processor']}, {told['cores']} cores", f"OpenCL {told['opencl']}",
-             f"GL {told['gl']}", *(f"{name} {told[name]}" for name in versions)]  # fmt: skip
-    return "; ".join(words)
 
 
 def scene_line(options: Options, stage, contents: str) -> str:

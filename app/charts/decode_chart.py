@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 from shapeshift.app.charts.chart_rows import RowsFile
-from shapeshift.app.paths import full
+from shapeshift.app.paths import DEMO, full
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.model import AnchorModel
 
@@ -35,9 +35,8 @@ class DecodeRow:
 
 def run_decode(folder: Path, context: str, command: str) -> int:
     """Writes decode.csv, decode.svg and decode.png; rows that are there are kept."""
-    from shapeshift.app.charts.chart import machine_line
-    from shapeshift.app.commands.headless import DEMO
     from shapeshift.app.drawing import open_renderer
+    from shapeshift.app.measure import machine_line
     from shapeshift.app.progress import tracked
     from shapeshift.runtime_models.read_scene import read_model
 

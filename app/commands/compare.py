@@ -102,8 +102,8 @@ def run(options: Options) -> int:
 def run_viewer(options: Options) -> int:
     """The same two in a window."""
     from shapeshift.app.commands.compare_sides import split_stop
+    from shapeshift.app.editor import desktop
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.viewer import desktop
     from shapeshift.scene.document.scene_file import is_scene_file
 
     shared = {name: getattr(options, name) for name in ReadingOptions.__dataclass_fields__}

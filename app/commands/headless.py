@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 from shapeshift.app.command_line import SIZE
+from shapeshift.app.paths import DEMO
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say, tell_json
 
-DEMO = Path(__file__).resolve().parents[2] / "assets" / "workshop.shift"
 TOUCH = "touch.png"
 BACKGROUND = (0.075, 0.078, 0.085)  # as in the viewer, where the scene names none
 QUALITY_SIZE = (192, 128)  # of the pictures that are compared with the float64 reference

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shapeshift.app.commands.png16 import MOST, write_png16, write_whole
-from shapeshift.app.commands.render import LEGEND
 
 if TYPE_CHECKING:
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.renderer.surface import Surface
 
+LEGEND = "legend.json"  # what the numbers of all pictures mean
 FARTHER = MOST  # what a depth picture says of all that is too far for it
 MEANINGS = {
     "depth": "metres along the view to where rays are halfway through the splats, blended as "

@@ -12,7 +12,6 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
-LEGEND = "legend.json"  # of --output
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
 
 
@@ -256,6 +255,7 @@ def choose_paths(
 
     Raises UsageError where one is there.
     """
+    from shapeshift.app.commands.outputs import LEGEND
     from shapeshift.app.drawing import MOST_VALUES
     from shapeshift.app.errors import UsageError
 

@@ -113,15 +113,15 @@ def wear(options: Options) -> int:
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
-    from shapeshift.app.headset.wearing import Eyes, Wearing
-    from shapeshift.app.headset.worn_scene import open_worn
+    from shapeshift.app.headset.xr_app import Eyes, XrApp
+    from shapeshift.app.headset.xr_scene import open_xr
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Instance, Lost
     from shapeshift.vr.openxr.session import Session
 
     with Instance() as instance:
-        scene = open_worn(options.scene or DEMO, options, options.x)
+        scene = open_xr(options.scene or DEMO, options, options.x)
         pacing = Pacing(
             scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms,
             options.stereo_colors,
@@ -138,13 +138,13 @@ def wear(options: Options) -> int:
             rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
-            wearing = Wearing(
+            xr_app = XrApp(
                 session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand,
                 options.floor, options.hints,
             )  # fmt: skip
             try:
-                with interrupting(wearing):
-                    wearing.loop(options.frames)
+                with interrupting(xr_app):
+                    xr_app.loop(options.frames)
             except Lost:
                 report.ended = "runtime lost"
                 raise
@@ -154,7 +154,7 @@ def wear(options: Options) -> int:
 
 
 @contextmanager
-def interrupting(wearing) -> Iterator[None]:
+def interrupting(xr_app) -> Iterator[None]:
     """Ctrl-C ends a session as its window's cross does, a second one at once.
 
     Torn down in the middle of a frame, runtimes and drivers crash.
@@ -162,7 +162,7 @@ def interrupting(wearing) -> Iterator[None]:
     before = signal.getsignal(signal.SIGINT)
 
     def ask(number, stack) -> None:
-        wearing.interrupted = True
+        xr_app.interrupted = True
         signal.signal(signal.SIGINT, before)
 
     signal.signal(signal.SIGINT, ask)
@@ -172,7 +172,7 @@ def interrupting(wearing) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-    if wearing.interrupted:
+    if xr_app.interrupted:
         raise KeyboardInterrupt
 
 
@@ -198,7 +198,7 @@ def without_headset(reason: str, options: Options) -> int:
     say(f"shapeshift vr: {reason}")
     if options.frames or options.report or not has_display():
         return NO_HEADSET
-    from shapeshift.app.viewer import desktop
+    from shapeshift.app.editor import desktop
 
     say("Opening the scene in a window instead.")
     reading = {each.name: getattr(options, each.name) for each in fields(ReadingOptions)}

@@ -1,25 +1,42 @@
 """What a run in the headset leaves behind for tests and benchmarks: a report, lines, pictures."""
 
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
+import moderngl
 import numpy as np
 
 from shapeshift.app.drawing import save_png
+from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.runtime_models.files.whole_file import open_lines, write_whole
 from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.record import Record
 from shapeshift.vr.frame import SIDES, Frame, Hand
+from shapeshift.vr.openxr.life import Life
 from shapeshift.vr.openxr.swapchain import read
-from shapeshift.vr.panel.carried import panel_row
-
-if TYPE_CHECKING:
-    from shapeshift.app.headset.wearing import Wearing
+from shapeshift.vr.pace import Pace
+from shapeshift.vr.panel.carried import Carried, panel_row
 
 DECIMALS = 6
+
+
+@dataclass(frozen=True)
+class DoneFrame:
+    """A frame that has been handed over, and what there is to tell of it."""
+
+    frame: Frame
+    state: XrState
+    carried: Carried  # the menu
+    pulses: Sequence[tuple[str, float, float]]  # side, strength, seconds
+    records: Sequence[Record]
+    life: Life
+    pace: Pace
 
 
 class Report:
@@ -38,15 +55,15 @@ class Report:
         if lines is not None:
             self._lines = open_lines(lines)
 
-    def note(self, wearing: "Wearing", frame: Frame, records: list) -> None:
-        """A frame that has been handed over."""
-        number = wearing.session.pace.frames
+    def note(self, done: DoneFrame, eyes: Sequence[moderngl.Framebuffer]) -> None:
+        """A frame that has been handed over, and the pictures of both eyes."""
+        frame, number = done.frame, done.pace.frames
         if self._lines is not None:
-            row = frame_row(number, wearing, frame, records)
+            row = frame_row(done)
             self._lines.write(json.dumps(row, allow_nan=False, separators=(",", ":")) + "\n")
             self._lines.flush()
         if self._pictures is not None and frame.drawn and number % self._every == 0:
-            for side, framebuffer in zip(SIDES, wearing.eyes.framebuffers, strict=True):
+            for side, framebuffer in zip(SIDES, eyes, strict=True):
                 save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
 
     def write(self, told: dict) -> None:
@@ -69,15 +86,15 @@ class Report:
         self.close()
 
 
-def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> dict:
+def frame_row(done: DoneFrame) -> dict:
     """What a line tells."""
-    session, world, standing = wearing.session, wearing.world, wearing.standing
-    times = session.pace.own_ms
+    frame, world, standing = done.frame, done.state.world, done.state.standing
+    times = done.pace.own_ms
     return {
-        "frame": number,
+        "frame": done.pace.frames,
         "seen_s": rounded(frame.seen_s),
         "time_s": rounded(world.time_s),  # of the physics
-        "state": session.life.state,
+        "state": done.life.state,
         "drawn": frame.drawn,
         "focused": frame.focused,
         "recentred": frame.recentred,
@@ -91,17 +108,17 @@ def frame_row(number: int, wearing: "Wearing", frame: Frame, records: list) -> d
         "held": {side: world.held(side) for side in SIDES},
         "offers": [
             {"hand": offer.side, "object": offer.object, "by": offer.by}
-            for offer in wearing.person.touched.offers
+            for offer in done.state.user.touched.offers
         ],
         "objects": {
             thing.name: {**pose_row(thing.world_from_object), "x": control_row(thing.x, DECIMALS)}
             for thing in world.drawn().objects
         },
-        "panel": panel_row(wearing.panel.carried),
-        "events": [event for record in records for event in record.events],
-        "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in wearing.pulses],
+        "panel": panel_row(done.carried),
+        "events": [event for record in done.records for event in record.events],
+        "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in done.pulses],
         "own_ms": rounded(times[-1]) if times else None,
-        "dropped": session.pace.dropped,
+        "dropped": done.pace.dropped,
     }
 
 

@@ -75,7 +75,8 @@ def run(options: Options) -> int:
     from shapeshift.app.pace import with_pace
     from shapeshift.app.paths import full
     from shapeshift.app.progress import progress_bar
-    from shapeshift.app.training.train import calibrated, settings_of
+    from shapeshift.app.training.run_loop import calibrated
+    from shapeshift.app.training.train_options import settings_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
     from shapeshift.training.calibration.extrinsics import with_found

@@ -9,9 +9,9 @@ from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.app.training.run_loop import INTERRUPTED
 from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
-from shapeshift.app.training.train import INTERRUPTED
-from shapeshift.app.training.train import Options as TrainOptions
+from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.app.training.train_options import PhotoOptions, SizeOptions
 
 if TYPE_CHECKING:
@@ -139,7 +139,8 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
 def offset_of(device, capture: "Capture", options: Options) -> str:
     """TrainSettings.rig of what --calibrate finds, once for all methods: it is kept in --out."""
     from shapeshift.app.charts.chart_rows import write_text
-    from shapeshift.app.training.train import calibrated, settings_of
+    from shapeshift.app.training.run_loop import calibrated
+    from shapeshift.app.training.train_options import settings_of
 
     if options.calibrate is None:
         return ""
@@ -157,13 +158,14 @@ def train_method(
 
     rig: of TrainSettings, what the capture's cameras were moved by.
     """
-    from shapeshift.app.training.train import describe, settings_of, train
+    from shapeshift.app.training.run_loop import describe, train
     from shapeshift.app.training.train_baselines import (
         Run,
         plain_settings,
         train_separate,
         train_splats,
     )
+    from shapeshift.app.training.train_options import settings_of
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
     from shapeshift.training.train import Trainer
 

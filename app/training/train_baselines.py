@@ -8,16 +8,15 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
-from shapeshift.app.training.train import (
+from shapeshift.app.training.run_loop import (
     INTERRUPTED,
-    Options,
     calibrated,
     decibels,
     describe,
-    settings_of,
     time_unit,
     train,
 )
+from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture

@@ -1,5 +1,5 @@
 // quantize_keys: exact sort keys -> steps of the frame's own range, 0..65534; the twin of
-// renderer/shaders/sort_quantize.comp.  A work-item owns a chunk of pairs and its histogram of
+// renderer/shaders/sort/sort_quantize.comp.  A work-item owns a chunk of pairs and its histogram of
 // digits.
 // Reads:   pairs (N, 2) of splat and key, packed a chunk; status, of each chunk the number of
 //          pairs.

@@ -22,12 +22,12 @@ class Sorter:
             raise ValueError(f"there is no sort {backend!r}; choose gl or numpy.")
         self.backend = backend
         self._gpu = gpu
-        self._command = gpu.compute("draw_command.comp")
+        self._command = gpu.compute("sort/draw_command.comp")
         if backend == "gl":
-            self._quantize = gpu.compute("sort_quantize.comp")
-            self._count = gpu.compute("sort_count.comp")
-            self._scan = gpu.compute("sort_scan.comp")
-            self._scatter = gpu.compute("sort_scatter.comp")
+            self._quantize = gpu.compute("sort/sort_quantize.comp")
+            self._count = gpu.compute("sort/sort_count.comp")
+            self._scan = gpu.compute("sort/sort_scan.comp")
+            self._scatter = gpu.compute("sort/sort_scatter.comp")
 
     def sort(self, arena: Arena, key_bits: int = 32) -> None:
         """Sorts by arena.keys: 32 is exact, 16 divides the frame's depths into 65535 steps."""

@@ -19,6 +19,7 @@ from shapeshift.runtime_models.files.zip_files import DAMAGED, KNOWN, member_nam
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.package_files import MANIFEST
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.whole_formats import Format, head_of, whole_formats
 
 GZIP = b"\x1f\x8b"
 PIECE = 1 << 20  # bytes that are unpacked at a time
@@ -39,9 +40,7 @@ def is_zip_of_one(head: bytes, path: Path) -> bool:
 
 def known_in(path: Path) -> list[str]:
     """The members of a zip that are of a known format by their names."""
-    from shapeshift.runtime_models.splats.formats import formats
-
-    endings = tuple(e for form in formats() if form.is_whole for e in form.endings)
+    endings = tuple(e for form in whole_formats() for e in form.endings)
     return [
         name
         for name in member_names(path)
@@ -93,16 +92,23 @@ def unpacked_and_read(
     path: Path, name: str, pieces: Iterator[bytes], reading: Reading
 ) -> RawSplats:
     """What a file of these bytes holds; the account of the outer one is in `reading`."""
-    from shapeshift.runtime_models.splats.formats import format_of
-
     with temporary_folder() as folder:
         inner = folder / plain_name(name)
         write_charged(inner, pieces, reading.account)
-        form = format_of(inner)
-        if form is None or not form.is_whole:
+        form = form_of(inner)
+        if form is None:
             raise BadFile(f"{path.name} holds {name[:60]!r}, which is no file of splats.")
         raw = form.read(inner, reading)
     return replace(raw, file=f"{path.name}: {inner.name}", format=f"{raw.format}, packed")
+
+
+def form_of(path: Path) -> Format | None:
+    """The format of what was packed; None: it has none, or is packed once more."""
+    head = head_of(path)
+    form = next((form for form in whole_formats() if form.fits(head, path)), None)
+    if form is not None and form.has_mark is None:  # by its name alone
+        return None if is_zip_of_one(head, path) or is_gzip(head, path) else form
+    return form
 
 
 @contextmanager

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from desktop_stand import PlainRenderer, read_stub, run_frames
 
-from shapeshift.app.viewer.desktop import Options, Viewer
-from shapeshift.app.viewer.stage import Stage
-from shapeshift.app.viewer.window import Window
+from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.window.window import Window
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +47,9 @@ def window(display):
 
 @pytest.fixture
 def viewer(window, tmp_path):
-    stage = Stage(read_stub)
-    stage.open([Path("ball.shift")])
+    state = EditorState(read_stub)
+    state.open([Path("ball.shift")])
     options = Options(pictures=tmp_path / "pictures")
-    viewer = Viewer(window, PlainRenderer(window.ctx), stage, options)
+    viewer = Viewer(window, PlainRenderer(window.ctx), state, options)
     run_frames(viewer, 4)
     return viewer

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from desktop_stand import PlainRenderer, ball, run_frames
 
-from shapeshift.app.viewer.desktop import Options, Viewer
-from shapeshift.app.viewer.files import opened_scene
-from shapeshift.app.viewer.opened import Found, Source, read_files
-from shapeshift.app.viewer.outlines import pixels
-from shapeshift.app.viewer.stage import Stage
-from shapeshift.app.viewer.touch import Touch
+from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.panels.outlines import pixels
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import opened_scene
+from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
+from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.cameras.camera_list import CameraReading
@@ -23,20 +23,20 @@ NAMES = ["background", "cube", "ball", "ring", "plate"]
 
 
 @pytest.fixture(scope="module")
-def touch_found() -> Found:
+def touch_found() -> OpenedFiles:
     return read_files([TOUCH], None, CameraReading(), lambda *_: None)
 
 
-def viewer_of(window, found: Found, folder: Path) -> Viewer:
-    stage = Stage(lambda path: ball())
+def viewer_of(window, found: OpenedFiles, folder: Path) -> Viewer:
+    state = EditorState(lambda path: ball())
     scene, document = opened_scene(found)
-    stage.take(found.sources, scene, None, document)
-    viewer = Viewer(window, PlainRenderer(window.ctx), stage, Options(pictures=folder / "pictures"))
+    state.take(found.sources, scene, None, document)
+    viewer = Viewer(window, PlainRenderer(window.ctx), state, Options(pictures=folder / "pictures"))
     viewer.files.read = lambda path, told: ball()
     viewer.set_title()
     run_frames(viewer, 4)
     end = time.monotonic() + 120  # a cold cache of colliders
-    while viewer.stage.bodies.busy and time.monotonic() < end:
+    while viewer.state.bodies.busy and time.monotonic() < end:
         run_frames(viewer, 1)
         time.sleep(0.005)
     run_frames(viewer, 2)
@@ -46,7 +46,7 @@ def viewer_of(window, found: Found, folder: Path) -> Viewer:
 @pytest.fixture
 def touch_viewer(window, touch_found, tmp_path, monkeypatch):
     """The touch scene, its world there, things holding still as in a scene of one's own."""
-    monkeypatch.setattr(Touch, "opens_playing", False)
+    monkeypatch.setattr(TouchState, "opens_playing", False)
     viewer = viewer_of(window, touch_found, tmp_path)
     yield viewer
     release(viewer)
@@ -67,22 +67,22 @@ def splats_viewer(window, tmp_path):
     path = tmp_path / "models" / "ball.ply"
     path.parent.mkdir()
     write_ply(PlainSplats(b.means, b.scales, b.wxyz, b.opacity, b.sh), path)
-    viewer = viewer_of(window, Found((Source(path, b),)), tmp_path)
+    viewer = viewer_of(window, OpenedFiles((Source(path, b),)), tmp_path)
     yield viewer
     release(viewer)
 
 
 def names(viewer) -> list[str]:
-    return [thing.name for thing in viewer.stage.scene.objects]
+    return [thing.name for thing in viewer.state.scene.objects]
 
 
 def thing(viewer, name: str):
-    return viewer.stage.scene.objects[names(viewer).index(name)]
+    return viewer.state.scene.objects[names(viewer).index(name)]
 
 
 def place_of(viewer, point) -> tuple[float, float]:
     """Logical pixels of a point (3,) of the world."""
-    view = viewer.view()
+    view = viewer.viewpoint.view()
     in_eye = (view.eye_from_world() @ np.append(point, 1.0))[:3]
     return tuple(pixels(view, in_eye, viewer.window.logical_size))
 
@@ -127,7 +127,7 @@ CTRL, SHIFT = glfw.MOD_CONTROL, glfw.MOD_SHIFT
 
 def viewer_is_over(viewer, place) -> bool:
     mouse(viewer, *place)
-    return viewer.objects.gizmo._under_mouse
+    return viewer.gizmo._under_mouse
 
 
 def until_added(viewer) -> None:

@@ -9,9 +9,9 @@ import pytest
 from desktop_stand import read_stub, run_frames, until_opened
 from PIL import Image
 
-from shapeshift.app.viewer import hands
-from shapeshift.app.viewer.stage import Stage
-from shapeshift.app.viewer.window import DoubleClick, Drag, Drop, KeyDown, Wheel
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.window import hands
+from shapeshift.app.editor.window.window import DoubleClick, Drag, Drop, KeyDown, Wheel
 from shapeshift.renderer.settings import RenderSettings
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
@@ -66,7 +66,7 @@ def test_a_change_draws_until_it_has_come_to_rest(viewer, event):
 
 def test_the_background_needs_no_new_splats(viewer):
     drawn = viewer.renderer.draws
-    viewer.stage.settings = RenderSettings(background=(1.0, 0.0, 0.0))
+    viewer.state.settings = RenderSettings(background=(1.0, 0.0, 0.0))
     run_frames(viewer, 1)
     assert viewer.renderer.draws == drawn
     assert viewer.renderer.settings.background == (1.0, 0.0, 0.0)
@@ -74,7 +74,7 @@ def test_the_background_needs_no_new_splats(viewer):
 
 def test_thresholds_do(viewer):
     drawn = viewer.renderer.draws
-    viewer.stage.settings = RenderSettings(max_pixels=10.0)
+    viewer.state.settings = RenderSettings(max_pixels=10.0)
     run_frames(viewer, 1)
     assert viewer.renderer.draws == drawn + 1
 
@@ -84,32 +84,32 @@ def test_thresholds_do(viewer):
 
 def test_number_keys_go_to_stops_and_stop_playing(viewer):
     press(viewer, glfw.KEY_SPACE)
-    assert viewer.stage.playing
+    assert viewer.state.playing
     press(viewer, glfw.KEY_2)
-    assert not viewer.stage.sweeps[0].playing
+    assert not viewer.state.sweeps[0].playing
     run_frames(viewer, 2, seconds=0.5)
-    assert viewer.stage.scene.objects[0].x == 1.0 and not viewer.stage.playing
+    assert viewer.state.scene.objects[0].x == 1.0 and not viewer.state.playing
     press(viewer, glfw.KEY_1)
     run_frames(viewer, 1, seconds=0.3)
-    assert 0 < viewer.stage.scene.objects[0].x < 1
+    assert 0 < viewer.state.scene.objects[0].x < 1
     run_frames(viewer, 1, seconds=0.4)
-    assert viewer.stage.scene.objects[0].x == 0.0
+    assert viewer.state.scene.objects[0].x == 0.0
     press(viewer, glfw.KEY_9)  # there is no ninth stop
-    assert viewer.stage.scene.objects[0].x == 0.0
+    assert viewer.state.scene.objects[0].x == 0.0
 
 
 def test_play_is_of_time_and_keeps_its_place(viewer):
     press(viewer, glfw.KEY_SPACE)
     run_frames(viewer, 2, seconds=1.0)
-    place = viewer.stage.scene.objects[0].x
+    place = viewer.state.scene.objects[0].x
     assert 0 < place < 1
     press(viewer, glfw.KEY_SPACE)
     run_frames(viewer, 5, seconds=1.0)
-    assert viewer.stage.scene.objects[0].x == place
+    assert viewer.state.scene.objects[0].x == place
     press(viewer, glfw.KEY_SPACE)
     run_frames(viewer, 1, seconds=0.0)
-    assert viewer.stage.scene.objects[0].x == pytest.approx(place)
-    many, few = viewer.stage.sweeps[0], Stage(read_stub)
+    assert viewer.state.scene.objects[0].x == pytest.approx(place)
+    many, few = viewer.state.sweeps[0], EditorState(read_stub)
     few.open([Path("ball.shift")])
     few.toggle_play()
     few.advance(2.0)
@@ -118,16 +118,16 @@ def test_play_is_of_time_and_keeps_its_place(viewer):
 
 
 def test_fly_frame_reset_and_hide(viewer):
-    first = viewer.view().eye_from_world()
+    first = viewer.viewpoint.view().eye_from_world()
     press(viewer, glfw.KEY_V)
-    assert viewer.camera.flying
+    assert viewer.viewpoint.camera.flying
     viewer.take(Drag("left", 200, 10))
     run_frames(viewer, 60)
-    assert np.abs(viewer.view().eye_from_world() - first).max() > 0.1
+    assert np.abs(viewer.viewpoint.view().eye_from_world() - first).max() > 0.1
     press(viewer, glfw.KEY_F, shift=True)
     press(viewer, glfw.KEY_V)
     run_frames(viewer, 60)
-    np.testing.assert_allclose(viewer.view().eye_from_world(), first, atol=1e-6)
+    np.testing.assert_allclose(viewer.viewpoint.view().eye_from_world(), first, atol=1e-6)
     with_overlay = screenshot(viewer)
     press(viewer, glfw.KEY_H)
     run_frames(viewer, 60)
@@ -137,16 +137,16 @@ def test_fly_frame_reset_and_hide(viewer):
         == 1
         < len(np.unique(with_overlay.reshape(-1, 3), axis=0))
     )
-    left, right, down, up = viewer.view().tangents
+    left, right, down, up = viewer.viewpoint.view().tangents
     assert left == pytest.approx(-right) and down == pytest.approx(-up)  # the whole window again
 
 
 def test_double_click_centres_the_near_side_under_the_cursor(viewer):
     width, _ = viewer.window.logical_size
-    left, top, right, bottom = viewer._free
+    left, top, right, bottom = viewer.viewpoint.free
     viewer.take(DoubleClick((left + right) / 2 + 40, (top + bottom) / 2 - 30))
     run_frames(viewer, 60)
-    point = viewer.camera.target
+    point = viewer.viewpoint.camera.target
     assert np.linalg.norm(point) == pytest.approx(1, abs=0.1)  # on the ball
     assert point[0] > 0.05 and point[1] > 0.05
     viewer.take(DoubleClick(width - 1, 1))  # the empty corner: nothing happens
@@ -166,19 +166,19 @@ def glfw_release(window, button=glfw.MOUSE_BUTTON_LEFT):
 
 
 def test_a_drag_in_the_scene_turns_the_camera_and_one_on_the_panel_does_not(viewer):
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     glfw_click(viewer.window, 60, 40)  # on the panel
     viewer.window._on_cursor(None, 120, 90)
     glfw_release(viewer.window)
     run_frames(viewer, 30)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     glfw_click(viewer.window, 600, 200)
     viewer.window._on_cursor(None, 660, 200)
     glfw_release(viewer.window)
     viewer.window._on_cursor(None, 800, 300)  # no button is down any more
     run_frames(viewer, 60)
-    centre = viewer.stage.centre
-    eyes = [np.linalg.inv(before)[:3, 3], viewer.view().world_from_eye.position]
+    centre = viewer.state.centre
+    eyes = [np.linalg.inv(before)[:3, 3], viewer.viewpoint.view().world_from_eye.position]
     one, other = (eye - centre for eye in eyes)
     assert np.linalg.norm(one) == pytest.approx(np.linalg.norm(other))
     angle = np.arctan2(one[0], one[2]) - np.arctan2(other[0], other[2])
@@ -192,15 +192,15 @@ def test_the_slider_follows_the_mouse_and_snaps(viewer):
     middle = (start + end) / 2
     glfw_click(viewer.window, middle, y)
     run_frames(viewer, 4)
-    x = viewer.stage.scene.objects[0].x
+    x = viewer.state.scene.objects[0].x
     assert 0.4 < x < 0.6
     viewer.window._on_cursor(None, end - 4, y)
     run_frames(viewer, 4)
-    assert viewer.stage.scene.objects[0].x == 1.0  # caught by the stop
+    assert viewer.state.scene.objects[0].x == 1.0  # caught by the stop
     glfw_release(viewer.window)
     run_frames(viewer, 4)
-    assert viewer.stage.scene.objects[0].x == 1.0
-    assert np.isclose(viewer.camera._lag, 0).all()  # the camera did not move
+    assert viewer.state.scene.objects[0].x == 1.0
+    assert np.isclose(viewer.viewpoint.camera._lag, 0).all()  # the camera did not move
 
 
 def test_alt_lets_the_slider_stand_beside_a_stop(viewer, monkeypatch):
@@ -212,7 +212,7 @@ def test_alt_lets_the_slider_stand_beside_a_stop(viewer, monkeypatch):
     for x in np.arange(right - 100, right - 70, 1.5):
         viewer.window._on_cursor(None, x, y)
         run_frames(viewer, 3)
-        found.append(viewer.stage.scene.objects[0].x)
+        found.append(viewer.state.scene.objects[0].x)
     glfw_release(viewer.window)
     monkeypatch.undo()
     run_frames(viewer, 3)
@@ -240,22 +240,26 @@ def test_two_quick_clicks_on_one_place_are_a_double_click(
 
 
 def test_a_dropped_bad_file_is_told_and_the_old_scene_stays(viewer):
-    before, camera = viewer.stage.scene, viewer.camera
+    before, camera = viewer.state.scene, viewer.viewpoint.camera
     viewer.take(Drop((Path("bad.shift"),)))
-    assert "bad.shift" in viewer.messages.note  # seen while it loads
+    assert "bad.shift" in viewer.state.messages.note  # seen while it loads
     until_opened(viewer)
-    assert viewer.stage.scene is before and viewer.camera is camera
-    assert "300 bytes found" in viewer.stage.problem
+    assert viewer.state.scene is before and viewer.viewpoint.camera is camera
+    assert "300 bytes found" in viewer.state.problem
     told = screenshot(viewer)
     left, top, right, low = map(int, viewer.window.covered[-1])
-    assert viewer._free[0] < left and right < viewer._free[2] and low < viewer._free[3] / 2
+    assert (
+        viewer.viewpoint.free[0] < left
+        and right < viewer.viewpoint.free[2]
+        and low < viewer.viewpoint.free[3] / 2
+    )
     assert bright(told, (left + 8, top, right, low)) > 0.02
     assert told[top:low, left:right].max() > 200  # readable, not dimmed
     viewer.take(Wheel(1))  # a sentence is no box: the scene goes on
     run_frames(viewer, 3)
-    assert viewer.stage.problem
+    assert viewer.state.problem
     press(viewer, glfw.KEY_ESCAPE)
-    assert viewer.stage.problem == ""
+    assert viewer.state.problem == ""
 
 
 def test_a_dropped_good_file_is_shown(viewer, tmp_path):
@@ -264,8 +268,8 @@ def test_a_dropped_good_file_is_shown(viewer, tmp_path):
         path.write_bytes(b"scene")
     viewer.take(Drop(paths))
     until_opened(viewer)
-    assert [thing.name for thing in viewer.stage.scene.objects] == ["one", "two"]
-    assert not viewer.stage.problem and not viewer.messages.note
+    assert [thing.name for thing in viewer.state.scene.objects] == ["one", "two"]
+    assert not viewer.state.problem and not viewer.state.messages.note
 
 
 def test_pictures_are_numbered_and_never_overwritten(viewer):
@@ -279,7 +283,7 @@ def test_pictures_are_numbered_and_never_overwritten(viewer):
     assert sorted(p.name for p in folder.iterdir()) == [f"shapeshift-000{n}.png" for n in (1, 2, 3)]
     with Image.open(folder / "shapeshift-0002.png") as picture:
         assert picture.size == viewer.window.size and picture.mode == "RGB"
-    assert "shapeshift-0003.png" in viewer.messages.note
+    assert "shapeshift-0003.png" in viewer.state.messages.note
     one, two = ((folder / f"shapeshift-000{n}.png").read_bytes() for n in (2, 3))
     assert one == two  # the note about the first is not in the second
 
@@ -299,10 +303,10 @@ def test_the_scale_bar_comes_with_the_thermal_stop(viewer):
 
 
 def test_choosing_a_palette_changes_the_stops_and_goes_back(viewer):
-    stage = viewer.stage
-    filed = stage.scene.objects[0].model
-    stage.choose_palette("gray")
-    assert stage.scene.objects[0].model.stops[1].palette == "gray"
-    assert stage.scene.objects[0].model.stops[0].palette == ""
-    stage.choose_palette("")
-    assert stage.scene.objects[0].model is filed
+    state = viewer.state
+    filed = state.scene.objects[0].model
+    state.choose_palette("gray")
+    assert state.scene.objects[0].model.stops[1].palette == "gray"
+    assert state.scene.objects[0].model.stops[0].palette == ""
+    state.choose_palette("")
+    assert state.scene.objects[0].model is filed

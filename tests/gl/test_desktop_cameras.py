@@ -10,8 +10,8 @@ from camera_files import NAMES, assert_same, cameras
 from desktop_stand import run_frames, until_opened
 from widgets import Widgets
 
-from shapeshift.app.viewer.recent import RecentFiles
-from shapeshift.app.viewer.window import Drag, Drop, KeyDown, Wheel
+from shapeshift.app.editor.state.user.recent import RecentFiles
+from shapeshift.app.editor.window.window import Drag, Drop, KeyDown, Wheel
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.cameras.write_cameras import write_cameras
 
@@ -37,7 +37,7 @@ def dropped(viewer, tmp_path):
     path = tmp_path / "ansichten ä.json"
     write_cameras(cameras(), path, "ours")
     viewer.take(Drop((path,)))
-    assert "ansichten ä.json" in viewer.messages.note
+    assert "ansichten ä.json" in viewer.state.messages.note
     until_opened(viewer)
     run_frames(viewer, 30)
     return viewer
@@ -45,12 +45,12 @@ def dropped(viewer, tmp_path):
 
 def test_dropped_cameras_are_stood_at_and_the_scene_stays(dropped):
     viewer = dropped
-    assert [thing.name for thing in viewer.stage.scene.objects] == ["ball"]
+    assert [thing.name for thing in viewer.state.scene.objects] == ["ball"]
     first = cameras().views[0]
     np.testing.assert_allclose(
-        viewer.view().world_from_eye.matrix(), first.world_from_eye.matrix(), atol=1e-9
+        viewer.viewpoint.view().world_from_eye.matrix(), first.world_from_eye.matrix(), atol=1e-9
     )
-    assert viewer.steps.text == f"camera 1 of 3 {NAMES[0]}"
+    assert viewer.viewpoint.steps.text == f"camera 1 of 3 {NAMES[0]}"
     assert not viewer._busy()
 
 
@@ -62,15 +62,15 @@ def test_n_and_p_step_and_moving_leaves(dropped):
     assert viewer._busy()  # in flight
     run_frames(viewer, 40)
     assert viewer.renderer.draws > drawn + 5 and not viewer._busy()
-    assert viewer.steps.index == 1
+    assert viewer.viewpoint.steps.index == 1
     press(viewer, glfw.KEY_P)
     press(viewer, glfw.KEY_P)
     run_frames(viewer, 40)
-    assert viewer.steps.index == 2
-    before = viewer.view()
+    assert viewer.viewpoint.steps.index == 2
+    before = viewer.viewpoint.view()
     viewer.take(Wheel(0.0))  # touches, and moves nothing
-    assert not viewer.steps.standing
-    after = viewer.view()
+    assert not viewer.viewpoint.steps.standing
+    after = viewer.viewpoint.view()
     np.testing.assert_allclose(
         after.world_from_eye.matrix(), before.world_from_eye.matrix(), atol=1e-6
     )
@@ -81,19 +81,19 @@ def test_n_and_p_step_and_moving_leaves(dropped):
 @pytest.mark.parametrize("event", [Drag("left", 9, 4), Drag("right", 9, 4), Wheel(1.0)])
 def test_every_hand_leaves_a_camera(dropped, event):
     dropped.take(event)
-    assert not dropped.steps.standing and dropped.steps.text == "3 cameras"
+    assert not dropped.viewpoint.steps.standing and dropped.viewpoint.steps.text == "3 cameras"
 
 
 @pytest.mark.parametrize("key", [glfw.KEY_V, glfw.KEY_F])
 def test_keys_that_move_leave_a_camera(dropped, key):
     press(dropped, key)
     run_frames(dropped, 3)
-    assert not dropped.steps.standing
+    assert not dropped.viewpoint.steps.standing
 
 
 def test_without_cameras_n_says_so(viewer):
     press(viewer, glfw.KEY_N)
-    assert "no cameras" in viewer.messages.note and not viewer.steps.standing
+    assert "no cameras" in viewer.state.messages.note and not viewer.viewpoint.steps.standing
 
 
 def test_k_keeps_views_in_one_file_of_this_start(dropped):
@@ -108,20 +108,20 @@ def test_k_keeps_views_in_one_file_of_this_start(dropped):
     viewer.take(Drag("left", 50, 4))
     run_frames(viewer, 60)
     press(viewer, glfw.KEY_K)
-    assert str((folder / "views-0002.ours.json").absolute()) in viewer.messages.note
+    assert str((folder / "views-0002.ours.json").absolute()) in viewer.state.messages.note
     kept = read_camera_list(folder / "views-0002.ours.json").views
     assert_same(kept[:2], cameras().views[:2])
     left, right, low, high = kept[2].tangents
     assert left == pytest.approx(-right) and low == pytest.approx(-high)
     np.testing.assert_allclose(
-        kept[2].world_from_eye.matrix(), viewer.view().world_from_eye.matrix(), atol=1e-9
+        kept[2].world_from_eye.matrix(), viewer.viewpoint.view().world_from_eye.matrix(), atol=1e-9
     )
-    viewer.kept.form = "colmap-bin"
+    viewer.viewpoint.kept.form = "colmap-bin"
     press(viewer, glfw.KEY_K)
     assert len(read_camera_list(folder / "views-0002").views) == 4
-    viewer.kept.form = "nerfstudio"  # which cannot hold pictures of several sizes
+    viewer.viewpoint.kept.form = "nerfstudio"  # which cannot hold pictures of several sizes
     press(viewer, glfw.KEY_K)
-    assert "camera path cannot" in viewer.stage.problem and len(viewer.kept.views) == 4
+    assert "camera path cannot" in viewer.state.problem and len(viewer.viewpoint.kept.views) == 4
     assert (folder / "views-0001.ours.json").read_text() == "mine"
 
 
@@ -131,11 +131,11 @@ def test_a_scene_and_its_cameras_dropped_together(viewer, tmp_path):
     write_cameras(cameras(), path, "inria")
     viewer.take(Drop((path, scene)))
     until_opened(viewer)
-    assert viewer.stage.scene.objects[0].name == "stuhl äöü"
-    assert viewer.steps.text == "3 cameras"  # the new scene is seen whole first
+    assert viewer.state.scene.objects[0].name == "stuhl äöü"
+    assert viewer.viewpoint.steps.text == "3 cameras"  # the new scene is seen whole first
     viewer.take(Drop((scene,)))
     until_opened(viewer)
-    assert viewer.steps.count == 0  # those were of the other
+    assert viewer.viewpoint.steps.count == 0  # those were of the other
 
 
 def test_a_floor_beside_a_scene_is_stood_on(viewer, tmp_path):
@@ -146,9 +146,9 @@ def test_a_floor_beside_a_scene_is_stood_on(viewer, tmp_path):
     viewer.take(Drop((scene,)))
     until_opened(viewer)
     run_frames(viewer, 30)
-    assert viewer.camera.flying
+    assert viewer.viewpoint.camera.flying
     np.testing.assert_allclose(
-        viewer.view().world_from_eye.matrix(), stood.world_from_eye.matrix(), atol=1e-6
+        viewer.viewpoint.view().world_from_eye.matrix(), stood.world_from_eye.matrix(), atol=1e-6
     )
 
 
@@ -161,7 +161,7 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
         viewer.take(Drop((path,)))
         until_opened(viewer)
     assert viewer.files.recent.paths == (scene, gone)
-    before = viewer.stage.scene
+    before = viewer.state.scene
     gone.unlink()
     run_frames(viewer, 2)
     click(viewer, *widgets.middle("Recent"))
@@ -170,8 +170,8 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
     assert not viewer.files.busy and viewer.window._popup
     click(viewer, *widgets.middle("one.shift"))
     until_opened(viewer)
-    assert viewer.stage.scene.objects[0].name == "one" and not viewer.stage.problem
-    assert viewer.stage.scene is not before
+    assert viewer.state.scene.objects[0].name == "one" and not viewer.state.problem
+    assert viewer.state.scene is not before
     assert not viewer.window._popup
     told = json.loads((tmp_path / "settings/recent.json").read_text())
     assert told["recent"] == [str(scene), str(gone)]
@@ -182,7 +182,7 @@ def test_a_list_that_cannot_be_kept_is_said_once(viewer, tmp_path):
     blocked.write_bytes(b"")
     viewer.files.recent = RecentFiles.read(blocked)
     viewer.files.remember(Path("a"))
-    assert "cannot be kept" in viewer.stage.problem and viewer.files.recent is None
+    assert "cannot be kept" in viewer.state.problem and viewer.files.recent is None
 
 
 def test_the_status_line_is_there_with_the_overlay(viewer):

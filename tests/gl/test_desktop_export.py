@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from desktop_stand import ball, run_frames
 
-from shapeshift.app.panels.export_panel import EVERYTHING, REGIONS, attach_export
+from shapeshift.app.editor.state.files.exporting import EVERYTHING, REGIONS, Exporting
 from shapeshift.runtime_models.splats.formats import read_plain
 from tests.writers import EACH_WRITER
 
@@ -17,7 +17,12 @@ pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 
 @pytest.fixture
 def panel(viewer):
-    return attach_export(viewer)
+    exporting = Exporting(
+        viewer.state, viewer.viewpoint, viewer.options.pictures.parent / "exports"
+    )
+    viewer.hooks.each_frame.append(exporting.poll)
+    viewer.hooks.opened.append(exporting.forget)
+    return exporting
 
 
 def finish(viewer, panel, seconds: float = 20.0) -> None:
@@ -39,7 +44,7 @@ def test_every_format_is_written_and_said(viewer, panel, writer):
     finish(viewer, panel)
     (path,) = exported(viewer)
     assert path.name == f"ball-x0.00{writer.ending}"
-    assert path.name in viewer.messages.note and "splats" in viewer.messages.note
+    assert path.name in viewer.state.messages.note and "splats" in viewer.state.messages.note
     assert len(read_plain(path).means) == len(ball().means)
 
 
@@ -53,12 +58,12 @@ def test_no_file_is_written_over(viewer, panel):
 
 def test_it_is_as_shown(viewer, panel):
     """x and palette of now: the ball of the stub is green, at the thermal stop it is not."""
-    viewer.stage.set_x(0, 1.0)
+    viewer.state.set_x(0, 1.0)
     panel.start()
-    viewer.stage.set_x(0, 0.0)  # moved meanwhile: not in the file
+    viewer.state.set_x(0, 0.0)  # moved meanwhile: not in the file
     finish(viewer, panel)
     panel.palette = False
-    viewer.stage.set_x(0, 1.0)
+    viewer.state.set_x(0, 1.0)
     panel.start()
     finish(viewer, panel)
     tinted, plain = (read_plain(path) for path in reversed(exported(viewer)))
@@ -68,14 +73,14 @@ def test_it_is_as_shown(viewer, panel):
 
 
 def test_inside_the_regions_and_one_object(viewer, panel):
-    stage = viewer.stage
-    one = stage.scene.objects[0]
-    stage.show(replace(stage.scene, objects=(one, replace(one, name="other"))))
+    state = viewer.state
+    one = state.scene.objects[0]
+    state.show(replace(state.scene, objects=(one, replace(one, name="other"))))
     panel.forget()
-    assert panel._choices()[0] == [EVERYTHING, 0, 1]
-    stage.add_region("half-space")
-    stage.regions.edit(0, centre=np.zeros(3), normal=np.array([0.0, 1, 0]), border=0.0)
-    assert panel._choices()[0][-1] == REGIONS
+    assert panel.choices()[0] == [EVERYTHING, 0, 1]
+    state.add_region("half-space")
+    state.regions.edit(0, centre=np.zeros(3), normal=np.array([0.0, 1, 0]), border=0.0)
+    assert panel.choices()[0][-1] == REGIONS
     panel.what = REGIONS
     panel.start()
     finish(viewer, panel)
@@ -96,15 +101,15 @@ def test_what_goes_wrong_is_in_the_box_and_leaves_nothing(viewer, panel, monkeyp
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("shapeshift.app.panels.export_panel.export", full)
+    monkeypatch.setattr("shapeshift.app.editor.state.files.exporting.export", full)
     panel.start()
     finish(viewer, panel)
-    assert "No space left" in viewer.stage.problem and not exported(viewer)
-    viewer.stage.problem = ""
+    assert "No space left" in viewer.state.problem and not exported(viewer)
+    viewer.state.problem = ""
     (viewer.options.pictures.parent / "exports").rmdir()
     (viewer.options.pictures.parent / "exports").write_text("a file")
     panel.start()
-    assert viewer.stage.problem and not panel.running
+    assert viewer.state.problem and not panel.running
 
 
 def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
@@ -112,11 +117,12 @@ def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
 
     go = Event()
     monkeypatch.setattr(
-        "shapeshift.app.panels.export_panel.export", lambda *_: go.wait(20) and ball()
+        "shapeshift.app.editor.state.files.exporting.export",
+        lambda *_: go.wait(20) and ball(),
     )
     panel.start()
     run_frames(viewer, 3)
     assert panel.running and panel.poll()
     go.set()
     finish(viewer, panel)
-    assert not viewer.stage.problem
+    assert not viewer.state.problem

@@ -9,12 +9,11 @@ from desktop_stand import run_frames
 from real_hands import RealHands
 from widgets import Widgets
 
-from shapeshift.app.panels.camera_panel import move_camera
-from shapeshift.app.viewer import monitor
-from shapeshift.app.viewer.framed import SETTLED_S
-from shapeshift.app.viewer.settings import Settings
-from shapeshift.app.viewer.split import splitting
-from shapeshift.app.viewer.window import Drag
+from shapeshift.app.editor.state.camera.framed import SETTLED_S
+from shapeshift.app.editor.state.user.settings import Settings
+from shapeshift.app.editor.window import monitor
+from shapeshift.app.editor.window.split import splitting
+from shapeshift.app.editor.window.window import Drag
 from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
@@ -30,7 +29,7 @@ def resize(viewer, size: tuple[int, int]) -> None:
             break
         glfw.wait_events_timeout(0.02)
     run_frames(viewer, 4)
-    while not np.array_equal(viewer._free, viewer._free_wanted()):
+    while not np.array_equal(viewer.viewpoint.free, viewer.viewpoint.free_wanted()):
         run_frames(viewer, 5, seconds=0.1)
     run_frames(viewer, 2)
 
@@ -51,11 +50,11 @@ def test_nothing_lies_over_the_scenes_middle(any_size, size, text_size, wanted):
     """At the thermal stop, so that the legend is there; the ball's middle is the scene's."""
     viewer = any_size
     viewer.settings.panel_open = wanted
-    viewer.stage.set_x(0, 1.0)
+    viewer.state.set_x(0, 1.0)
     viewer.window.text_size = text_size
     resize(viewer, size)
-    layout, view = viewer.layout, viewer.view()
-    clip = view.clip_from_eye() @ view.eye_from_world() @ np.append(viewer.stage.centre, 1.0)
+    layout, view = viewer.layout, viewer.viewpoint.view()
+    clip = view.clip_from_eye() @ view.eye_from_world() @ np.append(viewer.state.centre, 1.0)
     middle = (clip[:2] / clip[3] * (1, -1) + 1) / 2 * viewer.window.logical_size
     left, top, right, low = layout.free
     assert middle == pytest.approx([(left + right) / 2, (top + low) / 2], abs=1)
@@ -66,8 +65,8 @@ def test_nothing_lies_over_the_scenes_middle(any_size, size, text_size, wanted):
 
 def ball_px(viewer) -> float:
     """Half of what the ball of a metre's radius is wide in the picture, logical pixels."""
-    view = viewer.view()
-    away = np.linalg.norm(view.world_from_eye.position - viewer.stage.centre)
+    view = viewer.viewpoint.view()
+    away = np.linalg.norm(view.world_from_eye.position - viewer.state.centre)
     per_pixel = (view.tangents[1] - view.tangents[0]) / viewer.window.logical_size[0]
     return float(np.tan(np.arcsin(1.04 / away)) / per_pixel)
 
@@ -83,18 +82,18 @@ def settle(viewer) -> None:
 def test_what_no_hand_has_moved_is_fitted_into_any_window(any_size, framed):
     viewer = any_size
     if framed == "everything":
-        move_camera(viewer, "Frame all")
+        viewer.viewpoint.frame_all()
     elif framed == "by hand":
         viewer.take(Drag("left", 3, 0))
     run_frames(viewer, 40, seconds=0.1)
-    distance = viewer.camera.distance
+    distance = viewer.viewpoint.camera.distance
     for size in ((1900, 700), (700, 900), (1280, 720)):
         resize(viewer, size)
         settle(viewer)
         left, top, right, low = viewer.layout.free
         part = 2 * ball_px(viewer) / min(right - left, low - top)
         if framed == "by hand":
-            assert viewer.camera.distance == pytest.approx(distance)
+            assert viewer.viewpoint.camera.distance == pytest.approx(distance)
         else:
             assert 0.6 < part < 1.0  # whole, and not small
 
@@ -131,11 +130,11 @@ def test_the_text_grows_by_keys_and_is_kept(any_size, display, tmp_path):
         assert np.array(widths) / widths[0] == pytest.approx([1, 1.1, 1.25], abs=0.01)
         assert Settings.read(tmp_path).text_size == 1.25
         hands.key("minus", "Control_L")
-        assert viewer.window.text_size == 1.1 and "110%" in viewer.messages.note
+        assert viewer.window.text_size == 1.1 and "110%" in viewer.state.messages.note
         hands.key("0", "Control_L")
         assert viewer.window.text_size == 1.0 and Settings.read(tmp_path).text_size is None
         assert viewer.window.covered[0][2] == pytest.approx(widths[0])
-        assert viewer.stage.scene.objects[0].x == 0.0  # no stop was meant
+        assert viewer.state.scene.objects[0].x == 0.0  # no stop was meant
 
 
 def test_another_size_and_back_leaves_the_same_picture(any_size):
@@ -178,15 +177,17 @@ def test_settings_that_cannot_be_kept_are_said_once(any_size, display, tmp_path)
     viewer.settings.folder = tmp_path / "file"
     with RealHands(viewer, display) as hands:
         hands.key("equal", "Control_L")
-        assert "cannot be kept" in viewer.stage.problem
-        viewer.stage.problem = ""
+        assert "cannot be kept" in viewer.state.problem
+        viewer.state.problem = ""
         hands.key("0", "Control_L")
-        assert viewer.stage.problem == ""
+        assert viewer.state.problem == ""
 
 
 def test_no_slider_of_the_panel_lies_over_its_number(any_size, monkeypatch):
     """The line of text ends above the bar with the knob."""
-    from shapeshift.app.panels import panel, panel_rows, performance_panel, quality_panel
+    from shapeshift.app.editor.panels import panel
+    from shapeshift.app.editor.panels.sections import performance_panel, quality_panel
+    from shapeshift.app.editor.panels.widgets import panel_rows
 
     monkeypatch.setattr(panel, "section", lambda *_, **__: True)
     for module in (performance_panel, quality_panel):
@@ -220,54 +221,54 @@ def test_no_slider_of_the_panel_lies_over_its_number(any_size, monkeypatch):
 def split_viewer(any_size):
     viewer = any_size
     with splitting(
-        viewer.window, viewer.stage, viewer.hooks, viewer.messages,
-        lambda: viewer.layout.free, lambda: Renderer(viewer.window.ctx, drawing="quads"),
+        viewer.window, viewer.state, viewer.hooks, viewer.free,
+        lambda: Renderer(viewer.window.ctx, drawing="quads"),
     ):  # fmt: skip
         yield viewer
 
 
 def test_two_stops_stand_side_by_side_with_a_knob_each(split_viewer, display, monkeypatch):
     viewer, widgets = split_viewer, Widgets(monkeypatch)
-    stage = viewer.stage
+    state = viewer.state
     free = viewer.layout.free
     with RealHands(viewer, display) as hands:
         run_frames(viewer, 2)
         _, top, right, _ = viewer.window.covered[1]
         y = top + 12 + 46 * 0.68
         hands.click(right - 14 - 12, y)  # the button at the right end
-        assert stage.split.on and stage.split.x == 1.0  # the thermal stop
+        assert state.split.on and state.split.x == 1.0  # the thermal stop
         assert viewer.layout.left_legend and viewer.layout.free[0] > free[0]
         run_frames(viewer, 3)
         track = widgets.boxes["track"]
         ends = track[0] + 12, track[2] - 12
         hands.drag((ends[1], y), ((ends[0] + ends[1]) / 2 + 20, y))
-        assert 0.4 < stage.split.x < 0.65 and stage.scene.objects[0].x == 0.0
+        assert 0.4 < state.split.x < 0.65 and state.scene.objects[0].x == 0.0
         hands.drag((ends[0], y), (ends[0] + 40, y))
-        assert stage.scene.objects[0].x > 0.05 and 0.4 < stage.split.x < 0.65
-        before = viewer.view().eye_from_world()
+        assert state.scene.objects[0].x > 0.05 and 0.4 < state.split.x < 0.65
+        before = viewer.viewpoint.view().eye_from_world()
         line = 0.5 * (viewer.layout.free[0] + viewer.layout.free[2])
         hands.drag((line, 200), (line - 120, 200))  # the line, not the camera
-        np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+        np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
         hands.key("c")
-        assert not stage.split.on
+        assert not state.split.on
 
 
 def test_right_of_the_line_is_the_picture_of_the_other_x(split_viewer):
     """Against a renderer that is given that x alone."""
     viewer = split_viewer
-    viewer.overlay = False
-    viewer.stage.split.toggle(viewer.stage, 0)
+    viewer.state.overlay = False
+    viewer.state.split.toggle(viewer.state.scene.objects[0])
     run_frames(viewer, 4)
     viewer.window.begin_frame()
     viewer._draw_splats()
     viewer.window.end_frame()
     picture = viewer.window.picture().copy()
-    other = viewer.stage.split.right(viewer.stage.scene)
+    other = viewer.state.split.right(viewer.state.scene)
     window = viewer.window
     with Renderer(window.ctx, drawing="quads") as renderer:
         renderer.settings = viewer.renderer.settings
         renderer.update(other)
-        renderer.draw([viewer.view()], window.screen())
+        renderer.draw([viewer.viewpoint.view()], window.screen())
         alone = window.picture().copy()
     cut = picture.shape[1] // 2
     assert (alone[:, cut + 2 :] != alone[0, 0]).any()

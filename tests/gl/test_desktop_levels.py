@@ -10,11 +10,12 @@ from sog_scenes import write_folder
 from test_desktop_program import start
 from test_streamed import random_sog, rewrite, write_streamed
 
-from shapeshift.app.viewer.desktop import Options, Viewer
-from shapeshift.app.viewer.opened import Source
-from shapeshift.app.viewer.refine import Refiner, attach_refiner
-from shapeshift.app.viewer.scene_objects import scene_of
-from shapeshift.app.viewer.stage import Stage
+from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.files.refine import Refiner
+from shapeshift.app.editor.state.scene_objects import scene_of
+from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures display and window
@@ -33,6 +34,12 @@ def scene(tmp_path) -> Path:
         pictures["sh0.webp"][..., :3], pictures["sh0.webp"][..., 3] = color, 255
         write_folder(folder / f"{level}_0", meta, pictures)
     return rewrite(folder, lambda meta: None)
+
+
+def attach(viewer: Viewer, refiner: Refiner) -> None:
+    """As the program does."""
+    upload, changed = viewer.shown.upload, viewer.dial.scene_changed
+    attach_refiner(refiner, viewer.state, viewer.hooks, upload, changed)
 
 
 def shares(picture: np.ndarray) -> np.ndarray:
@@ -61,22 +68,22 @@ def test_a_budget_stops_before_it(display, scene, tmp_path):
 def test_the_first_frame_is_coarse_and_the_camera_stays(window, scene, tmp_path):
     options = Options(pictures=tmp_path / "pictures")
     with Refiner(options) as refiner, Renderer(window.ctx) as renderer:
-        stage = Stage(refiner.open)
+        state = EditorState(refiner.open)
         sources = [Source(scene, refiner.open(scene))]
-        stage.take(sources, scene_of(sources))
-        viewer = Viewer(window, renderer, stage, options)
+        state.take(sources, scene_of(sources))
+        viewer = Viewer(window, renderer, state, options)
         viewer.frame(0.0)
         red, green, blue = shares(window.picture())
         assert red > 0.005 and green < 0.002 and blue < 0.002
-        attach_refiner(viewer, refiner)
-        before = viewer.camera.view((900, 640))
+        attach(viewer, refiner)
+        before = viewer.viewpoint.camera.view((900, 640))
         for _ in range(200):
             run_frames(viewer, 1)
             if not viewer._polling:
                 break
         red, green, blue = shares(window.picture())
         assert green > 0.03 and red < 0.002 and blue < 0.002
-        after = viewer.camera.view((900, 640))
+        after = viewer.viewpoint.camera.view((900, 640))
         assert np.array_equal(before.world_from_eye.matrix(), after.world_from_eye.matrix())
         assert "detail 3 of 3" in [said() for said in viewer.hooks.status]
 
@@ -84,11 +91,11 @@ def test_the_first_frame_is_coarse_and_the_camera_stays(window, scene, tmp_path)
 def test_a_streamed_scene_that_is_dropped_on_the_window_is_refined(window, scene, tmp_path):
     options = Options(pictures=tmp_path / "pictures")
     with Refiner(options) as refiner, Renderer(window.ctx) as renderer:
-        stage = Stage(refiner.open)
+        state = EditorState(refiner.open)
         sources = [Source(scene / "1_0", refiner.open(scene / "1_0"))]  # one level alone: blue
-        stage.take(sources, scene_of(sources))
-        viewer = Viewer(window, renderer, stage, options)
-        attach_refiner(viewer, refiner)
+        state.take(sources, scene_of(sources))
+        viewer = Viewer(window, renderer, state, options)
+        attach(viewer, refiner)
         run_frames(viewer, 2)
         assert not refiner.running
         viewer.files.open_soon((scene,))
@@ -100,5 +107,5 @@ def test_a_streamed_scene_that_is_dropped_on_the_window_is_refined(window, scene
         run_frames(viewer, 1)
         red, green, blue = shares(window.picture())
         assert green > 0.03 and red + blue < green / 20
-        assert stage.scene.objects[0].model.splat_count == LEVELS[0]
-        assert stage.sources[0].facts["splats"] == LEVELS[0] and stage.problem == ""
+        assert state.scene.objects[0].model.splat_count == LEVELS[0]
+        assert state.sources[0].facts["splats"] == LEVELS[0] and state.problem == ""

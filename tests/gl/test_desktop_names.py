@@ -6,7 +6,7 @@ import pytest
 from desktop_stand import ball, run_frames
 from imgui_bundle import imgui
 
-from shapeshift.app.panels.clean_texts import clean_texts, cleaning, maker
+from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts, cleaning, maker
 from shapeshift.runtime_models.files.plain_text import UNSAFE
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.scene import Scene
@@ -59,9 +59,9 @@ def test_a_scene_of_such_names_is_shown(viewer):
     stops = tuple(Stop(name, i / 4, "thermal", "ironbow", (0.0, 1.0), name)
                   for i, name in enumerate(NAMES))  # fmt: skip
     model = replace(ball(100), stops=stops)
-    thing = viewer.stage.scene.objects[0]
-    viewer.stage.scene = Scene((replace(thing, name=NAMES[0], model=model, x=0.5),))
-    viewer.say(NAMES[1])
-    viewer.stage.problem = NAMES[3]
+    thing = viewer.state.scene.objects[0]
+    viewer.state.scene = Scene((replace(thing, name=NAMES[0], model=model, x=0.5),))
+    viewer.state.say(NAMES[1])
+    viewer.state.problem = NAMES[3]
     run_frames(viewer, 4)
     viewer.window.set_title(NAMES[1])

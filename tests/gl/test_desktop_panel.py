@@ -7,9 +7,10 @@ from objects_stand import names
 from real_hands import RealHands
 from widgets import Widgets
 
-from shapeshift.app.panels import panel, performance_panel, quality_panel
-from shapeshift.app.panels.keys_sheet import GROUPS, spread
-from shapeshift.app.panels.path_box import can_browse
+from shapeshift.app.editor.panels import panel
+from shapeshift.app.editor.panels.keys_sheet import GROUPS, spread
+from shapeshift.app.editor.panels.sections import performance_panel, quality_panel
+from shapeshift.app.editor.panels.widgets.path_box import can_browse
 from shapeshift.app.paths import TOUCH
 
 pytest_plugins = ["desktop_fixtures", "objects_stand"]  # window, viewer; touch_viewer
@@ -32,12 +33,12 @@ def unfolded(monkeypatch):
 
 def test_everything_in_the_panel_explains_itself(touch_viewer, unfolded, monkeypatch):
     viewer, widgets = touch_viewer, Widgets(monkeypatch)
-    viewer.stage.chosen = "ring"
+    viewer.state.chosen = "ring"
     for kind in ("sphere", "box", "half-space", "lens", "painted"):
-        viewer.stage.add_region(kind)
-        viewer.stage.regions.placing = False
+        viewer.state.add_region(kind)
+        viewer.state.regions.placing = False
         run_frames(viewer, 2)
-    viewer.stage.split.possible = True
+    viewer.state.split.possible = True
     run_frames(viewer, 2)
     assert len(widgets.explained) > 60
     silent = [name for name, explained in widgets.explained.items() if not explained]
@@ -78,19 +79,19 @@ def hands(viewer, display):
 
 
 def test_a_problem_stays_until_its_cross_is_clicked(viewer, hands):
-    viewer.stage.problem = "one.ply is empty."
-    viewer.stage.problem = "two.ply is empty."
+    viewer.state.problem = "one.ply is empty."
+    viewer.state.problem = "two.ply is empty."
     run_frames(viewer, 3)
     boxes = viewer.window.covered[-2:]
     assert boxes[0][3] <= boxes[1][1]  # the newer one above
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     left, top, right, _ = boxes[0]
     hands.drag((left + 40, top + 16), (left + 140, top + 16))  # on the sentence: no drag
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     hands.click(right - 22, top + 22)
-    assert viewer.messages.problems == ["one.ply is empty."]
+    assert viewer.state.messages.problems == ["one.ply is empty."]
     hands.key("Escape")
-    assert viewer.messages.problems == []
+    assert viewer.state.messages.problems == []
 
 
 def test_f1_opens_and_closes_the_sheet_of_all_keys(viewer, hands, monkeypatch):
@@ -116,8 +117,8 @@ def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     import inspect
     import re
 
-    from shapeshift.app.viewer import hands, objects, shell, split, touch, two_pictures
-    from shapeshift.app.viewer import window as window_module
+    from shapeshift.app.editor.window import hands, objects, shell, split, touch, two_pictures
+    from shapeshift.app.editor.window import window as window_module
 
     told = " ".join(key for rows in GROUPS.values() for key, _ in rows)
     more = (touch.KEYS, objects.KEYS, split.KEYS)
@@ -149,9 +150,9 @@ def test_groups_are_spread_over_columns_in_order():
 
 def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     viewer, widgets = splats_viewer, Widgets(monkeypatch)
-    viewer.files.read = lambda path, told: viewer.stage.read_model(path)
-    viewer.stage.chosen = "ball"
-    viewer.objects.delete()
+    viewer.files.read = lambda path, told: viewer.state.read_model(path)
+    viewer.state.chosen = "ball"
+    viewer.objects.edits.delete()
     run_frames(viewer, 3)
     assert names(viewer) == [] and "The demo" in widgets.boxes
     left, top, right, low = viewer.window.covered[3]
@@ -164,7 +165,7 @@ def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     until_opened(viewer)
     viewer.objects.saving.answer("Discard")
     run_frames(viewer, 2)
-    assert viewer.stage.document.path == TOUCH and len(viewer.window.covered) == 3
+    assert viewer.state.document.path == TOUCH and len(viewer.window.covered) == 3
 
 
 def test_ctrl_o_asks_for_a_path_and_opens_it(viewer, hands, tmp_path):
@@ -173,7 +174,7 @@ def test_ctrl_o_asks_for_a_path_and_opens_it(viewer, hands, tmp_path):
     hands.type(str(tmp_path / "one.shift"))
     hands.key("Return")
     until_opened(viewer)
-    assert names(viewer) == ["one"] and not viewer.stage.problem
+    assert names(viewer) == ["one"] and not viewer.state.problem
     hands.key("o", "Control_L")
     hands.key("Escape")
     assert not viewer.files._box.asking and names(viewer) == ["one"]
@@ -195,16 +196,16 @@ def test_browsing_is_offered_where_the_desktop_has_a_dialog(monkeypatch):
     ],
 )  # fmt: skip
 def test_the_numeric_keypad_looks_from_the_sides_as_in_blender(viewer, hands, key, held, side):
-    target, distance = viewer.camera.target.copy(), viewer.camera.distance
+    target, distance = viewer.viewpoint.camera.target.copy(), viewer.viewpoint.camera.distance
     hands.key(key, *held)
     run_frames(viewer, 80)
-    eye = viewer.view().world_from_eye.position
+    eye = viewer.viewpoint.view().world_from_eye.position
     np.testing.assert_allclose(eye, target + distance * np.array(side, float), atol=1e-3)
-    up = viewer.view().world_from_eye.matrix()[:3, 1]
+    up = viewer.viewpoint.view().world_from_eye.matrix()[:3, 1]
     assert up[1] > 0.99 or abs(side[1]) == 1  # level, or straight above with -Z up
     hands.drag((600, 200), (640, 200))
     run_frames(viewer, 60)
-    moved = viewer.view().world_from_eye.matrix()[:3, 2]
+    moved = viewer.viewpoint.view().world_from_eye.matrix()[:3, 2]
     assert abs(moved[1]) == pytest.approx(abs(side[1]), abs=1e-3)  # turned, not tipped over
 
 
@@ -213,15 +214,15 @@ def test_the_buttons_of_the_camera_do_the_same(viewer, hands, monkeypatch):
     run_frames(viewer, 2)
     hands.click(*widgets.middle("Top"))
     run_frames(viewer, 80)
-    assert viewer.view().world_from_eye.matrix()[1, 2] == pytest.approx(1, abs=1e-6)
+    assert viewer.viewpoint.view().world_from_eye.matrix()[1, 2] == pytest.approx(1, abs=1e-6)
     hands.click(*widgets.middle("Fly"))
-    assert viewer.camera.flying
+    assert viewer.viewpoint.camera.flying
     hands.click(*widgets.middle("Orbit"))
     hands.click(*widgets.middle("First view"))
     run_frames(viewer, 80)
-    assert not viewer.camera.flying
-    first = viewer.stage.first_view(viewer.free_size()).world_from_eye.position
-    np.testing.assert_allclose(viewer.view().world_from_eye.position, first, atol=1e-3)
+    assert not viewer.viewpoint.camera.flying
+    first = viewer.state.first_view(viewer.viewpoint.free_size()).world_from_eye.position
+    np.testing.assert_allclose(viewer.viewpoint.view().world_from_eye.position, first, atol=1e-3)
 
 
 def test_a_stop_is_gone_to_by_its_button(viewer, hands, monkeypatch):
@@ -229,10 +230,10 @@ def test_a_stop_is_gone_to_by_its_button(viewer, hands, monkeypatch):
     run_frames(viewer, 2)
     hands.click(*widgets.middle("thermal"))
     run_frames(viewer, 2, seconds=0.5)  # it is there after SHIFT_S
-    assert viewer.stage.scene.objects[0].x == 1.0
+    assert viewer.state.scene.objects[0].x == 1.0
     hands.click(*widgets.middle("photo"))
     run_frames(viewer, 2, seconds=0.5)
-    assert viewer.stage.scene.objects[0].x == 0.0
+    assert viewer.state.scene.objects[0].x == 0.0
 
 
 def test_painting_is_undone_by_the_keyboard_and_the_slider_stays(viewer, hands):
@@ -242,12 +243,12 @@ def test_painting_is_undone_by_the_keyboard_and_the_slider_stays(viewer, hands):
     hands._key("b", True)
     hands.drag(middle, (middle[0] + 30, middle[1]))
     hands._key("b", False)
-    regions = viewer.stage.regions
+    regions = viewer.state.regions
     assert regions.items[0].painted.sum() > 0
     hands.key("Right")
     hands.key("z", "Control_L")
-    assert regions.items == () and viewer.stage.scene.objects[0].x == 0.01
-    assert "paint" in viewer.messages.note
+    assert regions.items == () and viewer.state.scene.objects[0].x == 0.01
+    assert "paint" in viewer.state.messages.note
     hands.key("y", "Control_L")
     assert regions.items[0].painted.sum() > 0
 
@@ -261,19 +262,19 @@ def test_each_stroke_is_a_step_of_its_own(viewer, hands):
         hands._key("b", True)
         hands.drag((x + 60 * step, y), (x + 60 * step + 20, y))
         hands._key("b", False)
-        counts.append(int(viewer.stage.regions.items[0].painted.sum()))
+        counts.append(int(viewer.state.regions.items[0].painted.sum()))
     assert counts[0] < counts[1]
     hands.key("z", "Control_L")
-    assert int(viewer.stage.regions.items[0].painted.sum()) == counts[0]
+    assert int(viewer.state.regions.items[0].painted.sum()) == counts[0]
 
 
 def test_escape_leaves_what_is_nearest(viewer, hands):
-    viewer.stage.add_region("sphere")
-    viewer.stage.problem = "something."
+    viewer.state.add_region("sphere")
+    viewer.state.problem = "something."
     hands.key("F1")
     hands.key("Escape")
-    assert not viewer.shell.keys_open and viewer.stage.problem
+    assert not viewer.shell.keys_open and viewer.state.problem
     hands.key("Escape")
-    assert not viewer.stage.problem and viewer.stage.regions.placing
+    assert not viewer.state.problem and viewer.state.regions.placing
     hands.key("Escape")
-    assert not viewer.stage.regions.placing
+    assert not viewer.state.regions.placing

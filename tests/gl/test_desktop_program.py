@@ -13,13 +13,13 @@ from PIL import Image
 from Xlib import Xatom
 from Xlib.display import Display
 
-from shapeshift.app.viewer.window import Window
+from shapeshift.app.editor.window.window import Window
 from shapeshift.renderer.gl.context import NoContext
 from shapeshift.scene.pose import look_at
 
 pytest_plugins = ["desktop_fixtures"]  # its fixture display
 ROOT = Path(__file__).resolve().parents[2]
-ACCENT = np.array([242, 161, 69])  # app/panels/theme.py
+ACCENT = np.array([242, 161, 69])  # app/editor/panels/widgets/theme.py
 
 
 def start(display: str | None, *arguments, code: str | None = None) -> subprocess.CompletedProcess:
@@ -147,7 +147,8 @@ def test_a_region_a_debug_view_and_a_budget_from_the_command_line(display, scene
 
 def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_file, tmp_path):
     code = (
-        "import sys\nfrom app import cli; from shapeshift.app.viewer import window\n"
+        "import sys\nfrom shapeshift.app import cli\n"
+        "from shapeshift.app.editor.window import window\n"
         "def crash(self, event=None):\n    raise ZeroDivisionError('the callback broke')\n"
         "window.Window._note = crash\n"
         "old = window.Window.begin_frame\n"
@@ -164,7 +165,7 @@ def test_a_crash_in_a_callback_is_one_sentence_and_not_success(display, scene_fi
 
 def test_no_context_is_the_error_of_the_window(monkeypatch):
     monkeypatch.setattr(
-        "shapeshift.app.viewer.window.GlfwWindow",
+        "shapeshift.app.editor.window.window.GlfwWindow",
         lambda **_: (_ for _ in ()).throw(ValueError("no")),
     )
     with pytest.raises(NoContext, match=r"no window with OpenGL 4.3 could be opened \(no\)"):

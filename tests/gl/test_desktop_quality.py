@@ -8,7 +8,7 @@ import pytest
 from desktop_stand import run_frames, until_opened
 
 from shapeshift.app.charts.comparison import REST_S
-from shapeshift.app.viewer.window import Drag, KeyDown, Press, Release
+from shapeshift.app.editor.window.window import Drag, KeyDown, Press, Release
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
@@ -19,7 +19,7 @@ def press(viewer, key: int, shift: bool = False) -> None:
 
 
 def middle(viewer) -> tuple[float, float]:
-    left, top, right, bottom = viewer._free
+    left, top, right, bottom = viewer.viewpoint.free
     return (left + right) / 2, (top + bottom) / 2
 
 
@@ -31,7 +31,7 @@ def hold(monkeypatch, *keys: int) -> None:
 
 
 def test_a_setting_is_compared_with_exact_once_it_rests(viewer):
-    viewer.stage.settings = RenderSettings(min_pixels=2.0)
+    viewer.state.settings = RenderSettings(min_pixels=2.0)
     run_frames(viewer, 2)
     drawn = viewer.renderer.draws
     assert viewer.readings.error_db is None
@@ -42,7 +42,7 @@ def test_a_setting_is_compared_with_exact_once_it_rests(viewer):
     time.sleep(1.1 * REST_S)
     run_frames(viewer, 2)
     assert viewer.renderer.draws == drawn + 3
-    viewer.stage.settings = RenderSettings(min_pixels=1.0)
+    viewer.state.settings = RenderSettings(min_pixels=1.0)
     run_frames(viewer, 1)
     assert viewer.readings.error_is_old
 
@@ -55,7 +55,7 @@ def test_exact_costs_no_comparison(viewer):
 
 
 def test_the_loop_wakes_for_the_comparison_without_any_input(viewer):
-    viewer.stage.settings = RenderSettings(min_pixels=2.0)
+    viewer.state.settings = RenderSettings(min_pixels=2.0)
     run_frames(viewer, 5)
     until = time.perf_counter() + 5
     while viewer.readings.error_db is None and time.perf_counter() < until:
@@ -78,13 +78,13 @@ def test_the_dial_measures_between_frames_and_chooses(viewer):
         if not viewer.dial.measuring:
             break
     assert viewer.dial.choice is not None and not viewer.dial.measuring
-    assert viewer.stage.settings == viewer.dial.applied(viewer.stage.settings)
+    assert viewer.state.settings == viewer.dial.applied(viewer.state.settings)
     run_frames(viewer, 1)
-    assert viewer.renderer.settings.min_pixels == viewer.stage.settings.min_pixels
+    assert viewer.renderer.settings.min_pixels == viewer.state.settings.min_pixels
 
 
 def test_opening_another_scene_forgets_what_was_measured(viewer, tmp_path):
-    from shapeshift.app.viewer.window import Drop
+    from shapeshift.app.editor.window.window import Drop
 
     scene = tmp_path / "one.shift"
     scene.write_bytes(b"scene")
@@ -103,7 +103,7 @@ def test_fewer_pixels_while_moving_and_all_at_rest(viewer):
         run_frames(viewer, 1)
     assert viewer.renderer.settings.render_scale == 0.5
     run_frames(viewer, 80)
-    assert viewer.renderer.settings.render_scale == 1.0 == viewer.stage.settings.render_scale
+    assert viewer.renderer.settings.render_scale == 1.0 == viewer.state.settings.render_scale
 
 
 # Debug views
@@ -117,79 +117,81 @@ def test_g_goes_through_the_debug_views_and_back(viewer):
         seen.append(viewer.renderer.settings.debug)
     assert tuple(seen) == (*DEBUG_VIEWS[1:], "")
     press(viewer, glfw.KEY_G, shift=True)
-    assert viewer.stage.settings.debug == DEBUG_VIEWS[-1]
+    assert viewer.state.settings.debug == DEBUG_VIEWS[-1]
 
 
 # Regions
 
 
 def test_a_click_places_a_region_on_the_surface_and_a_drag_moves_it_on(viewer):
-    stage = viewer.stage
-    stage.add_region("sphere")
-    before = viewer.view().eye_from_world()
+    state = viewer.state
+    state.add_region("sphere")
+    before = viewer.viewpoint.view().eye_from_world()
     x, y = middle(viewer)
     viewer.take(Press("left", x, y))
-    first = stage.regions.current.centre
+    first = state.regions.current.centre
     assert np.linalg.norm(first) == pytest.approx(1, abs=0.1)  # on the ball
     viewer.take(Drag("left", 30, 0, x + 30, y))
-    assert np.linalg.norm(stage.regions.current.centre - first) > 0.05
+    assert np.linalg.norm(state.regions.current.centre - first) > 0.05
     viewer.take(Release("left"))
     run_frames(viewer, 3)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     viewer.take(Press("left", x, y))
     viewer.take(Drag("left", 30, 0, x + 30, y))  # now it is the camera again
-    assert viewer.camera.moving
+    assert viewer.viewpoint.camera.moving
 
 
 def test_regions_reach_the_renderer_and_change_what_is_drawn(viewer):
-    stage, drawn = viewer.stage, viewer.renderer.draws
-    stage.add_region("box")
+    state, drawn = viewer.state, viewer.renderer.draws
+    state.add_region("box")
     run_frames(viewer, 2)
     assert viewer.renderer.draws == drawn + 1  # once: the scene is the same object after that
-    assert [type(s).__name__ for s in stage.shown(viewer.view()).objects[0].selectors] == ["Box"]
-    stage.regions.edit(0, enabled=False)
+    assert [
+        type(s).__name__ for s in state.shown(viewer.viewpoint.view()).objects[0].selectors
+    ] == ["Box"]
+    state.regions.edit(0, enabled=False)
     run_frames(viewer, 2)
     assert viewer.renderer.draws == drawn + 2
-    assert stage.shown(viewer.view()).objects[0].selectors == ()
+    assert state.shown(viewer.viewpoint.view()).objects[0].selectors == ()
 
 
 def test_the_lens_follows_the_camera(viewer):
     press(viewer, glfw.KEY_L)
-    (lens,) = viewer.stage.shown(viewer.view()).objects[0].selectors
+    (lens,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
     viewer.take(Drag("left", 80, 0))
     run_frames(viewer, 60)
-    (moved,) = viewer.stage.shown(viewer.view()).objects[0].selectors
-    np.testing.assert_array_equal(moved.position, viewer.view().world_from_eye.position)
+    (moved,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
+    np.testing.assert_array_equal(moved.position, viewer.viewpoint.view().world_from_eye.position)
     assert moved != lens and not viewer._busy()
     press(viewer, glfw.KEY_L)
-    assert viewer.stage.shown(viewer.view()).objects[0].selectors == ()
+    assert viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors == ()
 
 
 def test_holding_b_paints_what_is_in_front_and_shift_erases(viewer, monkeypatch):
     x, y = middle(viewer)
-    before = viewer.view().eye_from_world()
-    viewer.stage.regions.brush = 80.0
+    before = viewer.viewpoint.view().eye_from_world()
+    viewer.state.regions.brush = 80.0
     hold(monkeypatch, glfw.KEY_B)
     viewer.take(Press("left", x, y))
     viewer.take(Drag("left", 20, 0, x + 20, y))
-    region = viewer.stage.regions.current
+    region = viewer.state.regions.current
     assert region.kind == "painted" and region.painted.sum() > 10
-    model = viewer.stage.scene.objects[0].model
-    eye = viewer.view().world_from_eye.position
+    model = viewer.state.scene.objects[0].model
+    eye = viewer.viewpoint.view().world_from_eye.position
     facing = np.einsum("ac,ac->a", model.means[region.painted], eye - model.means[region.painted])
     assert (facing > 0).all()  # none on the far side of the ball
     hold(monkeypatch, glfw.KEY_B, glfw.KEY_LEFT_SHIFT)
     viewer.take(Press("left", x, y))
-    assert viewer.stage.regions.current.painted.sum() < region.painted.sum()
+    assert viewer.state.regions.current.painted.sum() < region.painted.sum()
     monkeypatch.undo()
     run_frames(viewer, 3)
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
 
 
 def test_escape_leaves_the_region_and_hiding_keeps_it(viewer):
-    viewer.stage.add_region("half-space")
+    viewer.state.add_region("half-space")
     press(viewer, glfw.KEY_ESCAPE)
-    assert viewer.stage.regions.current is None and not viewer.stage.regions.placing
+    assert viewer.state.regions.current is None and not viewer.state.regions.placing
     press(viewer, glfw.KEY_H)
     run_frames(viewer, 2)
-    assert len(viewer.stage.shown(viewer.view()).objects[0].selectors) == 1
+    assert len(viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors) == 1

@@ -10,9 +10,9 @@ from objects_stand import CTRL, NAMES, SHIFT, TOUCH, button, key, mouse, names
 from real_hands import RealHands
 from widgets import Widgets
 
-from shapeshift.app.viewer.arrange import steer
-from shapeshift.app.viewer.document import stamp_of
-from shapeshift.app.viewer.opened import read_files
+from shapeshift.app.editor.state.arrange import steer
+from shapeshift.app.editor.state.files.document import stamp_of
+from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.read_scene_file import read_scene_file
@@ -33,18 +33,18 @@ def plain(splats_viewer):
 def test_what_the_program_brought_along_is_never_written_over(viewer, tmp_path, display):
     """Ctrl+S by the keyboard itself: a name is asked for, and the one proposed is one's own."""
     before = {path: path.read_bytes() for path in TOUCH.parent.rglob("*") if path.is_file()}
-    view = viewer.view().eye_from_world()
-    viewer.stage.chosen = "ball"
-    viewer.objects.delete()
+    view = viewer.viewpoint.view().eye_from_world()
+    viewer.state.chosen = "ball"
+    viewer.objects.edits.delete()
     with RealHands(viewer, display) as hands:
         hands.key("s", "Control_L")
         assert viewer.objects.saving.asking
         hands.key("Return")  # the proposed name
     wanted = tmp_path / "scenes" / "touch.scene.json"
     assert not viewer.objects.saving.asking and not viewer.objects.unsaved
-    assert str(wanted) in viewer.messages.note  # absolute
+    assert str(wanted) in viewer.state.messages.note  # absolute
     assert [item.name for item in read_scene_file(wanted).items] == ["cube", "ring", "plate"]
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), view)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), view)
     after = {path: path.read_bytes() for path in TOUCH.parent.rglob("*") if path.is_file()}
     assert after == before
     again = read_files([wanted], None, CameraReading(), lambda *_: None)
@@ -59,17 +59,17 @@ def test_a_name_among_what_the_program_brought_along_is_refused(viewer, tmp_path
         path.symlink_to(TOUCH)
     viewer.objects.saving.ask_name()
     assert not viewer.objects.saving.named(str(path), replace=True)
-    assert "came with the program" in viewer.stage.problem and viewer.objects.saving.asking
+    assert "came with the program" in viewer.state.problem and viewer.objects.saving.asking
     assert TOUCH.read_bytes() == before
     viewer.objects.saving.cancel_name()
 
 
 def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
-    saving, document = viewer.objects.saving, viewer.stage.document
+    saving, document = viewer.objects.saving, viewer.state.document
     path = tmp_path / "own.scene.json"
     assert not saving.in_place and saving.named(str(path)) and saving.in_place
-    viewer.stage.chosen = "ball"
-    viewer.objects.delete()
+    viewer.state.chosen = "ball"
+    viewer.objects.edits.delete()
     key(viewer, glfw.KEY_S, CTRL)
     assert not saving.asking and not viewer.objects.unsaved
     assert [item.name for item in read_scene_file(path).items] == ["cube", "ring", "plate"]
@@ -79,12 +79,12 @@ def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
     assert saving.original == other
     key(viewer, glfw.KEY_S, CTRL)
     assert saving.asking and other.read_bytes() == path.read_bytes()
-    assert saving._name == str(tmp_path / "scenes" / "other.scene.json")
+    assert saving.name == str(tmp_path / "scenes" / "other.scene.json")
     saving.cancel_name()
 
 
 def test_a_file_that_was_opened_is_replaced_when_it_is_said_twice(viewer, tmp_path, monkeypatch):
-    saving, document, widgets = viewer.objects.saving, viewer.stage.document, Widgets(monkeypatch)
+    saving, document, widgets = viewer.objects.saving, viewer.state.document, Widgets(monkeypatch)
     path = tmp_path / "theirs.scene.json"
     path.write_text("{}")
     document.path, document.stamp = path, stamp_of(path)
@@ -105,12 +105,12 @@ def test_a_proposed_name_is_free(plain, tmp_path):
     for name in ("ball.scene.json", "ball 2.scene.json"):
         (folder / name).write_text("mine")
     plain.objects.saving.ask_name()
-    assert plain.objects.saving._name == str(folder / "ball 3.scene.json")
+    assert plain.objects.saving.name == str(folder / "ball 3.scene.json")
     plain.objects.saving.cancel_name()
 
 
 def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_path):
-    objects, document = viewer.objects, viewer.stage.document
+    objects, document = viewer.objects, viewer.state.document
     path = tmp_path / "a.scene.json"
     assert objects.saving.named(str(path))
     path.write_text("{}")  # by somebody else
@@ -138,7 +138,7 @@ def test_nothing_is_replaced_unasked(viewer, tmp_path):
 def test_a_folder_that_cannot_be_written_is_a_sentence(viewer, tmp_path):
     (tmp_path / "file").write_text("")
     assert not viewer.objects.saving.named(str(tmp_path / "file" / "x"))
-    assert "cannot be saved" in viewer.stage.problem and "\n" not in viewer.stage.problem
+    assert "cannot be saved" in viewer.state.problem and "\n" not in viewer.state.problem
 
 
 def test_a_name_is_typed_and_what_goes_wrong_is_said_until_it_is_read(viewer, tmp_path):
@@ -152,22 +152,22 @@ def test_a_name_is_typed_and_what_goes_wrong_is_said_until_it_is_read(viewer, tm
         key(viewer, glfw.KEY_ENTER)
         run_frames(viewer, 3)
         assert (tmp_path / "mine.scene.json").is_file() == right
-        assert ("cannot be saved" in viewer.stage.problem) != right
+        assert ("cannot be saved" in viewer.state.problem) != right
         key(viewer, glfw.KEY_ESCAPE)  # out of the field, which had taken the key before
         key(viewer, glfw.KEY_ESCAPE)
         run_frames(viewer, 3)
         assert not viewer.objects.saving.asking
         key(viewer, glfw.KEY_ESCAPE)  # it is read
-        assert viewer.stage.problem == ""
-    assert viewer.stage.document.path == tmp_path / "mine.scene.json"
+        assert viewer.state.problem == ""
+    assert viewer.state.document.path == tmp_path / "mine.scene.json"
 
 
 def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
-    stage = plain.stage
-    assert not plain.objects.unsaved and stage.world is None
-    stage.add_region("sphere")
-    stage.regions.edit(0, x=1.0)
-    stage.toggle_lens()  # of the eye, not of the file
+    state = plain.state
+    assert not plain.objects.unsaved and state.world is None
+    state.add_region("sphere")
+    state.regions.edit(0, x=1.0)
+    state.toggle_lens()  # of the eye, not of the file
     key(plain, glfw.KEY_S, CTRL)
     assert plain.objects.saving.asking
     plain.objects.saving.cancel_name()
@@ -185,8 +185,8 @@ def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
 
 def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
     assert viewer._may_close()
-    viewer.stage.chosen = "ball"
-    viewer.objects.delete()
+    viewer.state.chosen = "ball"
+    viewer.objects.edits.delete()
     run_frames(viewer, 1)
     assert viewer.window._window.title.startswith("* touch.scene.json")
     assert viewer.objects.status() == "not saved"
@@ -205,40 +205,40 @@ def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
 
 
 def test_a_slider_alone_asks_nothing(viewer):
-    steer(viewer.stage, 1, 0.5)
+    steer(viewer.state, 1, 0.5)
     run_frames(viewer, 1)
     assert viewer.objects.status() == "" and viewer._may_close()
-    assert viewer.stage.document.file.all_items[1].x == 0.5  # saved when something else is
+    assert viewer.state.document.file.all_items[1].x == 0.5  # saved when something else is
 
 
 def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
-    objects, stage = viewer.objects, viewer.stage
-    first = stage.world
-    assert objects.edit(edits.ground, -0.2, what="floor")
-    assert stage.document.file.floor_y == -0.2 and stage.world is not first
-    assert stage.world.paused and list(stage.world.things) == NAMES
-    viewer.camera.turn(0.3, -0.1)
+    objects, state = viewer.objects, viewer.state
+    first = state.world
+    assert objects.edits.edit(edits.ground, -0.2, what="floor")
+    assert state.document.file.floor_y == -0.2 and state.world is not first
+    assert state.world.paused and list(state.world.things) == NAMES
+    viewer.viewpoint.camera.turn(0.3, -0.1)
     run_frames(viewer, 60)
-    objects.look_from_here()
-    eye = viewer.view().world_from_eye.position
-    assert stage.document.file.view.eye == pytest.approx(eye, abs=1e-6)
+    objects.edits.look_from_here()
+    eye = viewer.viewpoint.view().world_from_eye.position
+    assert state.document.file.view.eye == pytest.approx(eye, abs=1e-6)
     assert objects.saving.named(str(tmp_path / "a"))
-    again = stage.first_view((900, 640))
+    again = state.first_view((900, 640))
     np.testing.assert_allclose(
-        again.world_from_eye.matrix(), viewer.view().world_from_eye.matrix(), atol=1e-4
+        again.world_from_eye.matrix(), viewer.viewpoint.view().world_from_eye.matrix(), atol=1e-4
     )
     key(viewer, glfw.KEY_Z, CTRL)
     key(viewer, glfw.KEY_Z, CTRL)
-    assert stage.document.file.floor_y == -0.7 and objects.unsaved
+    assert state.document.file.floor_y == -0.7 and objects.unsaved
 
 
 def test_paint_on_what_is_no_file_yet_is_asked_about_and_a_lens_is_not(plain):
-    plain.stage.toggle_lens()
+    plain.state.toggle_lens()
     run_frames(plain, 1)
     assert not plain.objects.unsaved and plain._may_close()
-    plain.stage.add_region("sphere")
+    plain.state.add_region("sphere")
     run_frames(plain, 1)
     assert plain.objects.unsaved and not plain._may_close()
     plain.objects.saving.answer("Cancel")
-    plain.objects.undo()
+    plain.objects.edits.undo()
     assert not plain.objects.unsaved and plain._may_close()

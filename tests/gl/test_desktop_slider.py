@@ -6,7 +6,7 @@ from desktop_stand import run_frames
 from real_hands import RealHands
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
-ACCENT = np.array([242, 161, 69])  # app/panels/theme.py
+ACCENT = np.array([242, 161, 69])  # app/editor/panels/widgets/theme.py
 NAMES_PX = 34  # of the bar, from its upper edge: padding, and the names of the stops
 
 
@@ -19,11 +19,11 @@ def hands(viewer, display):
 
 
 def x_of(viewer) -> float:
-    return viewer.stage.scene.objects[0].x
+    return viewer.state.scene.objects[0].x
 
 
 def put(viewer, x: float) -> None:
-    viewer.stage.set_x(0, x)
+    viewer.state.set_x(0, x)
     run_frames(viewer, 3)
 
 
@@ -156,8 +156,8 @@ def test_x_is_typed_as_a_number_or_a_name(viewer, hands):
         hands.type(text)
         hands.key("Return")
         assert x_of(viewer) == 0.5
-        assert text in viewer.stage.problem and "photo, thermal" in viewer.stage.problem
-        viewer.stage.problem = ""
+        assert text in viewer.state.problem and "photo, thermal" in viewer.state.problem
+        viewer.state.problem = ""
     hands.click(*field)
     hands.type("0.9")
     hands.key("Escape")
@@ -167,13 +167,13 @@ def test_x_is_typed_as_a_number_or_a_name(viewer, hands):
 def test_typing_beside_other_keys_moves_nothing_else(viewer, hands):
     """While the number is typed, arrows and letters are the field's."""
     right, y = viewer.window.covered[1][2], knob(viewer)[1]
-    before = viewer.view().eye_from_world()
+    before = viewer.viewpoint.view().eye_from_world()
     hands.click(right - 30, y)
     hands.key("Right")
     hands.key("w")
     hands.key("Escape")
     assert x_of(viewer) == 0.0
-    np.testing.assert_array_equal(viewer.view().eye_from_world(), before)
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     hands.key("Right")
     assert x_of(viewer) == 0.01
 
@@ -186,6 +186,6 @@ def test_the_seconds_of_playing_are_beside_the_play_button(viewer, hands):
     hands.key("Escape")
     assert not viewer.window._popup
     hands.click(left + 30, (top + bottom) / 2)
-    assert viewer.stage.playing
+    assert viewer.state.playing
     hands.click(left + 30, (top + bottom) / 2)
-    assert not viewer.stage.playing
+    assert not viewer.state.playing

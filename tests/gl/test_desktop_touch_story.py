@@ -31,16 +31,16 @@ def glide(viewer, points: list, steps: int = 12) -> None:
 
 
 def test_a_person_plays_with_the_bundled_scene(viewer):
-    world = viewer.stage.world
+    world = viewer.state.world
     start = {name: place(viewer, name).copy() for name in ("cube", "ball", "ring")}
-    assert not world.paused and "Drag a thing" in viewer.messages.note
+    assert not world.paused and "Drag a thing" in viewer.state.messages.note
     run_frames(viewer, 10)
 
     rim = place(viewer, "ring") + np.array([0.06, 0.015, 0.0])
     up, over = (place_of(viewer, rim + np.array([x, 0.1, 0.0])) for x in (0.0, 0.23))
     mouse(viewer, *place_of(viewer, rim))
     button(viewer, True)
-    assert world.held("mouse") == "ring" and viewer.stage.chosen == "ring"
+    assert world.held("mouse") == "ring" and viewer.state.chosen == "ring"
     glide(viewer, [place_of(viewer, rim), up])
     assert place(viewer, "ring")[1] > start["ring"][1] + 0.05
     run_frames(viewer, 25)
@@ -74,11 +74,11 @@ def test_a_person_plays_with_the_bundled_scene(viewer):
     for name, at in start.items():
         np.testing.assert_allclose(place(viewer, name), at, atol=0.01)
     assert [thing(viewer, name).x for name in ("cube", "ball", "ring")] == [0.0, 0.0, 0.5]
-    assert not viewer.stage.document.unsaved  # play is no edit
+    assert not viewer.state.document.unsaved  # play is no edit
 
 
 def test_steps_by_hand_and_turning_with_shift(viewer):
-    world = viewer.stage.world
+    world = viewer.state.world
     key(viewer, glfw.KEY_T, SHIFT)
     steps = world.steps
     key(viewer, glfw.KEY_T, SHIFT)
@@ -91,8 +91,8 @@ def test_steps_by_hand_and_turning_with_shift(viewer):
     for _ in range(3):
         viewer.window._on_scroll(None, 0, 1)
         run_frames(viewer, 3)
-    away = np.linalg.norm(place(viewer, "cube") - viewer.camera.position)
-    assert away > np.linalg.norm(np.array([-0.22, 0.05, 0.05]) - viewer.camera.position)
+    away = np.linalg.norm(place(viewer, "cube") - viewer.viewpoint.camera.position)
+    assert away > np.linalg.norm(np.array([-0.22, 0.05, 0.05]) - viewer.viewpoint.camera.position)
     viewer.window._on_key(None, glfw.KEY_ESCAPE, 0, glfw.PRESS, 0)
     run_frames(viewer, 2)
     assert world.held("mouse") is None

@@ -9,11 +9,11 @@ import pytest
 from desktop_stand import ball, run_frames
 
 from shapeshift.app.commands.compare_sides import SceneSide
+from shapeshift.app.editor.desktop import Options, Viewer
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.window.window import Drag, KeyDown, Press, Release
+from shapeshift.app.editor.window.wipe import KEYS, Wipe
 from shapeshift.app.subject import Subject
-from shapeshift.app.viewer.desktop import Options, Viewer
-from shapeshift.app.viewer.stage import Stage
-from shapeshift.app.viewer.window import Drag, KeyDown, Press, Release
-from shapeshift.app.viewer.wipe import KEYS, Wipe
 from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
@@ -26,12 +26,14 @@ def stand(window, tmp_path, request):
         pytest.importorskip("pyopencl")
     a = ball(300)
     b = replace(a, means=a.means * np.float32(1.2), sh=a.sh[:, :, ::-1].copy())
-    stage = Stage(lambda path: a)
-    stage.open([Path("a.ply")])
+    state = EditorState(lambda path: a)
+    state.open([Path("a.ply")])
     options = Options(pictures=tmp_path, panel=False, drawing=request.param)
     with Renderer(window.ctx, request.param) as one, Renderer(window.ctx, request.param) as other:
-        viewer = Viewer(window, one, stage, options)
-        wipe = Wipe(viewer, other, SceneSide("b", Subject.of(b, 0.0), stated=False))
+        viewer = Viewer(window, one, state, options)
+        side = SceneSide("b", Subject.of(b, 0.0), stated=False)
+        wipe = Wipe(window, (one, other), state, side, viewer.free())
+        wipe.attach(viewer.hooks)
         run_frames(viewer, 5)
         yield viewer, wipe, b
         wipe.release()
@@ -47,10 +49,10 @@ def screen(viewer) -> np.ndarray:
 def alone(viewer, model) -> np.ndarray:
     """What the viewer shows of one model without a wipe."""
     over, viewer.hooks.over = viewer.hooks.over, []
-    scene = viewer.stage.scene
-    viewer.stage.scene = replace(scene, objects=(replace(scene.objects[0], model=model),))
+    scene = viewer.state.scene
+    viewer.state.scene = replace(scene, objects=(replace(scene.objects[0], model=model),))
     picture = screen(viewer)
-    viewer.stage.scene, viewer.hooks.over = scene, over
+    viewer.state.scene, viewer.hooks.over = scene, over
     return picture
 
 
@@ -58,7 +60,7 @@ def alone(viewer, model) -> np.ndarray:
 def test_each_side_of_the_line_is_exactly_its_own_picture(stand, part):
     viewer, wipe, b = stand
     wipe.part = part
-    of_a = alone(viewer, viewer.stage.scene.objects[0].model)
+    of_a = alone(viewer, viewer.state.scene.objects[0].model)
     of_b = alone(viewer, b)
     assert (of_a != of_b).any(axis=2).mean() > 0.02
     picture, cut = screen(viewer), round(part * viewer.window.size[0])
@@ -69,7 +71,7 @@ def test_each_side_of_the_line_is_exactly_its_own_picture(stand, part):
 def test_the_line_follows_mouse_and_keys_and_the_camera_stays(stand):
     viewer, wipe, _ = stand
     width = viewer.window.logical_size[0]
-    before = viewer.view()
+    before = viewer.viewpoint.view()
     viewer.take(Press("left", wipe.part * width + 4, 100))
     viewer.take(Drag("left", -90, 0, 0.25 * width, 100))
     assert wipe.part == 0.25
@@ -78,17 +80,17 @@ def test_the_line_follows_mouse_and_keys_and_the_camera_stays(stand):
     viewer.take(Release("left"))
     viewer.take(KeyDown(glfw.KEY_COMMA, False))
     assert wipe.part == pytest.approx(0.98)
-    assert str(viewer.view()) == str(before) and not viewer.camera.moving
+    assert str(viewer.viewpoint.view()) == str(before) and not viewer.viewpoint.camera.moving
     viewer.take(Press("left", 10, 100))  # far from the line: the camera's
     viewer.take(Drag("left", 30, 0, 40, 100))
-    assert viewer.camera.moving and wipe.part == pytest.approx(0.98)
+    assert viewer.viewpoint.camera.moving and wipe.part == pytest.approx(0.98)
 
 
 def test_it_can_be_switched_off(stand):
     viewer, wipe, _ = stand
     viewer.take(KeyDown(glfw.KEY_C, False))
     wipe.part = 0.5
-    of_a = alone(viewer, viewer.stage.scene.objects[0].model)
+    of_a = alone(viewer, viewer.state.scene.objects[0].model)
     np.testing.assert_array_equal(screen(viewer), of_a)
 
 
@@ -98,34 +100,36 @@ def test_at_rest_the_likeness_is_told_once(stand, monkeypatch):
     from shapeshift.app.charts import comparison
 
     monkeypatch.setattr(comparison, "REST_S", 0.0)
-    viewer.stage.set_x(0, 0.5)
+    viewer.state.set_x(0, 0.5)
     run_frames(viewer, 4)
     assert wipe.status().startswith("A to B ") and wipe.status().endswith(" dB")
     assert not wipe._waiting  # the loop may sleep
-    viewer.stage.set_x(0, 0.75)
-    assert wipe._scene_at(viewer.stage.scene).objects[0].x == 0.75  # no x was given: A's
+    viewer.state.set_x(0, 0.75)
+    assert wipe._scene_at(viewer.state.scene).objects[0].x == 0.75  # no x was given: A's
 
 
 def test_zeros_that_lie_elsewhere_are_respected(stand):
     viewer, wipe, b = stand
     far = Subject.of(replace(b, origin=(100.0, 0.0, 0.0)))
     wipe._side = replace(wipe._side, subject=far)
-    offset = wipe._offset(viewer.stage.scene)
+    offset = wipe._offset(viewer.state.scene)
     np.testing.assert_array_equal(offset, [-100.0, 0.0, 0.0])
 
 
 def test_a_scene_file_is_drawn_where_it_says_beside_itself_at_another_x(window, tmp_path):
     """Its zero is the world's, whatever was taken off a model of it; its own name stands there."""
     far = replace(ball(50), origin=(100.0, 0.0, 0.0))
-    stage = Stage(lambda path: far)
-    stage.open([Path("a.ply")])
-    stage.document.path = tmp_path / "a.scene.json"
+    state = EditorState(lambda path: far)
+    state.open([Path("a.ply")])
+    state.document.path = tmp_path / "a.scene.json"
     options = Options(pictures=tmp_path, panel=False, drawing="quads")
     with Renderer(window.ctx, "quads") as one, Renderer(window.ctx, "quads") as other:
-        viewer = Viewer(window, one, stage, options)
-        wipe = Wipe(viewer, other, SceneSide("b", Subject.of(ball(50), 0.0)))
+        viewer = Viewer(window, one, state, options)
+        side = SceneSide("b", Subject.of(ball(50), 0.0))
+        wipe = Wipe(window, (one, other), state, side, viewer.free())
+        wipe.attach(viewer.hooks)
         run_frames(viewer, 2)
-        assert not wipe._offset(stage.scene).any()
+        assert not wipe._offset(state.scene).any()
         wipe.release()
 
 

@@ -7,7 +7,11 @@ import pytest
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl import shader
 
-FILES = sorted(p.name for p in shader.SHADERS.iterdir() if p.suffix in (".comp", ".vert", ".frag"))
+FILES = sorted(
+    p.relative_to(shader.SHADERS).as_posix()
+    for p in shader.SHADERS.rglob("*")
+    if p.suffix in (".comp", ".vert", ".frag")
+)
 COMPUTE = [name for name in FILES if name.endswith(".comp")]
 MLP_DEFINES = {"LAYER_VECS": 16, "BLOCK_VECS": 1024, "STORED_WEIGHTS": 0}
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.app.headset.worn_scene import BACKGROUND
+from shapeshift.app.headset.xr_scene import BACKGROUND
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import read_models, scene_of

@@ -1,0 +1,49 @@
+"""A stream over another one that writes out what would steer a terminal: see terminal.py."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from shapeshift.runtime_models.files.plain_text import several_lines
+
+
+class CleanStream:
+    """A stream that writes out what is unsafe, over one that takes all."""
+
+    def __init__(self, beneath: TextIO, name: str, trusting: bool = False) -> None:
+        self.beneath = beneath
+        self._name, self._trusting = name, trusting
+
+    def trusted(self) -> "CleanStream":
+        """The same for what is clean already: tables, progress, JSON."""
+        return CleanStream(self.beneath, self._name, trusting=True)
+
+    def write(self, text: str) -> int:
+        clean = text if self._trusting else several_lines(text)
+        with self._naming():
+            self.beneath.write(clean)
+        return len(text)
+
+    def writelines(self, lines) -> None:
+        for line in lines:
+            self.write(line)
+
+    def flush(self) -> None:
+        with self._naming():
+            self.beneath.flush()
+
+    @contextmanager
+    def _naming(self) -> Iterator[None]:
+        """A full disk behind a redirection is named."""
+        try:
+            yield
+        except OSError as error:
+            error.filename = error.filename or self._name
+            raise
+
+    def __getattr__(self, name: str):
+        return getattr(self.beneath, name)
+
+
+def trusted(stream: TextIO) -> TextIO:
+    return stream.trusted() if isinstance(stream, CleanStream) else stream

@@ -1,0 +1,49 @@
+"""What the window says while nothing is open: what can be dropped, and what else there is."""
+
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.panel_rows import tip
+from shapeshift.app.editor.panels.widgets.theme import Box
+
+Vec = imgui.ImVec2
+WIDTH = 420.0  # logical pixels
+FORMATS = ".shift  .ply  .spz  .splat  .ksplat  .sog  .glb  .scene.json"
+DEMO_LABEL, TOUCH_LABEL, OPEN = "The demo", "Things to touch", "Open\u2026"
+CHOICES = {
+    OPEN: "Name a file or folder. Ctrl+O.",
+    DEMO_LABEL: "A workshop bench in three stops: photo, thermal, opened.",
+    TOUCH_LABEL: "A table with things that can be grabbed and thrown.",
+}
+
+
+def draw_empty(free: Box, ui_scale: float) -> tuple[Box, str]:
+    """A card in the middle of what is free.  Returns where it is, and which button was clicked."""
+    left, top, right, bottom = free
+    width = min(WIDTH * ui_scale, 0.94 * (right - left))
+    imgui.set_next_window_pos(Vec((left + right) / 2, (top + bottom) / 2), 0, Vec(0.5, 0.5))
+    imgui.set_next_window_size(Vec(width, 0))
+    flags = imgui.WindowFlags_
+    imgui.begin("##empty", None, flags.no_decoration | flags.no_move | flags.no_saved_settings)
+    imgui.push_text_wrap_pos(0)
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Drop a scene here")
+    imgui.text_unformatted(
+        "A package of this program, splats of any known format, a folder of layers or of a "
+        "training run, or a scene file."
+    )
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
+    imgui.text_unformatted(FORMATS)
+    imgui.pop_style_color()
+    imgui.pop_text_wrap_pos()
+    imgui.dummy(Vec(0, 4 * ui_scale))
+    clicked, gap = "", imgui.get_style().item_spacing.x
+    each = (imgui.get_content_region_avail().x - gap * (len(CHOICES) - 1)) / len(CHOICES)
+    for number, (label, what) in enumerate(CHOICES.items()):
+        if number:
+            imgui.same_line()
+        if imgui.button(label, Vec(each, 0)):
+            clicked = label
+        tip(what, ui_scale)
+    box = theme.window_box()
+    imgui.end()
+    return box, clicked

@@ -1,0 +1,132 @@
+"""The sheet of keys: everything that keys and mouse do, in groups; F1 opens and closes it."""
+
+from collections.abc import Sequence
+
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.panel_rows import tip
+from shapeshift.app.editor.panels.widgets.theme import Box
+
+Vec = imgui.ImVec2
+Row = tuple[str, str]  # key, what it does
+COLUMN = 330.0  # logical pixels, of a group
+KEY_PART = 0.38  # of a column, where what a key does begins
+MOUSE_AND_CAMERA = (
+    ("drag", "orbit; look about when flying"),
+    ("right drag", "pan; look about when flying"),
+    ("wheel", "nearer, farther"),
+    ("double click", "centre that place"),
+    ("V", "orbit or fly"),
+    ("W A S D Q E", "move; Shift fast, Ctrl slow"),
+    ("F", "frame everything"),
+    ("Shift+F", "the first view"),
+    ("numpad 1, 3, 7", "front, right, top; Ctrl: the other side"),
+    ("N, P", "next, previous camera of a file"),
+    ("K", "keep this view in a file"),
+)
+SLIDER = (
+    ("drag", "x from stop to stop; Alt: without snapping"),
+    ("1 \u2013 9", "go to a stop"),
+    ("left, right", "a hundredth of x"),
+    ("Shift+left, right", "to the next stop"),
+    ("Space", "play, pause"),
+    ("number beside it", "click to type x, or a stop's name"),
+)
+REGIONS = (
+    ("L", "lens on, off"),
+    ("B + drag", "paint a region; Shift erases"),
+    ("Esc", "leave the region"),
+)
+PROGRAM = (
+    ("Ctrl+O", "open; or drop files on the window"),
+    ("Ctrl+Z, Ctrl+Y", "undo, redo an edit"),
+    ("Ctrl+S", "save the scene; Shift: as"),
+    ("F12", "save a picture"),
+    ("G, Shift+G", "debug views"),
+    ("Ctrl +, Ctrl \u2013", "larger, smaller text; Ctrl 0 as at first"),
+    ("Ctrl+click", "on a slider of the panel: type its number"),
+    ("H, Tab", "hide all this"),
+    ("F11", "full screen"),
+    ("F1", "this sheet"),
+)
+GROUPS = {
+    "Slider": SLIDER,
+    "Camera": MOUSE_AND_CAMERA,
+    "Program": PROGRAM,
+    "Regions": REGIONS,
+}
+
+
+def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
+    """The sheet over the window's middle; `more` are groups of other parts of the program.
+
+    Returns where it is, and whether it was closed by its button.
+    """
+    screen = imgui.get_io().display_size
+    groups = {**{name: list(rows) for name, rows in GROUPS.items()}, **more}
+    columns = max(1, min(3, int(0.94 * screen.x / (COLUMN * ui_scale)), len(groups)))
+    width = min(columns * COLUMN * ui_scale, 0.94 * screen.x)
+    imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
+    imgui.set_next_window_size_constraints(Vec(width, 0), Vec(width, 0.94 * screen.y))
+    flags = imgui.WindowFlags_
+    imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.SURFACE, 0.98))
+    imgui.begin(
+        "##keys",
+        None,
+        flags.no_title_bar | flags.no_resize | flags.no_move | flags.no_saved_settings
+        | flags.always_auto_resize,
+    )  # fmt: skip
+    imgui.pop_style_color()
+    closed = _heading(ui_scale)
+    start, each = imgui.get_cursor_pos(), imgui.get_content_region_avail().x / columns
+    lowest = start.y
+    for column, names in enumerate(spread(groups, columns)):
+        imgui.set_cursor_pos(Vec(start.x + column * each, start.y))
+        for name in names:
+            _group(name, groups[name], each, ui_scale)
+        lowest = max(lowest, imgui.get_cursor_pos_y())
+    imgui.set_cursor_pos(Vec(start.x, lowest))
+    box = theme.window_box()
+    imgui.end()
+    return box, closed
+
+
+def _heading(ui_scale: float) -> bool:
+    """What this is, and the button that closes it, at the right; True when it was clicked."""
+    start, room = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
+    imgui.text_unformatted("Keys and mouse")
+    below, width = imgui.get_cursor_pos(), 80 * ui_scale
+    imgui.set_cursor_pos(Vec(start.x + room - width, start.y))
+    closed = imgui.button("Close", Vec(width, 0))
+    tip("F1 or Esc.", ui_scale)
+    imgui.set_cursor_pos(Vec(below.x, below.y + 10 * ui_scale))
+    return closed
+
+
+def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> None:
+    """A heading and its rows, one below the other from the cursor on."""
+    left, gap = imgui.get_cursor_pos_x(), 16 * ui_scale
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), name)
+    for key, what in rows:
+        imgui.set_cursor_pos_x(left)
+        y = imgui.get_cursor_pos_y()
+        imgui.text_unformatted(key)
+        imgui.set_cursor_pos(Vec(left + KEY_PART * width, y))
+        imgui.push_text_wrap_pos(left + width - gap)
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.MUTED, 1))
+        imgui.text_unformatted(what)
+        imgui.pop_style_color()
+        imgui.pop_text_wrap_pos()
+    imgui.set_cursor_pos(Vec(left, imgui.get_cursor_pos_y() + gap / 2))
+
+
+def spread(groups: dict[str, Sequence[Row]], columns: int) -> list[list[str]]:
+    """The groups' names by column, in their order, each to the column that is shortest so far."""
+    out: list[list[str]] = [[] for _ in range(columns)]
+    length = [0] * columns
+    for name, rows in groups.items():
+        at = length.index(min(length))
+        out[at].append(name)
+        length[at] += len(rows) + 2
+    return out

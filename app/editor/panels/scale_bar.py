@@ -1,0 +1,58 @@
+"""The scale of thermal stops in the scene view: palette, values, unit; it fades in with them."""
+
+import numpy as np
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.theme import Box
+from shapeshift.renderer.colors.palette import legend_opacity, palette_colors, thermal_blend
+from shapeshift.renderer.debug.ticks import nice_ticks, tick_text
+from shapeshift.scene.scene import Scene
+
+Vec = imgui.ImVec2
+WIDTH = 16.0  # logical pixels, of the colours
+PAD = 12.0
+STRIPES = 128
+
+
+def draw_scale_bar(scene: Scene, box: Box, ui_scale: float) -> None:
+    """Draws the bar with its ticks into a box; it fades in with the thermal stop."""
+    palette, weight, stop = thermal_blend(scene)
+    weight = legend_opacity(weight)
+    if not palette or stop is None or stop.value_range is None or not weight > 0.01:
+        return
+    left, top, right, bottom = box
+    width, pad, line = WIDTH * ui_scale, PAD * ui_scale, imgui.get_text_line_height()
+    draw = imgui.get_background_draw_list()
+    ground = theme.color(theme.SURFACE, 0.80 * weight)
+    draw.add_rect_filled(Vec(left, top), Vec(right, bottom), ground, 8 * ui_scale)
+    ink = theme.color(theme.TEXT, weight)
+    draw.push_clip_rect(Vec(left, top), Vec(right, bottom))
+    draw.add_text(Vec(left + pad, top + pad / 2), ink, stop.unit or stop.name)
+    first, last = top + line + 1.2 * pad, bottom - pad  # of the colours, top and bottom
+    bar = left + pad + width
+    _stripes(palette, weight, Vec(left + pad, first), Vec(bar, last))
+    low, high = stop.value_range
+    values = nice_ticks(low, high)
+    for value, text in zip(values, tick_text(values), strict=True):
+        y = last - (last - first) * (value - low) / (high - low if high > low else 1.0)
+        draw.add_line(Vec(bar, y), Vec(bar + 5 * ui_scale, y), ink, max(1.0, ui_scale))
+        draw.add_text(Vec(bar + 10 * ui_scale, y - line / 2), ink, text)
+    draw.pop_clip_rect()
+
+
+def _stripes(palette: str, weight: float, low: Vec, high: Vec) -> None:
+    """The palette from cold (bottom) to hot (top) as a smooth gradient."""
+    draw = imgui.get_background_draw_list()
+    steps = np.linspace(255, 0, STRIPES + 1).astype(int)
+    inks = [theme.color(tuple(map(float, c)), weight) for c in palette_colors(palette)[steps]]
+    edges = np.linspace(low.y, high.y, STRIPES + 1)
+    for i in range(STRIPES):
+        draw.add_rect_filled_multi_color(
+            Vec(low.x, edges[i]),
+            Vec(high.x, edges[i + 1]),
+            inks[i],
+            inks[i],
+            inks[i + 1],
+            inks[i + 1],
+        )

@@ -1,0 +1,150 @@
+"""What sections of the panel are made of: headings that fold, rows, sliders with an open end."""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.widgets import theme
+
+Vec = imgui.ImVec2
+TIP_WIDTH = 300.0  # logical pixels; longer explanations wrap
+
+
+def section(name: str, open_first: bool = False, unfold: bool = False) -> bool:
+    """A heading that folds; returns whether it is open, as it is after `unfold`."""
+    imgui.dummy(Vec(0, 1))
+    if unfold:
+        imgui.set_next_item_open(True)
+    flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+    if open_first:
+        flags |= imgui.TreeNodeFlags_.default_open
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(0, imgui.get_style().frame_padding.y))
+    is_open = imgui.tree_node_ex(name, flags)
+    imgui.pop_style_var()
+    return is_open
+
+
+def subsection(name: str, lit: bool, muted: bool = True) -> bool:
+    """A heading within a section, in the accent's colour when `lit`, else `muted` or plain."""
+    ink = theme.ACCENT if lit else theme.MUTED if muted else theme.TEXT
+    flags = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*ink, 1))
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(0, 1))
+    is_open = imgui.tree_node_ex(name, flags)
+    imgui.pop_style_var()
+    imgui.pop_style_color()
+    return is_open
+
+
+def rows(pairs: Iterable[tuple[str, str]], share: float = 0.0) -> None:
+    """Muted names, values: at the right, or from a `share` of the width on, where they wrap."""
+    for name, value in pairs:
+        imgui.text_disabled(name)
+        if share:
+            imgui.same_line(imgui.get_window_size().x * share)
+            imgui.push_text_wrap_pos(0)
+            imgui.text_unformatted(value)
+            imgui.pop_text_wrap_pos()
+        else:
+            imgui.same_line()
+            right_aligned(value)
+
+
+def right_aligned(text: str) -> None:
+    room = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(room, 0.0))
+    imgui.text_unformatted(text)
+
+
+def tip(text: str, ui_scale: float) -> None:
+    """Explains the item before it when the mouse rests there, also when it is disabled."""
+    flags = imgui.HoveredFlags_
+    if not imgui.is_item_hovered(flags.for_tooltip | flags.allow_when_disabled):
+        return
+    imgui.begin_tooltip()
+    imgui.push_text_wrap_pos(TIP_WIDTH * ui_scale)
+    imgui.text_unformatted(text)
+    imgui.pop_text_wrap_pos()
+    imgui.end_tooltip()
+
+
+def open_slider(
+    name: str, value: float, low: float, high: float, text: str, any_text: str
+) -> float:
+    """A logarithmic slider whose end means no limit: returns inf there.
+
+    `text` shows a limit ("largest splat: %.0f px"), `any_text` that there is none.
+    """
+    flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
+    shown = min(value, high)
+    moved, new = labelled_slider(name, shown, low, high, any_text if shown >= high else text, flags)
+    if not moved:
+        return value
+    return new if new < high else float(np.inf)
+
+
+def slider(
+    name: str, value: float, low: float, high: float, text: str, zero_text: str = ""
+) -> float:
+    """A plain slider; `zero_text` stands there instead of `text` at its lower end."""
+    at_zero = zero_text and value <= low
+    moved, new = labelled_slider(name, value, low, high, zero_text if at_zero else text)
+    return new if moved else value
+
+
+def labelled_slider(
+    name: str, value: float, low: float, high: float, text: str,
+    flags: int = imgui.SliderFlags_.always_clamp,
+) -> tuple[bool, float]:  # fmt: skip
+    """A line of text, with the value where it has a %, and under it the slider.
+
+    The two are one item for a tip.  No knob lies over its own number.
+    """
+    imgui.begin_group()
+    imgui.text_unformatted(text % value if "%" in text else text)
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, Vec(imgui.get_style().frame_padding.x, 0))
+    imgui.push_style_var(imgui.StyleVar_.frame_rounding, imgui.get_text_line_height() / 2)
+    imgui.push_style_var(imgui.StyleVar_.grab_rounding, imgui.get_text_line_height() / 2)
+    width = imgui.calc_item_width()
+    imgui.set_next_item_width(width if width > 0 else -1)
+    if isinstance(value, int):
+        moved, new = imgui.slider_int(f"##{name}", value, int(low), int(high), "", flags)
+    else:
+        moved, new = imgui.slider_float(f"##{name}", value, low, high, "", flags)
+    imgui.pop_style_var(3)
+    imgui.end_group()
+    return moved, new
+
+
+def choice(name: str, value: object, values: Iterable, labels: Iterable[str]) -> object:
+    """A list to choose from; returns the value that is chosen now."""
+    values = list(values)
+    changed, chosen = imgui.combo(f"##{name}", values.index(value), list(labels))
+    return values[chosen] if changed else value
+
+
+def button_row(tips: Mapping[str, str], ui_scale: float, columns: int) -> str:
+    """Buttons of equal width, some to a line; the name of the one that was clicked, or "".
+
+    `tips` says what each name does.
+    """
+    gap = imgui.get_style().item_spacing.x
+    width = (imgui.get_content_region_avail().x - gap * (columns - 1)) / columns
+    clicked = ""
+    for index, (name, what) in enumerate(tips.items()):
+        if index % columns:
+            imgui.same_line()
+        if imgui.button(name, Vec(width, 0)):
+            clicked = name
+        tip(what, ui_scale)
+    return clicked
+
+
+def ms_text(value: float) -> str:
+    return f"{value:.2f}" if value < 10 else f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+def db_text(value: float) -> str:
+    """Decibels; equal pictures have no number."""
+    return "equal" if value >= 200 else f"{value:.1f} dB"

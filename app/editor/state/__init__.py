@@ -1,0 +1,1 @@
+"""What is open, chosen, edited and set: no window, no imgui."""

@@ -1,0 +1,257 @@
+"""Edits of what the state shows: the file, its history, the world and the scene change together."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.document import key_of
+from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.track import next_stop, stepped
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.control import Shift, Sweep
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.edits import Change, History
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled, object_of
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.scene import SceneObject
+
+LOOKS = {"model", "mode", "up", "flip"}  # fields that ask for another model
+MOVED_M, TURNED = 1e-4, 1e-6  # metres, 1 - cosine of half the angle: less is not told
+COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
+
+
+def edit(state: EditorState, file: SceneFile, what: str, together: str = "") -> None:
+    """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
+    state.record_regions()
+    turn_to(state, state.document.history.take(file, what, together))
+    state.document.amend_regions(state.regions)
+
+
+def undo(state: EditorState) -> str:
+    """Takes the last edit back; returns what it was, "" where there was none.
+
+    Looks are no edits: the camera and every slider stay where they are.
+    """
+    state.record_regions()
+    what = state.document.history.undoes
+    go_back(state, state.document.history.undo())
+    return what
+
+
+def redo(state: EditorState) -> str:
+    state.record_regions()
+    what = state.document.history.redoes
+    go_back(state, state.document.history.redo())
+    return what
+
+
+def go_back(state: EditorState, history: History) -> None:
+    """Goes to a step that has been before, with every x as it is now."""
+    now = state.document.history
+    turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
+    if history.regions != now.regions:
+        state.regions.restore(history.regions)
+        for index, thing in enumerate(state.scene.objects):
+            state.regions.fit_painted(index, thing)
+    state.document.amend_regions(state.regions)
+
+
+def turn_to(state: EditorState, history: History) -> None:
+    """Goes to another step of the history: only what differs is touched."""
+    before = state.document.history
+    state.finish_shifts()
+    state.document.history = history
+    if history.file is before.file:
+        return
+    changed = edits.changes(before.file, history.file)
+    try:
+        world = state.world
+        state.bodies.follow(state.document)
+        arrange(state, changed)
+        if state.world is not world:  # a new one stands at its start
+            state.follow_world()
+    except BadFile:
+        state.document.history = before
+        state.bodies.follow(state.document)
+        raise
+
+
+def arrange(state: EditorState, changed: Sequence[Change]) -> None:
+    """The scene's objects as the file has them now; the rest goes on as it stands."""
+    of = {change.after.name: change for change in changed if change.after is not None}
+    was = {thing.name: index for index, thing in enumerate(state.scene.objects)}
+    rows, moved = [], {}
+    for number, (label, item) in enumerate(labelled(state.document.file)):
+        change = of.get(item.name)
+        if change is None:
+            index = was[item.name]
+        elif change.before is None or change.fields & LOOKS:
+            index = None
+        else:
+            index = was[change.before.name]
+        if index is None:
+            rows.append(fresh_row(state, item, label))
+        else:
+            thing = changed_thing(state.scene.objects[index], item, change)
+            rows.append((thing, state.filed[index], state.sweeps[index], state.sources[index]))
+            moved[index] = number
+    state.take_rows(rows, moved)
+    if any(
+        {"visible"} & change.fields or None in (change.before, change.after) for change in changed
+    ):
+        state.reframe()
+    names = {change.before.name: change.after for change in changed if change.before}
+    if state.chosen in names:
+        state.chosen = names[state.chosen].name if names[state.chosen] else ""
+
+
+def fresh_row(
+    state: EditorState, item: SceneItem, label: int
+) -> tuple[SceneObject, object, Sweep, Source]:
+    """What the state holds of an object that was not there."""
+    source = state.document.sources[key_of(item)]
+    thing = object_of(item, state.in_palette(source.model), label)
+    sweep = Sweep.over(source.model.blend)
+    sweep.resume_at(item.x)
+    return thing, source.model, sweep, source
+
+
+def changed_thing(thing: SceneObject, item: SceneItem, change: Change | None) -> SceneObject:
+    """An object that is there already, with what was edited."""
+    if change is None:
+        return thing
+    values: dict = {"name": item.name, "visible": item.visible, "selectors": item.selectors}
+    if change.fields & {"position", "wxyz"}:
+        values["world_from_object"] = item.pose
+    if "x" in change.fields:
+        values["x"] = item.x
+    return replace(thing, **values)
+
+
+def steer(state: EditorState, index: int, x: Control) -> None:
+    """A hand moves x: where the object starts as well, unless the world is running.
+
+    It is a look and no edit: undoing leaves it as it is.
+    """
+    thing = state.scene.objects[index]
+    state.set_x(index, x)
+    if not state.running and edits.find(state.document.file, thing.name) is not None:
+        history = state.document.history
+        state.document.history = history.amend(edits.set_x(history.file, thing.name, x))
+        state.bodies.follow(state.document)
+
+
+def steer_by_hand(state: EditorState, index: int, x: float) -> None:
+    """The same by a slider, a key or a number: what played stops, and keys go on with this one."""
+    state.sweeps[index].playing = False
+    state.steered = state.scene.objects[index].name
+    steer(state, index, x)
+
+
+def steered_index(state: EditorState) -> int | None:
+    """The object whose x the arrow keys move: the chosen one, else the one moved last."""
+    movable = state.movable
+    names = [state.scene.objects[index].name for index in movable]
+    for name in (state.chosen, state.steered):
+        if name in names:
+            return movable[names.index(name)]
+    return movable[0] if movable else None
+
+
+def step_x(state: EditorState, steps: int) -> None:
+    """The arrow keys: hundredths of x to the right, or left."""
+    if (index := steered_index(state)) is not None:
+        steer_by_hand(state, index, stepped(state.scene.objects[index].slider_x, steps))
+
+
+def step_stop(state: EditorState, direction: int) -> None:
+    """To the nearest stop above (1) or below (-1)."""
+    if (index := steered_index(state)) is not None:
+        stops = state.stops(index)
+        x = next_stop(stops, state.scene.objects[index].slider_x, direction)
+        numbers = [number for number, stop in enumerate(stops) if stop.x == x]
+        if numbers:
+            go_to_stop(state, index, numbers[0])
+
+
+def go_to_stop(state: EditorState, index: int, number: int) -> None:
+    """One object goes to a stop, counted from 0 by x; the arrow keys go on with that object."""
+    state.steered = state.scene.objects[index].name
+    leave_for_stop(state, index, number)
+
+
+def all_go_to_stop(state: EditorState, number: int) -> None:
+    """Every object that has a stop of that number, counted from 0, goes there."""
+    for index in range(len(state.scene.objects)):
+        leave_for_stop(state, index, number)
+
+
+def leave_for_stop(state: EditorState, index: int, number: int) -> None:
+    """Straight there, to rest; where the object starts is there at once."""
+    thing, stops = state.scene.objects[index], state.stops(index)
+    if number >= len(stops):
+        return
+    state.sweeps[index].playing = False
+    if (end := stops[number].x) != thing.x:
+        steer(state, index, end)
+        state.set_x(index, thing.x)
+        state.shifts[index] = Shift(thing.x, end, thing.model.blend)
+
+
+def place(state: EditorState, index: int, pose: Pose) -> None:
+    """A hand moves an object: where it starts as well, unless the world is running."""
+    name = state.scene.objects[index].name
+    file = edits.place(state.document.file, name, pose)
+    state.move(index, edits.wanted(file, name).pose)
+    if not state.running:
+        history = state.document.history
+        state.document.history = history.take(file, f"move {name}", f"place {name}")
+        state.bodies.follow(state.document)
+
+
+def as_it_stands(state: EditorState) -> SceneFile:
+    """The file with everything where it is now, at its x.  ValueError for what has flown off."""
+    file = state.document.file
+    for thing in state.scene.objects:
+        file = edits.place(file, thing.name, thing.world_from_object)
+        file = edits.set_x(file, thing.name, thing.x)
+    return file
+
+
+def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, float]:
+    """Metres along the world's x that a copy of points (N, 3), object frame, stands beside it."""
+    if not len(points):
+        return (0.0, 0.0, 0.0)
+    along = points @ thing.world_from_object.matrix()[0, :3]
+    low, high = np.percentile(along, (2, 98))
+    return (float(COPY_BESIDE * (high - low)), 0.0, 0.0)
+
+
+def stands_elsewhere(state: EditorState) -> bool:
+    """Whether anything is not where it starts, or at another x."""
+    items = {item.name: item for item in state.document.file.all_items}
+    for thing in state.scene.objects:
+        item, pose = items[thing.name], thing.world_from_object
+        if thing.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
+            return True
+        if abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True))) < 1 - TURNED:
+            return True
+    return False
+
+
+def poll_bodies(state: EditorState) -> bool:
+    """Once a frame: a scene becomes one that can be touched; True while colliders are made."""
+    bodies, before = state.bodies, state.world
+    busy = bodies.poll(state.document)
+    if state.world is not before:
+        state.follow_world()
+    if bodies.problem:
+        state.problem, bodies.problem = bodies.problem, ""
+    if bodies.notes:
+        notes, bodies.notes = bodies.notes, []
+        state.say("\n".join(notes))
+    return busy

@@ -1,0 +1,178 @@
+"""The world behind the window: colliders of the document's objects, made in a thread, then bodies.
+
+The picture does not wait for it: a scene is there to be seen before it can be touched.
+"""
+
+import threading
+from collections.abc import Mapping
+from concurrent.futures import Future
+from typing import TYPE_CHECKING
+
+from shapeshift.app.editor.state.files.document import Document, ModelKey, key_of
+from shapeshift.app.editor.state.files.opened import Told
+from shapeshift.app.opening import sentence
+from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
+
+if TYPE_CHECKING:
+    from shapeshift.scene.colliders.collider import Collider
+    from shapeshift.scene.world.world import World
+
+PATIENCE_S = 3.0  # longest wait at the end for a collider that is being made
+HZ = 90  # steps of the physics a second
+
+
+class Bodies:
+    """Colliders by object, and the world once all that are asked for are there."""
+
+    def __init__(self) -> None:
+        self.world: World | None = None  # None: nothing can be touched, or not yet
+        self.problem = ""  # one sentence: why something cannot be touched; "" = nothing is wrong
+        self.notes: list[str] = []  # what the physics has changed on the way in
+        self._of: dict[str, tuple[tuple, Collider]] = {}  # name -> what it was made of, and it
+        self._made: dict[tuple, Collider | None] = {}  # of a mesh or model; None: there is none
+        self._ground: tuple = ()  # floor and gravity of the world
+        self._future: Future | None = None
+        self._stale = True  # the world does not know of the last edits yet
+        self._given_up = False  # there can be no world: the scene is there to be seen and edited
+        self._unwanted = threading.Event()  # ends the thread at its next word
+        self._thread: threading.Thread | None = None
+        self._told = ("", 0.0)  # what is being done for a collider, part done
+
+    def __enter__(self) -> "Bodies":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends what is being made, the process that cuts it up too."""
+        self._unwanted.set()
+        if self._thread is not None:
+            self._thread.join(PATIENCE_S)
+
+    def forget(self) -> None:
+        """Another scene; a collider that is being made is not waited for."""
+        self._unwanted.set()
+        self.__init__()
+
+    @property
+    def busy(self) -> bool:
+        return self._future is not None
+
+    @property
+    def status(self) -> str:
+        what, part = self._told
+        return f"{what} {part:.0%}" if self.busy else ""
+
+    def follow(self, document: Document) -> None:
+        """Lets the world know of an edit, as soon as there are the colliders for it.
+
+        Raises BadFile, with the world as it was, for an object that cannot be as the file says.
+        """
+        self._stale = True
+        self._catch_up(document)
+
+    def poll(self, document: Document) -> bool:
+        """Once a frame; True while colliders are being made."""
+        if self._future is not None and self._future.done():
+            future, self._future = self._future, None
+            key, self._made[key], problem = future.result()
+            self.problem = problem or self.problem
+        try:
+            self._catch_up(document)
+        except BadFile as error:
+            self.problem, self._stale = str(error), False
+            self._given_up = self.world is None
+        return self.busy
+
+    def _catch_up(self, document: Document) -> None:
+        if self.busy or not self._stale or self._given_up:
+            return
+        file = document.file
+        touched = [item for item in file.all_items if item.collider is not None]
+        missing = [item for item in touched if self._collider(item) is MISSING]
+        if missing:
+            self._start(document, missing[0])
+            return
+        found = {item.name: self._collider(item) for item in touched}
+        colliders = {name: made for name, made in found.items() if made is not None}
+        self._of = {i.name: (made_of(i), colliders[i.name]) for i in touched if i.name in colliders}
+        if touched or self.world is not None:
+            self._to_world(file, document, colliders)
+        self._stale = False
+
+    def _to_world(
+        self, file: SceneFile, document: Document, colliders: Mapping[str, "Collider"]
+    ) -> None:
+        from shapeshift.scene.world.follow import follow
+        from shapeshift.scene.world.world import World
+
+        models, ground = document.models_by_name(), (file.floor_y, file.gravity_m_s2)
+        if self.world is None or self._ground != ground:  # a floor is no thing that comes or goes
+            paused = self.world is None or self.world.paused
+            self.world, self._ground = World(file, models, colliders, hz=HZ), ground
+            self.world.paused = paused
+            known = 0
+        else:
+            known = len(self.world.findings)
+            follow(self.world, file, models, colliders)
+        self.notes += [sentence(finding) for finding in self.world.findings[known:]]
+
+    def _collider(self, item: SceneItem) -> "Collider | object | None":
+        """What was made for the object, for its like, or MISSING; x may have moved since."""
+        before = self._of.get(item.name)
+        if before is not None and before[0] == made_of(item):
+            return before[1]
+        return self._made.get(making_of(item), MISSING)
+
+    def _start(self, document: Document, item: SceneItem) -> None:
+        """Makes one collider in a thread that the program's end does not wait for."""
+        future = self._future = Future()
+        file, model, unwanted = document.file, document.model(item), self._unwanted
+        self._told = (f"{item.name}: making a collider", 0.0)
+
+        def told(what: str, part: float) -> None:
+            if unwanted.is_set():
+                raise Unwanted
+            self._told = (f"{item.name}: {what}", part)
+
+        def work() -> None:
+            try:
+                future.set_result((making_of(item), *make(file, item, model, told)))
+            except Unwanted:
+                future.cancel()
+            except BaseException as error:  # handed to the window's thread, which raises it again
+                future.set_exception(error)
+
+        self._thread = threading.Thread(target=work, name="colliders", daemon=True)
+        self._thread.start()
+
+
+class Unwanted(Exception):
+    """Nobody waits for the collider any more."""
+
+
+MISSING = object()
+
+
+def made_of(item: SceneItem) -> tuple[str | None, ModelKey, bool]:
+    """What an object's collider depends on; a background's is open inside, a room."""
+    return item.collider, key_of(item), item.name == BACKGROUND
+
+
+def making_of(item: SceneItem) -> tuple:
+    """The same with the shape that its splats have at its x."""
+    return (*made_of(item), item.x if item.collider == HULLS else 0.0)
+
+
+def make(
+    file: SceneFile, item: SceneItem, model: Model, told: Told
+) -> "tuple[Collider | None, str]":
+    """The collider, or None and why there is none."""
+    from shapeshift.scene.colliders.collider import Making
+    from shapeshift.scene.colliders.collider_files import one_collider
+
+    try:
+        return one_collider(file, item, model, Making(told=told)), ""
+    except BadFile as error:
+        return None, f"{error} It cannot be touched."
+    except MemoryError:
+        return None, f"'{item.name}' needs more memory for its collider than there is."

@@ -1,0 +1,155 @@
+"""From where the editor looks: the camera that hands move, or one of a file; what moves it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.app.editor.state.camera.camera import EVERYTHING, FIRST, SMOOTH_S, Camera
+from shapeshift.app.editor.state.camera.kept_views import KeptViews
+from shapeshift.app.editor.state.camera.stepping import Steps
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.camera_list import CameraList, moved
+from shapeshift.scene.pose import View
+
+NEAR_FREE = 0.5  # pixels: nearer to where the overlay leaves room is there
+
+
+class Viewpoint:
+    """`size` tells the window's (W, H) in pixels, `free_wanted` the (4,) part of it that the
+    overlay leaves free: left, top, right, bottom.
+    """
+
+    def __init__(
+        self,
+        state: EditorState,
+        size: Callable[[], tuple[int, int]],
+        free_wanted: Callable[[], np.ndarray],
+        folder: Path,
+    ) -> None:
+        self._state, self._size, self.free_wanted = state, size, free_wanted
+        self.free = free_wanted()  # where the picture's middle is; follows the overlay
+        self.camera = self._first_camera()
+        self.steps = Steps()
+        self.kept = KeptViews(folder)
+        self.seen = False  # whether a frame has shown anything from here
+
+    def _first_camera(self) -> Camera:
+        """The camera of a new scene: on its floor where one is given, else the whole in view."""
+        state = self._state
+        camera = Camera(state.first_view(self.free_size()), state.first_target, state.radius)
+        if state.first_look.home is not None:
+            camera.toggle_flying()
+            camera.stand(state.first_look.home.world_from_eye, state.first_look.fov_y)
+        return camera
+
+    def start_anew(self) -> None:
+        """The state has another scene."""
+        self.camera = self._first_camera()
+        self.steps.leave()
+
+    # ---- what is seen
+
+    def view(self) -> View:
+        """What the window shows: a camera that was stepped to, or what the hand has turned to."""
+        view = self.camera.view(self._size(), tuple(self.free))
+        if self.steps.standing:
+            return self.steps.view(view.size, tuple(self.free), view.near, view.far)
+        return view
+
+    def plain_view(self) -> View:
+        """The same without what the overlay covers: a camera as filed, or centred."""
+        if self.steps.standing and not self.steps.moving:
+            return self.steps.cameras.views[self.steps.index]
+        return self.camera.view(self.free_size())
+
+    def free_size(self) -> tuple[int, int]:
+        left, top, right, bottom = self.free_wanted()
+        return int(right - left), int(bottom - top)
+
+    @property
+    def moving(self) -> bool:
+        return self.camera.moving or self.steps.moving
+
+    @property
+    def sliding(self) -> bool:
+        """Whether the picture is still moving over for the overlay."""
+        return not np.array_equal(self.free, self.free_wanted())
+
+    def follow_overlay(self, seconds: float) -> None:
+        """The picture moves over when the overlay comes or goes, in the same soft way."""
+        wanted = self.free_wanted()
+        self.free = wanted + (self.free - wanted) * np.exp(-seconds / SMOOTH_S)
+        if np.abs(self.free - wanted).max() < NEAR_FREE or not self.seen:
+            self.free = wanted
+
+    def refit(self, size: tuple[int, int]) -> None:
+        """The free part has another size: what no hand has moved is fitted into it."""
+        if self.steps.standing:
+            return
+        if self.camera.framed == FIRST and self._state.first_look.home is None:
+            self.camera.come_home(self._state.first_view(size))
+        elif self.camera.framed == EVERYTHING:
+            distance = self._state.fit(self.view(), self.camera.fov_y, size)
+            self.camera.frame(self._state.centre, distance)
+
+    # ---- what moves it
+
+    def leave_camera(self) -> None:
+        """From the camera that was stepped to, where it stands, to moving freely."""
+        if self.steps.standing:
+            view, (_, top, _, bottom) = self.view(), self.free
+            height = (view.tangents[3] - view.tangents[2]) * (bottom - top) / view.size[1]
+            self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
+            self.steps.leave()
+
+    def look_from(self, side: str) -> None:
+        """From one of camera.py's DIRECTIONS."""
+        self.leave_camera()
+        self.camera.look_from(side)
+
+    def frame_all(self) -> None:
+        self.leave_camera()
+        distance = self._state.fit(self.view(), self.camera.fov_y, self.free_size())
+        self.camera.frame(self._state.centre, distance)
+
+    def go_home(self) -> None:
+        """To the first view."""
+        self.leave_camera()
+        self.camera.come_home(self._state.first_view(self.free_size()))
+
+    def toggle_flying(self) -> None:
+        self.leave_camera()
+        self.camera.toggle_flying()
+
+    def follow_cameras(self, cameras: CameraList | None, stand: bool) -> None:
+        """Other cameras to step through; to the first of them at once where one is to `stand`."""
+        now = self.view()
+        self.steps.take(cameras)
+        if stand and cameras is not None:
+            self.steps.go_to(0, now if self.seen else None)
+            self.steps.untold = ()  # said with the file's other notes
+
+    def step_to_camera(self, by: int) -> None:
+        """To the next (1) or the previous (-1), with a word on what its file leaves out."""
+        steps = self.steps
+        if not steps.step(by, self.view()):
+            self._state.say("There are no cameras to step through; drop a file of them here.")
+        elif steps.untold:
+            self._state.say("\n".join(steps.untold))
+            steps.untold = ()
+
+    def keep_view(self) -> None:
+        """Writes the view of now, as it would be without the panel, behind those kept before."""
+        (view,) = moved([self.plain_view()], self._state.origin)
+        try:
+            path = self.kept.keep(view)
+        except BadFile as error:
+            self._state.messages.fail(str(error))
+        except OSError as error:
+            self._state.messages.fail(
+                f"The view cannot be kept: {error.strerror}: {error.filename}"
+            )
+        else:
+            self._state.say(f"Kept in {path.absolute()}")

@@ -1,0 +1,396 @@
+"""What the window shows: scene, control values over time, settings, messages; no GL, no imgui."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.app.editor.state.bodies import Bodies
+from shapeshift.app.editor.state.camera.first_look import FirstLook
+from shapeshift.app.editor.state.files.document import Document, document_from
+from shapeshift.app.editor.state.files.opened import Source
+from shapeshift.app.editor.state.messages import Messages
+from shapeshift.app.editor.state.regions import Regions
+from shapeshift.app.editor.state.scene_objects import origin_of, scene_of, stood_as, with_palette
+from shapeshift.app.editor.state.split_state import SplitState
+from shapeshift.app.editor.state.track import Grip
+from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
+from shapeshift.runtime_models.model import Finding, Model, Stop
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.cameras.framing import (
+    default_background,
+    fit_points,
+    frame_points,
+    scene_points,
+)
+from shapeshift.scene.control import SHIFT_S, Shift, Sweep
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import SceneItem, named_stops
+from shapeshift.scene.pick import Hit, Picker
+from shapeshift.scene.pose import Pose, View, perspective
+from shapeshift.scene.scene import Scene, SceneObject
+
+if TYPE_CHECKING:
+    from shapeshift.scene.world.world import World
+
+BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
+HANDLES = ("", "move", "turn")  # that an object can have; "": none
+AS_FILED = ""  # the palette that the scene's own stops name
+
+
+class EditorState:
+    """The scene with what a person may change about it while it is shown."""
+
+    def __init__(self, read_model: Callable[[Path], Model]) -> None:
+        self.read_model = read_model
+        self.scene = Scene(())
+        # Of each of the scene's objects:
+        self.filed: tuple[Model, ...] = ()  # its model as read, before a palette was chosen
+        self.sources: tuple[Source, ...] = ()  # where the scene's objects come from
+        self.document = document_from(self.scene, ())  # the same as a scene file, to be edited
+        self.bodies = Bodies()
+        self._followed: Scene | None = None  # the world's, as it was taken over last
+        self.chosen = ""  # name of the object that is edited; "": none
+        self.steered = ""  # name of the object whose x a hand has moved last
+        self.grip = Grip()  # of the track that the mouse holds
+        self.most_sliders = 2  # that there is room for
+        self.split = SplitState()
+        self.first_look = FirstLook()
+        self.sweeps: list[Sweep] = []
+        self.shifts: dict[int, Shift] = {}  # of objects on their way to a stop, by their index
+        self.settings = RenderSettings(background=BACKGROUND)
+        self.palette = AS_FILED
+        self.regions = Regions()
+        self.measure_now = False  # compare the picture with the exact one in the next frame
+        self.overlay = True  # the panel and all else over the picture is shown
+        self.handles = HANDLES[0]  # on the chosen object
+        self.save_picture = False  # into a file, of the next frame
+        self.seconds = 0.0  # that the frame which is under way lets pass
+        self.messages = Messages()
+        self.centre, self.radius = np.zeros(3), 1.0
+        self._points = (np.zeros((0, 3)), np.zeros(0))
+        self._picker = Picker()
+        self._shown: tuple = (None, None)  # what `shown` was made of, and what it was
+        self._movable: tuple[Scene | None, list[int]] = (None, [])
+        self._legend: tuple[Scene | None, bool] = (None, False)
+
+    def open(self, paths: Sequence[Path], x: float | None = None) -> None:
+        """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
+        sources = [Source(path, self.read_model(path)) for path in paths]
+        self.take(sources, scene_of(sources, x))
+
+    def take(
+        self,
+        sources: Sequence[Source],
+        scene: Scene,
+        first_look: FirstLook | None = None,
+        document: Document | None = None,
+    ) -> None:
+        """Shows what has been opened; `scene` is `scene_of(sources)` or of the document's file."""
+        self.sources, self.first_look = tuple(sources), first_look or FirstLook()
+        self.show(scene, document)
+
+    def show(self, scene: Scene, document: Document | None = None) -> None:
+        """Takes a scene over and frames it."""
+        self.scene, self.chosen, self.shifts = scene, "", {}
+        self.split.on, self.split.name = False, ""
+        self.document = document or document_from(scene, self.sources)
+        self.bodies.forget()
+        if scene.objects:
+            background = default_background(scene.objects[0].model, BACKGROUND)
+            self.settings = replace(self.settings, background=background)
+        self.filed = tuple(thing.model for thing in scene.objects)
+        self.palette = AS_FILED
+        self.sweeps = [Sweep.over(thing.model.blend) for thing in scene.objects]
+        for sweep, thing in zip(self.sweeps, scene.objects, strict=True):
+            sweep.resume_at(thing.x)
+        self.reframe()
+        self.regions.clear()
+        self.regions.radius = self.radius
+        self.keep_regions()
+
+    def keep_regions(self) -> None:
+        """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
+        self.document.amend_regions(self.regions)
+        self.document.saved_regions = self.regions.kept
+
+    def record_regions(self) -> None:
+        """What was done to the regions since the last call is a step of the history."""
+        self.document.record_regions(self.regions)
+
+    def reframe(self) -> None:
+        """Where the middle of all is now, and how far it reaches."""
+        self._points = scene_points(self.scene)
+        self.centre, self.radius = frame_points(*self._points)
+
+    def replace_model(self, index: int, model: Model) -> None:
+        """Another model of the same thing: x, sweep, regions, camera and settings stay.
+
+        For finer levels of detail.  What was painted on another number of splats is unpainted.
+        """
+        objects, filed = list(self.scene.objects), list(self.filed)
+        filed[index] = model
+        self.document.refine(index, model)
+        objects[index] = replace(objects[index], model=self.in_palette(model))
+        self.scene, self.filed = Scene(tuple(objects)), tuple(filed)
+        self._points = scene_points(self.scene)
+        self.regions.fit_painted(index, self.scene.objects[index])
+
+    def first_view(self, size: tuple[int, int]) -> View:
+        """The view of a single package if it gives one, else everything framed."""
+        return self.first_look.view(self.document.file, self.scene, self._points, size)
+
+    @property
+    def first_target(self) -> np.ndarray:
+        """(3,) metres: what the first view looks at and turns about."""
+        view = self.document.file.view
+        return self.centre if view is None else np.array(view.target)
+
+    @property
+    def origin(self) -> np.ndarray:
+        """(3,) metres of the file where the scene has its zero: not 0 for one re-centred."""
+        return origin_of(self.scene.objects[0].model) if self.scene.objects else np.zeros(3)
+
+    @property
+    def title(self) -> str:
+        """What is open: the scene file, else the names of the objects."""
+        path = self.document.path
+        return path.name if path else ", ".join(thing.name for thing in self.scene.objects)
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What was wrong in the files that are shown."""
+        return [finding for thing in self.scene.objects for finding in thing.model.findings]
+
+    def fit(self, view: View, fov_y: float, size: tuple[int, int]) -> float:
+        """Metres from the centre at which all fits size (W, H), looking as the view does."""
+        axes = view.world_from_eye.matrix()
+        return fit_points(*self._points, self.centre, axes, perspective(fov_y, size))
+
+    def shown(self, view: View) -> Scene:
+        """The scene with its regions as `view` sees them; the same object until one changes."""
+        if not self.regions.items:
+            return self.scene
+        pose = view.world_from_eye
+        eye = (pose.position.tobytes(), pose.wxyz.tobytes()) if self.regions.follow_the_eye else ()
+        made_of = (self.scene, self.regions.version, eye)
+        before, scene = self._shown
+        if before is None or before[0] is not self.scene or before[1:] != made_of[1:]:
+            things = [
+                replace(thing, selectors=thing.selectors + self.regions.selectors(index, view))
+                for index, thing in enumerate(self.scene.objects)
+            ]
+            scene = Scene(tuple(things))
+            self._shown = (made_of, scene)
+        return scene
+
+    def pick(self, view: View, direction: np.ndarray, spread: float) -> Hit | None:
+        """What a ray from the eye meets, of splats as they are now; `spread` is the hand's."""
+        origin = view.world_from_eye.position
+        return self._picker.under(self.shown(view), origin, direction, spread)
+
+    def add_region(self, kind: str) -> None:
+        """A region of the first object, in the middle of the scene until it is placed."""
+        thing = self.scene.objects[0]
+        object_from_world = np.linalg.inv(thing.world_from_object.matrix())
+        centre = object_from_world @ np.append(self.centre, 1.0)
+        self.regions.add(kind, 0, thing, centre[:3])
+
+    def toggle_lens(self) -> bool:
+        """Switches the lens on or off; returns whether it is on."""
+        return bool(self.scene.objects) and self.regions.toggle_lens(self.scene.objects[0])
+
+    def paint(self, view: View, cursor: tuple[float, float], radius: float, erase: bool) -> None:
+        """Paints anchors of the chosen painted region, of a new one where none is chosen."""
+        regions = self.regions
+        if regions.current is None or regions.current.kind != "painted":
+            numbers = [n for n, region in enumerate(regions.items) if region.kind == "painted"]
+            if numbers:
+                regions.choose(numbers[-1])
+            else:
+                regions.add("painted", 0, self.scene.objects[0], np.zeros(3))
+        thing = self.scene.objects[regions.current.index]
+        regions.paint(view, cursor, radius, thing, erase)
+
+    @property
+    def world(self) -> "World | None":
+        """What moves and answers to touch; None: nothing can be touched, or not yet."""
+        return self.bodies.world
+
+    @property
+    def running(self) -> bool:
+        """Whether the world goes on by itself: what moves then is no edit."""
+        return self.world is not None and not self.world.paused
+
+    def follow_world(self) -> None:
+        """Takes over where the world's objects are and what their x is."""
+        drawn = self.world.drawn()
+        if drawn is not self._followed:
+            stood = {thing.name: thing for thing in drawn.objects}
+            things = [stood_as(thing, stood.get(thing.name)) for thing in self.scene.objects]
+            self.scene, self._followed = Scene(tuple(things)), drawn
+
+    def rest(self) -> None:
+        """The hand has let go: the next edit is a step of its own."""
+        self.document.history = self.document.history.rest()
+
+    def move(self, index: int, pose: Pose) -> None:
+        """Puts an object elsewhere, at rest; what the file says stays."""
+        thing = self.scene.objects[index]
+        self._put(index, replace(thing, world_from_object=pose))
+        if self.world is not None and thing.name in self.world.things:
+            self.world.place(thing.name, pose)
+
+    def take_rows(self, rows: Sequence[tuple], moved: dict[int, int]) -> None:
+        """Other objects, each with model as read, sweep and source; camera and settings stay.
+
+        `moved` tells where those that stay have gone: index before -> index now.
+        """
+        columns = list(zip(*rows, strict=True)) or [(), (), (), ()]
+        self.scene = Scene(columns[0])
+        self.filed, self.sweeps, self.sources = columns[1], list(columns[2]), columns[3]
+        self.regions.renumber(moved)
+        self._followed = None
+
+    def next_debug_view(self, step: int) -> None:
+        """The next debug view in their order, the picture itself among them."""
+        number = (DEBUG_VIEWS.index(self.settings.debug) + step) % len(DEBUG_VIEWS)
+        self.settings = replace(self.settings, debug=DEBUG_VIEWS[number])
+
+    def set_x(self, index: int, x: Control) -> None:
+        """Moves an object's x; what the file says stays."""
+        thing = self.scene.objects[index]
+        self._put(index, replace(thing, x=x))
+        if self.world is not None and thing.name in self.world.things:
+            self.world.control(thing.name, x)
+
+    def _put(self, index: int, thing: SceneObject) -> None:
+        objects = list(self.scene.objects)
+        objects[index] = thing
+        self.scene = Scene(tuple(objects))
+
+    def stops(self, index: int) -> tuple[Stop, ...]:
+        """The stops of an object's slider, by x, under the names that the scene gives them."""
+        thing = self.scene.objects[index]
+        item = edits.find(self.document.file, thing.name)
+        return named_stops(item or SceneItem(name=thing.name, model=""), thing.model)
+
+    def finish_shifts(self) -> None:
+        """Objects on their way to a stop are there."""
+        self._advance_shifts(SHIFT_S)
+
+    def _advance_shifts(self, seconds: float) -> None:
+        """A hand that has moved x meanwhile has the last word."""
+        for index, shift in list(self.shifts.items()):
+            taken = self.scene.objects[index].x != shift.control
+            shift.seconds += seconds
+            if not taken:
+                self.set_x(index, shift.control)
+            if taken or shift.over:
+                del self.shifts[index]
+
+    def toggle_play(self, index: int | None = None) -> None:
+        """Starts or stops one object's sweep, or all together: all stop if any was playing."""
+        chosen = range(len(self.sweeps)) if index is None else [index]
+        start = not any(self.sweeps[i].playing for i in chosen)
+        for i in chosen:
+            self.shifts.pop(i, None)
+            if start:
+                self.set_x(i, self.sweeps[i].play(self.scene.objects[i].x))
+            else:
+                self.sweeps[i].playing = False
+
+    def visit(self, index: int, x: float, on: bool) -> None:
+        """Adds a stop to those that an object's sweep visits or takes it away; two are left."""
+        sweep = self.sweeps[index]
+        xs = {*sweep.xs, x} if on else {*sweep.xs} - {x}
+        if len(xs) >= 2:
+            sweep.xs = tuple(sorted(xs))
+            sweep.resume_at(self.scene.objects[index].x)
+
+    @property
+    def movable(self) -> list[int]:
+        """Indices of the objects that have somewhere to go: two stops or more."""
+        if self._movable[0] is not self.scene:  # asked several times a frame, of many objects
+            things = enumerate(self.scene.objects)
+            found = [index for index, thing in things if len({s.x for s in thing.model.stops}) > 1]
+            self._movable = (self.scene, found)
+        return self._movable[1]
+
+    @property
+    def sliders(self) -> list[int]:
+        """Of those, the ones that there is room for: all of a few, else the chosen one."""
+        movable = self.movable
+        if len(movable) <= self.most_sliders:
+            return movable
+        chosen = self.chosen_index
+        return [chosen if chosen in movable else movable[0]]
+
+    @property
+    def chosen_index(self) -> int | None:
+        """Where the chosen object is in the scene; None: none is."""
+        names = [thing.name for thing in self.scene.objects]
+        return names.index(self.chosen) if self.chosen in names else None
+
+    @property
+    def problem(self) -> str:
+        """The newest problem that nobody has taken away; "": nothing is wrong."""
+        return (self.messages.problems or [""])[-1]
+
+    @problem.setter
+    def problem(self, sentence: str) -> None:
+        """Tells another one; "" takes all away."""
+        if sentence:
+            self.messages.fail(sentence)
+        else:
+            self.messages.problems = []
+
+    def say(self, text: str, seconds: float | None = None) -> None:
+        """Shows a note for a few seconds, longer for more lines; "" takes it away."""
+        self.messages.say(text, time.perf_counter(), seconds)
+
+    @property
+    def playing(self) -> bool:
+        return bool(self.shifts) or any(sweep.playing for sweep in self.sweeps)
+
+    def advance(self, seconds: float) -> None:
+        """Lets playing sweeps and shifts go on; a slider moved by hand meanwhile is where a sweep
+        continues.
+        """
+        self.seconds = seconds
+        self._advance_shifts(seconds)
+        for index, sweep in enumerate(self.sweeps):
+            if sweep.playing:
+                sweep.resume_at(self.scene.objects[index].x)
+                self.set_x(index, sweep.advance(seconds))
+
+    def choose_palette(self, name: str) -> None:
+        """Shows every thermal stop in that palette; AS_FILED gives back the scene's own."""
+        self.palette = name
+        objects = [
+            replace(thing, model=self.in_palette(model))
+            for thing, model in zip(self.scene.objects, self.filed, strict=True)
+        ]
+        self.scene = Scene(tuple(objects))
+
+    def in_palette(self, model: Model) -> Model:
+        """A model as it was read, as it is shown."""
+        return model if self.palette == AS_FILED else with_palette(model, self.palette)
+
+    @property
+    def has_palettes(self) -> bool:
+        """Whether any thermal stop is drawn through a palette at all."""
+        return any(stop.palette for thing in self.scene.objects for stop in thing.model.stops)
+
+    @property
+    def has_legend(self) -> bool:
+        """Whether any thermal stop that may be seen has values to tell."""
+        if self._legend[0] is not self.scene:  # asked several times a frame, of many objects
+            seen = [thing for thing in self.scene.objects if thing.visible]
+            stops = [stop for thing in seen for stop in thing.model.stops]
+            found = any(stop.palette and stop.value_range is not None for stop in stops)
+            self._legend = (self.scene, found)
+        return self._legend[1]

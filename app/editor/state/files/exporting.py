@@ -1,0 +1,114 @@
+"""What is shown now, as a file for other programs, written in a thread."""
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+from shapeshift.app.commands.exported import Look, Part, export
+from shapeshift.app.drawing import make_folder
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.messages import number
+from shapeshift.app.errors import UsageError
+from shapeshift.app.paths import file_name
+from shapeshift.runtime_models.evaluate import follows_eye
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+
+EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
+
+
+class Exporting:
+    """The choices, and the one export that may be under way."""
+
+    def __init__(self, state: EditorState, viewpoint: Viewpoint, folder: Path) -> None:
+        self._state, self._viewpoint, self._folder = state, viewpoint, folder
+        self.ending = ".ply"
+        self.what = EVERYTHING
+        self.sh_degree = 3
+        self.palette = True
+        self._thread = ThreadPoolExecutor(1, "export")
+        self._work: Future[PlainSplats] | None = None
+        self._path = Path()
+        self.progress = ("", 0.0)  # what is being done, part done
+
+    @property
+    def running(self) -> bool:
+        return self._work is not None
+
+    def forget(self) -> None:
+        """Another scene: its objects are others."""
+        self.what = EVERYTHING
+
+    def status(self) -> str:
+        """Words for the status line; "" when nothing is under way."""
+        return f"exporting {self._path.name}" if self.running else ""
+
+    def choices(self) -> tuple[list[int], list[str]]:
+        """What can be exported: values and what they are called."""
+        state = self._state
+        values, labels = [EVERYTHING], ["everything"]
+        if len(state.scene.objects) > 1:
+            values += range(len(state.scene.objects))
+            labels += [f"{i + 1}  {thing.name}" for i, thing in enumerate(state.scene.objects)]
+        if any(region.enabled for region in state.regions.items):
+            values.append(REGIONS)
+            labels.append("inside the regions")
+        return values, labels
+
+    def parts(self) -> list[Part]:
+        """The objects as they are shown now, or what lies in their regions."""
+        things = self._state.shown(self._viewpoint.view()).objects
+        if self.what == EVERYTHING:
+            return [Part(thing) for thing in things if thing.visible]
+        if self.what == REGIONS:
+            return [Part(thing, thing.selectors) for thing in things if thing.selectors]
+        return [Part(things[self.what])]
+
+    def start(self) -> None:
+        """Begins to write; what is moved meanwhile does not show in the file."""
+        parts, state = self.parts(), self._state
+        seen = any(follows_eye(part.thing.model) for part in parts)
+        eye = tuple(map(float, self._viewpoint.view().world_from_eye.position)) if seen else None
+        look = Look(self.sh_degree, self.palette, eye, tuple(state.origin))
+        try:
+            self._path = claim_name(self._folder, parts, self.ending)
+        except (OSError, UsageError) as error:
+            state.problem = str(error)
+            return
+        self.progress = ("", 0.0)
+        self._work = self._thread.submit(export, parts, look, self._path, self._tell)
+
+    def _tell(self, what: str, part: float) -> None:
+        self.progress = (what, part)
+
+    def poll(self) -> bool:
+        """Once a frame: says how it ended; True while it is under way."""
+        if self._work is None or not self._work.done():
+            return self.running
+        work, self._work = self._work, None
+        try:
+            splats = work.result()
+        except (BadFile, UsageError, OSError, MemoryError) as error:
+            self._path.unlink(missing_ok=True)  # the claim, which is empty
+            self._state.problem = f"Nothing was exported: {error}"
+        else:
+            size = self._path.stat().st_size / 1e6
+            self._state.say(f"{self._path}: {number(len(splats.means))} splats, {size:.1f} MB")
+        return True  # one frame more, so that it is seen
+
+
+def claim_name(folder: Path, parts: list[Part], ending: str) -> Path:
+    """An empty file named after the scene and x; never one that is there."""
+    make_folder(folder)
+    thing = parts[0].thing
+    more = f" and {len(parts) - 1} more" * (len(parts) > 1)
+    name = f"{file_name(thing.name)}{more}-x{thing.slider_x:.2f}"
+    count = 1
+    while True:
+        path = folder / f"{name}{f'-{count}' * (count > 1)}{ending}"
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            count += 1
+            continue
+        return path

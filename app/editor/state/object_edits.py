@@ -1,0 +1,102 @@
+"""What a person does to the objects of the scene that is open: edit, copy, delete, undo."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from shapeshift.app.editor.state.arrange import as_it_stands, copy_offset, edit, redo, undo
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.cameras.framing import model_points
+from shapeshift.scene.document import edits
+from shapeshift.scene.document.scene_file import SceneFile, SceneItem
+from shapeshift.scene.pose import Pose
+
+
+class ObjectEdits:
+    """`count_changed` hears that there are more or fewer objects."""
+
+    def __init__(
+        self, state: EditorState, viewpoint: Viewpoint, count_changed: Callable[[], None]
+    ) -> None:
+        self.state, self._viewpoint, self.count_changed = state, viewpoint, count_changed
+        self.typed: tuple[str, str] = ("", "")  # the chosen object, and its name as it is typed
+
+    def edit(
+        self, change: Callable[..., SceneFile], *values: object, what: str, together: str = ""
+    ) -> bool:
+        """Does an edit of scene/document/edits.py; where it cannot be done False, and says why."""
+        state = self.state
+        try:
+            edit(state, change(state.document.file, *values), what, together)
+        except ValueError as error:  # BadFile is one
+            self.state.messages.fail(str(error))
+            return False
+        return True
+
+    def change(self, item: SceneItem, what: str, together: str = "", **values: object) -> bool:
+        """Other values of an object's fields."""
+        return self.edit(
+            lambda file: edits.change(file, item.name, **values), what=what, together=together
+        )
+
+    def keep_standing(self) -> None:
+        """Where everything is now, and its x, is where it starts."""
+        self.edit(lambda file: as_it_stands(self.state), what="keep as it stands")
+
+    def duplicate(self) -> None:
+        """A copy beside the chosen object, which is chosen then."""
+        state, name = self.state, self.state.chosen
+        index = state.chosen_index
+        if index is None:
+            return
+        thing = state.scene.objects[index]
+        by = copy_offset(thing, model_points(thing.model)[0])
+        known = {item.name for item in state.document.file.all_items}
+        pose = thing.world_from_object
+
+        def beside(file: SceneFile) -> SceneFile:
+            """The copy stands by what is seen, wherever that may have gone since the start."""
+            file = edits.duplicate(file, name, by)
+            copy = next(item.name for item in file.items if item.name not in known)
+            file = edits.place(file, copy, Pose(pose.position + by, pose.wxyz))
+            return edits.set_x(file, copy, thing.x)
+
+        if self.edit(beside, what=f"copy {name}"):
+            state.chosen = next(i.name for i in state.document.file.items if i.name not in known)
+            self.count_changed()
+
+    def delete(self) -> None:
+        if self.state.chosen_index is not None:
+            name = self.state.chosen
+            if self.edit(edits.remove, name, what=f"delete {name}"):
+                self.count_changed()
+
+    def undo(self) -> None:
+        self._step(undo, "Undone")
+
+    def redo(self) -> None:
+        self._step(redo, "Done again")
+
+    def _step(self, step: Callable, word: str) -> None:
+        count = len(self.state.scene.objects)
+        try:
+            what = step(self.state)
+        except BadFile as error:
+            self.state.say(str(error))
+            return
+        self.state.say(f"{word}: {what}" if what else f"Nothing to be {word.lower()}")
+        if len(self.state.scene.objects) != count:
+            self.count_changed()
+
+    def look_from_here(self) -> None:
+        """The view of now, about the point that it turns around, is where the scene opens."""
+        view = self._viewpoint.plain_view()
+        eye = view.world_from_eye.position
+        ahead = -view.world_from_eye.matrix()[:3, 2]
+        far = float(np.dot(self.state.centre - eye, ahead))
+        target = eye + ahead * max(far, 0.1 * self.state.radius)
+        fov_y = float(np.arctan(view.tangents[3]) - np.arctan(view.tangents[2]))
+        if self.edit(edits.look_from, eye, target, fov_y, what="first look"):
+            self.state.say("The scene opens with this view, once it is saved.")

@@ -1,0 +1,172 @@
+"""Touching a scene: its world played and stepped, what a hand holds, what has just answered."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapeshift.app.editor.state.arrange import steer
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.paths import is_bundled
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.world.follow import put_back
+from shapeshift.scene.world.mouse_hand import MouseHand
+from shapeshift.scene.world.record import Record
+from shapeshift.scene.world.world import World
+
+HAND = "mouse"
+HOW, HOW_S = "Drag a thing. X shoots. T stops.", 9.0  # said once, for so many seconds
+STILL, MOVING = "things hold still: T lets them move", "drag a thing, X shoots, T stops"
+REMEMBERED = 6  # reactions that the panel lists
+WORDS = {"collision": "struck", "grab": "taken", "ray": "hit by a ray", "enter": "arrived"}
+LABEL_S, FLASH_S = 1.8, 0.4  # how long they are seen
+
+
+@dataclass
+class Label:
+    """What an object has just become."""
+
+    object: str
+    text: str
+    age_s: float = 0.0
+
+
+@dataclass
+class Flash:
+    """Where a ray met something."""
+
+    point: np.ndarray  # (3,) metres, world
+    age_s: float = 0.0
+
+
+class TouchState:
+    """What the mouse holds, and what has just happened in the scene's world."""
+
+    def __init__(self, state: EditorState, play: bool) -> None:
+        """`play`: every scene opens with its things in motion, not only the bundled one."""
+        self._state, self.play = state, play
+        self.hand: MouseHand | None = None  # while it holds something
+        self.pads: dict[str, tuple[float, float]] = {}  # name -> balance, power as last put there
+        self.told: deque[str] = deque(maxlen=REMEMBERED)  # the last reactions, newest first
+        self.colliders = False  # they are shown
+        self.labels: list[Label] = []
+        self.flashes: list[Flash] = []
+        self._known: World | None = None
+        self._unfold = False
+
+    @property
+    def world(self) -> World | None:
+        """None: nothing of what is open can be touched, or its colliders are being made."""
+        return self._state.world
+
+    @property
+    def held(self) -> str | None:
+        return self.world.held(HAND) if self.world and self.hand else None
+
+    @property
+    def chosen(self) -> str:
+        """Name of the object that is edited."""
+        return self._state.chosen
+
+    def forget(self) -> None:
+        """Another scene: nothing of the old one is held or told."""
+        self.hand = self._known = None
+        self.pads.clear()
+        self.told.clear()
+        self.labels.clear()
+        self.flashes.clear()
+
+    def opens(self) -> bool:
+        """Once for every world: its section unfolds."""
+        unfold, self._unfold = self._unfold, False
+        return unfold
+
+    def meet(self, world: World) -> None:
+        """The bodies of what was opened are there, or there anew on another floor."""
+        if self._known is None:
+            self._unfold, world.paused = True, not self.opens_playing
+            if self.opens_playing:
+                self._state.say(HOW, HOW_S)
+        self._known = world
+
+    @property
+    def opens_playing(self) -> bool:
+        """The scene that the program brings along is there to be touched, not edited."""
+        path = self._state.document.path
+        return self.play or (path is not None and is_bundled(path))
+
+    def status(self) -> str:
+        """Words for the status line."""
+        if self.held:
+            return f"carrying {self.held}"
+        if self.world is None:
+            return ""
+        return STILL if self.world.paused else MOVING
+
+    def let_go(self) -> None:
+        """What the mouse holds flies on."""
+        if self.hand is not None and self.world is not None:
+            self.world.release(HAND)
+        self.hand = None
+
+    def toggle(self) -> None:
+        """Lets things move, or holds them still."""
+        self.let_go()
+        self.world.paused = not self.world.paused
+        self._state.say("Things hold still. T lets them move." if self.world.paused else HOW)
+
+    def step(self) -> None:
+        """One step by hand; things hold still after it."""
+        self.let_go()
+        self.world.paused = True
+        self.follow([self.world.step()])
+
+    def put_back(self) -> None:
+        """Everything where it was before it was touched."""
+        self.let_go()
+        state = self._state
+        state.bodies.follow(state.document)  # edits that the world has not heard of
+        put_back(self.world)
+        self.follow([])
+
+    def control(self, name: str, x: Control) -> None:
+        """A pad puts an object's x there."""
+        names = [thing.name for thing in self._state.scene.objects]
+        steer(self._state, names.index(name), x)
+
+    def meet_world(self) -> bool:
+        """Once a frame, before time passes; False while nothing can be touched."""
+        world = self.world
+        if world is None:
+            self.hand = None
+            if self._state.bodies.busy and self.opens_playing:
+                self._state.say("Getting things ready to be touched \u2026")
+            return False
+        if world is not self._known:
+            self.meet(world)
+        if self.hand is not None and world.held(HAND) is None:
+            self.hand = None  # what it held is gone
+        return True
+
+    def advance(self, seconds: float) -> None:
+        """Lets time pass in the world, and for what fades over it."""
+        records = self.world.advance(seconds)
+        if not self.world.paused:
+            self.follow(records)
+        for mark in (*self.labels, *self.flashes):
+            mark.age_s += seconds
+        self.labels = [label for label in self.labels if label.age_s < LABEL_S]
+        self.flashes = [flash for flash in self.flashes if flash.age_s < FLASH_S]
+
+    @property
+    def fading(self) -> bool:
+        return bool(self.labels or self.flashes)
+
+    def follow(self, records: list[Record]) -> None:
+        """Shows where things are now, and what has answered."""
+        self._state.follow_world()
+        for record in records:
+            for event in record.events:
+                after = event["to"] or f"x {event['x']:.2f}"
+                self.told.appendleft(f"{event['object']}: {WORDS[event['on']]}, now {after}")
+                self.labels.append(Label(event["object"], after))

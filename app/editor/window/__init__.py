@@ -1,0 +1,1 @@
+"""The window of the editor: its events, what is drawn into it, the loop."""

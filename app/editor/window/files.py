@@ -1,0 +1,194 @@
+"""The editor's files: those it opens while the window goes on, and those it opened before."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapeshift.app.camera_files import camera_reading, in_scene
+from shapeshift.app.editor.options import Options
+from shapeshift.app.editor.panels.empty_panel import DEMO_LABEL, OPEN, TOUCH_LABEL, draw_empty
+from shapeshift.app.editor.panels.open_row import OpenRow
+from shapeshift.app.editor.panels.widgets.path_box import PathBox
+from shapeshift.app.editor.panels.widgets.theme import Box
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.open_scene import first_look, opened_scene, told_of
+from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, ReadModel, read_files
+from shapeshift.app.editor.state.user.recent import RecentFiles
+from shapeshift.app.editor.window.window import Drop, Event, KeyDown
+from shapeshift.app.paths import DEMO, TOUCH, config_folder
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class OpenActions:
+    """What opening a scene asks of the window that shows it."""
+
+    upload: Callable[[Scene], None]  # gives it to the device; raises BadFile where it does not fit
+    before_losing: Callable[[Callable[[], None]], None]  # does it, first asking where work is lost
+    opened: Callable[[], None]  # the state has another scene
+
+
+class Files:
+    """Opens what is dropped or chosen; the scene changes when all of it has been read."""
+
+    def __init__(
+        self, state: EditorState, viewpoint: Viewpoint, options: Options, actions: OpenActions
+    ) -> None:
+        self._state, self._viewpoint = state, viewpoint
+        self._options, self._actions = options, actions
+        self._opener = Opener()
+        self.recent: RecentFiles | None = None  # None: nothing is kept
+        self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
+        # Reads one scene, in the thread that opens; replaced where progress can be told.
+        self.read: ReadModel = lambda path, told: state.read_model(path)
+        self._row = OpenRow()
+        self._box = PathBox("Open a scene", "Open")
+
+    @property
+    def busy(self) -> bool:
+        return self._opener.busy
+
+    def open_soon(self, paths: tuple[Path, ...]) -> None:
+        """Begins to read files; the window stays alive meanwhile."""
+        reading, plain = camera_reading(self._options), self._options.reading()
+        self._opener.start(
+            paths, lambda paths, told: read_files(paths, self.read, reading, told, plain)
+        )
+        self._state.say(self._opener.note)
+
+    def started(self, found: OpenedFiles) -> None:
+        """The scene and cameras with which the window opens."""
+        options = self._options
+        self._at_demo = not (options.scenes or options.touch)
+        if options.screenshot is None:
+            self.recent = RecentFiles.read(config_folder())
+            if options.scenes:
+                self.remember_all(found)
+        self.take_cameras(found, stand=options.camera is not None)
+        self._state.say(told_of(found))
+
+    def ask(self) -> None:
+        """Opens the box that takes a path; what is dropped meanwhile is opened as well."""
+        self._box.ask()
+
+    def take_event(self, event: Event) -> bool:
+        """True for Ctrl+O, for keys while the box is open, and for what is dropped on it."""
+        match event:
+            case KeyDown(shortcut="o") if not self._box.asking:
+                self.ask()
+            case KeyDown() if self._box.asking:
+                pass
+            case Drop() if self._box.asking:
+                self._box.close()
+                return False
+            case _:
+                return False
+        return True
+
+    def poll(self) -> bool:
+        """Takes over what has been read; True while something is being read or looked for."""
+        busy = take_over(self._state, self._opener, self._ask_and_take)
+        return busy or self._box.browsing
+
+    def _ask_and_take(self, found: OpenedFiles) -> None:
+        if found.sources:
+            self._actions.before_losing(lambda: self.take(found))
+        else:
+            self.take(found)
+
+    def take(self, found: OpenedFiles) -> None:
+        """Shows what has been read; a scene that the device cannot hold leaves the old one."""
+        state = self._state
+        if found.sources:
+            try:
+                scene, document = opened_scene(found)
+                self._actions.upload(scene)
+            except BadFile as error:
+                state.problem = str(error)
+                return
+            state.take(found.sources, scene, first_look(found), document)
+            self._at_demo = [source.path for source in found.sources] == [DEMO]
+            state.messages.problems = []
+            self._actions.opened()
+        self.take_cameras(found, stand=not found.sources)
+        self.remember_all(found)
+        self._state.say(told_of(found))
+
+    def take_cameras(self, found: OpenedFiles, stand: bool) -> None:
+        """The cameras of a file for n and p; of a scene without any there are none."""
+        cameras, things = found.cameras, self._state.scene.objects
+        if cameras is None and found.floor is not None and not found.sources:
+            cameras = found.floor
+        if cameras is None and not found.sources:
+            return
+        if cameras is not None and things:
+            cameras = in_scene(cameras, things[0].model)
+        self._viewpoint.follow_cameras(cameras, stand)
+
+    def draw_row(self, ui_scale: float) -> None:
+        """The buttons under the panel's title."""
+        here = self._state.document.path
+        others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
+        others = others if self._at_demo or here == TOUCH else {}
+        wants, chosen = self._row.draw(self.recent, others, ui_scale)
+        if wants:
+            self.ask()
+        elif chosen is not None:
+            self.open_soon((chosen,))
+
+    def draw_box(self, ui_scale: float) -> None:
+        """The box for a path, while it is open."""
+        if chosen := self._box.draw(self.recent.paths if self.recent else (), ui_scale):
+            self.open_soon(chosen)
+
+    def draw_empty(self, free: Box, ui_scale: float) -> Box | None:
+        """What can be opened, while nothing is."""
+        if self._state.scene.objects or self.busy:
+            return None
+        box, clicked = draw_empty(free, ui_scale)
+        if clicked == OPEN:
+            self.ask()
+        elif clicked:
+            self.open_soon((TOUCH if clicked == TOUCH_LABEL else DEMO,))
+        return box
+
+    def remember_all(self, found: OpenedFiles) -> None:
+        """What was opened by name: the scene file, not what is in it."""
+        inside = len(found.file.all_items) if found.file else 0
+        for path in [found.path] * (inside > 0) + [s.path for s in found.sources[inside:]]:
+            self.remember(path)
+
+    def remember(self, path: Path) -> None:
+        """Puts a file first in the list of recent ones."""
+        if self.recent is None:
+            return
+        try:
+            self.recent.add(path)
+        except OSError as error:
+            sentence = f"The list of recent files cannot be kept: {error.strerror}."
+            self._state.messages.fail(sentence)
+            self.recent = None
+
+
+def take_over(state: EditorState, opener: Opener, take: Callable[[OpenedFiles], None]) -> bool:
+    """Gives what a thread has read to `take`, its failure to the messages; True while it reads."""
+    if not opener.busy:
+        return False
+    name = opener.paths[0].name
+    try:
+        found = opener.poll()
+    except (BadFile, OSError) as error:
+        state.problem = str(error)
+        state.say("")
+    except MemoryError:
+        state.problem = f"{name} needs more memory than there is."
+        state.say("")
+    else:
+        if found is not None:
+            state.say("")
+            take(found)
+    if opener.busy:
+        state.say(opener.note)
+    return opener.busy

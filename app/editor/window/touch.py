@@ -1,0 +1,172 @@
+"""The mouse as a hand: it grabs, carries, turns and throws things, and shoots a ray."""
+
+import glfw
+
+from shapeshift.app.editor.options import Options
+from shapeshift.app.editor.panels.panel import Section
+from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.touch_state import HAND, Flash, TouchState
+from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.touch_marks import Marks
+from shapeshift.app.editor.window.window import (
+    DoubleClick,
+    Drag,
+    Event,
+    KeyDown,
+    Press,
+    Release,
+    Wheel,
+    Window,
+)
+from shapeshift.scene.pose import View
+from shapeshift.scene.world.mouse_hand import moved, pose, pushed, ray, rolled, take, turned
+from shapeshift.scene.world.rigid_object import middle_of
+
+KEYS = (
+    ("T", "let things move, hold them still"),
+    ("Shift+T", "one step of 1/90 s"),
+    ("R", "put everything back"),
+    ("drag a thing", "carry it, while things move"),
+    ("wheel, carrying", "farther, nearer"),
+    ("Shift, carrying", "drag turns it, wheel rolls it"),
+    ("X", "a ray at the mouse"),
+    ("J", "show colliders"),
+)
+
+
+def attach_touch(
+    window: Window, state: EditorState, viewpoint: Viewpoint, hands: Hands, hooks: Hooks,
+    options: Options,
+) -> TouchState:  # fmt: skip
+    """Adds the section, keys and mouse of touching to the hooks."""
+    touch = TouchState(state, options.play)
+    mouse = MouseTouch(touch, state, window, viewpoint, hands)
+    marks = Marks(touch, state, window, viewpoint, mouse.under)
+    waits = options.screenshot is None  # for marks to fade
+    hooks.takes.append(mouse.take)
+    hooks.each_frame.append(lambda: mouse.each_frame() and waits)
+    hooks.over.append(marks.draw_colliders)
+    hooks.marks.append(marks.draw)
+    hooks.opened += [touch.forget, marks.forget]
+    hooks.status.append(touch.status)
+    hooks.sections.append(
+        Section(
+            "Touch",
+            lambda ui_scale: draw_touch(touch, ui_scale),
+            opens=touch.opens,
+            shown=lambda: touch.world is not None,
+        )
+    )
+    hooks.keys["Touch"] = list(KEYS)
+    return touch
+
+
+class MouseTouch:
+    """What the mouse and the keys do to a `TouchState`."""
+
+    def __init__(
+        self, touch: TouchState, state: EditorState, window: Window, viewpoint: Viewpoint,
+        hands: Hands,
+    ) -> None:  # fmt: skip
+        self._touch, self._state, self._window = touch, state, window
+        self._viewpoint, self._hands = viewpoint, hands
+
+    def take(self, event: Event) -> bool:
+        """True for what concerns the hand, its ray and the physics."""
+        if self._touch.world is None:
+            return False
+        if isinstance(event, KeyDown):
+            return self.press_key(event)
+        if self._touch.hand is None:
+            return isinstance(event, Press) and event.button == "left" and self.grab(event)
+        match event:
+            case Drag(button="left"):
+                self.drag(event.dx, event.dy)
+            case Wheel():
+                self.turn_wheel(event.notches)
+            case Release(button="left"):
+                self._touch.let_go()
+            case Press() | DoubleClick():  # another button, or the camera is meant
+                self._touch.let_go()
+                return False
+            case _:
+                return False
+        return True
+
+    def press_key(self, event: KeyDown) -> bool:
+        match event.key:
+            case glfw.KEY_T if event.shift:
+                self._touch.step()
+            case glfw.KEY_T:
+                self._touch.toggle()
+            case glfw.KEY_R:
+                self._touch.put_back()
+            case glfw.KEY_X:
+                self.shoot()
+            case glfw.KEY_J:
+                self._touch.colliders = not self._touch.colliders
+            case glfw.KEY_ESCAPE if self._touch.hand is not None:
+                self._touch.let_go()
+            case _:
+                return False
+        return True
+
+    def grab(self, press: Press) -> bool:
+        """Takes what lies under the mouse, if it can be carried."""
+        regions, window = self._state.regions, self._window
+        if self._touch.world.paused or self._hands.is_painting or regions.placing:
+            return False
+        view, size = self._viewpoint.view(), window.logical_size
+        name = self.under(view, (press.x, press.y))
+        if name is None:
+            return False
+        middle = middle_of(self._touch.world.things[name])  # about which it is turned
+        self._touch.hand = take(view, size, middle)
+        self._touch.world.move_hand(HAND, pose(self._touch.hand, view, size))
+        self._touch.world.grab_body(HAND, name, middle)
+        self._state.chosen = name
+        return True
+
+    def under(self, view: View, place: tuple[float, float]) -> str | None:
+        """What could be carried that lies under a place of the picture, logical pixels."""
+        hit = self._touch.world.aim(*ray(view, place, self._window.logical_size))
+        thing = self._touch.world.things.get(hit.object) if hit else None
+        return hit.object if thing is not None and thing.moves else None
+
+    def drag(self, dx: float, dy: float) -> None:
+        if self._hands.shift:
+            self._touch.hand = turned(self._touch.hand, dx, dy, self._viewpoint.view())
+        else:
+            self._touch.hand = moved(self._touch.hand, dx, dy, self._window.logical_size)
+
+    def turn_wheel(self, notches: float) -> None:
+        view = self._viewpoint.view()
+        self._touch.hand = (rolled if self._hands.shift else pushed)(
+            self._touch.hand, notches, view
+        )
+
+    def shoot(self) -> None:
+        """A ray from the eye through the mouse: what it meets answers."""
+        window = self._window
+        if not window.on_scene:
+            return
+        at = ray(self._viewpoint.view(), window.cursor, window.logical_size)
+        hit = self._touch.world.ray(*at)
+        if hit is not None:
+            self._touch.flashes.append(Flash(hit.point))
+        if self._touch.world.paused:  # nobody else would let it answer
+            self._touch.step()
+
+    def each_frame(self) -> bool:
+        """Moves the hand and lets time pass; True while a mark has yet to fade."""
+        touch = self._touch
+        if not touch.meet_world():
+            return False
+        if touch.hand is not None:
+            where = pose(touch.hand, self._viewpoint.view(), self._window.logical_size)
+            touch.world.move_hand(HAND, where)
+        touch.advance(self._state.seconds)
+        return touch.fading

@@ -1,0 +1,386 @@
+"""The viewer: a window loop that draws only when something has changed."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.app.editor.options import Options
+from shapeshift.app.editor.panels.legend_panel import draw_legend
+from shapeshift.app.editor.panels.outlines import draw_brush, draw_outlines
+from shapeshift.app.editor.panels.panel import Section, draw_panel
+from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
+from shapeshift.app.editor.panels.sections.camera_panel import draw_cameras, draw_edges
+from shapeshift.app.editor.panels.sections.export_panel import draw_export
+from shapeshift.app.editor.panels.sections.look_panel import draw_look
+from shapeshift.app.editor.panels.sections.objects_panel import draw_objects
+from shapeshift.app.editor.panels.sections.performance_panel import draw_performance
+from shapeshift.app.editor.panels.sections.regions_panel import draw_regions
+from shapeshift.app.editor.panels.sections.stops_panel import draw_stops
+from shapeshift.app.editor.panels.slider import draw_slider_bar
+from shapeshift.app.editor.panels.status_line import draw_status
+from shapeshift.app.editor.state.arrange import poll_bodies
+from shapeshift.app.editor.state.camera.framed import Framed
+from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.files.exporting import Exporting
+from shapeshift.app.editor.state.files.saving import Saving
+from shapeshift.app.editor.state.frame_stats import FrameStatsView
+from shapeshift.app.editor.state.layout import Box, Layout, lay_out
+from shapeshift.app.editor.state.object_edits import ObjectEdits
+from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, QualityController
+from shapeshift.app.editor.state.user.own_files import OwnFiles
+from shapeshift.app.editor.state.user.settings import Settings
+from shapeshift.app.editor.window.adding import Adding
+from shapeshift.app.editor.window.files import Files, OpenActions
+from shapeshift.app.editor.window.gizmo import Gizmo
+from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hooks import Hooks
+from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
+from shapeshift.app.editor.window.objects import Objects
+from shapeshift.app.editor.window.pictures import write_numbered_png, write_png
+from shapeshift.app.editor.window.shell import Shell
+from shapeshift.app.editor.window.shown import FrameRequest, Shown
+from shapeshift.app.editor.window.touch import attach_touch
+from shapeshift.app.editor.window.window import Event, Window
+from shapeshift.app.paths import WorkFolders
+from shapeshift.renderer.debug.debug import debug_legend
+from shapeshift.renderer.gl.context import describe
+from shapeshift.renderer.renderer import Renderer
+
+WARM_UP = 3  # frames at the start that are drawn anew: the first pays for compilers and caches
+SLEEP_S = 0.5  # longest wait for input while nothing moves
+POLL_S = 0.03  # the same while a thread works at something that the window waits for
+MOST_SLIDERS, LOW_WINDOW = 2, 420.0  # at the lower edge; one in a window lower than so many units
+LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took long
+
+
+class Viewer:
+    """One window, one renderer, one state, one viewpoint, and the loop that ties them.
+
+    Makes the parts; each is handed the state that it reads and what it may call.
+    """
+
+    def __init__(
+        self, window: Window, renderer: Renderer, state: EditorState, options: Options,
+        settings: Settings | None = None, own_files: OwnFiles | None = None,
+    ) -> None:  # fmt: skip
+        self.window, self.renderer, self.state, self.options = window, renderer, state, options
+        state.overlay = options.panel
+        self.settings = settings or Settings()  # of the program; state.settings are the picture's
+        folders = WorkFolders.of(options.pictures)
+        self._pictures = folders.pictures
+        self.hooks = Hooks()
+        self.shell = Shell(window, self.settings, state.messages, time.perf_counter)
+        self._polling = False  # a hook waits for something that is under way
+        names = describe(window.ctx) | renderer.backends
+        self.readings = FrameStatsView(
+            machine={key.replace("_", " "): str(v) for key, v in names.items()},
+            drawing=renderer.backends["drawing"],
+        )
+        self.viewpoint = Viewpoint(state, lambda: window.size, self._free_wanted, self._pictures)
+        self.shown = Shown(renderer, self.readings)
+        self.dial = QualityController(
+            options.target_ms or TARGET_MS,
+            options.floor_db or FLOOR_DB,
+            wanted=(options.target_ms or options.floor_db) is not None,
+        )
+        self.hands = Hands(window, state, self.viewpoint, self.hooks, self.open_soon)
+        self.files = self._attach_files()
+        self.objects = self._attach_objects(folders, own_files or OwnFiles())
+        self._attach_cameras_and_export(folders)
+        self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
+        self._add_sections()
+        self._framed = Framed(self.viewpoint.free_size, self.viewpoint.refit)
+        self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
+        self.hooks.opened.append(self._framed.forget)
+        self.hooks.takes.insert(0, self.shell.take)
+        self._title = ""  # what the window's title says
+        self.frames = 0  # drawn since the window opened
+        self._overlay_ms = 0.0
+
+    # ---- the parts
+
+    def _attach_files(self) -> Files:
+        hooks, state = self.hooks, self.state
+        actions = OpenActions(
+            self.shown.upload,
+            lambda then: self.objects.saving.before_losing(then),
+            self.show_scene,
+        )
+        files = Files(state, self.viewpoint, self.options, actions)
+        hooks.each_frame += [files.poll, lambda: poll_bodies(state)]
+        hooks.top.append(files.draw_row)
+        hooks.marks.append(files.draw_box)
+        hooks.cards.append(files.draw_empty)
+        hooks.takes.append(files.take_event)
+        hooks.status.append(lambda: state.bodies.status)
+        return files
+
+    def _attach_objects(self, folders: WorkFolders, own_files: OwnFiles) -> Objects:
+        """The section, its keys, clicks and boxes; handles see the mouse before all else does."""
+        hooks, state, files = self.hooks, self.state, self.files
+        edits = ObjectEdits(state, self.viewpoint, self.dial.scene_changed)
+        saving = Saving(state, own_files, folders.scenes, files.remember)
+        adding = Adding(
+            state, self.options, self.shown.upload, self.dial.scene_changed,
+            lambda: files.recent.paths if files.recent else (),
+        )  # fmt: skip
+        self.gizmo = gizmo = Gizmo(state, self.viewpoint, self.window)
+        objects = Objects(self.window, self.hands, edits, saving, adding)
+        hooks.takes.insert(0, gizmo.take)
+        hooks.takes.append(objects.take)
+        hooks.marks += [gizmo.draw, objects.draw_boxes]
+        hooks.each_frame.append(objects.each_frame)
+        hooks.status.append(objects.status)
+        hooks.opened += [objects.forget, gizmo.let_go]
+        if self.options.screenshot is None:
+            hooks.closing.append(objects.may_close)
+        hooks.sections.append(
+            Section(
+                "Objects",
+                lambda scale: draw_objects(edits, saving, adding.ask, scale),
+                opens=objects.opens,
+                early=lambda: len(state.scene.objects) > 1,
+            )
+        )
+        hooks.keys["Objects"] = list(OBJECT_KEYS)
+        return objects
+
+    def _attach_cameras_and_export(self, folders: WorkFolders) -> None:
+        hooks, state, viewpoint = self.hooks, self.state, self.viewpoint
+        hooks.sections.append(
+            Section("Camera", lambda scale: draw_cameras(viewpoint, scale), open_first=True)
+        )
+        hooks.status.append(lambda: viewpoint.steps.text)
+        hooks.marks.append(lambda scale: draw_edges(state, viewpoint, scale))
+        exporting = Exporting(state, viewpoint, folders.exports)
+        hooks.sections.append(Section("Export", lambda scale: draw_export(exporting, state, scale)))
+        hooks.each_frame.append(exporting.poll)
+        hooks.opened.append(exporting.forget)
+        hooks.status.append(exporting.status)
+
+    def _add_sections(self) -> None:
+        """What of the panel needs no more than the state and what was measured."""
+        state, dial, readings = self.state, self.dial, self.readings
+        asked = dial.wanted
+        self.hooks.sections += [
+            Section("Stops", lambda scale: draw_stops(state, scale), open_first=True),
+            Section("Look", lambda scale: draw_look(state, scale), open_first=True),
+            Section(
+                "Regions",
+                lambda scale: draw_regions(state, scale),
+                open_first=bool(state.regions.items),
+            ),
+            Section(
+                "Performance",
+                lambda scale: draw_performance(state, dial, readings, scale),
+                open_first=asked,
+            ),
+        ]
+
+    # ---- frames
+
+    def loop(self) -> None:
+        """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
+        last = time.perf_counter()
+        while not (self.window.closing and self._may_close()):
+            busy = self._busy()
+            redraw = self.window.wait(0.0 if busy else POLL_S if self._polling else SLEEP_S)
+            now = time.perf_counter()
+            if self.window.minimised:
+                last = now
+                time.sleep(0.05)
+                continue
+            seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
+            last = now
+            due = self.state.messages.ended(now) or self._idle_work_due(now)
+            if busy or redraw or self._polling or due:
+                self.frame(seconds)
+            if self.options.screenshot and self._last_frame:
+                return
+
+    def _may_close(self) -> bool:
+        """Whether nothing would be lost; else the window stays, and a box asks."""
+        may = all([asked() for asked in self.hooks.closing])
+        if not may:
+            self.window.keep_open()
+        return may
+
+    def frame(self, seconds: float) -> None:
+        """One frame of the window: `seconds` have passed since the last one."""
+        start, viewpoint = time.perf_counter(), self.viewpoint
+        self.state.messages.ended(start)
+        for event in self.window.begin_frame():
+            self.take(event)
+        self.state.advance(seconds)
+        pushed = self.hands.push
+        if pushed.any:
+            viewpoint.leave_camera()
+        viewpoint.camera.step(seconds, pushed)
+        viewpoint.steps.advance(seconds)
+        self._polling = any([work() for work in self.hooks.each_frame])
+        self.set_title()
+        viewpoint.follow_overlay(seconds)
+        self._turn_dial()
+        fresh = self._draw_splats()
+        drawn = time.perf_counter()
+        self._draw_overlay()
+        self.window.end_frame()
+        self._overlay_ms = (time.perf_counter() - drawn) * 1e3
+        self.frames += 1
+        viewpoint.seen = True
+        self._save_pictures()
+        self.window.swap()
+        now = self.readings.now = time.perf_counter()
+        if fresh:
+            self.readings.meter.note(now, (now - start) * 1e3, self.readings.stats)
+            self.dial.seen((now - start) * 1e3, self._moving)
+        self.readings.idle = not fresh
+
+    def take(self, event: Event) -> None:
+        """Lets one input event act."""
+        self.hands.take(event)
+
+    def open_soon(self, paths: tuple[Path, ...]) -> None:
+        """Opens files and folders, scenes or cameras, while the window goes on."""
+        self.files.open_soon(paths)
+
+    def _busy(self) -> bool:
+        """Whether the next frame is due without waiting for input."""
+        waiting = self.options.screenshot is not None
+        measuring = self.dial.wanted or self.dial.measuring
+        first = self.frames < WARM_UP
+        return self._moving or waiting or self.viewpoint.sliding or measuring or first
+
+    @property
+    def layout(self) -> Layout:
+        """Where the parts of the overlay lie now, logical pixels."""
+        window, state = self.window, self.state
+        size, scale = window.logical_size, window.ui_scale
+        state.most_sliders = MOST_SLIDERS if size[1] >= LOW_WINDOW * scale else 1
+        rows, wanted = len(state.sliders), self.settings.panel_open
+        both = state.split.on
+        return lay_out(size, scale, rows, state.has_legend, wanted, state.overlay, both)
+
+    def _free_wanted(self) -> np.ndarray:
+        """(4,) pixels: the part of the window that the overlay leaves free."""
+        window = self.window
+        return np.array(self.layout.free) * window.size[0] / max(window.logical_size[0], 1)
+
+    def free(self) -> Box:
+        """The part of the window that nothing covers, logical pixels."""
+        return self.layout.free
+
+    def _request(self) -> FrameRequest:
+        """What the screen should show now."""
+        state, view, moving = self.state, self.viewpoint.view(), self._moving
+        settings = self.dial.while_moving(state.settings) if moving else state.settings
+        return FrameRequest(state.shown(view), view, settings, moving or self.dial.measuring)
+
+    @property
+    def _moving(self) -> bool:
+        by_hand = self.viewpoint.moving or self.hands.push.any
+        state = self.state
+        living = state.running and not state.world.resting
+        return by_hand or state.playing or living
+
+    def _idle_work_due(self, now: float) -> bool:
+        """Whether the picture has rested so long that its error is to be measured."""
+        return self.shown.due(self._request(), now)
+
+    def _turn_dial(self) -> None:
+        """Measures a little for the budget where that is wanted, and takes over what it chose."""
+        dial, state = self.dial, self.state
+        if dial.wanted:
+            view = self.viewpoint.view()
+            finish = self.window.ctx.finish
+            dial.start(self.renderer, state.shown(view), view, state.centre, finish)
+        if dial.measuring:
+            self.shown.forget()
+            if dial.step():
+                state.settings = dial.applied(state.settings)
+
+    def _draw_splats(self) -> bool:
+        """Draws the scene into the window; True when the splats had to be drawn anew."""
+        request, now = self._request(), time.perf_counter()
+        if self.state.measure_now or self.shown.due(request, now):
+            self.state.measure_now = False
+            self.shown.measure(request)
+        force = self.options.screenshot is not None or self.frames < WARM_UP
+        fresh = self.shown.draw(request, self.window.screen(), force)
+        for draw in self.hooks.over:
+            draw(request)
+        if fresh:
+            self.readings.stats.ms["overlay"] = self._overlay_ms  # of the frame before
+        self.shown.read(request, now)
+        return fresh
+
+    def _draw_overlay(self) -> None:
+        scale, state, layout = self.window.ui_scale, self.state, self.layout
+        self.readings.flying = self.viewpoint.camera.flying
+        covered = []
+        if not state.save_picture:
+            self._draw_marks(scale)
+        if state.overlay:
+            right = state.split.right(state.scene) if state.split.on else state.scene
+            for scene, box in ((state.scene, layout.left_legend), (right, layout.legend)):
+                if box is not None:
+                    draw_scale_bar(scene, box, scale)
+            debug, stats = state.settings.debug, self.readings.stats
+            draw_legend(debug_legend(debug, stats), layout.free, scale)
+            hooks, words = self.hooks, [words() for words in self.hooks.status]
+            covered = [
+                draw_panel(
+                    state.title, hooks.sections, hooks.top, self.shell.actions, layout, scale
+                ),
+                draw_slider_bar(state, layout.bar, scale),
+                draw_status(state, words, layout.status, scale),
+                *[box for draw in hooks.cards if (box := draw(layout.free, scale)) is not None],
+            ]
+        if not state.save_picture:  # what is said is no part of a picture
+            covered += self.shell.draw(layout.free, self.hooks.keys, scale)
+        self.window.covered = tuple(covered)
+
+    def _draw_marks(self, scale: float) -> None:
+        """Outlines of the regions, and the brush while there is one."""
+        state, window = self.state, self.window
+        for draw in self.hooks.marks:
+            draw(scale)
+        if state.overlay or state.regions.placing:
+            draw_outlines(state.regions, state.scene, self.viewpoint.view(), scale)
+        if self.hands.is_painting and window.on_scene:
+            erasing = self.hands.is_erasing
+            draw_brush(window.cursor, state.regions.brush * scale, erasing, scale)
+
+    def show_scene(self) -> None:
+        """The state has another scene: a new camera, and whoever depends on it is told."""
+        self.viewpoint.start_anew()
+        self.dial.forget()
+        for changed in self.hooks.opened:
+            changed()
+        self.set_title()
+
+    def set_title(self) -> None:
+        """The window says what is open, and whether something of it is not saved."""
+        mark = "* " if self.objects.unsaved else ""
+        name = self.state.title
+        title = f"{mark}{name} \u2013 Shapeshift" if name else "Shapeshift"
+        if title != self._title:
+            self._title = title
+            self.window.set_title(title)
+
+    @property
+    def _last_frame(self) -> bool:
+        """Whether a --screenshot is due: enough frames, the budget has chosen, all is read."""
+        measuring = self.dial.wanted or self.dial.measuring
+        return self.frames >= self.options.frames and not measuring and not self._polling
+
+    def _save_pictures(self) -> None:
+        """Writes the picture that a key or --screenshot asked for, of what is on the screen."""
+        if self.options.screenshot is not None and self._last_frame:
+            write_png(self.window.picture(), self.options.screenshot)
+        if self.state.save_picture:
+            self.state.save_picture = False
+            path = write_numbered_png(self.window.picture(), self._pictures)
+            self.state.say(f"Saved {path}")

@@ -1,0 +1,392 @@
+"""The real window: glfw through moderngl-window, ImGui on top, input as a list of plain events."""
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import glfw
+import moderngl
+import numpy as np
+from imgui_bundle import imgui
+from moderngl_window.context.glfw import Window as GlfwWindow
+from moderngl_window.integrations.imgui_bundle import ModernGLRenderer
+
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.panels.widgets.clean_texts import clean_texts
+from shapeshift.app.editor.state.user.settings import default_text_size
+from shapeshift.app.editor.window.monitor import grow_window, monitor_height
+from shapeshift.app.paths import plain
+from shapeshift.app.program import program
+from shapeshift.renderer.gl.context import NoContext
+from shapeshift.runtime_models.files.plain_text import one_line
+
+BUTTONS = {0: "left", 1: "right", 2: "middle"}
+DOUBLE_CLICK_S = 0.3
+CLICK_PIXELS = 4.0  # a press that moves further is a drag, not a click
+SETTLE_FRAMES = 3  # ImGui hands out queued input over this many frames
+HOVER_S = 0.35  # after the mouse came to rest tooltips are due, so there is a frame for them
+MODIFIERS = {
+    imgui.Key.mod_shift: (glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT),
+    imgui.Key.mod_ctrl: (glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL),
+    imgui.Key.mod_alt: (glfw.KEY_LEFT_ALT, glfw.KEY_RIGHT_ALT),
+}
+TEXT_KEYS = {  # what typing a number into a slider needs
+    glfw.KEY_LEFT: imgui.Key.left_arrow,
+    glfw.KEY_RIGHT: imgui.Key.right_arrow,
+    glfw.KEY_HOME: imgui.Key.home,
+    glfw.KEY_END: imgui.Key.end,
+    glfw.KEY_DELETE: imgui.Key.delete,
+    glfw.KEY_BACKSPACE: imgui.Key.backspace,
+    glfw.KEY_ENTER: imgui.Key.enter,
+    glfw.KEY_KP_ENTER: imgui.Key.enter,
+    glfw.KEY_ESCAPE: imgui.Key.escape,
+    glfw.KEY_TAB: imgui.Key.tab,
+    glfw.KEY_A: imgui.Key.a,
+    glfw.KEY_C: imgui.Key.c,
+    glfw.KEY_V: imgui.Key.v,
+    glfw.KEY_X: imgui.Key.x,
+    glfw.KEY_Y: imgui.Key.y,
+    glfw.KEY_Z: imgui.Key.z,
+}
+SHORTCUTS = ("z", "y", "s", "d", "o", "+", "=", "-", "0")  # with Ctrl, as printed on the key
+REPEATING = (glfw.KEY_LEFT, glfw.KEY_RIGHT)  # held down they go on
+MOVING = (glfw.KEY_W, glfw.KEY_A, glfw.KEY_S, glfw.KEY_D, glfw.KEY_Q, glfw.KEY_E)
+
+
+@dataclass(frozen=True)
+class KeyDown:
+    key: int  # glfw.KEY_*: the physical key, named after what is printed there on a US keyboard
+    shift: bool
+    shortcut: str = ""  # one of SHORTCUTS, with Ctrl: the letter that is printed on the key
+    ctrl: bool = False
+
+
+@dataclass(frozen=True)
+class Drag:
+    button: str  # left, right or middle
+    dx: float  # logical pixels since the last event, right and down positive
+    dy: float
+    x: float = 0.0  # logical pixels from the top left, where it is now
+    y: float = 0.0
+
+
+@dataclass(frozen=True)
+class Press:
+    button: str  # left, right or middle
+    x: float  # logical pixels from the top left
+    y: float
+
+
+@dataclass(frozen=True)
+class Release:
+    button: str
+
+
+@dataclass(frozen=True)
+class Wheel:
+    notches: float
+
+
+@dataclass(frozen=True)
+class DoubleClick:
+    x: float  # logical pixels from the top left
+    y: float
+
+
+@dataclass(frozen=True)
+class Drop:
+    paths: tuple[Path, ...]
+
+
+Event = KeyDown | Press | Drag | Release | Wheel | DoubleClick | Drop
+
+
+class Window:
+    """An open window with a GL 4.3 context and an ImGui overlay; use it in a `with`.
+
+    `events` is what the scene gets: input that the overlay wants for itself is not in it.
+    """
+
+    def __init__(self, title: str, size: tuple[int, int], text_size: float | None = None) -> None:
+        self._window = _open(title, size)
+        self._handle = self._window._window  # moderngl-window keeps glfw's own handle private
+        self._window.exit_key = None  # Escape belongs to the overlay
+        self.ctx: moderngl.Context = self._window.ctx
+        clean_texts()
+        self._imgui = imgui.create_context()
+        imgui.get_io().set_ini_filename("")  # leaves no imgui.ini behind
+        self._chosen_size = text_size  # None: by the monitor
+        self._monitor_size = self._size_for_monitor()
+        theme.apply(self.ui_scale, self._window.pixel_ratio)
+        self._restyle = False  # the next frame's type has another size
+        self._overlay = ModernGLRenderer(wnd=None, ctx=self.ctx, display_size=self.logical_size)
+        self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
+        self._popup = False  # a list or a box is open, and the next click is for it
+        self._raw: list[Event] = []
+        self._chorded: set[int] = set()  # keys that are down for a shortcut, not for moving
+        self._pressed: str | None = None  # the button whose drag the scene owns
+        self._last_click = (0.0, 0.0, -1.0)  # x, y, seconds
+        self._cursor = (0.0, 0.0)
+        self._unsettled = SETTLE_FRAMES
+        self._look_again = np.inf  # seconds on glfw's clock
+        self._clock = glfw.get_time()
+        self._listen()
+
+    def __enter__(self) -> "Window":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self._overlay.shutdown()
+        imgui.destroy_context(self._imgui)
+        self._window.destroy()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Framebuffer pixels."""
+        return self._window.buffer_size
+
+    @property
+    def ui_scale(self) -> float:
+        """Logical pixels a unit of the overlay: what the desktop asks for, times the text size."""
+        return self._desktop_scale * self.text_size
+
+    @property
+    def _desktop_scale(self) -> float:
+        """What is set for the monitor; where input is in finer units already (macOS), 1."""
+        content = glfw.get_window_content_scale(self._handle)[0]
+        return max(1.0, content / self._window.pixel_ratio)
+
+    @property
+    def text_size(self) -> float:
+        """1: as large as the desktop asks for."""
+        return self._chosen_size or self._monitor_size
+
+    @text_size.setter
+    def text_size(self, size: float | None) -> None:
+        """None: as the monitor asks for."""
+        self._chosen_size, self._restyle = size, True
+        self._note()
+
+    def _size_for_monitor(self) -> float:
+        """What the monitor under the window asks for, where nobody has chosen a size."""
+        high_px, high_mm = monitor_height(self._handle)
+        return default_text_size(high_px / self._window.pixel_ratio, high_mm, self._desktop_scale)
+
+    @property
+    def logical_size(self) -> tuple[int, int]:
+        """What input and overlay are measured in."""
+        return self._window.size
+
+    def grow_with_text(self) -> None:
+        """A window as much larger as its text is, in the middle of its monitor."""
+        grow_window(self._handle, self.text_size)
+
+    @property
+    def closing(self) -> bool:
+        return self._window.is_closing
+
+    @property
+    def minimised(self) -> bool:
+        return 0 in self.size or bool(glfw.get_window_attrib(self._handle, glfw.ICONIFIED))
+
+    def close(self) -> None:
+        self._window.is_closing = True
+
+    def keep_open(self) -> None:
+        """Takes back that somebody has asked to close it."""
+        self._window.is_closing = False
+
+    @property
+    def cursor(self) -> tuple[float, float]:
+        """Where the mouse is, logical pixels from the top left."""
+        return self._cursor
+
+    @property
+    def on_scene(self) -> bool:
+        """Whether the mouse is over the picture rather than over the overlay."""
+        return not self._over_overlay(*self._cursor)
+
+    def set_title(self, title: str) -> None:
+        self._window.title = one_line(title)
+
+    def held(self, key: int) -> bool:
+        """Whether a key is down right now and not typed into the overlay."""
+        busy = imgui.get_io().want_text_input or key in self._chorded
+        return not busy and glfw.get_key(self._handle, key) == glfw.PRESS
+
+    def wait(self, seconds: float) -> bool:
+        """Takes input, sleeping up to that long for it; True when the overlay must be redrawn."""
+        seconds = min(seconds, self._look_again - glfw.get_time())
+        if self._unsettled > 0 or seconds <= 0:
+            glfw.poll_events()
+        else:
+            glfw.wait_events_timeout(seconds)
+        if glfw.get_time() >= self._look_again:
+            self._look_again = np.inf
+            self._note()
+        return self._unsettled > 0
+
+    def begin_frame(self) -> list[Event]:
+        """Starts an overlay frame; returns the input since the last one that is for the scene."""
+        if self._restyle:
+            self._restyle = False
+            theme.apply(self.ui_scale, self._window.pixel_ratio)
+            self._overlay.refresh_font_texture()
+        io = imgui.get_io()
+        io.display_size = imgui.ImVec2(*self.logical_size)
+        density = self._window.pixel_ratio
+        io.display_framebuffer_scale = imgui.ImVec2(density, density)
+        now = glfw.get_time()
+        io.delta_time = max(now - self._clock, 1e-4)
+        self._clock = now
+        for modifier, keys in MODIFIERS.items():
+            down = any(glfw.get_key(self._handle, key) == glfw.PRESS for key in keys)
+            io.add_key_event(modifier, down)
+        self._unsettled = max(self._unsettled - 1, 0)
+        imgui.new_frame()
+        if self._popup and imgui.is_key_pressed(imgui.Key.escape, False):
+            imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
+        events, self._raw = self._raw, []
+        return events
+
+    def end_frame(self) -> None:
+        """Draws the overlay over whatever the scene has drawn into `screen()`."""
+        self._popup = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+        imgui.render()
+        self.screen().use()
+        self._overlay.render(imgui.get_draw_data())
+
+    def screen(self) -> moderngl.Framebuffer:
+        """The window's framebuffer with the viewport on all of it."""
+        self.ctx.screen.viewport = (0, 0, *self.size)
+        return self.ctx.screen
+
+    def swap(self) -> None:
+        glfw.swap_buffers(self._handle)
+
+    def picture(self) -> np.ndarray:
+        """(H, W, 3) uint8 of all that has been drawn and not yet swapped, row 0 on top."""
+        width, height = self.size
+        data = self.ctx.screen.read(viewport=(0, 0, width, height), components=3, alignment=1)
+        return np.frombuffer(data, np.uint8).reshape(height, width, 3)[::-1]
+
+    def _listen(self) -> None:
+        """Registers the callbacks; each only notes what happened."""
+        handle = self._handle
+        glfw.set_key_callback(handle, self._on_key)
+        glfw.set_char_callback(handle, self._on_char)
+        glfw.set_cursor_pos_callback(handle, self._on_cursor)
+        glfw.set_mouse_button_callback(handle, self._on_button)
+        glfw.set_scroll_callback(handle, self._on_scroll)
+        glfw.set_drop_callback(handle, self._on_drop)
+        glfw.set_window_refresh_callback(handle, lambda _: self._note())
+        glfw.set_framebuffer_size_callback(handle, lambda *_: self._note())
+        glfw.set_window_content_scale_callback(handle, self._on_content_scale)
+
+    def _note(self, event: Event | None = None) -> None:
+        self._unsettled = SETTLE_FRAMES
+        if event is not None:
+            self._raw.append(event)
+
+    def _on_key(self, handle, key: int, scancode: int, action: int, mods: int) -> None:
+        io = imgui.get_io()
+        self._note()
+        if key in TEXT_KEYS:
+            io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
+        if action == glfw.RELEASE:
+            self._chorded.discard(key)
+        if action == glfw.RELEASE or io.want_text_input:
+            return
+        if action == glfw.REPEAT and key not in REPEATING:
+            return
+        if key == glfw.KEY_F11:
+            self._window.fullscreen = not self._window.fullscreen
+        if key == glfw.KEY_ESCAPE and self._popup:
+            return  # for what is open
+        shortcut = self._shortcut(key, scancode, mods)
+        if shortcut:
+            self._chorded.add(key)
+        ctrl = bool(mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER))
+        self._note(KeyDown(key, bool(mods & glfw.MOD_SHIFT), shortcut, ctrl))
+
+    def _shortcut(self, key: int, scancode: int, mods: int) -> str:
+        """The letter of a shortcut; "" while keys are held to move, where Ctrl means slowly."""
+        moving = any(other != key and self.held(other) for other in MOVING)
+        letter = (glfw.get_key_name(key, scancode) or "").lower()
+        with_ctrl = mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER)
+        return letter if with_ctrl and letter in SHORTCUTS and not moving else ""
+
+    def _on_char(self, handle, codepoint: int) -> None:
+        imgui.get_io().add_input_character(codepoint)
+        self._note()
+
+    def _on_cursor(self, handle, x: float, y: float) -> None:
+        imgui.get_io().add_mouse_pos_event(x, y)
+        dx, dy = x - self._cursor[0], y - self._cursor[1]
+        self._cursor = (x, y)
+        self._look_again = glfw.get_time() + HOVER_S
+        self._note(Drag(self._pressed, dx, dy, x, y) if self._pressed else None)
+
+    def _on_button(self, handle, button: int, action: int, mods: int) -> None:
+        if button not in BUTTONS:
+            return
+        io = imgui.get_io()
+        x, y = self._cursor
+        io.add_mouse_button_event(button, action == glfw.PRESS)
+        self._note()
+        if action == glfw.RELEASE:
+            if self._pressed == BUTTONS[button]:
+                self._pressed = None
+                self._note(Release(BUTTONS[button]))
+            return
+        if self._over_overlay(x, y):
+            return
+        if self._pressed is not None:  # one button at a time: who had the first one hears its end
+            self._note(Release(self._pressed))
+        self._pressed = BUTTONS[button]
+        self._note(Press(BUTTONS[button], x, y))
+        if button == glfw.MOUSE_BUTTON_LEFT:
+            last_x, last_y, when = self._last_click
+            close = abs(x - last_x) + abs(y - last_y) <= CLICK_PIXELS
+            now = glfw.get_time()
+            if close and 0 <= now - when <= DOUBLE_CLICK_S and when >= 0:
+                self._note(DoubleClick(x, y))
+                now = -1.0  # a third click starts anew
+            self._last_click = (x, y, now)
+
+    def _on_scroll(self, handle, dx: float, dy: float) -> None:
+        imgui.get_io().add_mouse_wheel_event(dx, dy)
+        self._note(None if self._over_overlay(*self._cursor) else Wheel(dy))
+
+    def _on_content_scale(self, handle, x: float, y: float) -> None:
+        """The desktop's scale has changed, or the window has gone to another monitor."""
+        self._monitor_size = self._size_for_monitor()
+        self._restyle = True
+        self._note()
+
+    def _on_drop(self, handle, paths: list[str]) -> None:
+        self._note(Drop(tuple(map(plain, paths))))
+
+    def _over_overlay(self, x: float, y: float) -> bool:
+        """Whether the overlay takes input at that place.
+
+        Not ImGui's want_capture_mouse: it is of the last frame and of the place where the mouse
+        was then, which may be 100 ms ago where there is no GPU.
+        """
+        inside = (left <= x < right and top <= y < low for left, top, right, low in self.covered)
+        return self._popup or any(inside)
+
+
+def _open(title: str, size: tuple[int, int]) -> GlfwWindow:
+    """The glfw window, or NoContext in one sentence."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")  # pyGLFW reports through warnings
+        try:
+            return GlfwWindow(title=title, size=size, gl_version=(4, 3), vsync=True)
+        except (ValueError, moderngl.Error, OSError) as error:
+            reasons = [str(w.message).split(") ", 1)[-1].strip("'\" b") for w in said]
+            reason = (reasons or [str(error)])[0].rstrip(".")
+    raise NoContext(
+        f"no window with OpenGL 4.3 could be opened ({reason}); "
+        f"`{program()} headless` and `{program()} render` need none."
+    )

@@ -1,0 +1,226 @@
+"""The loop of a headset: what happens in a frame, in order."""
+
+import time
+from collections.abc import Sequence
+
+import moderngl
+
+from shapeshift.app.headset.headset_report import DoneFrame, Report
+from shapeshift.app.headset.mirror import Mirror, NoMirror
+from shapeshift.app.headset.notices import Late, late_card
+from shapeshift.app.headset.pacing import Pacing, StereoChart
+from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
+from shapeshift.app.headset.xr_scene import XrScene
+from shapeshift.app.headset.xr_user import XrState, XrUser
+from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats
+from shapeshift.scene.pose import View
+from shapeshift.vr.card import Card
+from shapeshift.vr.drawn import Drawn, drawn_of
+from shapeshift.vr.floor import REST, Floor, Grid, clearness
+from shapeshift.vr.frame import Frame
+from shapeshift.vr.glove import Capsule
+from shapeshift.vr.hints import hints
+from shapeshift.vr.locomotion.locomotion import RULES, Rules
+from shapeshift.vr.locomotion.stance import underfoot
+from shapeshift.vr.openxr.session import Session
+from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
+from shapeshift.vr.overlay import Overlay
+from shapeshift.vr.touching import strongest
+
+LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
+
+
+class Eyes:
+    """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`.
+
+    And what is drawn behind its splats and over them.
+    """
+
+    def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
+        self.floor, self.overlay = Floor(ctx), Overlay(ctx)
+        self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
+
+    @property
+    def textures(self) -> list[moderngl.Texture]:
+        return [framebuffer.color_attachments[0] for framebuffer in self.framebuffers]
+
+    def __enter__(self) -> "Eyes":
+        return self
+
+    def __exit__(self, *failure) -> None:
+        self.floor.release()
+        self.overlay.release()
+        for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
+            framebuffer.release()
+            texture.release()
+
+
+class XrApp:
+    """One session with one scene, from the first frame to the last."""
+
+    def __init__(
+        self,
+        session: Session,
+        renderer: Renderer,
+        eyes: Eyes,
+        mirror: Mirror | NoMirror,
+        scene: XrScene,
+        pacing: Pacing,
+        report: Report,
+        rules: Rules = RULES,
+        panel_hand: str = "left",
+        floor: bool = True,
+        hints: bool = True,
+    ) -> None:
+        self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
+        self.scene, self.report, self._hints = scene, report, hints
+        user = XrUser(scene.world, scene.eye, scene.floor_y, rules)
+        self.state = XrState(scene.world, pacing, user, floor_shown=floor)
+        actions = MenuActions(self.recentre, self.leave, self.pulse)
+        self.menu = WristMenu(self.state, actions, panel_hand)
+        self._level_m = 0.0  # of the floor in the world
+        self._clearness = REST
+        self._outlines, self._late = Outlines(), Late()
+        self._worn_s = 0.0  # since the hands were there for the first time
+        self.pulses: list[tuple[str, float, float]] = []  # of this frame: side, strength, seconds
+        self.stats = FrameStats()
+        self._seen_s: float | None = None  # when the frame before was to be seen
+        self._drawing_ms = 0.0  # of the splats of both eyes, last
+        self._stood = False  # whether the person has been put before the scene
+        self.interrupted = False  # by Ctrl-C: no frame is left half done
+        self._leaving = False
+
+    def loop(self, frames: int = 0) -> None:
+        """Until the runtime, the person at the desk or `frames` (0: none) end it."""
+        for frame in self.session.frames(self._rest):
+            self.frame(frame)
+            done = 0 < frames <= self.session.pace.frames
+            if done or self._ends:
+                self.leave("frames" if done else self._ends)
+
+    def _rest(self) -> None:
+        """While the headset lies on the table: the window can be closed all the same."""
+        self.mirror.rest()
+        if self._ends:
+            self.leave(self._ends)
+
+    @property
+    def _ends(self) -> str:
+        """Why the person at the desk wants it to end; "" for not at all."""
+        if self.interrupted:
+            return "interrupted"
+        return "closed at the desk" if self.mirror.closing else ""
+
+    def leave(self, why: str) -> None:
+        """Asks the runtime for the end; a few frames later it comes."""
+        if not self._leaving:
+            self._leaving, self.report.ended = True, why
+            self.session.leave()
+
+    def frame(self, frame: Frame) -> None:
+        """One frame: the person, the world, the pictures of both eyes."""
+        seconds = self._time_passed(frame)
+        self.pulses.clear()
+        if not self._stood or frame.recentred:
+            self.recentre(frame)
+        self._stood |= frame.drawn  # before, nobody knows where the head is
+        self._seen_s = frame.seen_s
+        before = self.state.standing
+        left_over = self.menu.act(frame, seconds)
+        self.state.standing = self.state.user.act(left_over, self.state.standing, seconds)
+        self._clearness = clearness(self._clearness, before, self.state.standing, seconds)
+        if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
+            self._worn_s += seconds
+        records = self.state.world.advance(seconds)
+        for pulse in strongest(self.state.user.felt(records)):
+            self.pulse(pulse.side, pulse.strength, pulse.seconds)
+        if frame.drawn:
+            views = [self.state.standing.view(view) for view in frame.views]
+            self._choose_quality(views)
+            self.draw(views, frame.views, self._over(frame))
+            self.session.submit(self.eyes.textures)
+            self.state.pacing.seen(self._drawing_ms, self.session.pace.last_ms)
+            self.mirror.show(self.eyes.textures[0])
+        else:
+            self.mirror.rest()
+        session = self.session
+        done = DoneFrame(
+            frame, self.state, self.menu.carried, self.pulses, records, session.life, session.pace
+        )
+        self.report.note(done, self.eyes.framebuffers)
+
+    def _over(self, frame: Frame) -> Drawn:
+        """What is in the room over the splats."""
+        person, carried = self.state.user, self.menu.carried
+        outlines, cards = self._outlined(frame), self._cards(frame)
+        return drawn_of(frame.hands, carried, person.comfort, person.touched, outlines, cards)
+
+    def _outlined(self, frame: Frame) -> list[Capsule]:
+        """Around what hands would take, or their rays act on, that do not point at the panel."""
+        lines: list[Capsule] = []
+        for offer in self.state.user.touched.offers:
+            thing = self.state.world.things[offer.object]
+            hull = self._outlines.hull(thing.collider)
+            if hull is None or offer.side in self.menu.carried.panel.hovers:
+                continue
+            pose, ink = thing.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
+            lines += outline(hull, pose, self.state.standing, frame.head.position, ink)
+        return lines
+
+    def _cards(self, frame: Frame) -> tuple[Card, ...]:
+        """What buttons do, at first; and that frames are late."""
+        if not self._hints:
+            return ()
+        side, rules = self.menu.carried.home, self.state.user.rules
+        cards = hints(frame, self._worn_s, self.session.profiles, rules, side)
+        if self._late.watch(frame.seen_s, self.session.pace.dropped):
+            cards += (late_card(frame.head, self.state.pacing.quality),)
+        return cards
+
+    def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
+        """Splats with one sort for both eyes, the floor behind them, the room over them."""
+        self.renderer.settings = self.state.pacing.settings()
+        start = time.perf_counter()
+        self.renderer.update(self.state.world.drawn())
+        self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
+        self._drawing_ms = (time.perf_counter() - start) * 1e3
+        self.session.pace.drew(self._drawing_ms)
+        for i, framebuffer in enumerate(self.eyes.framebuffers):
+            self.renderer.present(framebuffer, i)
+            if self.state.floor_shown:
+                grid = Grid(self._level_m, self._clearness)
+                behind, hidden = self.scene.background, self.renderer.coverage(i)
+                floor = self.eyes.floor
+                floor.draw(framebuffer, play_views[i], self.state.standing, hidden, grid, behind)
+            self.eyes.overlay.draw(framebuffer, play_views[i], over)
+
+    def _choose_quality(self, views: list[View]) -> None:
+        """What of the picture can be had within the display's period: once that is known, and
+        when it is another one.
+        """
+        pace = self.session.pace
+        if not (pace.settled and self.state.pacing.wants_measure(pace.period_s)):
+            return
+        scene, finish = self.state.world.drawn(), self.mirror.ctx.finish
+        chart = StereoChart(self.renderer, scene, views, self.scene.centre, finish)
+        self.state.pacing.measure(chart, pace.period_s)
+        pace.restart()
+
+    def recentre(self, frame: Frame) -> None:
+        """Back to where the scene is looked at first, at the size it has now."""
+        self.state.standing = self.state.user.before_scene(frame, self.state.standing.scale)
+        self.state.user.jumped()
+        floor_y, under = self.state.user.floor_y, self.state.standing.point(underfoot(frame.head))
+        self._level_m = float(under[1]) if floor_y is None else floor_y
+
+    def pulse(self, side: str, strength: float, seconds: float) -> None:
+        """Buzzes a hand."""
+        self.pulses.append((side, strength, seconds))
+        self.session.pulse(side, strength, seconds)
+
+    def _time_passed(self, frame: Frame) -> float:
+        """Seconds since the frame before, by the runtime's clock; not those of a long rest."""
+        if self._seen_s is None:
+            return 0.0
+        return min(max(frame.seen_s - self._seen_s, 0.0), LONGEST_STEP_S)

@@ -1,0 +1,71 @@
+"""The person in a headset between two frames: how they stand, move, and what their hands do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from shapeshift.app.headset.pacing import Pacing
+from shapeshift.scene.pose import Pose
+from shapeshift.scene.world.world import World
+from shapeshift.vr.frame import Frame, Pulse
+from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, move
+from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.stance import standing_before, underfoot
+from shapeshift.vr.locomotion.teleport import ground_of
+from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
+
+
+class XrUser:
+    """Keeps what the pure steps of vr/ hand on; `jumped` is called when a menu moved the room.
+
+    `eye` is from where the scene is looked at first, world_from_eye.
+    """
+
+    def __init__(
+        self, world: World, eye: Pose, floor_y: float | None, rules: Rules = RULES
+    ) -> None:
+        self.world, self.eye, self.floor_y, self.rules = world, eye, floor_y, rules
+        self.touching, self.travel = Touching(), Travel()
+        self.touched, self.comfort = Touched(), Comfort()  # of the last frame, to be shown
+        self._jumps = False
+
+    def before_scene(self, frame: Frame, scale: float = 1.0) -> Standing:
+        """Where the scene is looked at first, on its floor."""
+        return standing_before(self.eye, frame.head, self.floor_y, scale)
+
+    def jumped(self) -> None:
+        """The room was put elsewhere or scaled: what is held comes along in the next `act`."""
+        self._jumps = True
+
+    def act(self, frame: Frame, standing: Standing, seconds: float) -> Standing:
+        """Before the world's steps: hands take, let go and act, and the room is moved."""
+        if self._jumps:
+            frame, self._jumps = replace(frame, recentred=True), False
+        self.touching, self.touched = touch(self.world, self.touching, frame, standing)
+        level = standing.point(underfoot(frame.head))[1] if self.floor_y is None else None
+        standing, self.travel, self.comfort = move(
+            standing,
+            self.travel,
+            at_rest(frame, self.touching),
+            seconds,
+            self.rules,
+            ground_of(self.world, level),
+        )
+        if self.comfort.home:
+            standing = self.before_scene(frame)
+        follow(self.world, frame, standing, self.comfort.jumps)
+        return standing
+
+    def felt(self, records: Sequence) -> tuple[Pulse, ...]:
+        """After the world's steps: what buzzes, of these and of what the hands did."""
+        return (*self.touched.pulses, *feel(self.world, records))
+
+
+@dataclass
+class XrState:
+    """What changes from frame to frame, and what the parts of a session read of each other."""
+
+    world: World
+    pacing: Pacing
+    user: XrUser
+    standing: Standing = field(default_factory=Standing)
+    floor_shown: bool = True
