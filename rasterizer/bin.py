@@ -1,0 +1,200 @@
+"""bin: projected splats -> for each 16x16 tile the list of its splats, near to far."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import LOW_BITS, Projected, TileScratch, chunks_of, grid_of
+from shapeshift.rasterizer.sort import prefix_sums, sort_pairs
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
+
+KERNELS = Path(__file__).parent / "kernels"
+SPARE = 16  # as in bin.cl
+MOST_BINS = 1 << 14  # of one pass: its table must stay in the second cache
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Every intersection (splat, tile), tile by tile, near to far; backward reads it, too."""
+
+    grid: tuple[int, int]  # tiles across, tiles down
+    starts: "Array"  # (tiles + 1 or more,) int32: where each tile's list starts in `intersections`
+    intersections: "Array"  # (I or more,) int32 splat indices
+    tile_bounds: "Array"  # (N, 2) uint32: see kernels/common/tiles.cl
+    order: "Array"  # (visible,) int32: the visible splats by depth, stable
+    count: int  # slots: as many as intersections, and more where large boxes have tiles left out
+    first_slot: "Array | None" = None  # (N,) int32: a splat's slots are numbered from there
+
+    def slots(self, device: Device) -> "Array":
+        """first_slot; counted now if the form that made these lists did not need it."""
+        if self.first_slot is not None:
+            return self.first_slot
+        count = self.tile_bounds.shape[0]
+        first_slot = device.empty(count, np.int32)
+        kernel = device.program(KERNELS / "bin.cl")["number_slots"]
+        device.launch(kernel, 1, 1, count, self.tile_bounds, first_slot)
+        return first_slot
+
+    def room(self, device: Device, first_slot: "Array", columns: int) -> "Array":
+        """(count, columns) float32 for what intersections write to their slots; others are 0."""
+        slots, count = device.empty((self.count, columns)), self.tile_bounds.shape[0]
+        kernel = device.program(KERNELS / "sum_slots.cl")["clear_boxes"]
+        device.launch(kernel, count, 64, count, columns, self.tile_bounds, first_slot, slots)
+        return slots
+
+
+def bin_tiles(
+    device: Device,
+    projected: Projected,
+    size: tuple[int, int],
+    form: str | None = None,
+    order: "Array | None" = None,
+) -> Tiles:
+    """The intersection lists of an image of `size` (width, height) pixels; order by depth, stable.
+
+    form: "cpu" or "gpu", by default the device's kind.  Both give the same lists.
+    order: (n,) int32 splats near to far, as sort_order gives it for another view or an earlier
+    frame: it is not sorted again, and splats that this view does not show take no part.
+    """
+    grid = grid_of(size)
+    if order is not None:
+        return _bin_chunks(device, projected, grid, order)
+    bin_form = {"cpu": _bin_chunks, "gpu": _bin_groups}[form or device.kind]
+    return bin_form(device, projected, grid)
+
+
+def sort_order(device: Device, scratch: TileScratch) -> "Array":
+    """(n,) int32: the splats that project_arena entered, by their keys, stable.
+
+    Once a projection: the first pass of the sort turns scratch.table into positions.
+    """
+    status = device.view(scratch.status)
+    visible = int(status[:, 0].sum(dtype=np.int64))
+    kernels = device.program(KERNELS / "bin.cl")
+    return _sort(
+        device, kernels, scratch, visible, int(status[:, 2].min()), int(status[:, 3].max())
+    )
+
+
+def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> Tiles:
+    """The GPU form: everything in parallel, two radix sorts."""
+    kernels = device.program(KERNELS / "bin_gpu.cl")
+    count = projected.depth.shape[0]
+    tiles = grid[0] * grid[1]
+    tile_bounds, first_slot = device.empty((count, 2), np.uint32), device.empty(count, np.int32)
+    keys, splats = device.empty(count, np.uint32), device.empty(count, np.int32)
+    device.launch(
+        kernels["find_tile_bounds"], count, 64,
+        count, *grid, projected.record, projected.depth, tile_bounds, keys, splats,
+    )  # fmt: skip
+    keys, order = sort_pairs(device, keys, splats, 32)
+
+    offsets, slots, visible = (device.empty(n, np.int32) for n in (count + 1, count + 1, 1))
+    device.launch(
+        kernels["count_intersections"], count + 1, 64,
+        count, keys, order, projected.record, tile_bounds, offsets, slots, visible,
+    )  # fmt: skip
+    prefix_sums(device, offsets)
+    prefix_sums(device, slots)
+    shown, total = int(device.view(visible)[0]), int(device.view(offsets)[-1])
+    slot_count = int(device.view(slots)[-1])
+    tile_of, intersections = device.empty(total, np.uint32), device.empty(total, np.int32)
+    device.launch(
+        kernels["write_intersections"], shown, 64,
+        shown, grid[0], order, projected.record, tile_bounds, offsets, slots, tile_of,
+        intersections, first_slot,
+    )  # fmt: skip
+    tile_of, intersections = sort_pairs(device, tile_of, intersections, (tiles - 1).bit_length())
+    starts = device.empty(tiles + 1, np.int32)
+    device.launch(kernels["find_starts"], total + 1, 64, total, tiles, tile_of, starts)
+    return Tiles(grid, starts, intersections, tile_bounds, order[:shown], slot_count, first_slot)
+
+
+def _bin_chunks(
+    device: Device, projected: Projected, grid: tuple[int, int], order: "Array | None" = None
+) -> Tiles:
+    """The CPU form: a work-item owns a chunk of splats and a table of counts."""
+    kernels = device.program(KERNELS / "bin.cl")
+    scratch = projected.scratch
+    if scratch is None or scratch.grid != grid:
+        scratch = TileScratch.empty(device, projected.depth.shape[0], grid)
+        device.launch(
+            kernels["find_tile_bounds"], scratch.status.shape[0], 1,
+            projected.depth.shape[0], scratch.chunk, *grid, projected.record, projected.depth,
+            *scratch.arrays(),
+        )  # fmt: skip
+    total = int(device.view(scratch.status)[:, 1].sum(dtype=np.int64))
+    order = sort_order(device, scratch) if order is None else order
+    starts, intersections = _scatter_tiles(device, kernels, order, projected.record, scratch, total)
+    return Tiles(grid, starts, intersections, scratch.tile_bounds, order, total)
+
+
+def _digits(least: int, most: int) -> list[tuple[int, int, int]]:
+    """(origin, shift, bins) of each pass of the sort of keys from `least` to `most`."""
+    passes = [(0, 0, 1 << LOW_BITS)]
+    origin = least >> LOW_BITS << LOW_BITS
+    high_bins = (most - origin >> LOW_BITS) + 1
+    if high_bins > MOST_BINS:
+        half = ((high_bins - 1).bit_length() + 1) // 2
+        passes.append((origin, LOW_BITS, 1 << half))
+        passes.append((origin, LOW_BITS + half, (high_bins >> half) + 1))
+    elif high_bins > 1:
+        passes.append((origin, LOW_BITS, high_bins))
+    return passes
+
+
+def _sort(device: Device, kernels: dict, scratch: TileScratch, visible: int, least: int, most: int):
+    """(visible,) splat indices by depth: a counting sort by the low digit, then the high ones."""
+    if visible == 0:
+        return device.empty(0, np.int32)
+    pairs, table, chunk = scratch.pairs, scratch.table, scratch.chunk
+    order = device.empty(visible, np.int32)
+    passes = _digits(least, most)
+    for number, (origin, shift, bins) in enumerate(passes):
+        first, final = number == 0, number == len(passes) - 1
+        if not first:  # the first digit was counted with the tile bounds
+            chunks = chunks_of(device, visible)
+            chunk = -(-visible // chunks)
+            table = device.empty((chunks, bins), np.int32)
+            device.launch(
+                kernels["count_digits"], chunks, 1,
+                visible, chunk, bins, np.uint32(origin), shift, pairs, table,
+            )  # fmt: skip
+        starts = device.empty(bins + 1, np.int32)
+        device.launch(kernels["scan_table"], 1, 1, bins, table.shape[0], table, starts)
+        sorted_pairs = None if final else device.empty((visible, 2), np.uint32)
+        device.launch(
+            kernels["scatter_digits"], table.shape[0], 1,
+            visible, chunk, bins, np.uint32(origin), shift, int(first), int(final), scratch.status,
+            pairs, table, sorted_pairs, order,
+        )  # fmt: skip
+        pairs = sorted_pairs
+    return order
+
+
+def _scatter_tiles(device, kernels, order, record, scratch: TileScratch, total: int) -> tuple:
+    """(tiles + 1,) starts and at most (total,) intersections from the splats in depth order."""
+    grid, tiles, visible = scratch.grid, scratch.grid[0] * scratch.grid[1], order.shape[0]
+    chunks = chunks_of(device, visible)
+    chunk = -(-visible // chunks)
+    # The branch-free walk looks at a tile's right, lower and lower right neighbours, too.
+    bins = tiles + grid[0] + 1
+    table, starts = device.empty((chunks, bins), np.int32), device.empty(bins + 1, np.int32)
+    intersections = device.empty(total + SPARE * chunks, np.int32)
+    near_to_far = device.empty((visible, 2), np.uint32)  # tile bounds
+    shared = (visible, chunk, grid[0], bins)
+    device.launch(
+        kernels["count_tiles"], chunks, 1,
+        *shared, order, record, scratch.tile_bounds, near_to_far, table,
+    )  # fmt: skip
+    device.launch(kernels["scan_table"], 1, 1, bins, chunks, table, starts)
+    device.launch(
+        kernels["scatter_tiles"], chunks, 1,
+        *shared, total, order, record, near_to_far, table, intersections,
+    )  # fmt: skip
+    return starts, intersections

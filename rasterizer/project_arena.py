@@ -1,0 +1,162 @@
+"""project_arena: splats of posed objects -> ellipses, tiles and sort keys of one or two views."""
+
+from dataclasses import dataclass, replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.rasterizer.device import Device
+from shapeshift.rasterizer.project import (
+    CULL_REASONS,
+    LEAST_ALPHA,
+    LOW_BITS,
+    LOW_PASS,
+    RECORD,
+    Camera,
+    Projected,
+    TileScratch,
+    chunks_of,
+    grid_of,
+)
+
+KERNEL = Path(__file__).parent / "kernels" / "project_arena.cl"
+FARTHEST = 1e18  # metres, or pixels: its square is a finite float
+LANES = 8
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is left out of a frame, gate by gate; see renderer.settings for the prices."""
+
+    min_alpha: float = LEAST_ALPHA
+    max_pixels: float = inf  # one sigma of the longer screen axis
+    max_distance: float = inf  # metres from the eye
+    min_pixels: float = 0.0  # of the longer axis where alpha reaches min_alpha
+    fade: float = 0.0  # part of each limit over which opacity falls to 0 before it
+    low_pass: float = LOW_PASS  # px^2
+
+    def packed(self) -> np.ndarray:
+        """(13,) float32 as kernels/common/limits.cl reads it."""
+        limits = (self.max_pixels, self.max_distance, self.min_pixels)
+        large, far, least = (min(limit, FARTHEST) for limit in limits)
+        bands = [1 / (self.fade * t) if 0 < self.fade * t < inf else 0.0 for t in limits]
+        rows = [self.min_alpha, 1 / self.min_alpha, self.low_pass, large, large**2, far, far**2]
+        return np.float32([*rows, least, least**2, *bands, any(bands)])
+
+
+@dataclass(frozen=True)
+class SortFrames:
+    """By what splats are ordered: camera_from_world (4, 4), OpenCV axes, one or one a view.
+
+    by_distance: metres to the frame's origin instead of along its z.  keep_outside: splats that no
+    view sees are ordered, too, so that the order can be kept while the views turn.
+    """
+
+    camera_from_world: tuple[np.ndarray, ...]
+    by_distance: bool = False
+    keep_outside: bool = False
+
+
+def project_arena(
+    device: Device, mean_opacity, covariance, color, object_index, world_from_object,
+    cameras: list[Camera], limits: Limits | None = None, sort: SortFrames | None = None,
+    into: list[Projected] | None = None, antialiased: tuple[bool, ...] = (), second_color=None,
+) -> list[Projected]:  # fmt: skip
+    """For drawing: N splats of O posed objects in one or two views; counts what each gate drops.
+
+    mean_opacity (N, 4) object frame metres and 0..1; covariance (N, 8) m^2, object frame, xx xy xz
+    yy yz zz and two unused; color (N, 4), last unused, and second_color, that of the second view
+    where it has its own; object_index (N,) int32; device arrays.
+    world_from_object: numpy (O, 3 or 4, 4) or (O, 12) rows, rigid.
+    sort: no camera_from_world at all: no keys, an order from before is to be used; None: by depth,
+    each view for itself.  With one frame for two views both share the pairs to be sorted.
+    into: an earlier result, whose arrays are filled again where they fit (making them anew takes
+    longer than projecting 10,000 splats).
+    antialiased: one an object, or none where no object is: opacity falls as the low pass grows the
+    ellipse, by sqrt(det / det with it) (Mip-Splatting's 2D filter, gsplat's "antialiased").
+    """
+    limits = limits or Limits()
+    sort = sort or SortFrames(tuple(camera.camera_from_world for camera in cameras))
+    count, views, orders = mean_opacity.shape[0], len(cameras), len(sort.camera_from_world)
+    if views not in (1, 2) or orders not in (0, 1, views):
+        raise ValueError(f"project_arena takes 1 or 2 views and 0, 1 or as many sort frames, "
+                         f"not {views} and {orders}.")  # fmt: skip
+    grids = [grid_of(camera.size) for camera in cameras]
+    if not _fits(into, count, orders, grids):
+        into = _room(device, count, orders, grids)
+    projected = [replace(p, low_pass=limits.low_pass) for p in into]
+    poses = _poses(cameras, sort, world_from_object)
+    variant = {"VIEWS": views, "ORDERS": orders}
+    if second_color is not None and views == 2:
+        variant["OWN_COLORS"] = 1
+    if any(antialiased):
+        flags = np.array(antialiased, np.float32)
+        poses = np.concatenate([poses.reshape(len(flags), -1), flags[:, None]], axis=1)
+        variant["ANTIALIASED"] = 1
+    frame = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
+    buffers = [_buffers(p) for p in projected]
+    scratch = projected[0].scratch
+    device.launch(
+        device.program(KERNEL, **variant)["project_arena"], len(scratch.status), 1,
+        count, scratch.chunk, sort.by_distance, sort.keep_outside,
+        device.constants(np.concatenate(frame)), mean_opacity, covariance, color, second_color,
+        object_index, *buffers[0], *(buffers[1] if views == 2 else [None] * len(buffers[0])),
+    )  # fmt: skip
+    return projected
+
+
+def _fits(earlier: list[Projected] | None, count: int, orders: int, grids: list) -> bool:
+    """Whether the arrays of an earlier result are those that this one needs."""
+    if earlier is None or [p.scratch.grid for p in earlier] != grids:
+        return False
+    pairs = {id(p.scratch.pairs) for p in earlier if p.scratch.pairs is not None}
+    return earlier[0].depth.shape[0] == count and len(pairs) == orders
+
+
+def _room(device: Device, count: int, orders: int, grids: list) -> list[Projected]:
+    """Arrays for `count` splats in as many views as there are grids."""
+    chunks = chunks_of(device, count)
+    chunk = -(-count // (chunks * LANES)) * LANES  # whole vectors but for the last
+    keys = [
+        (device.empty((count, 2), np.uint32), device.empty((chunks, 1 << LOW_BITS), np.int32))
+        for _ in range(orders)
+    ]
+    keys = keys * len(grids) if orders == 1 else keys or [(None, None)] * len(grids)
+    return [
+        Projected(
+            device.empty((count, RECORD)),
+            device.empty(count),
+            culled_counts=device.empty((chunks, len(CULL_REASONS)), np.int32),
+            scratch=TileScratch(
+                device.empty((count, 2), np.uint32),
+                *pairs_and_table,
+                device.empty((chunks, 4), np.uint32),
+                chunk,
+                grid,
+            ),
+        )
+        for pairs_and_table, grid in zip(keys, grids, strict=False)
+    ]
+
+
+def _buffers(projected: Projected) -> tuple:
+    scratch = projected.scratch
+    results = (projected.record, projected.depth, projected.culled_counts)
+    return (*results, scratch.tile_bounds, scratch.status, scratch.pairs, scratch.table)
+
+
+def _packed(camera: Camera) -> np.ndarray:
+    """(25,) float32 as kernels/common/limits.cl reads a view."""
+    rest = (*camera.size, camera.near, *grid_of(camera.size))
+    return np.concatenate([camera.packed(), np.float32(rest)])
+
+
+def _poses(cameras: list[Camera], sort: SortFrames, world_from_object) -> np.ndarray:
+    """(O, blocks, 12) float32: rows from each object into every camera and sort frame."""
+    poses = np.asarray(world_from_object, np.float64)
+    poses = poses.reshape(-1, poses.size // max(1, len(poses)) // 4, 4)[:, :3]  # (O, 3, 4)
+    into = [camera.camera_from_world for camera in cameras] + list(sort.camera_from_world)
+    chained = np.stack([np.asarray(m, np.float64)[:3, :3] @ poses for m in into], axis=1)
+    chained[..., 3] += np.stack([np.asarray(m, np.float64)[:3, 3] for m in into])
+    return chained.reshape(-1, len(into), 12).astype(np.float32)

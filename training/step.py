@@ -1,0 +1,110 @@
+"""One training step in order: heads, Gaussians, project, bin, rasterize, loss, and all back."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from shapeshift.scene.pose import View
+from shapeshift.training.density.density import Evidence
+from shapeshift.training.drawing import Color, Drawing, draw_splats, splats_backward
+from shapeshift.training.heads.gaussians import Activation, Gaussians
+from shapeshift.training.heads.networks import HeadLayout, Heads
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.depth_loss import DepthWish
+from shapeshift.training.losses.losses import ImageLoss, Target, regularise
+from shapeshift.training.losses.smooth import smooth_picture
+from shapeshift.training.rise import draw_up
+
+
+class Step:
+    """Draws the model that an optimiser holds and learns from a target."""
+
+    def __init__(self, device, layout: HeadLayout, voxel: float, adam: Adam) -> None:
+        self.device, self.layout, self.adam = device, layout, adam
+        self.heads = Heads(device, layout)
+        self.activation = Activation(device, layout, voxel)
+        self.rows = None  # (R,) int32 on the device: the anchors of the last drawing; None: all
+        self.there: dict[str, object] = {}  # what the optimiser has of these, by group
+        self.ms: dict[str, float] | None = None  # of each pass, summed; a dict switches it on
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        if self.ms is not None:
+            self.device.queue.finish()
+            self.ms[name] = self.ms.get(name, 0.0) + 1e3 * (time.perf_counter() - start)
+
+    def decode(self, control: np.ndarray, eye: np.ndarray, rows=None) -> Gaussians:
+        """The splats of the model, or of some `rows` (R,) of its anchors alone.
+
+        They are decoded for Psi `control` (d,), or (5, d) one a head, and seen from `eye` (3,)
+        metres.
+        """
+        adam, self.rows = self.adam, rows
+        with self.timed("heads"):
+            self.there = {n: adam.gather(n, rows) for n in self.layout.per_anchor}
+            raw = self.heads.forward(
+                adam["weights"], self.there["anchors"], self.there["features"], control, eye
+            )
+        with self.timed("activate"):
+            return self.activation.forward(raw, self.there)
+
+    def draw(
+        self, view: View, control: np.ndarray, background: Color, with_depth: bool = False,
+        rows=None,
+    ) -> Drawing:  # fmt: skip
+        splats = self.decode(control, view.world_from_eye.position, rows)
+        return draw_splats(self.device, splats, view, background, with_depth, self.timed)
+
+    def gradients(
+        self,
+        drawing: Drawing,
+        loss: ImageLoss,
+        target: Target,
+        ssim_share: float,
+        opacity_share: float = 0.0,
+        scale_share: float = 0.0,
+        evidence: Evidence | None = None,
+        depth: DepthWish | None = None,
+        revive: float = 0.0,
+        smooth: float = 0.0,
+    ) -> dict[str, object]:
+        """Gradients of the loss by what the optimiser holds, under its names.
+
+        Where the drawing had some anchors alone, so do the gradients of groups with a row for each.
+        """
+        device = self.device
+        with self.timed("loss"):
+            grad_image = loss.compare(drawing.frame.image, target, ssim_share)
+            if smooth:
+                smooth_picture(device, drawing.frame.image, grad_image, smooth)
+        watched = evidence is not None
+        grad, grad_record = splats_backward(
+            device, drawing, grad_image, depth, self.timed, absolute=watched, weight=watched
+        )
+        with self.timed("density"):
+            if evidence is not None:
+                record, opacity = drawing.projected.record, drawing.splats.opacity
+                evidence.add(record, grad_record, opacity, drawing.camera.size, self.rows)
+        with self.timed("heads backward"):
+            if opacity_share or scale_share:
+                regularise(device, drawing.splats, grad, opacity_share, scale_share)
+            if revive:
+                draw_up(device, drawing.splats, grad, revive)
+            return self.backward(grad)
+
+    def backward(self, grad: Gaussians) -> dict[str, object]:
+        """The gradients by what the optimiser holds of those by the last splats decoded."""
+        there = self.there
+        grad_raw, found = self.activation.backward(self.heads.raw, there, grad)
+        weights, features = self.heads.backward(
+            self.adam["weights"], there["anchors"], there["features"], grad_raw, found["anchors"]
+        )
+        return {"weights": weights, "features": features} | found
+
+    def update(self, grads: dict[str, object], rate_scale: float) -> None:
+        with self.timed("adam"):
+            self.adam.step(grads, rate_scale, dict.fromkeys(self.layout.per_anchor, self.rows))

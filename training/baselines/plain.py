@@ -1,0 +1,219 @@
+"""Plain 3DGS splats of one modality, trained with the anchor model's rasterizer, loss and photos.
+
+The yardstick: what an anchor model saves and gains is told beside this.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.runtime_models.colors.spherical_harmonics import C0
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.rotation import normalize
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.baselines.plain_density import (
+    changed_splats,
+    decide,
+    extent_of,
+    reset_opacity,
+)
+from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettings
+from shapeshift.training.baselines.plain_step import REST, PlainEvidence, PlainStep
+from shapeshift.training.drawing import Color
+from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
+from shapeshift.training.first_anchors.initial import choose_voxel, initial_points, voxel_centres
+from shapeshift.training.guard import EVERY as GUARD_EVERY
+from shapeshift.training.guard import SNAPSHOT_EVERY, Guard
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
+from shapeshift.training.run import SETTLE, Run
+from shapeshift.training.schedule import Budget, Schedule
+from shapeshift.training.supervision.backgrounds import choose_background
+from shapeshift.training.supervision.exposure import Exposures
+from shapeshift.training.supervision.targets import Targets
+
+GROW_FROM, GROW_UNTIL = 1 / 60, 0.5  # of the run, as 3DGS: steps 500 to 15,000 of 30,000
+DEGREES = 30  # a degree of the harmonics more after each 1 / DEGREES of the run, as 3DGS
+FIRST_OPACITY = 0.1
+
+
+def one_modality(capture: Capture, name: str) -> Capture:
+    """The capture as if nothing but one modality had been photographed.
+
+    Raises BadFile where it has no training photos.
+    """
+    photos = tuple(p for p in capture.photos if p.modality == name)
+    if not any(p.split == "train" for p in photos):
+        raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
+    return replace(capture, stops=tuple(s for s in capture.stops if s.name == name), photos=photos)
+
+
+def group_rates(rates: PlainRates, extent: float) -> dict[str, np.ndarray]:
+    """Rates as the optimiser takes them: one a group."""
+    each = {name: getattr(rates, name) for name in PlainRates.__dataclass_fields__}
+    each["means"] *= extent
+    return {name: np.array([rate], np.float32) for name, rate in each.items() if name != "decay"}
+
+
+class PlainTrainer(Run):
+    """One run over a capture of one modality.  `steps` trains; `splats` gives what there is."""
+
+    unit, counted = "splats", "means"
+
+    def __init__(self, device, capture: Capture, settings: PlainSettings) -> None:
+        self.device, self.capture, self.settings = device, capture, settings
+        (self.stop,) = capture.stops
+        self.budget = Budget(settings.iterations, settings.seconds)
+        self.factor = settings.downscale or choose_downscale(capture.photos)
+        photos = load_photos(capture, "train", self.factor, settings.masks)
+        self.held_out = load_photos(capture, "test", self.factor, settings.masks)
+        background = choose_background(settings.background, capture.background, photos)
+        if settings.background == "auto":
+            self.capture = replace(capture, background=background)  # hulls are carved out of it
+        self.schedule = Schedule({self.stop.name: photos}, settings.seed, background)
+        self.extent = extent_of([p.view for p in photos])
+        self.targets = Targets(device)
+        self.exposures = Exposures(device, self.schedule.photos)
+        self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
+        self.run_length, self.rate_scale = settings.iterations, settings.rate_scale
+        self.adam = Adam(device, self.first_values(photos), self.all_rates())
+        self.step = PlainStep(device, self.adam, settings.sh_degree)
+        self.evidence = PlainEvidence(device, self.count)
+        self.guard, self.next_snapshot = Guard(self.adam.state()), SNAPSHOT_EVERY
+
+    def first_values(self, photos: list[LoadedPhoto]) -> dict[str, np.ndarray]:
+        """Round, faint splats at the first points, in the colours of the photos."""
+        settings = self.settings
+        rng = np.random.default_rng([settings.seed, 0])
+        first = initial_points(self.capture, photos, rng, settings.points)
+        points, self.origin = np.concatenate([first.points, first.guesses]), first.origin
+        most = min(settings.splats, settings.max_splats)
+        self.voxel = settings.voxel or choose_voxel(points, most, rng)
+        means = voxel_centres(points, self.voxel)
+        count = len(means)
+        colors = seen_colors(means, photos, self.schedule.background or BLACK)
+        values = {
+            "means": means,
+            "scales": np.log(neighbour_distance(means))[:, None].repeat(3, axis=1),
+            "wxyz": np.tile([1.0, 0, 0, 0], (count, 1)),
+            "opacity": np.full(count, np.log(FIRST_OPACITY / (1 - FIRST_OPACITY))),
+            "base": (colors - 0.5) / C0,
+            "rest": np.zeros((count, REST[settings.sh_degree], 3)),
+        }
+        return {name: array.astype(np.float32) for name, array in values.items()}
+
+    @property
+    def count(self) -> int:
+        return len(self.adam["means"])
+
+    @property
+    def splat_count(self) -> int:
+        return self.count
+
+    def all_rates(self) -> dict[str, np.ndarray]:
+        return group_rates(self.rates(), self.extent)
+
+    def warm_up(self) -> None:
+        """Compile every kernel for every photo size, outside of the time that is counted."""
+        before = self.adam.state()
+        background = self.schedule.background or BLACK
+        photos = self.schedule.photos[self.stop.name]
+        for photo in {(p.view.size, p.depth is None): p for p in photos}.values():
+            self.adam.step(self.learn(photo, background), 0.0)
+            loss, visible = self.empty_loss(photo, background), self.visible()
+            self.guard.expect(self.stop.name, loss, visible, 1.0)
+        self.adam.load(before)
+        self.evidence = PlainEvidence(self.device, self.count)
+
+    def empty_loss(self, photo: LoadedPhoto, background: Color) -> float:
+        """The loss of a picture without splats; the first splats, coloured, are better already."""
+        loss, (width, height) = self.targets.loss(photo), photo.view.size
+        image = np.broadcast_to(np.float32(background)[:, None, None], (3, height, width))
+        target = self.targets.target(photo, background)
+        loss.compare(self.device.upload(image), target, self.settings.ssim_share)
+        return loss.value()
+
+    def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
+        depth = self.targets.wish(photo, self.settings.depth_share)
+        self.drawing = self.step.draw(photo.view, background, depth is not None)
+        target = self.target(photo, background)
+        loss = self.targets.loss(photo)
+        share = self.settings.ssim_share
+        return self.step.gradients(self.drawing, loss, target, share, self.evidence, depth)
+
+    def one_step(self) -> tuple[float | None, bool]:
+        """(loss or None, whether the guard turned back)."""
+        photo = self.schedule.photo(self.iteration)
+        background = self.schedule.background_of(self.iteration, photo)
+        fraction = self.budget.fraction(self.iteration, self.elapsed)
+        self.step.used = REST[min(self.settings.sh_degree, int(DEGREES * fraction))]
+        grads = self.learn(photo, background)
+        self.adam.step(grads, self.rate_scale * self.rates().decay ** fraction)
+        self.iteration += 1
+        loss, fell_back = None, False
+        if self.iteration % GUARD_EVERY == 0:
+            loss = self.targets.loss(photo).value()
+            fell_back = self.look_after(loss)
+        self.find_pace()
+        if self.settings.grow and GROW_FROM <= fraction <= GROW_UNTIL:
+            if self.steps_to_go() >= SETTLE:
+                self.change()
+        return loss, fell_back
+
+    def steps_to_go(self) -> float:
+        """How many more the budget allows, as fast as they have been."""
+        done = self.budget.fraction(self.iteration, self.elapsed)
+        return self.iteration * (1 - done) / max(done, 1e-9)
+
+    def look_after(self, loss: float) -> bool:
+        """The guard's look at the last step; True when it turned the run back."""
+        if self.guard.healthy(self.stop.name, loss, self.visible(), 1.0):
+            if self.iteration >= self.next_snapshot and self.guard.sure and self.settled:
+                self.guard.remember(self.adam.state())
+                self.next_snapshot = self.iteration + SNAPSHOT_EVERY
+            return False
+        self.adam.load(self.guard.fall_back())
+        self.evidence = PlainEvidence(self.device, self.count)
+        self.rate_scale /= 2
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
+        return True
+
+    def change(self) -> None:
+        """Clones, halves and farewells every so many steps; opacities are set back more rarely.
+
+        What is drawn by chance follows from the seed and the step alone.
+        """
+        settings = self.settings
+        if self.iteration % settings.interval(self.run_length or 0) == 0:
+            evidence = self.device.download(self.evidence.sums)
+            after_reset = self.iteration > settings.reset_every
+            state = self.adam.state()
+            change = decide(state, evidence, settings, self.extent, after_reset)
+            rng = np.random.default_rng([settings.seed, 3, self.iteration])
+            self.adam.load(changed_splats(state, change, rng))
+            self.evidence = PlainEvidence(self.device, self.count)
+            self.grown_at = self.iteration
+        if self.iteration % settings.reset_every == 0:
+            self.adam.load(reset_opacity(self.adam.state()))
+            self.grown_at = self.iteration
+
+    def held_out_psnr(self, most: int = 2) -> dict[str, float]:
+        """Mean PSNR in dB over the first held-out photos, as they are trained."""
+        background, values = self.schedule.background or BLACK, []
+        for photo in self.held_out[:most]:
+            drawing = self.step.draw(photo.view, background)
+            values.append(self.psnr_of(drawing, photo, background))
+        return {self.stop.name: float(np.mean(values))} if values else {}
+
+    def splats(self) -> PlainSplats:
+        """The splats as a PLY holds them; harmonics that were not switched on yet are zero."""
+        value = {n: a for n, a in self.adam.state().items() if n.endswith(".value")}
+        sh = np.concatenate([value["base.value"][:, None], value["rest.value"]], axis=1)
+        return PlainSplats(
+            value["means.value"],
+            np.exp(value["scales.value"]),
+            normalize(value["wxyz.value"]),
+            1 / (1 + np.exp(-value["opacity.value"])),
+            sh,
+        )
