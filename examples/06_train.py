@@ -32,7 +32,7 @@ def tell(step) -> None:
         print(f"{step.iteration} steps, {step.fraction:.0%}, {step.anchors:,} anchors")
 
 
-model = ss.train(capture, seconds=SECONDS, anchors=2000, progress=tell, pace=False)
+model = ss.train(capture, seconds=SECONDS, max_anchors=2000, progress=tell, pace=False)
 print(f"{model.steps} steps in {model.seconds:.0f} s; held-out photos:", model.psnr_db)
 
 # 3. A trained scene is a scene.

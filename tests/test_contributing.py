@@ -142,7 +142,7 @@ def test_every_training_setting_says_what_it_is_and_python_takes_it():
     assert not silent
     with pytest.raises(ss.BadFile):  # every field is taken; the capture is what is missing
         values = {f.name: getattr(TrainSettings(), f.name) for f in fields(TrainSettings)}
-        ss.train("no capture", preset="fast", **{n: values[n] for n in ("anchors", "revive")})
+        ss.train("no capture", preset="fast", **{n: values[n] for n in ("max_anchors", "revive")})
 
 
 def test_every_kernel_is_named_by_the_module_that_launches_it_or_a_kernel_that_includes_it():

@@ -142,11 +142,12 @@ def capture(tmp_path_factory):
 def test_training_gives_a_scene_and_the_same_bits_as_the_command(capture, tmp_path):
     from shapeshift.app.training import train as command
 
-    how = {"iterations": 12, "anchors": 60, "points": "random", "device": "cpu"}
+    how = {"iterations": 12, "max_anchors": 60, "points": "random", "device": "cpu"}
     told = []
     model = ss.train(capture, tmp_path / "a.shift", pace=False, progress=told.append, **how)
     words = [str(capture), "--out", str(tmp_path / "b.shift")]
-    words += [w for name, value in how.items() for w in (f"--{name}", str(value))]
+    for name, value in how.items():
+        words += ["--" + name.replace("_", "-"), str(value)]
     assert command.run(parse(command.Options, words, "train")) == 0
     other = ss.load(tmp_path / "b.shift")
     np.testing.assert_array_equal(model.model.anchors, other.model.anchors)
@@ -160,7 +161,7 @@ def test_training_gives_a_scene_and_the_same_bits_as_the_command(capture, tmp_pa
 
 
 def test_a_run_goes_on_from_its_checkpoint_and_ends_when_told(capture, tmp_path):
-    how = {"anchors": 60, "points": "random", "device": "cpu", "pace": False}
+    how = {"max_anchors": 60, "points": "random", "device": "cpu", "pace": False}
     ss.train(capture, tmp_path / "a.shift", iterations=6, **how)
     more = ss.train(capture, tmp_path / "a.shift", iterations=12, resume=True, device="cpu",
                     pace=False)  # fmt: skip
@@ -168,7 +169,7 @@ def test_a_run_goes_on_from_its_checkpoint_and_ends_when_told(capture, tmp_path)
     short = ss.train(capture, iterations=50, progress=lambda step: step.iteration < 3, **how)
     assert short.steps == 3 and short.path is None
     with pytest.raises(ss.UsageError, match="resume goes on with the settings of the checkpoint"):
-        ss.train(capture, tmp_path / "a.shift", resume=True, anchors=70)
+        ss.train(capture, tmp_path / "a.shift", resume=True, max_anchors=70)
     with pytest.raises(ss.UsageError, match="give out, too"):
         ss.train(capture, resume=True)
 
@@ -179,7 +180,7 @@ def test_ctrl_c_loses_nothing(capture, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        ss.train(capture, tmp_path / "a.shift", iterations=50, anchors=60, points="random",
+        ss.train(capture, tmp_path / "a.shift", iterations=50, max_anchors=60, points="random",
                  device="cpu", progress=interrupt)  # fmt: skip
     assert [stop.name for stop in ss.load(tmp_path / "a.shift").stops] == ["RGB", "Thermal"]
     model = ss.train(capture, tmp_path / "a.shift", resume=True, iterations=8, pace=False)
@@ -187,7 +188,7 @@ def test_ctrl_c_loses_nothing(capture, tmp_path):
 
 
 def test_what_a_training_does_not_know_is_refused(capture, tmp_path):
-    with pytest.raises(ss.UsageError, match="no setting 'anchor' of a training; did you mean anch"):
+    with pytest.raises(ss.UsageError, match="no setting 'anchor' of a training; did you mean"):
         ss.train(capture, anchor=60)
     with pytest.raises(ss.UsageError, match="iterations is 0"):
         ss.train(capture, iterations=0)
@@ -212,7 +213,7 @@ def test_the_front_page_of_the_readme_runs(capture, tmp_path, monkeypatch):
     shutil.copy(ss.DEMO, tmp_path / "workshop.shift")
     shutil.copytree(capture, tmp_path / "capture")
     names = {}
-    exec(lines.replace("seconds=60", "seconds=1, anchors=60, points='random'"), names)
+    exec(lines.replace("seconds=60", "seconds=1, max_anchors=60, points='random'"), names)
     assert names["picture"].shape == (360, 640, 3)
     assert [stop.name for stop in ss.load("scene.shift").stops] == ["RGB", "Thermal"]
     assert (tmp_path / "thermal.png").exists()

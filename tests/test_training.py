@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.app.errors import UsageError
-from shapeshift.app.training.train_options import resumed
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.write_package import write_package
@@ -20,7 +18,7 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
 from shapeshift.training.evaluation.evaluate import evaluate_model
-from shapeshift.training.settings import TrainSettings
+from shapeshift.training.settings import TrainSettings, resumed
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
 from tests.training_runs import run
@@ -198,11 +196,11 @@ def test_a_checkpoint_that_is_cut_off_is_refused(tmp_path):
 
 def test_a_checkpoint_of_another_version_is_refused():
     before = SETTINGS.as_dict()
-    assert resumed(before) == SETTINGS
+    assert resumed(before, {}) == SETTINGS
     older = {name: value for name, value in before.items() if name != "own"} | {"voxel": None}
     for other, word in ((older, "own"), (before | {"tomorrow": 1}, "tomorrow")):
-        with pytest.raises(UsageError, match=rf"another version.*\({word}\); train anew"):
-            resumed(other)
+        with pytest.raises(ValueError, match=rf"another version.*\({word}\); train anew"):
+            resumed(other, {})
 
 
 def test_a_modality_without_photos_is_refused(device, balls):

@@ -58,18 +58,19 @@ def train(
 ) -> TrainedScene:
     """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
 
-    seconds or iterations: how long; without either the preset says.  The same iterations give the
-    same bits on one device.  out: a package, NAME.shift or a folder, that is written with its
-    checkpoint beside it, also every minute and when Ctrl-C ends the run; resume goes on from there.
+    seconds or iterations: how long; without either the preset says.  Seconds are of one core, the
+    processor time of all threads; on a GPU by the clock.  The same iterations give the same bits on
+    one device.  out: a package, NAME.shift or a folder, that is written with its checkpoint beside
+    it, also every minute and when Ctrl-C ends the run; resume goes on from there.
     calibrate: a modality whose cameras all sit a little beside their stated poses, as on a rig.
     pace: measure how evenly the slider moves, a second or two a pair of stops.  progress: called
     after every step with (iteration, fraction, loss, anchors); what gives False ends the run early,
     and the scene is what was trained so far.  settings: any field of
-    `shapeshift.training.settings.TrainSettings`, such as anchors, max_anchors, downscale, masks.
+    `shapeshift.training.settings.TrainSettings`, such as max_anchors, downscale, masks.
 
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
-        model = ss.train("capture", seconds=60, anchors=4000)
+        model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
     from shapeshift.app.training.keeping import memory_for_training, refuse_place
