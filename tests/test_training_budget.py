@@ -26,6 +26,8 @@ class Steps(Run):
         self.adam = {"anchors": [0]}
         self.iteration, self.elapsed, self.run_length = 0, 0.0, None
 
+    splat_count = 1
+
     def warm_up(self) -> None:
         burn(0.05)
 
@@ -99,7 +101,8 @@ def test_the_same_seed_gives_the_same_file_to_the_byte(tmp_path):
     files = []
     for name in ("a", "b"):
         out = tmp_path / name / "scene.shift"
-        words = ["train", tmp_path / "balls", "--out", out, "--iterations", 30, "--anchors", 200]
+        words = ["train", tmp_path / "balls", "--out", out, "--iterations", 30, "--max-anchors",
+                 200]  # fmt: skip
         assert cli.main(list(map(str, words))) == 0
         files.append(out.read_bytes())
     assert files[0] == files[1]
