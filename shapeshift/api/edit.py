@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shapeshift.app.document import Document, placed
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject, placed
 from shapeshift.runtime_models.model import Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.stop_weights import StopWeights
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from shapeshift.api.scene import Scene
 
 
-def stops_of(subject: Subject) -> tuple[Stop, ...]:
+def stops_of(subject: Document) -> tuple[Stop, ...]:
     """The stops of all objects by x, as a scene file names them; one of each name."""
     found: dict[str, Stop] = {}
     items = {item.name: item for item in subject.file.all_items} if subject.file else {}
@@ -51,13 +51,13 @@ def describe(scene: "Scene") -> dict[str, Any]:
 
 
 def changed(
-    subject: Subject,
+    subject: Document,
     thing: SceneObject,
     position: Sequence[float] | None,
     wxyz: Sequence[float] | None,
     x: "X | None",
     visible: bool | None,
-) -> Subject:
+) -> Document:
     """With one object elsewhere, or at another x, in what is drawn and in its scene file."""
     before, file = thing.world_from_object, subject.file
     pose = Pose(
@@ -75,7 +75,7 @@ def changed(
     if file is not None:  # as a simulation takes it
         place = {"position": tuple(map(float, pose.position)), "wxyz": tuple(map(float, pose.wxyz))}
         file = edits.change(file, thing.name, x=moved.x, visible=shown, **place)
-    return Subject(DrawnScene(things), file)
+    return Document(DrawnScene(things), file)
 
 
 def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayers:

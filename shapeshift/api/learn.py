@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from shapeshift.api.arguments import PathText
 from shapeshift.api.load import opened
 from shapeshift.api.scene import Scene
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class TrainedScene(Scene):
     """
 
     def __init__(self, model: AnchorModel, path: Path | None, trainer: "Trainer") -> None:
-        super().__init__(Subject.of(model), path)
+        super().__init__(Document.of(model), path)
         self.steps: int = trainer.iteration
         self.seconds: float = trainer.elapsed
         self.anchors: int = trainer.anchors_count

@@ -4,9 +4,9 @@ from typing import Any, Literal
 
 from shapeshift.api.arguments import PathText, Progress
 from shapeshift.api.scene import Scene
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.document.scene_file import is_scene_file
@@ -51,7 +51,7 @@ def load(
         memory_gb=memory_gb,
     )  # fmt: skip
     if not is_scene_file(path):
-        return Scene(Subject.of(read_model(path, reading)), path, up=up, flip=flip)
+        return Scene(Document.of(read_model(path, reading)), path, up=up, flip=flip)
     for name in OF_OBJECTS:
         if getattr(reading, name):
             raise UsageError(f"{name} is for one model; in {path.name} each object has its own.")
@@ -59,7 +59,7 @@ def load(
     scene = scene_of(file, read_models(file, reading))
     if not scene.objects:
         raise BadFile(f"{path} has no object; nothing is there to be drawn.")
-    return Scene(Subject(scene, file), path)
+    return Scene(Document(scene, file), path)
 
 
 def info(scene: "PathText | Scene") -> dict[str, Any]:

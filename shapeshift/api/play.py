@@ -8,9 +8,9 @@ from typing import Any, Literal
 from shapeshift.api.arguments import PathText, Progress, Size, X
 from shapeshift.api.load import opened
 from shapeshift.api.scene import Scene
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
 
 HZ = 90
@@ -99,7 +99,7 @@ def steps_of(scene: Scene, simulation: Any, steps: int) -> Iterator[Step]:
     """The steps, made as they are asked for."""
     for number in range(1, steps + 1):
         row = simulation.step().row()
-        stands = Scene(Subject(simulation.world.drawn(), scene.subject.file), scene.path)
+        stands = Scene(Document(simulation.world.drawn(), scene.subject.file), scene.path)
         yield Step(number, number / HZ, row, stands)
 
 

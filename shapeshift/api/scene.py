@@ -9,8 +9,8 @@ import numpy as np
 
 from shapeshift.api.arguments import DEFAULT_SIZE, Camera, Output, PathText, Size, X
 from shapeshift.api.edit import changed, describe, layers_of, regions_of, stops_of
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.model import Finding, Model, Stop
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.stop_weights import Control, StopWeights
@@ -38,7 +38,7 @@ class Scene:
     """
 
     def __init__(
-        self, subject: Subject, path: Path | None = None, *, up: str = "", flip: bool = False
+        self, subject: Document, path: Path | None = None, *, up: str = "", flip: bool = False
     ) -> None:
         self._subject = subject
         self.turned = (up, flip)  # as `load` was given them: cameras of its world are, too
@@ -150,7 +150,7 @@ class Scene:
         return self._subject.scene
 
     @property
-    def subject(self) -> Subject:
+    def subject(self) -> Document:
         """The same scene as the commands have it, with its scene file if it came from one.
 
         scene.subject.file.gravity_m_s2
@@ -166,7 +166,7 @@ class Scene:
 
     # ---- another scene
 
-    def _with(self, subject: Subject) -> "Scene":
+    def _with(self, subject: Document) -> "Scene":
         up, flip = self.turned
         return Scene(subject, self.path, up=up, flip=flip)
 
@@ -264,7 +264,7 @@ class Scene:
 
         scene = ss.Scene.from_model(replace(model, stops=model.stops[:2]))
         """
-        return Scene(Subject.of(model))
+        return Scene(Document.of(model))
 
     @staticmethod
     def from_splats(*layers: PlainSplats, names: Sequence[str] = ()) -> "Scene":
