@@ -21,7 +21,6 @@ from shapeshift.scene.selectors.selector import Selector
 
 if TYPE_CHECKING:
     from shapeshift.api.arguments import X
-    from shapeshift.api.scene import Scene
 
 
 def stops_of(subject: Document) -> tuple[Stop, ...]:
@@ -35,17 +34,19 @@ def stops_of(subject: Document) -> tuple[Stop, ...]:
     return tuple(sorted(found.values(), key=lambda stop: stop.x))
 
 
-def describe(scene: "Scene") -> dict[str, Any]:
+def describe(subject: Document, path: Path | None) -> dict[str, Any]:
     """What Scene.info gives."""
     from shapeshift.app.scene_files import describe_scene
     from shapeshift.runtime_models.read_scene import describe as describe_model
 
-    if scene.subject.file is not None and scene.path is not None:
-        models = {thing.name: thing.model for thing in scene.objects}
-        return describe_scene(scene.subject.file, models, scene.path)
-    if scene.path is not None:
-        return describe_model(scene.model, scene.path)
-    facts = describe_model(scene.model, Path("."))
+    things = subject.scene.objects
+    if subject.file is not None and path is not None:
+        return describe_scene(subject.file, {thing.name: thing.model for thing in things}, path)
+    if len(subject.models) != 1:
+        raise UsageError("this scene has several models; take scene.object(NAME).model.")
+    if path is not None:
+        return describe_model(subject.models[0], path)
+    facts = describe_model(subject.models[0], Path("."))
     facts.pop("bytes")
     return facts
 

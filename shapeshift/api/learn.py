@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from shapeshift.api.arguments import PathText
-from shapeshift.api.load import opened
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import opened
 from shapeshift.api.scene import Scene
 from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
@@ -61,12 +62,11 @@ def train(
     seconds or iterations: how long; without either the preset says.  Seconds are of one core, the
     processor time of all threads; on a GPU by the clock.  The same iterations give the same bits on
     one device.  out: a package, NAME.shift or a folder, that is written with its checkpoint beside
-    it, also every minute and when Ctrl-C ends the run; resume goes on from there.
-    calibrate: a modality whose cameras all sit a little beside their stated poses, as on a rig.
-    pace: measure how evenly the slider moves, a second or two a pair of stops.  progress: called
-    after every step with (iteration, fraction, loss, anchors); what gives False ends the run early,
-    and the scene is what was trained so far.  settings: any field of
-    `shapeshift.training.settings.TrainSettings`, such as max_anchors, downscale, masks.
+    it, also every minute and when Ctrl-C ends the run; resume goes on from there.  calibrate: a
+    modality whose cameras all sit a little beside their stated poses, as on a rig.  pace: measure
+    how evenly the slider moves, a second a pair of stops.  progress: called after every step with
+    (iteration, fraction, loss, anchors); False from it ends the run with what there is.  settings:
+    any field of `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
 
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
@@ -170,7 +170,7 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
 
 
 def evaluate(
-    scene: PathText | Scene,
+    scene: PathText | OpenedScene,
     capture: PathText,
     *,
     modality: str | None = None,
