@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from shapeshift.app.subject import Subject
+from shapeshift.app.document import Document
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.cameras.framing import distances_from, orbit_path
@@ -34,7 +34,7 @@ class Measure:
     """One scene at one size in one renderer."""
 
     def __init__(
-        self, renderer: Renderer, ctx, subject: Subject, x: float | None, size: tuple[int, int]
+        self, renderer: Renderer, ctx, subject: Document, x: float | None, size: tuple[int, int]
     ) -> None:
         """x: of all objects on the orbit; None: each at its own."""
         self.renderer, self.ctx, self.subject, self.size = renderer, ctx, subject, size

@@ -2,8 +2,8 @@
 
 from splat_scenes import random_layers
 
+from shapeshift.app.document import Document
 from shapeshift.app.stability_cases.stage import Stage
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.model import SplatLayers
 
 SIZE = (96, 64)
@@ -12,7 +12,7 @@ SIZE = (96, 64)
 def make_stage(renderer, ctx, reopen, model: SplatLayers | None = None, **choices) -> Stage:
     """A cloud of splats of random colours in two layers: the hardest scene for an old order."""
     model = model or random_layers(1500, seed=3, layers=2)
-    return Stage(renderer, ctx, Subject.of(model), SIZE, reopen, steps=12, rounds=20, **choices)
+    return Stage(renderer, ctx, Document.of(model), SIZE, reopen, steps=12, rounds=20, **choices)
 
 
 def failures(result) -> list[str]:

@@ -28,8 +28,8 @@ NAMES = ["background", "cube", "ball", "ring", "plate"]
 
 def state_of(found: OpenedFiles) -> EditorState:
     state = EditorState(lambda path: None)
-    scene, document = opened_scene(found)
-    state.take(found.sources, scene, None, document)
+    scene, edited = opened_scene(found)
+    state.take(found.sources, scene, None, edited)
     return state
 
 
@@ -73,23 +73,23 @@ def names(state: EditorState) -> list[str]:
 
 def same_as_file(state: EditorState) -> None:
     """What is drawn is what the file says, and every row belongs to its object."""
-    items = state.document.file.all_items
+    items = state.edited.file.all_items
     assert names(state) == [item.name for item in items]
     assert len(state.filed) == len(state.sweeps) == len(state.sources) == len(items)
     for thing, item, source in zip(state.scene.objects, items, state.sources, strict=True):
         assert (thing.x, thing.visible, thing.selectors) == (item.x, item.visible, item.selectors)
         assert tuple(thing.world_from_object.position) == item.position
-        assert source.model is thing.model is state.document.model(item)
+        assert source.model is thing.model is state.edited.model(item)
 
 
 def edit(state: EditorState, change, *values) -> None:
-    arrange.edit(state, change(state.document.file, *values), change.__name__)
+    arrange.edit(state, change(state.edited.file, *values), change.__name__)
 
 
 def test_a_scene_file_is_shown_as_it_says(state):
     assert names(state) == NAMES
     same_as_file(state)
-    assert not state.document.unsaved
+    assert not state.edited.unsaved
     assert state.first_view((640, 360)).world_from_eye.position == pytest.approx((0.05, 0.5, 0.95))
     assert tuple(state.first_target) == (0.02, 0.04, 0.0)
 
@@ -106,14 +106,14 @@ def test_every_edit_is_shown_and_taken_back(state):
     for step in steps:
         edit(state, *step)
         same_as_file(state)
-        assert state.document.unsaved
+        assert state.edited.unsaved
         scenes.append(state.scene)
     assert names(state) == ["ball 2", "torus", "plate"]
     for scene in reversed(scenes[:-1]):
         arrange.undo(state)
         same_as_file(state)
         assert told(state.scene) == told(scene)
-    assert not state.document.unsaved and arrange.undo(state) == ""
+    assert not state.edited.unsaved and arrange.undo(state) == ""
     for scene in scenes[1:]:
         assert arrange.redo(state) != ""
         same_as_file(state)
@@ -172,15 +172,15 @@ def test_regions_go_with_their_objects(state):
     assert [region.index for region in state.regions.items] == [2]
     view = state.first_view((64, 64))
     assert [len(thing.selectors) for thing in state.shown(view).objects] == [0, 0, 1, 0]
-    file = edits.change(state.document.file, "ring", selectors=(inside,))
+    file = edits.change(state.edited.file, "ring", selectors=(inside,))
     arrange.edit(state, file, "a selector")
     assert len(state.shown(view).objects[2].selectors) == 2  # the file's and the region's
 
 
 def test_a_hand_on_the_slider_is_a_look_that_is_saved_but_not_undone(plain):
     arrange.steer(plain, 0, 0.3)
-    assert plain.document.file.items[0].x == 0.3  # where it starts, once it is saved
-    assert arrange.undo(plain) == "" and not plain.document.unsaved
+    assert plain.edited.file.items[0].x == 0.3  # where it starts, once it is saved
+    assert arrange.undo(plain) == "" and not plain.edited.unsaved
     edit(plain, edits.hide, "b")
     arrange.steer(plain, 0, 0.7)
     arrange.all_go_to_stop(plain, 1)
@@ -259,14 +259,14 @@ def test_a_region_comes_back_with_its_deleted_object(state):
     state.chosen = "cube"
     state.regions.take((Sphere(centre=(0, 0, 0), radius=0.05, x=1.0),), 3)
     state.keep_regions()
-    assert state.document.history.undoes == ""
+    assert state.edited.history.undoes == ""
     edit(state, edits.remove, "ring")
     assert state.regions.items == ()
     edit(state, edits.remove, "cube")
     arrange.undo(state)
     arrange.undo(state)
     assert [region.index for region in state.regions.items] == [3]
-    assert names(state)[3] == "ring" and state.regions.kept == state.document.saved_regions
+    assert names(state)[3] == "ring" and state.regions.kept == state.edited.saved_regions
     arrange.redo(state)
     assert state.regions.items == ()
 
@@ -289,17 +289,17 @@ def test_paint_of_another_level_of_detail_is_none_after_undoing(plain):
 
 
 def test_what_was_opened_alone_is_a_scene_that_is_not_saved(plain):
-    items = plain.document.file.items
+    items = plain.edited.file.items
     assert [Path(item.model).name for item in items] == ["a.ply", "b.ply"]
     assert all(Path(item.model).is_absolute() for item in items)
-    assert plain.document.path is None and not plain.document.unsaved
+    assert plain.edited.path is None and not plain.edited.unsaved
     edit(plain, edits.remove, "a")
-    assert plain.document.unsaved and names(plain) == ["b"]
+    assert plain.edited.unsaved and names(plain) == ["b"]
     edit(plain, edits.remove, "b")
     assert plain.scene.objects == ()
     arrange.undo(plain)
     arrange.undo(plain)
-    assert names(plain) == ["a", "b"] and not plain.document.unsaved
+    assert names(plain) == ["a", "b"] and not plain.edited.unsaved
 
 
 def test_two_of_the_same_file_have_names_of_their_own():
@@ -331,11 +331,11 @@ def test_whatever_is_edited_undone_and_redone_all_stay_one(state, seed, monkeypa
     ready(state)
     same_as_file(state)
     same_in_world(state)
-    assert names(state) == NAMES and not state.document.unsaved
+    assert names(state) == NAMES and not state.edited.unsaved
 
 
 def do_something(state: EditorState, rng: np.random.Generator) -> None:
-    file = state.document.file
+    file = state.edited.file
     name = rng.choice(names(state)) if state.scene.objects else ""
     deed = rng.integers(0, 12)
     if deed < 2:
@@ -344,7 +344,7 @@ def do_something(state: EditorState, rng: np.random.Generator) -> None:
         arrange.redo(state)
     elif not name or (deed == 4 and len(file.items) < 12):
         item = replace(edits.find(file, name), name=f"new {rng.integers(5)}") if name else None
-        item = item or state.document.history.steps[0].file.items[0]
+        item = item or state.edited.history.steps[0].file.items[0]
         arrange.edit(state, edits.add(file, item), "add")
     elif deed == 5:
         arrange.edit(state, edits.remove(file, name), "delete")
@@ -374,14 +374,14 @@ def do_something(state: EditorState, rng: np.random.Generator) -> None:
 
 def ready(state: EditorState) -> None:
     end = time.monotonic() + 10
-    while state.bodies.poll(state.document) and time.monotonic() < end:
+    while state.bodies.poll(state.edited) and time.monotonic() < end:
         time.sleep(0.0005)
     assert state.bodies.problem == "" and not state.bodies.busy
 
 
 def same_in_world(state: EditorState) -> None:
     """The world has the same objects in the same order, places, values and bodies."""
-    items = state.document.file.all_items
+    items = state.edited.file.all_items
     assert list(state.world.things) == [item.name for item in items]
     for item, thing in zip(items, state.world.things.values(), strict=True):
         assert thing.item is item and thing.standing.x == item.x
@@ -392,9 +392,9 @@ def same_in_world(state: EditorState) -> None:
 def test_an_edit_that_cannot_be_leaves_all_as_it_was(state):
     before = state.scene
     wrong = edits.change(
-        state.document.file, "ball", selectors=(Painted(np.ones(7, np.float32), 1.0),)
+        state.edited.file, "ball", selectors=(Painted(np.ones(7, np.float32), 1.0),)
     )
     wrong = edits.add(wrong, replace(edits.find(wrong, "ball"), name="copy"))
     with pytest.raises(BadFile, match="paint it anew"):
         arrange.edit(state, wrong, "paint")
-    assert told(state.scene) == told(before) and not state.document.unsaved
+    assert told(state.scene) == told(before) and not state.edited.unsaved

@@ -8,8 +8,8 @@ import pytest
 
 from shapeshift.app import cli, measure
 from shapeshift.app.commands import bench
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.runtime_models.model import Stop
@@ -70,7 +70,7 @@ def clock(monkeypatch):
 
 
 def measured(model, renderer, frames=4, sweep=5, x=0.0):
-    work = measure.Measure(renderer, None, Subject.of(model), x, (16, 12))
+    work = measure.Measure(renderer, None, Document.of(model), x, (16, 12))
     return work.all(frames, sweep, (8, 6))
 
 

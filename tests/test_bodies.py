@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.bodies import Bodies
-from shapeshift.app.editor.state.files.document import Document, key_of
+from shapeshift.app.editor.state.files.edited_file import EditedFile, key_of
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.scene.colliders import collider_files
@@ -31,10 +31,10 @@ def model() -> SplatLayers:
     )  # fmt: skip
 
 
-def document(*items: SceneItem) -> Document:
+def edited(*items: SceneItem) -> EditedFile:
     file = SceneFile(folder=Path("/none"), items=items)
     sources = {key_of(item): Source(Path(item.model), model()) for item in items}
-    return Document(History.of(file), saved=file, sources=sources)
+    return EditedFile(History.of(file), saved=file, sources=sources)
 
 
 def thing(name: str, x: float = 0.0, collider: str | None = HULLS) -> SceneItem:
@@ -61,7 +61,7 @@ def made(monkeypatch) -> list:
     return asked
 
 
-def until_there(bodies: Bodies, of: Document) -> None:
+def until_there(bodies: Bodies, of: EditedFile) -> None:
     end = time.monotonic() + 10
     while bodies.poll(of) and time.monotonic() < end:
         time.sleep(0.001)
@@ -70,7 +70,7 @@ def until_there(bodies: Bodies, of: Document) -> None:
 
 def test_one_collider_serves_all_that_are_alike(made):
     bodies = Bodies()
-    of = document(thing("a"), thing("b"), thing("c", x=1.0), thing("d", collider=None))
+    of = edited(thing("a"), thing("b"), thing("c", x=1.0), thing("d", collider=None))
     until_there(bodies, of)
     assert made == [("a", 0.0), ("c", 1.0)]  # another x is another shape
     things = bodies.world.things
@@ -79,7 +79,7 @@ def test_one_collider_serves_all_that_are_alike(made):
 
 
 def test_a_background_s_is_another_than_an_object_s(made):
-    bodies, of = Bodies(), document(thing("a"))
+    bodies, of = Bodies(), edited(thing("a"))
     background = thing("background", collider=HULLS)
     file = replace(of.file, background=replace(background, static=True))
     of.history = History.of(file)
@@ -88,7 +88,7 @@ def test_a_background_s_is_another_than_an_object_s(made):
 
 
 def test_a_slider_does_not_make_it_anew(made):
-    bodies, of = Bodies(), document(thing("a"))
+    bodies, of = Bodies(), edited(thing("a"))
     until_there(bodies, of)
     for x in (0.1, 0.2, 0.3):
         of.history = of.history.take(edits.set_x(of.file, "a", x), "x")
@@ -98,7 +98,7 @@ def test_a_slider_does_not_make_it_anew(made):
 
 
 def test_what_cannot_be_made_is_said_once_and_the_rest_can_be_touched(made):
-    bodies, of = Bodies(), document(thing("bad", x=0.5), thing("a"))
+    bodies, of = Bodies(), edited(thing("bad", x=0.5), thing("a"))
     until_there(bodies, of)
     assert "bad" in bodies.problem and "cannot be touched" in bodies.problem
     things = bodies.world.things
@@ -110,7 +110,7 @@ def test_what_cannot_be_made_is_said_once_and_the_rest_can_be_touched(made):
 
 
 def test_where_nothing_can_be_touched_there_is_no_world(made):
-    bodies, of = Bodies(), document(thing("a", collider=None))
+    bodies, of = Bodies(), edited(thing("a", collider=None))
     until_there(bodies, of)
     assert bodies.world is None and made == []
 
@@ -120,7 +120,7 @@ def test_without_physics_a_scene_can_be_seen_and_edited(made, monkeypatch):
         raise BadFile("the physics needs rapier3d; pip install rapier3d.")
 
     monkeypatch.setattr(physics.Physics, "__init__", absent)
-    bodies, of = Bodies(), document(thing("a"))
+    bodies, of = Bodies(), edited(thing("a"))
     until_there(bodies, of)
     assert "rapier3d" in bodies.problem and bodies.world is None
     bodies.problem = ""
@@ -143,7 +143,7 @@ def test_another_scene_ends_what_is_being_made(monkeypatch):
             ended.set()
 
     monkeypatch.setattr(collider_files, "one_collider", one_collider)
-    of = document(thing("a"))
+    of = edited(thing("a"))
     with Bodies() as bodies:
         assert bodies.poll(of) and begun.wait(10)
         end = time.monotonic() + 10

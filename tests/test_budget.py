@@ -20,8 +20,8 @@ from shapeshift.app.charts.budget_chart import (
     steady,
     store_rows,
 )
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from tests.models import make_random_model, random_package
@@ -166,13 +166,13 @@ def test_measured_once_for_each_thing_that_matters(cache, monkeypatch):
     monkeypatch.setattr(budget_chart, "measure", lambda *what: calls.append(what) or list(ROWS))
     model = make_random_model(20)
     with Renderer(None) as renderer:
-        first = Drawn(Subject.of(model), 0.0, (40, 30))
+        first = Drawn(Document.of(model), 0.0, (40, 30))
         assert budget_rows(renderer, None, first) == ROWS
-        again = Drawn(Subject.of(make_random_model(20)), 0.0, (40, 30))
+        again = Drawn(Document.of(make_random_model(20)), 0.0, (40, 30))
         assert budget_rows(renderer, None, again) == ROWS
         assert len(calls) == 1
         others = [replace(first, x=0.5), replace(first, size=(30, 40)), replace(first, eyes=2),
-                  replace(first, subject=Subject.of(make_random_model(21)))]  # fmt: skip
+                  replace(first, subject=Document.of(make_random_model(21)))]  # fmt: skip
         for number, other in enumerate(others, 2):
             budget_rows(renderer, None, other)
             assert len(calls) == number

@@ -26,8 +26,8 @@ from shapeshift.app.charts.chart_stage import (
 )
 from shapeshift.app.charts.comparison import MOST_DB
 from shapeshift.app.charts.pareto import pareto_front
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.cameras.framing import frame_points, model_points
 from tests.models import make_random_model, random_package
@@ -257,7 +257,7 @@ def test_scenes_stand_side_by_side():
     """Framed radii touch but do not overlap; the first stays; a shared model is one model."""
     small, large = make_random_model(60, seed=1), make_random_model(60, seed=2)
     large = replace(large, anchors=large.anchors * 3 + np.float32([50, 2, 1]))
-    scene = side_by_side([Subject.of(m) for m in (small, large, small)], 0.5)
+    scene = side_by_side([Document.of(m) for m in (small, large, small)], 0.5)
     centres, radii = [], []
     for thing in scene.objects:
         centre, radius = frame_points(*model_points(thing.model))
@@ -273,14 +273,14 @@ def test_scenes_stand_side_by_side():
 def test_near_and_far_are_in_the_scale_of_the_scene():
     """A scene ten times as large has them ten times as far; within them lie 60 and 90 %."""
     model = make_random_model(500)
-    stage = make_stage([Subject.of(model)], 0.0, (40, 30), Walk(8, 3))
+    stage = make_stage([Document.of(model)], 0.0, (40, 30), Walk(8, 3))
     near, far = stage.distances.near, stage.distances.far
     points = model_points(model)
     eye = stage.middle.world_from_eye.position
     inside = np.linalg.norm(points[0] - eye, axis=1)
     assert (inside < near).mean() == pytest.approx(0.6, abs=0.05)
     assert (inside < far).mean() == pytest.approx(0.9, abs=0.05)
-    ten = Subject.of(replace(model, anchors=model.anchors * 10))
+    ten = Document.of(replace(model, anchors=model.anchors * 10))
     large = make_stage([ten], 0.0, (40, 30), Walk(8, 3))
     assert large.distances.near == pytest.approx(10 * near, rel=1e-3)
     assert large.distances.far == pytest.approx(10 * far, rel=1e-3)
@@ -289,7 +289,7 @@ def test_near_and_far_are_in_the_scale_of_the_scene():
 
 
 def test_the_path_turns_evenly_about_the_scene():
-    stage = make_stage([Subject.of(make_random_model(50))], 0.0, (40, 30), Walk(9, 5, step=1.5))
+    stage = make_stage([Document.of(make_random_model(50))], 0.0, (40, 30), Walk(9, 5, step=1.5))
     assert len(stage.path) == WARM_UP + 9 and stage.xs == (0, 0.25, 0.5, 0.75, 1)
     forward = np.array([v.world_from_eye.matrix()[[0, 2], 2] for v in stage.path])
     turn = np.degrees(np.unwrap(np.arctan2(*forward.T)))

@@ -19,9 +19,9 @@ from shapeshift.app.commands.compare_sides import (
     pictures_in,
     split_stop,
 )
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -104,7 +104,7 @@ def test_the_same_place_in_the_world_is_compared_whatever_the_zero(tmp_path, cap
 
     options = Options("a", "b", size=SMALL)
     for pair in drawn_views(
-        options, choose_views(options, a), a, SceneSide("b", Subject.of(shifted, 0.0))
+        options, choose_views(options, a), a, SceneSide("b", Document.of(shifted, 0.0))
     ):
         assert psnr(pair.a, pair.b) > 60
     views = choose_views(options, a)

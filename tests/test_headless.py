@@ -9,7 +9,7 @@ from PIL import Image
 
 from shapeshift.app import cli
 from shapeshift.app.commands import headless, touch_film
-from shapeshift.app.subject import Subject
+from shapeshift.app.document import Document
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.framing import default_view, frame_points, model_points
 from tests.models import make_random_model, random_package
@@ -105,7 +105,7 @@ def test_a_scene_file_as_it_says(tmp_path, capsys):
 
 def test_viewpoints_look_at_the_same_place_from_as_far(scene):
     model = make_random_model(200)
-    first, left, right = headless.viewpoints(Subject.of(model), (60, 40))
+    first, left, right = headless.viewpoints(Document.of(model), (60, 40))
     wanted = default_view(model, (60, 40))
     np.testing.assert_array_equal(first.world_from_eye.matrix(), wanted.world_from_eye.matrix())
     assert {(v.tangents, v.near, v.far, v.size) for v in (first, left, right)} == {

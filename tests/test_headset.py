@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from shapeshift.app.cli import main
+from shapeshift.app.document import DARK
 from shapeshift.app.headset import headset
 from shapeshift.app.headset.headset import DEMO, NO_HEADSET, Options, interrupting
-from shapeshift.app.headset.xr_scene import BACKGROUND, open_xr
+from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.vr.openxr.instance import Lost, NoHeadset
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -104,18 +105,20 @@ def test_a_second_ctrl_c_ends_at_once_and_none_changes_nothing():
 
 
 def test_a_scene_file_is_a_world_with_a_floor():
-    scene = open_xr(DEMO, Options())
-    assert scene.floor_y == -0.7 and scene.background == BACKGROUND
-    assert set(scene.models) == set(scene.world.things) >= {"cube", "ball", "ring", "plate"}
-    np.testing.assert_allclose(scene.eye.position, (0.05, 0.5, 0.95))
-    assert scene.world.aim((-0.22, 1.0, 0.05), (0.0, -1.0, 0.0)).object == "cube"
-    assert np.abs(scene.centre).max() < 0.5
+    document, world = open_xr(DEMO, Options())
+    assert document.floor_y == -0.7 and document.background_or(DARK) == DARK
+    named = {thing.name for thing in document.scene.objects}
+    assert named == set(world.things) >= {"cube", "ball", "ring", "plate"}
+    eye = document.view((640, 360)).world_from_eye
+    np.testing.assert_allclose(eye.position, (0.05, 0.5, 0.95))
+    assert world.aim((-0.22, 1.0, 0.05), (0.0, -1.0, 0.0)).object == "cube"
+    assert np.abs(document.bounds()[0]).max() < 0.5
 
 
 def test_a_package_alone_is_seen_and_not_touched():
-    scene = open_xr(ROOT / "assets" / "workshop.shift", Options())
-    (thing,) = scene.world.drawn().objects
-    assert (thing.name, scene.floor_y) == ("workshop", None)
-    scene.world.advance(0.05)
-    assert scene.world.drawn().objects[0].world_from_object == thing.world_from_object
-    assert scene.world.nearest(np.zeros(3), 10.0) is None
+    document, world = open_xr(ROOT / "assets" / "workshop.shift", Options())
+    (thing,) = world.drawn().objects
+    assert (thing.name, document.floor_y) == ("workshop", None)
+    world.advance(0.05)
+    assert world.drawn().objects[0].world_from_object == thing.world_from_object
+    assert world.nearest(np.zeros(3), 10.0) is None

@@ -24,8 +24,8 @@ def state() -> EditorState:
     model = replace(make_random_model(20, k=2), stops=STOPS)
     found = OpenedFiles((Source(Path("/data/a.shift"), model),))
     made = EditorState(lambda path: None)
-    scene, document = opened_scene(found)
-    made.take(found.sources, scene, None, document)
+    scene, edited = opened_scene(found)
+    made.take(found.sources, scene, None, edited)
     return made
 
 
@@ -97,7 +97,7 @@ def test_a_key_for_where_it_is_or_a_stop_that_is_not_there_does_nothing(state):
 def test_other_objects_end_a_shift_at_its_end(state):
     arrange.all_go_to_stop(state, 2)
     state.advance(SHIFT_S / 2)
-    file = state.document.file
+    file = state.edited.file
     arrange.edit(state, replace(file, floor_y=0.5), "floor")
     assert state.scene.objects[0].x == 1.0 and not state.shifts
 

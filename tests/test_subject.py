@@ -11,9 +11,9 @@ import pytest
 from shapeshift.app import cli
 from shapeshift.app.charts.chart_stage import side_by_side
 from shapeshift.app.commands.compare_sides import open_side
+from shapeshift.app.document import Document, open_document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import ReadingOptions
-from shapeshift.app.subject import Subject, open_subject
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import read_plain
@@ -58,8 +58,8 @@ def drawn(renderer, scene: Scene, view) -> np.ndarray:
     return renderer.image(0).copy()
 
 
-def opened(path: Path) -> Subject:
-    return open_subject(path, ReadingOptions())
+def opened(path: Path) -> Document:
+    return open_document(path, ReadingOptions())
 
 
 def run(command: str, *words) -> int:
@@ -80,7 +80,7 @@ def test_a_subject_tells_what_its_objects_have(scene):
     assert {thing.x for thing in subject.at(0.25).objects} == {0.25}
     assert subject.at(None) == subject.scene
     one = replace(read_model(scene.parent / "cloud.ply"), origin=(3.0, 0.0, -2.0))
-    assert Subject.of(one).x == 0 and Subject.of(one).origin.tolist() == [3, 0, -2]
+    assert Document.of(one).x == 0 and Document.of(one).origin.tolist() == [3, 0, -2]
     empty = scene.with_name("empty.scene.json")
     empty.write_text("{}")
     with pytest.raises(BadFile, match="has no object"):
@@ -149,8 +149,8 @@ def test_stability(scene, tmp_path, capsys):
     assert "FAILS" not in text and all(case in text for case in cases)
 
 
-def baked(path: Path) -> Subject:
-    return Subject.of(read_model(path))
+def baked(path: Path) -> Document:
+    return Document.of(read_model(path))
 
 
 def test_export_bakes_all_objects_in_place(renderer, scene, tmp_path, capsys):

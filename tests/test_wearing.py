@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shapeshift.app.document import DARK
 from shapeshift.app.headset.headset import DEMO, Options
 from shapeshift.app.headset.headset_report import Report
+from shapeshift.app.headset.open_xr import open_xr
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.app.headset.xr_app import LONGEST_STEP_S, XrApp
-from shapeshift.app.headset.xr_scene import open_xr
 from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import IDENTITY
@@ -96,8 +97,9 @@ def scene():
 def wear(scene):
     def worn(frames: list[Frame], quality: str = "best") -> tuple[XrApp, Played]:
         played = Played(frames)
-        pacing, report = Pacing(scene.background, quality), Report()
-        return XrApp(played, played, played, played, scene, pacing, report), played
+        document, _ = scene
+        pacing, report = Pacing(document.background_or(DARK), quality), Report()
+        return XrApp(played, played, played, played, *scene, pacing, report), played
 
     return worn
 
@@ -113,7 +115,7 @@ def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
             "present right", "floor by coverage 1", "overlay"]  # fmt: skip
     assert played.asked == ["draw", *eyes, "submit", "mirror"] * 2
     assert [len(views) for views in played.views] == [2, 2]
-    assert played.settings.background == xr_app.scene.background
+    assert played.settings.background == xr_app.background
     left = played.views[0][0].world_from_eye
     np.testing.assert_allclose(left.matrix(), head_in_world(xr_app, frame_at(0.0)), atol=1e-9)
 
@@ -121,7 +123,7 @@ def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
 def test_the_floor_is_that_of_the_scene_and_clearer_while_one_moves(wear):
     xr_app, played = wear([frame_at(i * PERIOD) for i in range(3)])
     xr_app.loop()
-    assert {grid.level_m for grid in played.grids} == {xr_app.scene.floor_y}
+    assert {grid.level_m for grid in played.grids} == {xr_app.state.user.floor_y}
     resting = played.grids[-1].clearness
     stick = replace(LOST, active=True, grip=HEAD, aim=HEAD, stick=(0.0, 1.0))
     hands = {"left": stick, "right": LOST}
@@ -162,9 +164,9 @@ def test_the_person_is_put_before_the_scene_once_the_head_is_known(wear):
     xr_app, _ = wear([unknown, frame_at(PERIOD)])
     xr_app.loop()
     found = head_in_world(xr_app, frame_at(PERIOD))
-    eye = xr_app.scene.eye.matrix()
+    eye = xr_app.state.user.eye.matrix()
     np.testing.assert_allclose(found[[0, 2], 3], eye[[0, 2], 3], atol=1e-9)
-    assert found[1, 3] == pytest.approx(1.6 + xr_app.scene.floor_y)
+    assert found[1, 3] == pytest.approx(1.6 + xr_app.state.user.floor_y)
     ahead = -found[:3, 2]
     level = -eye[:3, 2] * (1, 0, 1)
     np.testing.assert_allclose(ahead, level / np.linalg.norm(level), atol=1e-9)

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from shapeshift.app import cli
+from shapeshift.app.document import Document, control_of_text
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject, control_of_text
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -117,8 +117,8 @@ def test_objects_that_have_the_stop_go_there_and_the_others_stay(objects, tmp_pa
 def test_every_command_puts_the_same_x(package, objects, tmp_path, monkeypatch):
     """Names and the numbers that they stand for give the same results."""
     seen = []
-    of = Subject.placed
-    monkeypatch.setattr(Subject, "placed", lambda *a: seen.append(of(*a).x) or of(*a))
+    of = Document.placed
+    monkeypatch.setattr(Document, "placed", lambda *a: seen.append(of(*a).x) or of(*a))
     frames = ("--frames", "2", "--sweep", "2", "--quality-size", "8x8", "--drawing", "tiles")
     assert run("bench", package, "--x", "Thermal", *frames, *TINY) == 0
     quick = ("--quick", "--frames", "2", "--drawing", "tiles", "--context", "none")
@@ -145,7 +145,7 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
     if command == "compare":
         done = run(command, f"{package}@Thermic", package)
     elif command == "vr":
-        from shapeshift.app.headset.xr_scene import open_xr
+        from shapeshift.app.headset.open_xr import open_xr
         from shapeshift.app.opening import ReadingOptions
 
         with pytest.raises(UsageError, match=r"'Thermic' is no x of this scene"):
@@ -161,17 +161,17 @@ def test_every_command_refuses_in_the_same_words(package, tmp_path, capsys, monk
 def test_the_viewer_and_the_headset_start_there(package, objects):
     from shapeshift.app.editor.state.files.open_scene import opened_scene
     from shapeshift.app.editor.state.files.opened import read_files
-    from shapeshift.app.headset.xr_scene import open_xr
+    from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.opening import ReadingOptions
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.scene.cameras.camera_list import CameraReading
 
     def shown(*paths: Path, x: str) -> dict[str, float]:
         found = read_files(paths, lambda path, told: read_model(path), CameraReading(), None)
-        scene, document = opened_scene(found, x)
+        scene, edited = opened_scene(found, x)
         xs = {thing.name: thing.x for thing in scene.objects}
-        assert {item.name: item.x for item in document.file.all_items} == xs
-        assert not document.history.undoes
+        assert {item.name: item.x for item in edited.file.all_items} == xs
+        assert not edited.history.undoes
         return xs
 
     cloud = objects.parent / "cloud.ply"
@@ -180,5 +180,5 @@ def test_the_viewer_and_the_headset_start_there(package, objects):
     assert shown(objects, x="0.25") == {"cube": 0.25, "cloud": 0.25}
     for path, x in ((package, {"random": 1.0}), (objects, {"cube": 1.0, "cloud": 0.0})):
         text = "Thermal" if path == package else "hot"
-        world = open_xr(path, ReadingOptions(), text).world
+        _, world = open_xr(path, ReadingOptions(), text)
         assert {thing.name: thing.x for thing in world.drawn().objects} == x

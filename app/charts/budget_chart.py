@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from shapeshift.app.charts.budget import Budget, Choice, choose
 from shapeshift.app.charts.chart_rows import write_text
-from shapeshift.app.subject import Subject
+from shapeshift.app.document import Document
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
@@ -36,7 +36,7 @@ class BudgetRow:
 class Drawn:
     """What is going to be drawn: the chart belongs to exactly this."""
 
-    subject: Subject
+    subject: Document
     x: float | None  # of all objects; None: each at its own
     size: tuple[int, int]
     eyes: int = 1

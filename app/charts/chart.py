@@ -70,9 +70,9 @@ def run(options: Options) -> int:
 
 def read_subjects(options: Options) -> list:
     """The scenes in order; one that is named twice is read once and shared."""
-    from shapeshift.app.subject import open_subject
+    from shapeshift.app.document import open_document
 
-    known = {path: open_subject(path, options) for path in dict.fromkeys(options.scenes)}
+    known = {path: open_document(path, options) for path in dict.fromkeys(options.scenes)}
     if options.x:
         known = {path: subject.placed(options.x) for path, subject in known.items()}
     return [known[path] for path in options.scenes]

@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeshift.app.charts.chart_settings import Distances
 from shapeshift.app.charts.quick_chart import turned
-from shapeshift.app.subject import Subject
+from shapeshift.app.document import Document
 from shapeshift.scene.cameras.framing import (
     distances_from,
     frame_points,
@@ -57,7 +57,7 @@ class Stage:
 
 
 def make_stage(
-    subjects: Sequence[Subject],
+    subjects: Sequence[Document],
     x: float | None,
     size: tuple[int, int],
     walk: Walk,
@@ -87,7 +87,7 @@ def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
     return tuple(turned(first, centre, step * (i - half)) for i in range(-WARM_UP, walk.frames))
 
 
-def side_by_side(subjects: Sequence[Subject], x: float | None) -> Scene:
+def side_by_side(subjects: Sequence[Document], x: float | None) -> Scene:
     """Along the world's x, framed radii touching; the first stays where it is."""
     things, at, before = [], 0.0, None
     for subject in subjects:

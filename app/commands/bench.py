@@ -54,10 +54,10 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     from shapeshift.app.charts.budget import read_budget
+    from shapeshift.app.document import open_document
     from shapeshift.app.drawing import open_renderer, parse_size
     from shapeshift.app.errors import UsageError
     from shapeshift.app.measure import Measure
-    from shapeshift.app.subject import open_subject
 
     size, budget = parse_size(options.size), read_budget(options.target_ms, options.floor_db)
     quality_size = parse_size(options.quality_size, "--quality-size")
@@ -66,7 +66,7 @@ def run(options: Options) -> int:
         raise UsageError("--target-ms chooses the setting; leave --settings and --target out.")
     if options.json not in (None, STANDARD_OUTPUT):
         check_result_path(options.json)
-    subject = open_subject(options.scene, options)
+    subject = open_document(options.scene, options)
     if options.x:
         subject = subject.placed(options.x)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.app.document import Document, open_document
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject, open_subject
 from shapeshift.runtime_models.model import BadFile
 
 PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
@@ -19,7 +19,7 @@ class SceneSide:
     """A scene as it is at x."""
 
     name: str
-    subject: Subject  # at that x
+    subject: Document  # at that x
     stated: bool = True  # x was given, or each object has its own; else the first stop's was taken
 
 
@@ -36,12 +36,12 @@ def open_side(text: str, options: ReadingOptions) -> SceneSide | PictureSide:
     path, at = split_stop(text)
     if not at and (files := pictures_in(path)):
         return PictureSide(path.name, files)
-    subject, name = open_subject(path, options), path.resolve().name
+    subject, name = open_document(path, options), path.resolve().name
     if at:
         return SceneSide(f"{name} @ {at}", subject.placed(at, f"'{text}'"))
     if subject.file:
         return SceneSide(name, subject)
-    return SceneSide(name, Subject(subject.at(min(subject.stops, default=0.0))), False)
+    return SceneSide(name, Document(subject.at(min(subject.stops, default=0.0))), False)
 
 
 def split_stop(text: str) -> tuple[Path, str]:

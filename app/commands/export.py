@@ -119,18 +119,18 @@ def choose_scenes(options: Options) -> tuple[Path, ...]:
 
 
 def open_scene(path: Path, options: Options):
-    """The Subject of a file, of a scene file the chosen objects alone.  Raises UsageError."""
+    """The Document of a file, of a scene file the chosen objects alone.  Raises UsageError."""
     from dataclasses import replace
 
     from shapeshift.app.commands.exported import check_output
+    from shapeshift.app.document import Document, open_document
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.subject import Subject, open_subject
     from shapeshift.scene.document.scene_file import HULLS, is_scene_file
     from shapeshift.scene.scene import Scene
 
     if not is_scene_file(path):
-        return Subject.of(open_model(path, options))
-    subject = open_subject(path, options)
+        return Document.of(open_model(path, options))
+    subject = open_document(path, options)
     read = {name for item in subject.file.all_items for name in (item.model, item.collider) if name}
     inputs = [subject.file.path(name) for name in read if name != HULLS]
     check_output(options.out, inputs, options.overwrite)
@@ -154,7 +154,7 @@ def parts_of(path: Path, subject, position, options: Options) -> list:
     """What of a scene is written; position (3,) metres is where its zero is put."""
     from dataclasses import replace
 
-    from shapeshift.app.subject import moved_object
+    from shapeshift.app.document import moved_object
     from shapeshift.scene.pose import Pose
     from shapeshift.scene.scene import IDENTITY
 
@@ -216,7 +216,7 @@ def make_part(path: Path, model, position, options: Options, known=None):
 
 def choose_x(text: str, model):
     """The Control of one model.  Raises UsageError."""
-    from shapeshift.app.subject import control_of_text, pace_of
+    from shapeshift.app.document import control_of_text, pace_of
 
     if not text:
         return min((stop.x for stop in model.stops), default=0.0)

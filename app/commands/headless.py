@@ -11,7 +11,6 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import say, tell_json
 
 TOUCH = "touch.png"
-BACKGROUND = (0.075, 0.078, 0.085)  # as in the viewer, where the scene names none
 QUALITY_SIZE = (192, 128)  # of the pictures that are compared with the float64 reference
 TURN = 0.6  # radians between the viewpoints
 
@@ -41,23 +40,23 @@ def run(options: Options) -> int:
         print_table,
         write_json,
     )
+    from shapeshift.app.document import DARK, open_document
     from shapeshift.app.drawing import make_folder, open_renderer, parse_size
     from shapeshift.app.errors import UsageError
     from shapeshift.app.measure import Measure
     from shapeshift.app.opening import ReadingOptions
-    from shapeshift.app.subject import open_subject
 
     size = parse_size(options.size)
     check_counts(options)
     if options.scene == DEMO and not DEMO.exists():
         raise UsageError(f"the bundled demo {DEMO} is missing; `{program()} demo` makes one.")
-    subject = open_subject(options.scene, ReadingOptions())
+    subject = open_document(options.scene, ReadingOptions())
     result_path = options.out / "bench.json"
     make_folder(options.out)
     check_result_path(result_path)
     check_ours([options.out / TOUCH])
     with open_renderer("auto", "auto") as (renderer, ctx):
-        renderer.settings = replace(renderer.settings, background=behind(subject))
+        renderer.settings = replace(renderer.settings, background=subject.background_or(DARK))
         draw_sheet(renderer, subject, size, options.out)
         result = measure(Measure(renderer, ctx, subject, None, size), options, QUALITY_SIZE)
         if options.scene == DEMO:
@@ -68,13 +67,6 @@ def run(options: Options) -> int:
     told = {"out": str(options.out), "frame_ms": result["frame_ms"]}
     tell_json(told | {"psnr_db": result["psnr_db"], "touch": result.get("touch")}, indent=None)
     return 0
-
-
-def behind(subject) -> tuple[float, float, float]:
-    """The background: what the scene names, else the viewer's."""
-    from shapeshift.scene.cameras.framing import default_background
-
-    return BACKGROUND if subject.file else default_background(subject.models[0], BACKGROUND)
 
 
 def play_touch(renderer, ctx, size: tuple[int, int], out: Path) -> dict | None:

@@ -1,6 +1,5 @@
 """launch.py render: a scene into PNG files, without a window."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -91,7 +90,6 @@ def run(options: Options) -> int:
         split_controls,
     )
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.document.scene_file import is_scene_file
 
     controls = split_controls(options.x) or [None]
     size = parse_size(options.size) if options.size else None
@@ -108,13 +106,13 @@ def run(options: Options) -> int:
     cameras = choose_cameras(options, size)
     count = len(cameras.views) if cameras else None
     choose_paths(options, [label_of(control) for control in controls], count)
-    opened = (open_objects if is_scene_file(options.scene) else open_one)(options, cameras, size)
-    views, subjects = opened.views, [subject_at(opened.subject, each) for each in controls]
+    document, views, selectors = open_views(options, cameras, size)
+    subjects = [document_at(document, each) for each in controls]
     labels = [label_of(each, s.x) for each, s in zip(controls, subjects, strict=True)]
     rows, paths = choose_paths(options, labels, count)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         make_folder(options.out)
-        background = options.background or opened.background
+        background = options.background or document.background
         renderer.settings = replace(
             settings, target=renderer.settings.target, background=background
         )
@@ -123,48 +121,47 @@ def run(options: Options) -> int:
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
             if options.stereo_colors != "auto":
                 renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)
-        scenes = [opened.scene_of(subjects[c], i) for c, i in rows]
+        scenes = [with_selectors(subjects[c].scene, selectors[i]) for c, i in rows]
         work = (renderer, scenes, [views[i] for _, i in rows], paths, options.stereo)
         if options.output == "picture":
             draw_all(*work)
         else:
-            draw_outputs(*work, options.output, unit_of(options, opened.subject, views))
+            draw_outputs(*work, options.output, unit_of(options, document, views))
     say(f"{len(paths)} picture{'s' * (len(paths) > 1)} in {full(options.out)}")
     return 0
 
 
-@dataclass(frozen=True)
-class Opened:
-    """What is drawn, from where, before what."""
+def open_views(options: Options, cameras, size: tuple[int, int] | None) -> tuple:
+    """The Document, the views of it, and for each view the selectors of --select."""
+    from shapeshift.app.document import Document, open_document
+    from shapeshift.app.errors import UsageError
+    from shapeshift.scene.document.scene_file import is_scene_file
 
-    views: list
-    background: tuple[float, float, float]  # where the options give none
-    scene_of: Callable  # (Subject at its x, row of the view) -> Scene
-    subject: object
-
-
-def open_one(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
-    """A scene of one model, with the parts of --select."""
-    from shapeshift.app.subject import Subject
-    from shapeshift.scene.scene import Scene
-
-    model = open_model(options.scene, options)
-    subject = Subject.of(model, 0.0)
-    views = subject.sees(cameras).views if cameras else own_views(options, subject, size)
-    selectors = [choose_selectors(options.select, model, view) for view in views]
-
-    def scene_of(subject: Subject, row: int) -> Scene:
-        (thing,) = subject.scene.objects
-        return Scene((replace(thing, selectors=selectors[row]),))
-
-    return Opened(views, subject.background, scene_of, subject)
+    if not is_scene_file(options.scene):
+        model = open_model(options.scene, options)
+        document = Document.of(model, 0.0)
+        views = document.sees(cameras).views if cameras else own_views(options, document, size)
+        return document, views, [choose_selectors(options.select, model, view) for view in views]
+    if options.select:
+        raise UsageError("--select is for one model; a scene file has selectors for each object.")
+    document = open_document(options.scene, options)
+    views = cameras.views if cameras else own_views(options, document, size)
+    return document, views, [()] * len(views)
 
 
-def subject_at(subject, control: float | str | None):
-    """The Subject at a value of --x; None: as it is.  Raises UsageError."""
+def with_selectors(scene, selectors: tuple):
+    """The scene of one object with these parts; without any, as it is."""
+    if not selectors:
+        return scene
+    (thing,) = scene.objects
+    return replace(scene, objects=(replace(thing, selectors=selectors),))
+
+
+def document_at(document, control: float | str | None):
+    """The Document at a value of --x; None: as it is.  Raises UsageError."""
     if isinstance(control, str):
-        return subject.placed(control)
-    return replace(subject, scene=subject.at(control))
+        return document.placed(control)
+    return replace(document, scene=document.at(control))
 
 
 def label_of(control: float | str | None, x=None) -> str:
@@ -179,18 +176,6 @@ def label_of(control: float | str | None, x=None) -> str:
         return f"x{float(control):.3f}"
     except ValueError:
         return file_name(control)
-
-
-def open_objects(options: Options, cameras, size: tuple[int, int] | None) -> Opened:
-    """The objects of a scene file, each where and as the file says."""
-    from shapeshift.app.errors import UsageError
-    from shapeshift.app.subject import open_subject
-
-    if options.select:
-        raise UsageError("--select is for one model; a scene file has selectors for each object.")
-    subject = open_subject(options.scene, options)
-    views = cameras.views if cameras else own_views(options, subject, size)
-    return Opened(views, subject.background, lambda subject, row: subject.scene, subject)
 
 
 def check_one_of(options: Options, budget) -> None:

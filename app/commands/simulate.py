@@ -91,9 +91,9 @@ def refuse_model(path: Path) -> None:
 
 def make_simulation(file, acts: tuple, x: str = ""):
     """The scene with its models, bodies and physics.  Raises BadFile, UsageError."""
+    from shapeshift.app.document import file_at
     from shapeshift.app.opening import PATIENCE_S, progress_after, sentence
     from shapeshift.app.scene_files import tell_findings
-    from shapeshift.app.subject import file_at
     from shapeshift.runtime_models.splats.plain_splats import Reading
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document.scene_file import read_models

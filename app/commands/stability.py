@@ -47,14 +47,14 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
+    from shapeshift.app.document import open_document
     from shapeshift.app.drawing import make_folder, open_renderer, parse_size
     from shapeshift.app.stability_cases.stage import Stage
     from shapeshift.app.stability_cases.table import open_table
-    from shapeshift.app.subject import open_subject
 
     size = parse_size(options.size)
     names = choose_cases(options)
-    scene = open_subject(options.scene, options)
+    scene = open_document(options.scene, options)
     make_folder(options.out)
 
     def reopen():

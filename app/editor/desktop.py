@@ -42,8 +42,8 @@ def run(options: Options) -> int:
     found = named_cameras(options.camera, options, read)
     if not found.sources and found.file is None:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
-    scene, document = opened_scene(found, options.x)
-    state.take(found.sources, scene, first_look(found), document)
+    scene, edited = opened_scene(found, options.x)
+    state.take(found.sources, scene, first_look(found), edited)
     state.settings = replace(state.settings, debug=options.debug)
     state.regions.take(read_selectors(options.select, state), 0)
     state.keep_regions()

@@ -11,9 +11,9 @@ from typing import Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, Opt
 from shapeshift.app.opening import ReadingOptions
+from shapeshift.app.paths import TOUCH as DEMO
 from shapeshift.app.terminal import say
 
-DEMO = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
 NO_HEADSET = 4  # exit code
 
 
@@ -109,22 +109,23 @@ def check(options: Options) -> None:
 def wear(options: Options) -> int:
     """The session from its door to its end.  Raises NoHeadset, Lost."""
     from shapeshift.app.cli import has_display
+    from shapeshift.app.document import DARK
     from shapeshift.app.drawing import make_folder
     from shapeshift.app.headset.headset_report import Report
     from shapeshift.app.headset.mirror import open_mirror
+    from shapeshift.app.headset.open_xr import open_xr
     from shapeshift.app.headset.pacing import FLOOR_DB, Pacing
     from shapeshift.app.headset.xr_app import Eyes, XrApp
-    from shapeshift.app.headset.xr_scene import open_xr
     from shapeshift.renderer.renderer import Renderer
     from shapeshift.vr.locomotion.locomotion import Rules
     from shapeshift.vr.openxr.instance import Instance, Lost
     from shapeshift.vr.openxr.session import Session
 
     with Instance() as instance:
-        scene = open_xr(options.scene or DEMO, options, options.x)
+        document, world = open_xr(options.scene or DEMO, options, options.x)
         pacing = Pacing(
-            scene.background, options.quality, options.floor_db or FLOOR_DB, options.target_ms,
-            options.stereo_colors,
+            document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
+            options.target_ms, options.stereo_colors,
         )  # fmt: skip
         if options.pictures:
             make_folder(options.pictures)
@@ -139,8 +140,8 @@ def wear(options: Options) -> int:
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
-                session, renderer, eyes, mirror, scene, pacing, report, rules, options.panel_hand,
-                options.floor, options.hints,
+                session, renderer, eyes, mirror, document, world, pacing, report, rules,
+                options.panel_hand, options.floor, options.hints,
             )  # fmt: skip
             try:
                 with interrupting(xr_app):

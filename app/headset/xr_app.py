@@ -5,16 +5,17 @@ from collections.abc import Sequence
 
 import moderngl
 
+from shapeshift.app.document import DARK, Document
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
-from shapeshift.app.headset.xr_scene import XrScene
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.pose import View
+from shapeshift.scene.world.world import World
 from shapeshift.vr.card import Card
 from shapeshift.vr.drawn import Drawn, drawn_of
 from shapeshift.vr.floor import REST, Floor, Grid, clearness
@@ -28,6 +29,7 @@ from shapeshift.vr.outline import BY_HAND, BY_RAY, Outlines, outline
 from shapeshift.vr.overlay import Overlay
 from shapeshift.vr.touching import strongest
 
+ANY_SIZE = (640, 360)  # of a view that only says where to stand
 LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on the table
 
 
@@ -65,7 +67,8 @@ class XrApp:
         renderer: Renderer,
         eyes: Eyes,
         mirror: Mirror | NoMirror,
-        scene: XrScene,
+        document: Document,
+        world: World,
         pacing: Pacing,
         report: Report,
         rules: Rules = RULES,
@@ -74,9 +77,11 @@ class XrApp:
         hints: bool = True,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
-        self.scene, self.report, self._hints = scene, report, hints
-        user = XrUser(scene.world, scene.eye, scene.floor_y, rules)
-        self.state = XrState(scene.world, pacing, user, floor_shown=floor)
+        self.report, self._hints = report, hints
+        self.background = document.background_or(DARK)
+        eye = document.view(ANY_SIZE).world_from_eye
+        user = XrUser(world, eye, document.floor_y, rules)
+        self.state = XrState(world, pacing, user, floor_shown=floor)
         actions = MenuActions(self.recentre, self.leave, self.pulse)
         self.menu = WristMenu(self.state, actions, panel_hand)
         self._level_m = 0.0  # of the floor in the world
@@ -190,7 +195,7 @@ class XrApp:
             self.renderer.present(framebuffer, i)
             if self.state.floor_shown:
                 grid = Grid(self._level_m, self._clearness)
-                behind, hidden = self.scene.background, self.renderer.coverage(i)
+                behind, hidden = self.background, self.renderer.coverage(i)
                 floor = self.eyes.floor
                 floor.draw(framebuffer, play_views[i], self.state.standing, hidden, grid, behind)
             self.eyes.overlay.draw(framebuffer, play_views[i], over)
@@ -203,7 +208,8 @@ class XrApp:
         if not (pace.settled and self.state.pacing.wants_measure(pace.period_s)):
             return
         scene, finish = self.state.world.drawn(), self.mirror.ctx.finish
-        chart = StereoChart(self.renderer, scene, views, self.scene.centre, finish)
+        centre, _ = Document(scene).bounds()
+        chart = StereoChart(self.renderer, scene, views, centre, finish)
         self.state.pacing.measure(chart, pace.period_s)
         pace.restart()
 

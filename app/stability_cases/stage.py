@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from shapeshift.app.document import Document
 from shapeshift.app.stability_cases.finding import Panel
-from shapeshift.app.subject import Subject
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
@@ -24,7 +24,7 @@ class Stage:
 
     renderer: Renderer
     ctx: object  # moderngl.Context, or None with tiles alone
-    subject: Subject
+    subject: Document
     size: tuple[int, int]
     reopen: Callable[[], AbstractContextManager]  # another context and renderer of this kind
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)

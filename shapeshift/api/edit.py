@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from shapeshift.app.document import Document, placed
 from shapeshift.app.errors import UsageError
-from shapeshift.app.subject import Subject, placed
 from shapeshift.runtime_models.model import Model, SplatLayers, Stop
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.stop_weights import StopWeights
@@ -21,10 +21,9 @@ from shapeshift.scene.selectors.selector import Selector
 
 if TYPE_CHECKING:
     from shapeshift.api.arguments import X
-    from shapeshift.api.scene import Scene
 
 
-def stops_of(subject: Subject) -> tuple[Stop, ...]:
+def stops_of(subject: Document) -> tuple[Stop, ...]:
     """The stops of all objects by x, as a scene file names them; one of each name."""
     found: dict[str, Stop] = {}
     items = {item.name: item for item in subject.file.all_items} if subject.file else {}
@@ -35,29 +34,31 @@ def stops_of(subject: Subject) -> tuple[Stop, ...]:
     return tuple(sorted(found.values(), key=lambda stop: stop.x))
 
 
-def describe(scene: "Scene") -> dict[str, Any]:
+def describe(subject: Document, path: Path | None) -> dict[str, Any]:
     """What Scene.info gives."""
     from shapeshift.app.scene_files import describe_scene
     from shapeshift.runtime_models.read_scene import describe as describe_model
 
-    if scene.subject.file is not None and scene.path is not None:
-        models = {thing.name: thing.model for thing in scene.objects}
-        return describe_scene(scene.subject.file, models, scene.path)
-    if scene.path is not None:
-        return describe_model(scene.model, scene.path)
-    facts = describe_model(scene.model, Path("."))
+    things = subject.scene.objects
+    if subject.file is not None and path is not None:
+        return describe_scene(subject.file, {thing.name: thing.model for thing in things}, path)
+    if len(subject.models) != 1:
+        raise UsageError("this scene has several models; take scene.object(NAME).model.")
+    if path is not None:
+        return describe_model(subject.models[0], path)
+    facts = describe_model(subject.models[0], Path("."))
     facts.pop("bytes")
     return facts
 
 
 def changed(
-    subject: Subject,
+    subject: Document,
     thing: SceneObject,
     position: Sequence[float] | None,
     wxyz: Sequence[float] | None,
     x: "X | None",
     visible: bool | None,
-) -> Subject:
+) -> Document:
     """With one object elsewhere, or at another x, in what is drawn and in its scene file."""
     before, file = thing.world_from_object, subject.file
     pose = Pose(
@@ -75,7 +76,7 @@ def changed(
     if file is not None:  # as a simulation takes it
         place = {"position": tuple(map(float, pose.position)), "wxyz": tuple(map(float, pose.wxyz))}
         file = edits.change(file, thing.name, x=moved.x, visible=shown, **place)
-    return Subject(DrawnScene(things), file)
+    return Document(DrawnScene(things), file)
 
 
 def layers_of(layers: Sequence[PlainSplats], names: Sequence[str]) -> SplatLayers:

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from shapeshift.api.arguments import PathText
-from shapeshift.api.load import opened
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import opened
 from shapeshift.api.scene import Scene
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class TrainedScene(Scene):
     """
 
     def __init__(self, model: AnchorModel, path: Path | None, trainer: "Trainer") -> None:
-        super().__init__(Subject.of(model), path)
+        super().__init__(Document.of(model), path)
         self.steps: int = trainer.iteration
         self.seconds: float = trainer.elapsed
         self.anchors: int = trainer.anchors_count
@@ -61,12 +62,11 @@ def train(
     seconds or iterations: how long; without either the preset says.  Seconds are of one core, the
     processor time of all threads; on a GPU by the clock.  The same iterations give the same bits on
     one device.  out: a package, NAME.shift or a folder, that is written with its checkpoint beside
-    it, also every minute and when Ctrl-C ends the run; resume goes on from there.
-    calibrate: a modality whose cameras all sit a little beside their stated poses, as on a rig.
-    pace: measure how evenly the slider moves, a second or two a pair of stops.  progress: called
-    after every step with (iteration, fraction, loss, anchors); what gives False ends the run early,
-    and the scene is what was trained so far.  settings: any field of
-    `shapeshift.training.settings.TrainSettings`, such as max_anchors, downscale, masks.
+    it, also every minute and when Ctrl-C ends the run; resume goes on from there.  calibrate: a
+    modality whose cameras all sit a little beside their stated poses, as on a rig.  pace: measure
+    how evenly the slider moves, a second a pair of stops.  progress: called after every step with
+    (iteration, fraction, loss, anchors); False from it ends the run with what there is.  settings:
+    any field of `shapeshift.training.settings.TrainSettings`, such as max_anchors or downscale.
 
     The model and its losses: the paper's equations 1 to 9.  Raises BadFile, UsageError, NoDevice.
 
@@ -170,7 +170,7 @@ def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
 
 
 def evaluate(
-    scene: PathText | Scene,
+    scene: PathText | OpenedScene,
     capture: PathText,
     *,
     modality: str | None = None,

@@ -3,15 +3,9 @@
 from typing import Any, Literal
 
 from shapeshift.api.arguments import PathText, Progress
+from shapeshift.api.read import opened, read_document
 from shapeshift.api.scene import Scene
-from shapeshift.app.errors import UsageError
-from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject
-from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from shapeshift.scene.document.scene_file import is_scene_file
-
-OF_OBJECTS = ("mode", "up", "flip")  # what a scene file says for each object
 
 
 def load(
@@ -25,7 +19,7 @@ def load(
     max_splats: int = 0,
     memory_gb: float = 0.0,
     progress: Progress | None = None,
-) -> "Scene":
+) -> Scene:
     """Opens whatever the viewer opens: a package, splats of any known format, a folder of layers,
     the folder of a training run, or a scene file of objects (docs/formats.md, docs/scene.md).
 
@@ -41,28 +35,15 @@ def load(
         scene = ss.load("workshop.shift")
         scan = ss.load("scan.ply", up="+Z")
     """
-    from shapeshift.runtime_models.read_scene import read_model
-    from shapeshift.scene.document.read_scene_file import read_scene_file
-    from shapeshift.scene.document.scene_file import read_models, scene_of
-
-    path = plain(str(path))
     reading = Reading(
         mode, up, flip, strict, allow_huge=allow_huge, most_splats=max_splats, told=progress,
         memory_gb=memory_gb,
     )  # fmt: skip
-    if not is_scene_file(path):
-        return Scene(Subject.of(read_model(path, reading)), path, up=up, flip=flip)
-    for name in OF_OBJECTS:
-        if getattr(reading, name):
-            raise UsageError(f"{name} is for one model; in {path.name} each object has its own.")
-    file = read_scene_file(path)
-    scene = scene_of(file, read_models(file, reading))
-    if not scene.objects:
-        raise BadFile(f"{path} has no object; nothing is there to be drawn.")
-    return Scene(Subject(scene, file), path)
+    document, found = read_document(path, reading)
+    return Scene(document, found, up=up, flip=flip)
 
 
-def info(scene: "PathText | Scene") -> dict[str, Any]:
+def info(scene: PathText | Scene) -> dict[str, Any]:
     """What is in a scene: format, splats, stops, networks, objects; JSON types alone.
 
     Of a scene that lies nowhere on disk, `bytes` is missing.  Raises BadFile.
@@ -71,8 +52,3 @@ def info(scene: "PathText | Scene") -> dict[str, Any]:
         [stop["name"] for stop in ss.info(scene)["stops"]]
     """
     return opened(scene).info()
-
-
-def opened(scene: "PathText | Scene") -> "Scene":
-    """The scene itself, or the one in that file."""
-    return scene if isinstance(scene, Scene) else load(scene)

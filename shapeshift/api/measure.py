@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shapeshift.api.arguments import Camera, PathText, Progress, Size, X
-from shapeshift.api.load import opened
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import opened
 from shapeshift.api.render import Context, Drawing
-from shapeshift.api.scene import Scene
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
 from shapeshift.renderer.settings import RenderSettings
@@ -26,8 +26,8 @@ def silent(*told: object) -> None:
 
 
 def compare(
-    a: PathText | Scene,
-    b: PathText | Scene,
+    a: PathText | OpenedScene,
+    b: PathText | OpenedScene,
     *,
     cameras: Camera | None = None,
     size: Size | None = None,
@@ -48,14 +48,15 @@ def compare(
         ss.compare("scene.shift@RGB", "scan.ply")["mean"]["psnr_db"]
         ss.compare(scene.at("RGB"), scene.at("Thermal"), out="diff")
     """
+    from shapeshift.api.views import choose_views
     from shapeshift.app.commands.compare import Options, drawn_views, score
 
     first, second = side_of(a), side_of(b)
-    scene = Scene(first.subject)
+    scene = OpenedScene(first.subject)
     if cameras is None:
-        views = scene.views("orbit", VIEWS, size)
+        views = choose_views(scene, "orbit", VIEWS, size)
     else:
-        views = (a if isinstance(a, Scene) else scene).views(cameras, 1, size)
+        views = choose_views(a if isinstance(a, OpenedScene) else scene, cameras, 1, size)
     options = Options(
         first.name, second.name, out=None if out is None else plain(str(out)),
         background=background, overwrite=overwrite, drawing=drawing, context=context,
@@ -64,13 +65,13 @@ def compare(
     return score(pairs, (first.name, second.name), options, silent)
 
 
-def side_of(scene: PathText | Scene):
+def side_of(scene: PathText | OpenedScene):
     """A scene as it stands, or what a path, or a path with @stop or @x, stands for."""
     from shapeshift.app.commands.compare_sides import SceneSide, split_stop
     from shapeshift.runtime_models.stop_weights import told_control
 
     at = ""
-    if not isinstance(scene, Scene):
+    if not isinstance(scene, OpenedScene):
         path, at = split_stop(str(scene))
         scene = opened(path).at(at or None)
     stops = {stop.x: stop.name for stop in scene.stops}
@@ -81,7 +82,7 @@ def side_of(scene: PathText | Scene):
 
 
 def bench(
-    scene: PathText | Scene,
+    scene: PathText | OpenedScene,
     *,
     frames: int = 60,
     sweep: int = 200,
@@ -118,7 +119,7 @@ def bench(
 
 
 def chart(
-    scene: PathText | Scene,
+    scene: PathText | OpenedScene,
     out: PathText | None = None,
     *,
     quick: bool = True,
@@ -174,7 +175,7 @@ def draws_on_cpu(drawing: str, ctx: Any) -> bool:
 
 
 def draw(
-    rows: "list[ChartRow]", scene: Scene, size: Size, drawing: str, out: Path, on_cpu: bool
+    rows: "list[ChartRow]", scene: OpenedScene, size: Size, drawing: str, out: Path, on_cpu: bool
 ) -> None:
     """chart.svg and chart.png of the rows."""
     from shapeshift.app.charts.chart_picture import draw_chart

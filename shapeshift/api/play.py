@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from shapeshift.api.arguments import PathText, Progress, Size, X
-from shapeshift.api.load import opened
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import opened
 from shapeshift.api.scene import Scene
+from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
-from shapeshift.app.subject import Subject
 from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
 
 HZ = 90
@@ -45,7 +46,7 @@ class Step:
 
 
 def simulate(
-    scene: PathText | Scene,
+    scene: PathText | OpenedScene,
     script: PathText | None = None,
     *,
     seconds: float | None = None,
@@ -81,7 +82,7 @@ def simulate(
     return steps_of(scene, simulation, math.ceil(seconds * HZ - 1e-6))
 
 
-def world_of(scene: Scene, progress: Progress | None):
+def world_of(scene: OpenedScene, progress: Progress | None):
     """The bodies and physics of a scene file, each object's x as the scene has it."""
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document import edits
@@ -95,11 +96,11 @@ def world_of(scene: Scene, progress: Progress | None):
     return World(file, models, colliders_of(file, models, progress), hz=HZ)
 
 
-def steps_of(scene: Scene, simulation: Any, steps: int) -> Iterator[Step]:
+def steps_of(scene: OpenedScene, simulation: Any, steps: int) -> Iterator[Step]:
     """The steps, made as they are asked for."""
     for number in range(1, steps + 1):
         row = simulation.step().row()
-        stands = Scene(Subject(simulation.world.drawn(), scene.subject.file), scene.path)
+        stands = Scene(Document(simulation.world.drawn(), scene.subject.file), scene.path)
         yield Step(number, number / HZ, row, stands)
 
 

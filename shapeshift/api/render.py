@@ -17,7 +17,7 @@ from shapeshift.scene.pose import View
 if TYPE_CHECKING:
     import moderngl
 
-    from shapeshift.api.scene import Scene
+    from shapeshift.api.opened import OpenedScene
     from shapeshift.renderer.renderer import Renderer as FrameRenderer
 
 Drawing = Literal["auto", "quads", "tiles"]
@@ -83,7 +83,7 @@ class Renderer:
         """
         return self._stats
 
-    def render(self, scene: "Scene", view: View, out: np.ndarray | None = None) -> np.ndarray:
+    def render(self, scene: "OpenedScene", view: View, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of a view, row 0 on top, over the settings' background.
 
         out: written to and given back, (H, W, 3) float32 of the view's size; without it the array
@@ -104,7 +104,7 @@ class Renderer:
             np.copyto(out, picture)
         return picture if out is None else out
 
-    def render_views(self, scene: "Scene", views: Sequence[View]) -> list[np.ndarray]:
+    def render_views(self, scene: "OpenedScene", views: Sequence[View]) -> list[np.ndarray]:
         """The same of several views in one frame: what two eyes share is computed once.
 
         left, right = renderer.render_views(scene, ss.stereo_pair(view, 0.063))
@@ -113,7 +113,7 @@ class Renderer:
             self._draw(scene, list(views))
             return [self._frames.resolved(i) for i in range(len(views))]
 
-    def premultiplied(self, scene: "Scene", view: View) -> np.ndarray:
+    def premultiplied(self, scene: "OpenedScene", view: View) -> np.ndarray:
         """(H, W, 4) float32 red, green, blue times alpha, and alpha, before any background.
 
         Tiles on a CPU hand over the memory that they drew into: read-only, not copied, and yours as
@@ -125,7 +125,7 @@ class Renderer:
             self._draw(scene, [view])
             return self._frames.image(0)
 
-    def surface(self, scene: "Scene", view: View) -> Surface:
+    def surface(self, scene: "OpenedScene", view: View) -> Surface:
         """Depth (metres along the view), normals and coverage of what a view sees.
 
         depth_m = renderer.surface(scene, view).depth()  # (H, W), NaN where nothing is
@@ -134,7 +134,7 @@ class Renderer:
             self._frames.update(scene.drawn)
             return self._frames.surface(view)
 
-    def _draw(self, scene: "Scene", views: list[View]) -> None:
+    def _draw(self, scene: "OpenedScene", views: list[View]) -> None:
         self._frames.update(scene.drawn)
         self._stats = self._frames.draw(views)
 

@@ -1,6 +1,5 @@
 """From where a scene is drawn, and the pictures that come of it."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from shapeshift.scene.pose import View
 from shapeshift.scene.stereo import stereo_pair
 
 if TYPE_CHECKING:
-    from shapeshift.api.scene import Scene
+    from shapeshift.api.opened import OpenedScene
 
 SWEEP = "sweep"
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
@@ -28,7 +27,7 @@ OUTPUTS = ("picture", "depth", "normal", "coverage")
 WIDEST_EYES_M = 1.0
 
 
-def choose_views(scene: "Scene", camera: Any, count: int, size: Size | None) -> list[View]:
+def choose_views(scene: "OpenedScene", camera: Any, count: int, size: Size | None) -> list[View]:
     """What Scene.views gives."""
     if not (isinstance(count, int | np.integer) and count >= 1):
         raise UsageError(f"count is {count}; 1 view or more are wanted.")
@@ -51,7 +50,7 @@ def choose_views(scene: "Scene", camera: Any, count: int, size: Size | None) -> 
     return [view.resized(size) if size else view for view in views]
 
 
-def read_cameras(scene: "Scene", camera: str, size: Size | None) -> CameraList:
+def read_cameras(scene: "OpenedScene", camera: str, size: Size | None) -> CameraList:
     """The cameras of a file, or with `auto` those that lie with the scene's own."""
     from shapeshift.scene.cameras.read_cameras import find_cameras, find_floor, read_camera_list
 
@@ -66,7 +65,7 @@ def read_cameras(scene: "Scene", camera: str, size: Size | None) -> CameraList:
 
 
 def picture_of(
-    scene: "Scene",
+    scene: "OpenedScene",
     view: View,
     background: tuple[float, float, float] | None,
     eye_distance: float,
@@ -91,7 +90,7 @@ def picture_of(
 
 
 def draw_eyes(
-    renderer: Renderer, scene: "Scene", eyes: list[View], output: Output
+    renderer: Renderer, scene: "OpenedScene", eyes: list[View], output: Output
 ) -> list[np.ndarray]:
     """(H, W, 3) or (H, W) of each eye."""
     if output == "picture":
@@ -100,15 +99,6 @@ def draw_eyes(
     if output == "coverage":
         return [surface.coverage for surface in surfaces]
     return [s.depth() if output == "depth" else s.normals() for s in surfaces]
-
-
-def film(
-    scene: "Scene", x: Any, camera: Any, count: int, size: Size | None, how: dict[str, Any]
-) -> Iterator[Picture]:
-    """What Scene.frames gives; what cannot be is refused before the first picture."""
-    views = choose_views(scene, camera, count, size)
-    scenes = [scene.at(each) for each in spread(x, len(views))]
-    return (each.render(None, view, **how) for each, view in zip(scenes, views, strict=True))
 
 
 def spread(x: Any, count: int) -> list[Any]:

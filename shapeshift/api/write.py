@@ -9,8 +9,8 @@ import numpy as np
 
 from shapeshift.api.arguments import PathText, Progress, X
 from shapeshift.api.edit import regions_of
-from shapeshift.api.load import opened
-from shapeshift.api.scene import Scene
+from shapeshift.api.opened import OpenedScene
+from shapeshift.api.read import opened
 from shapeshift.app.commands.exported import Look, Part, bake_part, check_output, is_folder
 from shapeshift.app.commands.exported import export as export_parts
 from shapeshift.app.errors import UsageError
@@ -38,7 +38,7 @@ class Exported:
 
 
 def export(
-    scene: PathText | Scene,
+    scene: PathText | OpenedScene,
     out: PathText,
     *,
     x: X | None = None,
@@ -90,7 +90,7 @@ def export(
     return Exported(out, out.stat().st_size, len(splats.means), splats.findings)
 
 
-def save(scene: Scene, path: PathText, overwrite: bool) -> Exported:
+def save(scene: OpenedScene, path: PathText, overwrite: bool) -> Exported:
     """What Scene.save does."""
     from shapeshift.runtime_models.package.write_package import write_package
 
@@ -127,7 +127,7 @@ def look_of(
 
 
 def bake_scene(
-    scene: Scene, sh_degree: int, palette: bool, eye: Sequence[float] | None
+    scene: OpenedScene, sh_degree: int, palette: bool, eye: Sequence[float] | None
 ) -> PlainSplats:
     """What Scene.splats gives: arrays that nothing else holds."""
     look = look_of(sh_degree, palette, eye)

@@ -29,8 +29,8 @@ def touch_found() -> OpenedFiles:
 
 def viewer_of(window, found: OpenedFiles, folder: Path) -> Viewer:
     state = EditorState(lambda path: ball())
-    scene, document = opened_scene(found)
-    state.take(found.sources, scene, None, document)
+    scene, edited = opened_scene(found)
+    state.take(found.sources, scene, None, edited)
     viewer = Viewer(window, PlainRenderer(window.ctx), state, Options(pictures=folder / "pictures"))
     viewer.files.read = lambda path, told: ball()
     viewer.set_title()

@@ -81,12 +81,12 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     assert moved.position[0] > 0.05 and moved.position[1:] == pytest.approx(start[1:], abs=1e-6)
     np.testing.assert_array_equal(moved.wxyz, (1, 0, 0, 0))
     np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), camera)
-    item = state.document.file.items[1]
+    item = state.edited.file.items[1]
     assert item.position == pytest.approx(moved.position, abs=1e-6) and item.wxyz == (1, 0, 0, 0)
     assert tuple(moved.position) == item.position
     there = state.world.physics.pose(state.world.things["ball"].body).position
     assert there == pytest.approx(moved.position, abs=1e-6)
-    assert len(state.document.history.steps) == 2 and viewer.objects.unsaved
+    assert len(state.edited.history.steps) == 2 and viewer.objects.unsaved
     key(viewer, glfw.KEY_Z, CTRL)
     assert tuple(thing(viewer, "ball").world_from_object.position) == tuple(start)
     assert not viewer.objects.unsaved
@@ -110,7 +110,7 @@ def test_handles_turn_it_in_its_place(viewer):
     pose = thing(viewer, "cube").world_from_object
     assert abs(pose.wxyz[0]) < 0.999 and np.linalg.norm(pose.wxyz) == pytest.approx(1)
     assert pose.position == pytest.approx((-0.22, 0.051, 0.05), abs=0.01)  # about its middle
-    assert state.document.file.items[0].wxyz == pytest.approx(pose.wxyz, abs=1e-8)
+    assert state.edited.file.items[0].wxyz == pytest.approx(pose.wxyz, abs=1e-8)
     viewer.state.handles = ""
 
 
@@ -129,7 +129,7 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     assert not objects.edits.edit(edits.rename, "ball", "cube", what="rename")
     assert "taken" in viewer.state.problem
     key(viewer, glfw.KEY_ESCAPE)
-    while viewer.state.document.history.undoes:
+    while viewer.state.edited.history.undoes:
         key(viewer, glfw.KEY_Z, CTRL)
     assert names(viewer) == NAMES and list(viewer.state.world.things) == NAMES
     key(viewer, glfw.KEY_Z, CTRL)
@@ -163,13 +163,13 @@ def test_what_the_device_cannot_hold_is_not_added(viewer, monkeypatch):
     monkeypatch.setattr(viewer.renderer, "update", refuse)
     viewer.objects.adding.take(OpenedFiles((Source(Path("/x/more.ply"), ball(50)),)))
     assert names(viewer) == NAMES and "device" in viewer.state.problem
-    assert viewer.state.document.history.undoes == ""
+    assert viewer.state.edited.history.undoes == ""
 
 
 def test_a_scene_file_is_dropped_on_the_window(plain):
     plain.take(Drop((TOUCH,)))
     until_opened(plain)
-    assert names(plain) == NAMES and plain.state.document.path == TOUCH
+    assert names(plain) == NAMES and plain.state.edited.path == TOUCH
     wrong = Drop((TOUCH, TOUCH.with_name("other.scene.json")))
     plain.take(wrong)
     until_opened(plain)
@@ -187,7 +187,7 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
         run_frames(viewer, 1, seconds=0.02)
     fallen = thing(viewer, "ball")
     assert 0.0 < fallen.world_from_object.position[1] < 0.45 and fallen.x == 0.25
-    assert not state.document.edited and not objects.unsaved
+    assert not state.edited.changed and not objects.unsaved
     state.world.paused = True
     run_frames(viewer, 2)
     state.chosen = "ball"
@@ -199,7 +199,7 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
     assert copy.x == 0.25  # a copy of what is seen, not of where it started
     key(viewer, glfw.KEY_Z, CTRL)
     objects.edits.keep_standing()
-    item = edits.find(state.document.file, "ball")
+    item = edits.find(state.edited.file, "ball")
     assert item.x == 0.25
     assert item.position == pytest.approx(fallen.world_from_object.position, abs=1e-5)
     key(viewer, glfw.KEY_Z, CTRL)
@@ -208,12 +208,12 @@ def test_what_moves_while_the_world_runs_is_no_edit_until_it_is_kept(viewer):
 
 def test_a_body_is_given_taken_and_weighed(viewer):
     objects, world = viewer.objects, viewer.state.world
-    item = edits.find(viewer.state.document.file, "ball")
+    item = edits.find(viewer.state.edited.file, "ball")
     assert objects.edits.change(item, "body", collider=None)
     assert world.things["ball"].body is None
     key(viewer, glfw.KEY_Z, CTRL)
     assert world.things["ball"].body is not None
-    item = edits.find(viewer.state.document.file, "ball")
+    item = edits.find(viewer.state.edited.file, "ball")
     assert objects.edits.change(item, "mass", mass_kg=2.0)
     assert world.physics.mass(world.things["ball"].body) == pytest.approx(2.0)
     assert objects.edits.change(item, "body", static=True) and not world.things["ball"].moves
@@ -221,7 +221,7 @@ def test_a_body_is_given_taken_and_weighed(viewer):
 
 def test_a_collider_that_cannot_be_made_is_a_sentence(viewer):
     objects, state = viewer.objects, viewer.state
-    item = edits.find(state.document.file, "ball")
+    item = edits.find(state.edited.file, "ball")
     assert objects.edits.change(item, "body", collider="touch/none.obj")
     end = time.monotonic() + 20
     while state.bodies.busy and time.monotonic() < end:
@@ -255,4 +255,4 @@ def test_a_long_list_and_every_part_of_the_panel_is_drawn(viewer):
     viewer.state.move(1, thing(viewer, "plate").world_from_object)
     run_frames(viewer, 2)
     viewer.objects.edits.keep_standing()
-    assert viewer.state.document.file.items[0].position == (0.28, 0.005, 0.1)
+    assert viewer.state.edited.file.items[0].position == (0.28, 0.005, 0.1)

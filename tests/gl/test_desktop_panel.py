@@ -165,7 +165,7 @@ def test_nothing_open_says_what_to_drop(splats_viewer, display, monkeypatch):
     until_opened(viewer)
     viewer.objects.saving.answer("Discard")
     run_frames(viewer, 2)
-    assert viewer.state.document.path == TOUCH and len(viewer.window.covered) == 3
+    assert viewer.state.edited.path == TOUCH and len(viewer.window.covered) == 3
 
 
 def test_ctrl_o_asks_for_a_path_and_opens_it(viewer, hands, tmp_path):

@@ -11,7 +11,7 @@ from real_hands import RealHands
 from widgets import Widgets
 
 from shapeshift.app.editor.state.arrange import steer
-from shapeshift.app.editor.state.files.document import stamp_of
+from shapeshift.app.editor.state.files.edited_file import stamp_of
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.document import edits
@@ -65,7 +65,7 @@ def test_a_name_among_what_the_program_brought_along_is_refused(viewer, tmp_path
 
 
 def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
-    saving, document = viewer.objects.saving, viewer.state.document
+    saving, edited = viewer.objects.saving, viewer.state.edited
     path = tmp_path / "own.scene.json"
     assert not saving.in_place and saving.named(str(path)) and saving.in_place
     viewer.state.chosen = "ball"
@@ -75,7 +75,7 @@ def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
     assert [item.name for item in read_scene_file(path).items] == ["cube", "ring", "plate"]
     other = tmp_path / "other.scene.json"  # as somebody has sent it, and as it was opened
     other.write_bytes(path.read_bytes())
-    document.path, document.stamp = other, stamp_of(other)
+    edited.path, edited.stamp = other, stamp_of(other)
     assert saving.original == other
     key(viewer, glfw.KEY_S, CTRL)
     assert saving.asking and other.read_bytes() == path.read_bytes()
@@ -84,10 +84,10 @@ def test_ones_own_file_is_written_over_and_anothers_is_not(viewer, tmp_path):
 
 
 def test_a_file_that_was_opened_is_replaced_when_it_is_said_twice(viewer, tmp_path, monkeypatch):
-    saving, document, widgets = viewer.objects.saving, viewer.state.document, Widgets(monkeypatch)
+    saving, edited, widgets = viewer.objects.saving, viewer.state.edited, Widgets(monkeypatch)
     path = tmp_path / "theirs.scene.json"
     path.write_text("{}")
-    document.path, document.stamp = path, stamp_of(path)
+    edited.path, edited.stamp = path, stamp_of(path)
     key(viewer, glfw.KEY_S, CTRL)
     run_frames(viewer, 3)
     for word in ("Over it", "Replace it"):
@@ -110,7 +110,7 @@ def test_a_proposed_name_is_free(plain, tmp_path):
 
 
 def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_path):
-    objects, document = viewer.objects, viewer.state.document
+    objects, edited = viewer.objects, viewer.state.edited
     path = tmp_path / "a.scene.json"
     assert objects.saving.named(str(path))
     path.write_text("{}")  # by somebody else
@@ -123,7 +123,7 @@ def test_what_somebody_else_has_written_meanwhile_is_asked_about(viewer, tmp_pat
     assert objects.saving.in_place  # by its name; what lies there is asked about all the same
     objects.saving.save()
     assert objects.saving.named(str(path), replace=True) and not objects.saving.asking
-    assert json.loads(path.read_text())["objects"] and document.path == path
+    assert json.loads(path.read_text())["objects"] and edited.path == path
 
 
 def test_nothing_is_replaced_unasked(viewer, tmp_path):
@@ -159,7 +159,7 @@ def test_a_name_is_typed_and_what_goes_wrong_is_said_until_it_is_read(viewer, tm
         assert not viewer.objects.saving.asking
         key(viewer, glfw.KEY_ESCAPE)  # it is read
         assert viewer.state.problem == ""
-    assert viewer.state.document.path == tmp_path / "mine.scene.json"
+    assert viewer.state.edited.path == tmp_path / "mine.scene.json"
 
 
 def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
@@ -208,20 +208,20 @@ def test_a_slider_alone_asks_nothing(viewer):
     steer(viewer.state, 1, 0.5)
     run_frames(viewer, 1)
     assert viewer.objects.status() == "" and viewer._may_close()
-    assert viewer.state.document.file.all_items[1].x == 0.5  # saved when something else is
+    assert viewer.state.edited.file.all_items[1].x == 0.5  # saved when something else is
 
 
 def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
     objects, state = viewer.objects, viewer.state
     first = state.world
     assert objects.edits.edit(edits.ground, -0.2, what="floor")
-    assert state.document.file.floor_y == -0.2 and state.world is not first
+    assert state.edited.file.floor_y == -0.2 and state.world is not first
     assert state.world.paused and list(state.world.things) == NAMES
     viewer.viewpoint.camera.turn(0.3, -0.1)
     run_frames(viewer, 60)
     objects.edits.look_from_here()
     eye = viewer.viewpoint.view().world_from_eye.position
-    assert state.document.file.view.eye == pytest.approx(eye, abs=1e-6)
+    assert state.edited.file.view.eye == pytest.approx(eye, abs=1e-6)
     assert objects.saving.named(str(tmp_path / "a"))
     again = state.first_view((900, 640))
     np.testing.assert_allclose(
@@ -229,7 +229,7 @@ def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
     )
     key(viewer, glfw.KEY_Z, CTRL)
     key(viewer, glfw.KEY_Z, CTRL)
-    assert state.document.file.floor_y == -0.7 and objects.unsaved
+    assert state.edited.file.floor_y == -0.7 and objects.unsaved
 
 
 def test_paint_on_what_is_no_file_yet_is_asked_about_and_a_lens_is_not(plain):

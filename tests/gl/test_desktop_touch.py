@@ -11,7 +11,7 @@ from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.panels.sections.touch_panel import pad_object, pad_of, side_names
 from shapeshift.app.editor.state.bodies import made_of
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.document import Document
+from shapeshift.app.editor.state.files.edited_file import EditedFile
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.window.touch import HAND, MouseTouch
 from shapeshift.app.editor.window.window import DoubleClick, Drag, KeyDown, Press, Release, Wheel
@@ -52,8 +52,8 @@ def viewer(window, tmp_path):
     models = {item.name: model for item in ITEMS}
     source = Source(Path("a"), model)
     state = EditorState(lambda path: model)
-    document = Document(History.of(FILE), saved=FILE, sources={("a", "", "", False): source})
-    state.take([source, source], scene_of(FILE, models), None, document)
+    edited = EditedFile(History.of(FILE), saved=FILE, sources={("a", "", "", False): source})
+    state.take([source, source], scene_of(FILE, models), None, edited)
     state.bodies._of = {item.name: (made_of(item), BOX) for item in ITEMS}  # nothing is cut up
     with state.bodies:
         options = Options(pictures=tmp_path, play=True)

@@ -74,7 +74,7 @@ def test_a_person_plays_with_the_bundled_scene(viewer):
     for name, at in start.items():
         np.testing.assert_allclose(place(viewer, name), at, atol=0.01)
     assert [thing(viewer, name).x for name in ("cube", "ball", "ring")] == [0.0, 0.0, 0.5]
-    assert not viewer.state.document.unsaved  # play is no edit
+    assert not viewer.state.edited.unsaved  # play is no edit
 
 
 def test_steps_by_hand_and_turning_with_shift(viewer):

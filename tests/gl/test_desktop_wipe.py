@@ -9,11 +9,11 @@ import pytest
 from desktop_stand import ball, run_frames
 
 from shapeshift.app.commands.compare_sides import SceneSide
+from shapeshift.app.document import Document
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.window.window import Drag, KeyDown, Press, Release
 from shapeshift.app.editor.window.wipe import KEYS, Wipe
-from shapeshift.app.subject import Subject
 from shapeshift.renderer.renderer import Renderer
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window
@@ -31,7 +31,7 @@ def stand(window, tmp_path, request):
     options = Options(pictures=tmp_path, panel=False, drawing=request.param)
     with Renderer(window.ctx, request.param) as one, Renderer(window.ctx, request.param) as other:
         viewer = Viewer(window, one, state, options)
-        side = SceneSide("b", Subject.of(b, 0.0), stated=False)
+        side = SceneSide("b", Document.of(b, 0.0), stated=False)
         wipe = Wipe(window, (one, other), state, side, viewer.free())
         wipe.attach(viewer.hooks)
         run_frames(viewer, 5)
@@ -110,7 +110,7 @@ def test_at_rest_the_likeness_is_told_once(stand, monkeypatch):
 
 def test_zeros_that_lie_elsewhere_are_respected(stand):
     viewer, wipe, b = stand
-    far = Subject.of(replace(b, origin=(100.0, 0.0, 0.0)))
+    far = Document.of(replace(b, origin=(100.0, 0.0, 0.0)))
     wipe._side = replace(wipe._side, subject=far)
     offset = wipe._offset(viewer.state.scene)
     np.testing.assert_array_equal(offset, [-100.0, 0.0, 0.0])
@@ -121,11 +121,11 @@ def test_a_scene_file_is_drawn_where_it_says_beside_itself_at_another_x(window, 
     far = replace(ball(50), origin=(100.0, 0.0, 0.0))
     state = EditorState(lambda path: far)
     state.open([Path("a.ply")])
-    state.document.path = tmp_path / "a.scene.json"
+    state.edited.path = tmp_path / "a.scene.json"
     options = Options(pictures=tmp_path, panel=False, drawing="quads")
     with Renderer(window.ctx, "quads") as one, Renderer(window.ctx, "quads") as other:
         viewer = Viewer(window, one, state, options)
-        side = SceneSide("b", Subject.of(ball(50), 0.0))
+        side = SceneSide("b", Document.of(ball(50), 0.0))
         wipe = Wipe(window, (one, other), state, side, viewer.free())
         wipe.attach(viewer.hooks)
         run_frames(viewer, 2)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shapeshift.app.headset.xr_scene import BACKGROUND
+from shapeshift.app.document import DARK
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import read_models, scene_of
@@ -53,7 +53,7 @@ def scene_at(line: dict) -> Scene:
 def drawn(scene: Scene, view: View) -> np.ndarray:
     """(H, W, 3) over the background."""
     image = reference_image(scene, view)
-    return np.clip(image[..., :3] + (1 - image[..., 3:]) * BACKGROUND, 0, 1)
+    return np.clip(image[..., :3] + (1 - image[..., 3:]) * DARK, 0, 1)
 
 
 def pixel_of(view: View, world: np.ndarray) -> tuple[int, int]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.document import key_of
+from shapeshift.app.editor.state.files.edited_file import key_of
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.track import next_stop, stepped
 from shapeshift.runtime_models.model import BadFile
@@ -27,8 +27,8 @@ COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 def edit(state: EditorState, file: SceneFile, what: str, together: str = "") -> None:
     """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
     state.record_regions()
-    turn_to(state, state.document.history.take(file, what, together))
-    state.document.amend_regions(state.regions)
+    turn_to(state, state.edited.history.take(file, what, together))
+    state.edited.amend_regions(state.regions)
 
 
 def undo(state: EditorState) -> str:
@@ -37,46 +37,46 @@ def undo(state: EditorState) -> str:
     Looks are no edits: the camera and every slider stay where they are.
     """
     state.record_regions()
-    what = state.document.history.undoes
-    go_back(state, state.document.history.undo())
+    what = state.edited.history.undoes
+    go_back(state, state.edited.history.undo())
     return what
 
 
 def redo(state: EditorState) -> str:
     state.record_regions()
-    what = state.document.history.redoes
-    go_back(state, state.document.history.redo())
+    what = state.edited.history.redoes
+    go_back(state, state.edited.history.redo())
     return what
 
 
 def go_back(state: EditorState, history: History) -> None:
     """Goes to a step that has been before, with every x as it is now."""
-    now = state.document.history
+    now = state.edited.history
     turn_to(state, history.amend(edits.with_x_of(history.file, now.file)))
     if history.regions != now.regions:
         state.regions.restore(history.regions)
         for index, thing in enumerate(state.scene.objects):
             state.regions.fit_painted(index, thing)
-    state.document.amend_regions(state.regions)
+    state.edited.amend_regions(state.regions)
 
 
 def turn_to(state: EditorState, history: History) -> None:
     """Goes to another step of the history: only what differs is touched."""
-    before = state.document.history
+    before = state.edited.history
     state.finish_shifts()
-    state.document.history = history
+    state.edited.history = history
     if history.file is before.file:
         return
     changed = edits.changes(before.file, history.file)
     try:
         world = state.world
-        state.bodies.follow(state.document)
+        state.bodies.follow(state.edited)
         arrange(state, changed)
         if state.world is not world:  # a new one stands at its start
             state.follow_world()
     except BadFile:
-        state.document.history = before
-        state.bodies.follow(state.document)
+        state.edited.history = before
+        state.bodies.follow(state.edited)
         raise
 
 
@@ -85,7 +85,7 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
     of = {change.after.name: change for change in changed if change.after is not None}
     was = {thing.name: index for index, thing in enumerate(state.scene.objects)}
     rows, moved = [], {}
-    for number, (label, item) in enumerate(labelled(state.document.file)):
+    for number, (label, item) in enumerate(labelled(state.edited.file)):
         change = of.get(item.name)
         if change is None:
             index = was[item.name]
@@ -113,7 +113,7 @@ def fresh_row(
     state: EditorState, item: SceneItem, label: int
 ) -> tuple[SceneObject, object, Sweep, Source]:
     """What the state holds of an object that was not there."""
-    source = state.document.sources[key_of(item)]
+    source = state.edited.sources[key_of(item)]
     thing = object_of(item, state.in_palette(source.model), label)
     sweep = Sweep.over(source.model.blend)
     sweep.resume_at(item.x)
@@ -139,10 +139,10 @@ def steer(state: EditorState, index: int, x: Control) -> None:
     """
     thing = state.scene.objects[index]
     state.set_x(index, x)
-    if not state.running and edits.find(state.document.file, thing.name) is not None:
-        history = state.document.history
-        state.document.history = history.amend(edits.set_x(history.file, thing.name, x))
-        state.bodies.follow(state.document)
+    if not state.running and edits.find(state.edited.file, thing.name) is not None:
+        history = state.edited.history
+        state.edited.history = history.amend(edits.set_x(history.file, thing.name, x))
+        state.bodies.follow(state.edited)
 
 
 def steer_by_hand(state: EditorState, index: int, x: float) -> None:
@@ -205,17 +205,17 @@ def leave_for_stop(state: EditorState, index: int, number: int) -> None:
 def place(state: EditorState, index: int, pose: Pose) -> None:
     """A hand moves an object: where it starts as well, unless the world is running."""
     name = state.scene.objects[index].name
-    file = edits.place(state.document.file, name, pose)
+    file = edits.place(state.edited.file, name, pose)
     state.move(index, edits.wanted(file, name).pose)
     if not state.running:
-        history = state.document.history
-        state.document.history = history.take(file, f"move {name}", f"place {name}")
-        state.bodies.follow(state.document)
+        history = state.edited.history
+        state.edited.history = history.take(file, f"move {name}", f"place {name}")
+        state.bodies.follow(state.edited)
 
 
 def as_it_stands(state: EditorState) -> SceneFile:
     """The file with everything where it is now, at its x.  ValueError for what has flown off."""
-    file = state.document.file
+    file = state.edited.file
     for thing in state.scene.objects:
         file = edits.place(file, thing.name, thing.world_from_object)
         file = edits.set_x(file, thing.name, thing.x)
@@ -233,7 +233,7 @@ def copy_offset(thing: SceneObject, points: np.ndarray) -> tuple[float, float, f
 
 def stands_elsewhere(state: EditorState) -> bool:
     """Whether anything is not where it starts, or at another x."""
-    items = {item.name: item for item in state.document.file.all_items}
+    items = {item.name: item for item in state.edited.file.all_items}
     for thing in state.scene.objects:
         item, pose = items[thing.name], thing.world_from_object
         if thing.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
@@ -246,7 +246,7 @@ def stands_elsewhere(state: EditorState) -> bool:
 def poll_bodies(state: EditorState) -> bool:
     """Once a frame: a scene becomes one that can be touched; True while colliders are made."""
     bodies, before = state.bodies, state.world
-    busy = bodies.poll(state.document)
+    busy = bodies.poll(state.edited)
     if state.world is not before:
         state.follow_world()
     if bodies.problem:

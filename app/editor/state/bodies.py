@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
-from shapeshift.app.editor.state.files.document import Document, ModelKey, key_of
+from shapeshift.app.editor.state.files.edited_file import EditedFile, ModelKey, key_of
 from shapeshift.app.editor.state.files.opened import Told
 from shapeshift.app.opening import sentence
 from shapeshift.runtime_models.model import BadFile, Model
@@ -62,50 +62,50 @@ class Bodies:
         what, part = self._told
         return f"{what} {part:.0%}" if self.busy else ""
 
-    def follow(self, document: Document) -> None:
+    def follow(self, edited: EditedFile) -> None:
         """Lets the world know of an edit, as soon as there are the colliders for it.
 
         Raises BadFile, with the world as it was, for an object that cannot be as the file says.
         """
         self._stale = True
-        self._catch_up(document)
+        self._catch_up(edited)
 
-    def poll(self, document: Document) -> bool:
+    def poll(self, edited: EditedFile) -> bool:
         """Once a frame; True while colliders are being made."""
         if self._future is not None and self._future.done():
             future, self._future = self._future, None
             key, self._made[key], problem = future.result()
             self.problem = problem or self.problem
         try:
-            self._catch_up(document)
+            self._catch_up(edited)
         except BadFile as error:
             self.problem, self._stale = str(error), False
             self._given_up = self.world is None
         return self.busy
 
-    def _catch_up(self, document: Document) -> None:
+    def _catch_up(self, edited: EditedFile) -> None:
         if self.busy or not self._stale or self._given_up:
             return
-        file = document.file
+        file = edited.file
         touched = [item for item in file.all_items if item.collider is not None]
         missing = [item for item in touched if self._collider(item) is MISSING]
         if missing:
-            self._start(document, missing[0])
+            self._start(edited, missing[0])
             return
         found = {item.name: self._collider(item) for item in touched}
         colliders = {name: made for name, made in found.items() if made is not None}
         self._of = {i.name: (made_of(i), colliders[i.name]) for i in touched if i.name in colliders}
         if touched or self.world is not None:
-            self._to_world(file, document, colliders)
+            self._to_world(file, edited, colliders)
         self._stale = False
 
     def _to_world(
-        self, file: SceneFile, document: Document, colliders: Mapping[str, "Collider"]
+        self, file: SceneFile, edited: EditedFile, colliders: Mapping[str, "Collider"]
     ) -> None:
         from shapeshift.scene.world.follow import follow
         from shapeshift.scene.world.world import World
 
-        models, ground = document.models_by_name(), (file.floor_y, file.gravity_m_s2)
+        models, ground = edited.models_by_name(), (file.floor_y, file.gravity_m_s2)
         if self.world is None or self._ground != ground:  # a floor is no thing that comes or goes
             paused = self.world is None or self.world.paused
             self.world, self._ground = World(file, models, colliders, hz=HZ), ground
@@ -123,10 +123,10 @@ class Bodies:
             return before[1]
         return self._made.get(making_of(item), MISSING)
 
-    def _start(self, document: Document, item: SceneItem) -> None:
+    def _start(self, edited: EditedFile, item: SceneItem) -> None:
         """Makes one collider in a thread that the program's end does not wait for."""
         future = self._future = Future()
-        file, model, unwanted = document.file, document.model(item), self._unwanted
+        file, model, unwanted = edited.file, edited.model(item), self._unwanted
         self._told = (f"{item.name}: making a collider", 0.0)
 
         def told(what: str, part: float) -> None:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.app.document import DARK, Document
 from shapeshift.app.editor.state.bodies import Bodies
 from shapeshift.app.editor.state.camera.first_look import FirstLook
-from shapeshift.app.editor.state.files.document import Document, document_from
+from shapeshift.app.editor.state.files.edited_file import EditedFile, edited_from_scene
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.messages import Messages
 from shapeshift.app.editor.state.regions import Regions
@@ -24,7 +25,6 @@ from shapeshift.scene.cameras.framing import (
     default_background,
     fit_points,
     frame_points,
-    scene_points,
 )
 from shapeshift.scene.control import SHIFT_S, Shift, Sweep
 from shapeshift.scene.document import edits
@@ -36,7 +36,6 @@ from shapeshift.scene.scene import Scene, SceneObject
 if TYPE_CHECKING:
     from shapeshift.scene.world.world import World
 
-BACKGROUND = (0.075, 0.078, 0.085)  # display sRGB: dark and neutral
 HANDLES = ("", "move", "turn")  # that an object can have; "": none
 AS_FILED = ""  # the palette that the scene's own stops name
 
@@ -50,7 +49,7 @@ class EditorState:
         # Of each of the scene's objects:
         self.filed: tuple[Model, ...] = ()  # its model as read, before a palette was chosen
         self.sources: tuple[Source, ...] = ()  # where the scene's objects come from
-        self.document = document_from(self.scene, ())  # the same as a scene file, to be edited
+        self.edited = edited_from_scene(self.scene, ())  # the same as a scene file, to be edited
         self.bodies = Bodies()
         self._followed: Scene | None = None  # the world's, as it was taken over last
         self.chosen = ""  # name of the object that is edited; "": none
@@ -61,7 +60,7 @@ class EditorState:
         self.first_look = FirstLook()
         self.sweeps: list[Sweep] = []
         self.shifts: dict[int, Shift] = {}  # of objects on their way to a stop, by their index
-        self.settings = RenderSettings(background=BACKGROUND)
+        self.settings = RenderSettings(background=DARK)
         self.palette = AS_FILED
         self.regions = Regions()
         self.measure_now = False  # compare the picture with the exact one in the next frame
@@ -87,20 +86,20 @@ class EditorState:
         sources: Sequence[Source],
         scene: Scene,
         first_look: FirstLook | None = None,
-        document: Document | None = None,
+        edited: EditedFile | None = None,
     ) -> None:
         """Shows what has been opened; `scene` is `scene_of(sources)` or of the document's file."""
         self.sources, self.first_look = tuple(sources), first_look or FirstLook()
-        self.show(scene, document)
+        self.show(scene, edited)
 
-    def show(self, scene: Scene, document: Document | None = None) -> None:
+    def show(self, scene: Scene, edited: EditedFile | None = None) -> None:
         """Takes a scene over and frames it."""
         self.scene, self.chosen, self.shifts = scene, "", {}
         self.split.on, self.split.name = False, ""
-        self.document = document or document_from(scene, self.sources)
+        self.edited = edited or edited_from_scene(scene, self.sources)
         self.bodies.forget()
         if scene.objects:
-            background = default_background(scene.objects[0].model, BACKGROUND)
+            background = default_background(scene.objects[0].model, DARK)
             self.settings = replace(self.settings, background=background)
         self.filed = tuple(thing.model for thing in scene.objects)
         self.palette = AS_FILED
@@ -114,16 +113,16 @@ class EditorState:
 
     def keep_regions(self) -> None:
         """The regions as they are belong to what was opened: nothing to undo, nothing unsaved."""
-        self.document.amend_regions(self.regions)
-        self.document.saved_regions = self.regions.kept
+        self.edited.amend_regions(self.regions)
+        self.edited.saved_regions = self.regions.kept
 
     def record_regions(self) -> None:
         """What was done to the regions since the last call is a step of the history."""
-        self.document.record_regions(self.regions)
+        self.edited.record_regions(self.regions)
 
     def reframe(self) -> None:
         """Where the middle of all is now, and how far it reaches."""
-        self._points = scene_points(self.scene)
+        self._points = self.document.points()
         self.centre, self.radius = frame_points(*self._points)
 
     def replace_model(self, index: int, model: Model) -> None:
@@ -133,20 +132,20 @@ class EditorState:
         """
         objects, filed = list(self.scene.objects), list(self.filed)
         filed[index] = model
-        self.document.refine(index, model)
+        self.edited.refine(index, model)
         objects[index] = replace(objects[index], model=self.in_palette(model))
         self.scene, self.filed = Scene(tuple(objects)), tuple(filed)
-        self._points = scene_points(self.scene)
+        self._points = self.document.points()
         self.regions.fit_painted(index, self.scene.objects[index])
 
     def first_view(self, size: tuple[int, int]) -> View:
         """The view of a single package if it gives one, else everything framed."""
-        return self.first_look.view(self.document.file, self.scene, self._points, size)
+        return self.first_look.view(self.edited.file, self.scene, self._points, size)
 
     @property
     def first_target(self) -> np.ndarray:
         """(3,) metres: what the first view looks at and turns about."""
-        view = self.document.file.view
+        view = self.edited.file.view
         return self.centre if view is None else np.array(view.target)
 
     @property
@@ -155,9 +154,14 @@ class EditorState:
         return origin_of(self.scene.objects[0].model) if self.scene.objects else np.zeros(3)
 
     @property
+    def document(self) -> Document:
+        """What is open, as it is now, as commands and the headset have it."""
+        return Document(self.scene, self.edited.file)
+
+    @property
     def title(self) -> str:
         """What is open: the scene file, else the names of the objects."""
-        path = self.document.path
+        path = self.edited.path
         return path.name if path else ", ".join(thing.name for thing in self.scene.objects)
 
     @property
@@ -235,7 +239,7 @@ class EditorState:
 
     def rest(self) -> None:
         """The hand has let go: the next edit is a step of its own."""
-        self.document.history = self.document.history.rest()
+        self.edited.history = self.edited.history.rest()
 
     def move(self, index: int, pose: Pose) -> None:
         """Puts an object elsewhere, at rest; what the file says stays."""
@@ -275,7 +279,7 @@ class EditorState:
     def stops(self, index: int) -> tuple[Stop, ...]:
         """The stops of an object's slider, by x, under the names that the scene gives them."""
         thing = self.scene.objects[index]
-        item = edits.find(self.document.file, thing.name)
+        item = edits.find(self.edited.file, thing.name)
         return named_stops(item or SceneItem(name=thing.name, model=""), thing.model)
 
     def finish_shifts(self) -> None:

@@ -29,7 +29,7 @@ class ObjectEdits:
         """Does an edit of scene/document/edits.py; where it cannot be done False, and says why."""
         state = self.state
         try:
-            edit(state, change(state.document.file, *values), what, together)
+            edit(state, change(state.edited.file, *values), what, together)
         except ValueError as error:  # BadFile is one
             self.state.messages.fail(str(error))
             return False
@@ -53,7 +53,7 @@ class ObjectEdits:
             return
         thing = state.scene.objects[index]
         by = copy_offset(thing, model_points(thing.model)[0])
-        known = {item.name for item in state.document.file.all_items}
+        known = {item.name for item in state.edited.file.all_items}
         pose = thing.world_from_object
 
         def beside(file: SceneFile) -> SceneFile:
@@ -64,7 +64,7 @@ class ObjectEdits:
             return edits.set_x(file, copy, thing.x)
 
         if self.edit(beside, what=f"copy {name}"):
-            state.chosen = next(i.name for i in state.document.file.items if i.name not in known)
+            state.chosen = next(i.name for i in state.edited.file.items if i.name not in known)
             self.count_changed()
 
     def delete(self) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.app.editor.state.files.document import first_stop
+from shapeshift.app.editor.state.files.edited_file import first_stop
 from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.runtime_models.model import Model
 from shapeshift.scene.document.edits import free_name

@@ -92,7 +92,7 @@ class TouchState:
     @property
     def opens_playing(self) -> bool:
         """The scene that the program brings along is there to be touched, not edited."""
-        path = self._state.document.path
+        path = self._state.edited.path
         return self.play or (path is not None and is_bundled(path))
 
     def status(self) -> str:
@@ -125,7 +125,7 @@ class TouchState:
         """Everything where it was before it was touched."""
         self.let_go()
         state = self._state
-        state.bodies.follow(state.document)  # edits that the world has not heard of
+        state.bodies.follow(state.edited)  # edits that the world has not heard of
         put_back(self.world)
         self.follow([])
 

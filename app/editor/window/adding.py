@@ -69,9 +69,9 @@ class Adding:
         if not found.sources:
             state.problem = "A file of cameras is no object; drop it on the window itself."
             return
-        file = state.document.file
+        file = state.edited.file
         for source in found.sources:
-            item = state.document.item(source)
+            item = state.edited.item(source)
             file = edits.add(file, item)
         try:
             edit(state, file, f"add {file.items[-1].name}")

@@ -103,12 +103,12 @@ class Files:
         state = self._state
         if found.sources:
             try:
-                scene, document = opened_scene(found)
+                scene, edited = opened_scene(found)
                 self._actions.upload(scene)
             except BadFile as error:
                 state.problem = str(error)
                 return
-            state.take(found.sources, scene, first_look(found), document)
+            state.take(found.sources, scene, first_look(found), edited)
             self._at_demo = [source.path for source in found.sources] == [DEMO]
             state.messages.problems = []
             self._actions.opened()
@@ -129,7 +129,7 @@ class Files:
 
     def draw_row(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""
-        here = self._state.document.path
+        here = self._state.edited.path
         others = {TOUCH_LABEL: TOUCH} if self._at_demo else {DEMO_LABEL: DEMO}
         others = others if self._at_demo or here == TOUCH else {}
         wants, chosen = self._row.draw(self.recent, others, ui_scale)

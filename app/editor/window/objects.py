@@ -51,7 +51,7 @@ class Objects:
         """True once for a scene of several things: the section unfolds for it."""
         opened, self._opened = self._opened, False
         several = len(self.state.scene.objects) > 1
-        return opened and (several or self.state.document.path is not None)
+        return opened and (several or self.state.edited.path is not None)
 
     def may_close(self) -> bool:
         """Whether the window may be closed now; else it is asked what to do with the changes."""
@@ -129,5 +129,5 @@ class Objects:
 
     def draw_boxes(self, ui_scale: float) -> None:
         """The boxes that ask for a name, before something is lost, for what to add."""
-        draw_saving(self.saving, self.state.document.name, ui_scale)
+        draw_saving(self.saving, self.state.edited.name, ui_scale)
         self.adding.draw(ui_scale)

@@ -66,7 +66,7 @@ class Wipe(TwoPictures):
         super().__init__(window, renderers[1], (free[0] + free[2]) / 2 / window.logical_size[0])
         self._of_a, self._state, self._side = renderers[0], state, side
         self._scene = side.subject.scene
-        self._scene_file = state.document.path  # that A is; None: models
+        self._scene_file = state.edited.path  # that A is; None: models
         self._comparison = Comparison()
         self._waiting = False  # the picture has not rested long enough to be measured
         self.on = True

@@ -1,4 +1,4 @@
-"""The panel's section ObjectEdits: the list, what of the chosen one can be edited, the floor."""
+"""The panel's section "Objects": the list, what of the chosen one can be edited, the floor."""
 
 from collections.abc import Callable
 
@@ -46,7 +46,7 @@ def draw_objects(
     if clicked:
         deeds = {"Add": ask_to_add, "Copy": objects.duplicate, "Delete": objects.delete}
         deeds[clicked]()
-    item = edits.find(state.document.file, state.chosen)
+    item = edits.find(state.edited.file, state.chosen)
     if item is not None and state.chosen_index is not None:
         imgui.push_item_width(-1)
         imgui.push_id(item.name)
@@ -59,8 +59,8 @@ def draw_objects(
 
 def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
     """Undo, redo, save."""
-    document = objects.state.document
-    history = document.history
+    edited = objects.state.edited
+    history = edited.history
     width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
     for word, what, act in (
         ("Undo", history.undoes, objects.undo),
@@ -146,7 +146,7 @@ def _rename(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     before, typed = objects.typed
     if before != item.name:
         objects.typed = (item.name, item.name)
-        if typed != before and edits.find(objects.state.document.file, before) is not None:
+        if typed != before and edits.find(objects.state.edited.file, before) is not None:
             objects.edit(edits.rename, before, typed, what=f"rename {before}")
     _, text = imgui.input_text("##name", objects.typed[1])
     objects.typed = (item.name, text)
@@ -174,7 +174,7 @@ def _place(objects: ObjectEdits, ui_scale: float) -> None:
 
 def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     """Whether it can be touched, whether it moves, how heavy it is."""
-    item = edits.find(objects.state.document.file, item.name)
+    item = edits.find(objects.state.edited.file, item.name)
     if item is None:  # renamed just now
         return
     mesh = item.collider if item.collider not in (None, HULLS) else None
@@ -203,7 +203,7 @@ def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
 def _scene(objects: ObjectEdits, ui_scale: float) -> None:
     """What belongs to no object: the floor, the first look, where everything starts."""
     state = objects.state
-    floor_y = state.document.file.floor_y
+    floor_y = state.edited.file.floor_y
     changed, on = imgui.checkbox("floor", floor_y is not None)
     tip("An endless floor that is not seen; without it what falls goes on for ever.", ui_scale)
     if changed:

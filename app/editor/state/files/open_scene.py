@@ -4,12 +4,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from shapeshift.app.camera_files import camera_reading, in_scene
+from shapeshift.app.document import file_at, placed
 from shapeshift.app.editor.state.camera.first_look import FirstLook
-from shapeshift.app.editor.state.files.document import Document, document_from, document_of
+from shapeshift.app.editor.state.files.edited_file import (
+    EditedFile,
+    edited_from_file,
+    edited_from_scene,
+)
 from shapeshift.app.editor.state.files.opened import OpenedFiles
 from shapeshift.app.editor.state.scene_objects import scene_of
 from shapeshift.app.opening import ReadingOptions, sentence
-from shapeshift.app.subject import file_at, placed
 from shapeshift.scene.cameras.framing import common_side
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.document import edits
@@ -19,7 +23,7 @@ from shapeshift.scene.scene import Scene
 MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
 
 
-def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, Document]:
+def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, EditedFile]:
     """What is drawn of what was opened, and its file: each at its own x, or where the text x says.
 
     Raises BadFile for a scene file whose objects cannot be as it says, UsageError for x.
@@ -27,17 +31,17 @@ def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, Document]:
     if found.file is None:
         scene = scene_of(found.sources)
         scene = Scene(placed(scene.objects, x)) if x else scene
-        return scene, document_from(scene, found.sources)
+        return scene, edited_from_scene(scene, found.sources)
     file, inside = found.file, len(found.file.all_items)
-    document = document_of(found.path, file, found.sources[:inside])
+    edited = edited_from_file(found.path, file, found.sources[:inside])
     for source in found.sources[inside:]:
-        file = edits.add(file, document.item(source))
-        document.history = document.history.take(file, f"add {file.items[-1].name}")
-    models = document.models_by_name()
+        file = edits.add(file, edited.item(source))
+        edited.history = edited.history.take(file, f"add {file.items[-1].name}")
+    models = edited.models_by_name()
     if x:
         file = file_at(file, models, x)
-        document.history = edits.History.of(file)
-    return scene_of_file(file, models), document
+        edited.history = edits.History.of(file)
+    return scene_of_file(file, models), edited
 
 
 def told_of(found: OpenedFiles) -> str:

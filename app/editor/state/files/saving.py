@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.document import beside, stamp_of, with_regions
+from shapeshift.app.editor.state.files.edited_file import beside, stamp_of, with_regions
 from shapeshift.app.editor.state.user.own_files import OwnFiles
 from shapeshift.app.paths import is_bundled, plain
 from shapeshift.scene.document.scene_file import ENDING, FAR_M, SceneFile
@@ -32,33 +32,33 @@ class Saving:
     @property
     def in_place(self) -> bool:
         """Whether saving writes at once: over a file that this person has saved before."""
-        document = self._state.document
-        if document.path is None or is_bundled(document.path):
+        edited = self._state.edited
+        if edited.path is None or is_bundled(edited.path):
             return False
-        return self._own.has(document.path, document.stamp)
+        return self._own.has(edited.path, edited.stamp)
 
     def save(self) -> bool:
         """Writes over what was saved before, else asks for a name; True when it did."""
-        document = self._state.document
+        edited = self._state.edited
         if not self.in_place:
             self.ask_name()
             return False
-        if document.stamp != stamp_of(document.path):  # somebody else has written it since
-            self.name, self.taken = str(document.path), True
+        if edited.stamp != stamp_of(edited.path):  # somebody else has written it since
+            self.name, self.taken = str(edited.path), True
             return False
-        return self.write(document.path)
+        return self.write(edited.path)
 
     def ask_name(self) -> None:
         """Opens the box that asks for a name; nothing that is there is replaced unasked."""
-        document = self._state.document
+        edited = self._state.edited
         folder = self._folder
-        path = document.path if self.in_place else free_path(folder / document.name)
+        path = edited.path if self.in_place else free_path(folder / edited.name)
         self.name, self.taken = str(path.absolute()), False
 
     @property
     def original(self) -> Path | None:
         """The file that was opened and that somebody else has made, where it may be replaced."""
-        path = self._state.document.path
+        path = self._state.edited.path
         return None if path is None or self.in_place or is_bundled(path) else path
 
     def named(self, text: str, replace: bool = False) -> bool:
@@ -88,15 +88,15 @@ class Saving:
             self.name, self.taken = text[:LONGEST_PATH] or " ", False
 
     def _is_open(self, path: Path) -> bool:
-        document = self._state.document
-        return document.path is not None and document.path.absolute() == path.absolute()
+        edited = self._state.edited
+        return edited.path is not None and edited.path.absolute() == path.absolute()
 
     def write(self, path: Path) -> bool:
         """Writes the file; what is wrong is said."""
         state = self._state
-        document = state.document
+        edited = state.edited
         try:
-            file = filed(document.file, state, path)
+            file = filed(edited.file, state, path)
             path.parent.mkdir(parents=True, exist_ok=True)
             write_scene_file(file, path)
         except (OSError, ValueError) as error:
@@ -105,14 +105,14 @@ class Saving:
             return False
         self.name = ""
         path = path.absolute()
-        document.path, document.stamp = path, stamp_of(path)
+        edited.path, edited.stamp = path, stamp_of(path)
         try:
-            self._own.wrote(path, document.stamp)
+            self._own.wrote(path, edited.stamp)
         except OSError as error:
             self._state.messages.fail(
                 f"That this file is yours cannot be remembered: {error.strerror or error}."
             )
-        document.saved, document.saved_regions = document.file, state.regions.kept
+        edited.saved, edited.saved_regions = edited.file, state.regions.kept
         self._remember(path)
         self._state.say(f"Saved {path}")
         self._go_on()
@@ -154,7 +154,7 @@ def free_path(path: Path) -> Path:
 
 def unsaved(state: EditorState) -> bool:
     """Whether something would be lost: edits, regions, paint; not a lens, nor where x stands."""
-    return state.document.unsaved or state.regions.kept != state.document.saved_regions
+    return state.edited.unsaved or state.regions.kept != state.edited.saved_regions
 
 
 def filed(file: SceneFile, state: EditorState, path: Path) -> SceneFile:

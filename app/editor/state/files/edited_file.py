@@ -19,7 +19,7 @@ ModelKey = tuple  # what makes two objects have the same model: path, mode, up, 
 
 
 @dataclass
-class Document:
+class EditedFile:
     """Edits change `history`; a model that was read once stays in `sources`, for undo."""
 
     history: History
@@ -35,7 +35,7 @@ class Document:
         return self.history.file
 
     @property
-    def edited(self) -> bool:
+    def changed(self) -> bool:
         """Whether the file says something else than what lies on the disk."""
         return self._told[0]
 
@@ -113,14 +113,14 @@ def key_of(item: SceneItem) -> ModelKey:
     return (item.model, item.mode, item.up, item.flip)
 
 
-def document_of(path: Path, file: SceneFile, sources: Sequence[Source]) -> Document:
+def edited_from_file(path: Path, file: SceneFile, sources: Sequence[Source]) -> EditedFile:
     """A scene file that was opened, and the models of its objects in their order."""
     by_key = {key_of(item): source for item, source in zip(file.all_items, sources, strict=True)}
     stamp = stamp_of(path)
-    return Document(History.of(file), path, saved=file, stamp=stamp, sources=by_key)
+    return EditedFile(History.of(file), path, saved=file, stamp=stamp, sources=by_key)
 
 
-def document_from(scene: Scene, sources: Sequence[Source]) -> Document:
+def edited_from_scene(scene: Scene, sources: Sequence[Source]) -> EditedFile:
     """What was opened without a scene file, as one that is not saved yet."""
     items, by_key = [], {}
     for number, thing in enumerate(scene.objects):
@@ -135,7 +135,7 @@ def document_from(scene: Scene, sources: Sequence[Source]) -> Document:
         items.append(item)
         by_key[key_of(item)] = source
     file = SceneFile(folder=Path.cwd(), items=tuple(items))
-    return Document(History.of(file), saved=file, sources=by_key)
+    return EditedFile(History.of(file), saved=file, sources=by_key)
 
 
 def item_of(source: Source) -> SceneItem:

@@ -1,4 +1,4 @@
-"""What a command draws and measures: one model, or the objects of a scene file."""
+"""What is open: one model, or the objects of a scene file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,18 +28,25 @@ if TYPE_CHECKING:
     from shapeshift.scene.cameras.camera_list import CameraList
 
 
+BLACK = (0.0, 0.0, 0.0)
+DARK = (0.075, 0.078, 0.085)  # display sRGB: what the window and the headset have behind objects
+
+
 @dataclass(frozen=True)
-class Subject:
-    """A scene as it opened, and what can be asked of it as of a single model."""
+class Document:
+    """A scene as it opened: objects with models, a first view, a background, bounds.
+
+    Commands draw and measure it, the headset makes a world of it, the window edits its file.
+    """
 
     scene: Scene  # each object at its own x
     file: SceneFile | None = None  # None: one model, where it is
 
     @staticmethod
-    def of(model: Model, x: float | None = None) -> "Subject":
+    def of(model: Model, x: float | None = None) -> "Document":
         """One model at x; None: its first stop."""
         x = model.stops[0].x if x is None else x
-        return Subject(Scene((SceneObject("scene", model, x=x),)))
+        return Document(Scene((SceneObject("scene", model, x=x),)))
 
     @property
     def models(self) -> tuple[Model, ...]:
@@ -69,8 +76,18 @@ class Subject:
     @property
     def background(self) -> tuple[float, float, float]:
         """Display sRGB behind everything: what one model was trained before, else black."""
-        black = (0.0, 0.0, 0.0)
-        return black if self.file else default_background(self.scene.objects[0].model, black)
+        return self.background_or(BLACK)
+
+    def background_or(self, otherwise: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Display sRGB behind everything: what one model was trained before, else `otherwise`."""
+        if self.file:
+            return otherwise
+        return default_background(self.scene.objects[0].model, otherwise)
+
+    @property
+    def floor_y(self) -> float | None:
+        """Metres, world; None: the scene says nothing about a floor."""
+        return self.file.floor_y if self.file else None
 
     def at(self, x: Control | None, pose: Pose = IDENTITY) -> Scene:
         """All objects at x (None: each at its own), the world moved by a pose."""
@@ -81,7 +98,7 @@ class Subject:
             things = tuple(moved_object(thing, pose) for thing in things)
         return Scene(things)
 
-    def placed(self, text: str, said: str = "--x") -> "Subject":
+    def placed(self, text: str, said: str = "--x") -> "Document":
         """The same with all objects where `control_of_text` has their sliders; of a scene file,
         objects that have no such stop or state stay.  Raises UsageError.
         """
@@ -189,10 +206,10 @@ def moved_object(thing: SceneObject, world_from_before: Pose) -> SceneObject:
     return replace(thing, world_from_object=pose, selectors=parts)
 
 
-def open_subject(path: Path, options: ReadingOptions) -> Subject:
+def open_document(path: Path, options: ReadingOptions) -> Document:
     """A model or a scene file; progress and findings go to stderr.  Raises BadFile, UsageError."""
     if not is_scene_file(path):
-        return Subject.of(open_model(path, options))
+        return Document.of(open_model(path, options))
     from shapeshift.app.scene_files import open_scene_file
 
     file, _, scene = open_scene_file(path, options)
@@ -200,4 +217,4 @@ def open_subject(path: Path, options: ReadingOptions) -> Subject:
         from shapeshift.runtime_models.model import BadFile
 
         raise BadFile(f"{path} has no object; nothing is there to be drawn.")
-    return Subject(scene, file)
+    return Document(scene, file)
