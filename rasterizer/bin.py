@@ -153,6 +153,7 @@ def _sort(device: Device, kernels: dict, scratch: TileScratch, visible: int, lea
     if visible == 0:
         return device.empty(0, np.int32)
     pairs, table, chunk = scratch.pairs, scratch.table, scratch.chunk
+    assert table is not None, "an order from before needs no sort"
     order = device.empty(visible, np.int32)
     passes = _digits(least, most)
     for number, (origin, shift, bins) in enumerate(passes):

@@ -113,6 +113,12 @@ class Projected:
     culled_counts: "Array | None" = None  # (chunks, 6) int32, CULL_REASONS
     scratch: TileScratch | None = None  # in the grid of the camera's image
 
+    @property
+    def in_tiles(self) -> TileScratch:
+        """`scratch`, where project_arena made it."""
+        assert self.scratch is not None
+        return self.scratch
+
     def culled(self, device: Device) -> dict[str, int]:
         """How many splats each gate kept out; empty where it was not counted."""
         if self.culled_counts is None:

@@ -42,7 +42,7 @@ class Limits:
         large, far, least = (min(limit, FARTHEST) for limit in limits)
         bands = [1 / (self.fade * t) if 0 < self.fade * t < inf else 0.0 for t in limits]
         rows = [self.min_alpha, 1 / self.min_alpha, self.low_pass, large, large**2, far, far**2]
-        return np.float32([*rows, least, least**2, *bands, any(bands)])
+        return np.array([*rows, least, least**2, *bands, any(bands)], np.float32)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def project_arena(
         raise ValueError(f"project_arena takes 1 or 2 views and 0, 1 or as many sort frames, "
                          f"not {views} and {orders}.")  # fmt: skip
     grids = [grid_of(camera.size) for camera in cameras]
-    if not _fits(into, count, orders, grids):
+    if into is None or not _fits(into, count, orders, grids):
         into = _room(device, count, orders, grids)
     projected = [replace(p, low_pass=limits.low_pass) for p in into]
     poses = _poses(cameras, sort, world_from_object)
@@ -96,7 +96,7 @@ def project_arena(
         variant["ANTIALIASED"] = 1
     frame = [limits.packed(), *(_packed(camera) for camera in cameras), poses.ravel()]
     buffers = [_buffers(p) for p in projected]
-    scratch = projected[0].scratch
+    scratch = projected[0].in_tiles
     device.launch(
         device.program(KERNEL, **variant)["project_arena"], len(scratch.status), 1,
         count, scratch.chunk, sort.by_distance, sort.keep_outside,
@@ -106,11 +106,11 @@ def project_arena(
     return projected
 
 
-def _fits(earlier: list[Projected] | None, count: int, orders: int, grids: list) -> bool:
+def _fits(earlier: list[Projected], count: int, orders: int, grids: list) -> bool:
     """Whether the arrays of an earlier result are those that this one needs."""
-    if earlier is None or [p.scratch.grid for p in earlier] != grids:
+    if [p.in_tiles.grid for p in earlier] != grids:
         return False
-    pairs = {id(p.scratch.pairs) for p in earlier if p.scratch.pairs is not None}
+    pairs = {id(p.in_tiles.pairs) for p in earlier if p.in_tiles.pairs is not None}
     return earlier[0].depth.shape[0] == count and len(pairs) == orders
 
 
@@ -118,7 +118,7 @@ def _room(device: Device, count: int, orders: int, grids: list) -> list[Projecte
     """Arrays for `count` splats in as many views as there are grids."""
     chunks = chunks_of(device, count)
     chunk = -(-count // (chunks * LANES)) * LANES  # whole vectors but for the last
-    keys = [
+    keys: list = [
         (device.empty((count, 2), np.uint32), device.empty((chunks, 1 << LOW_BITS), np.int32))
         for _ in range(orders)
     ]
@@ -130,18 +130,19 @@ def _room(device: Device, count: int, orders: int, grids: list) -> list[Projecte
             culled_counts=device.empty((chunks, len(CULL_REASONS)), np.int32),
             scratch=TileScratch(
                 device.empty((count, 2), np.uint32),
-                *pairs_and_table,
+                pairs,
+                table,
                 device.empty((chunks, 4), np.uint32),
                 chunk,
                 grid,
             ),
         )
-        for pairs_and_table, grid in zip(keys, grids, strict=False)
+        for (pairs, table), grid in zip(keys, grids, strict=False)
     ]
 
 
 def _buffers(projected: Projected) -> tuple:
-    scratch = projected.scratch
+    scratch = projected.in_tiles
     results = (projected.record, projected.depth, projected.culled_counts)
     return (*results, scratch.tile_bounds, scratch.status, scratch.pairs, scratch.table)
 
@@ -149,7 +150,7 @@ def _buffers(projected: Projected) -> tuple:
 def _packed(camera: Camera) -> np.ndarray:
     """(25,) float32 as kernels/common/limits.cl reads a view."""
     rest = (*camera.size, camera.near, *grid_of(camera.size))
-    return np.concatenate([camera.packed(), np.float32(rest)])
+    return np.concatenate([camera.packed(), np.array(rest, np.float32)])
 
 
 def _poses(cameras: list[Camera], sort: SortFrames, world_from_object) -> np.ndarray:

@@ -99,7 +99,7 @@ def rasterize_with_heat(
     width, height = size
     images = [device.empty((height, width, 4)) for _ in views]
     hot = [device.empty((height, width, 2)) for _ in heats]
-    inputs = [
+    inputs: list[tuple] = [
         (tiles.starts, tiles.intersections, projected.record, image)
         for (projected, tiles), image in zip(views, images, strict=True)
     ]

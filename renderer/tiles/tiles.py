@@ -87,9 +87,9 @@ class TilesDrawing:
         self._changed = True
         self._mean_opacity = device.zeros((self.splats, 4))
         self._covariance = device.zeros((self.splats, 8))
-        self._colors = [device.zeros((self.splats, 4))]  # for all views, or one a view
+        self._colors: list = [device.zeros((self.splats, 4))]  # for all views, or one a view
         self._color, self._set = self._colors[0], 0  # that decoding writes into
-        self._heats = [None]  # beside them, (N, 4) once an object has any
+        self._heats: list = [None]  # beside them, (N, 4) once an object has any
         self._antialiased = tuple(map(is_antialiased, models))
         self._object_index = device.upload(
             np.repeat(np.arange(len(models), dtype=np.int32), counts)
@@ -266,8 +266,8 @@ class TilesDrawing:
         if self.sorts:
             sorted_by = self._projected[: self.sorts]  # views whose keys make an order
             for projected in sorted_by if key_bits == 16 else ():
-                quantize_keys(self.device, projected.scratch)
-            self._orders = [sort_order(self.device, p.scratch) for p in sorted_by]
+                quantize_keys(self.device, projected.in_tiles)
+            self._orders = [sort_order(self.device, p.in_tiles) for p in sorted_by]
         orders = self._orders * (len(views) if len(self._orders) == 1 else 1)
         return [
             bin_tiles(self.device, projected, view.size, order=order)
@@ -349,7 +349,7 @@ class TilesDrawing:
         camera = camera_of(view)
         sort = SortFrames((camera.camera_from_world,), settings.order == "distance")
         (projected,) = self._launch([view], settings, sort)
-        order = sort_order(self.device, projected.scratch)
+        order = sort_order(self.device, projected.in_tiles)
         tiles = bin_tiles(self.device, projected, view.size, order=order)
         surfaces = surface_arena(
             self.device, self._mean_opacity, self._covariance, self._object_index,
