@@ -26,7 +26,7 @@ Runs the tests; the first time it installs what they need into .venv.
   -x                    stop at the first that fails
   -q, -v                say less, say more
   --regenerate          make the golden pictures anew
-  tests/test_cli.py     only the tests of a file
+  tests/app/test_cli.py     only the tests of a file
 
 All others, once they are installed: .venv/bin/python -m pytest --help"""
 

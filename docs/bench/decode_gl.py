@@ -21,8 +21,6 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from splat_scenes import random_model  # noqa: E402
-
 from shapeshift.rasterizer.device import NoDevice  # noqa: E402
 from shapeshift.renderer.gl.buffers import Arena  # noqa: E402
 from shapeshift.renderer.gl.context import open_context  # noqa: E402
@@ -31,6 +29,7 @@ from shapeshift.renderer.gl.gpu import Gpu  # noqa: E402
 from shapeshift.runtime_models.evaluate import BATCH, Evaluator, directions, open_session  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.package.write_onnx import write_onnx  # noqa: E402
+from tests.support.splat_scenes import random_model  # noqa: E402
 
 LIMITS = {"onnxruntime": 1.2, "gl": 15.0}  # times the floor
 RUNS = 7

@@ -21,8 +21,6 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from splat_scenes import random_model, shell  # noqa: E402
-
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.renderer import layout  # noqa: E402
 from shapeshift.renderer.gl.buffers import Arena, bind  # noqa: E402
@@ -38,6 +36,7 @@ from shapeshift.renderer.tiles.tiles import TilesDrawing  # noqa: E402
 from shapeshift.runtime_models.evaluate import Evaluator, directions, evaluate  # noqa: E402
 from shapeshift.scene.pose import View, look_at  # noqa: E402
 from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
+from tests.support.splat_scenes import random_model, shell  # noqa: E402
 
 SIZE = (1280, 720)
 EYES = [View(look_at((x, 0.3, 4.5), (x, 0, 0)), (-0.6, 0.6, -0.34, 0.34), 0.05, 50, SIZE)

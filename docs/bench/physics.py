@@ -5,7 +5,8 @@
 Costs are CPU ms of this process a step of 1/90 s, while objects fall in layers onto a table,
 collide, roll and settle for 4 s: other load does not count in full.  Everything else is the worst
 of all trials: tables are a slab of 20 mm and an open sheet of triangles; cups are 8 hulls, concave
-as a whole, plates 2 mm thick.  Limits are those that tests/test_physics_figures.py asserts.
+as a whole, plates 2 mm thick.  Limits are those of
+tests/scene/world/test_physics_figures.py.
 """
 
 import argparse
@@ -23,9 +24,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from physics_things import PLATE, at, box, cup, lowest, run, table  # noqa: E402
-
 from shapeshift.scene.world.physics import Physics  # noqa: E402
+from tests.support.physics_things import PLATE, at, box, cup, lowest, run, table  # noqa: E402
 
 FIELDS = ("figure", "case", "value", "unit", "limit", "holds")
 COSTS = {5: 0.5, 20: 1.0, 100: 8.0}  # objects: ms, mean

@@ -22,8 +22,8 @@ from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from tests.gl.conftest import read
-from tests.models import make_random_model
-from tests.splat_scenes import (
+from tests.support.models import make_random_model
+from tests.support.splat_scenes import (
     FIELDS,
     alone,
     front_view,

@@ -22,7 +22,7 @@ from shapeshift.runtime_models.rotation import covariance
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.gl.test_culls import FRONT, LIMITS, SCENES, row_of
-from tests.splat_scenes import (
+from tests.support.splat_scenes import (
     alone,
     front_view,
     one_splat,

@@ -18,7 +18,7 @@ from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, Mlp, SplatLayers
 from shapeshift.runtime_models.rotation import covariance
 from tests.gl.conftest import f32, make_layers, make_mlp, make_model, read
-from tests.test_frames import with_frames
+from tests.runtime_models.package.test_frames import with_frames
 
 EYE = np.array([0.3, -0.2, 2.0])
 BLOCK, GROUP = layout.DECODE_WORKGROUP, layout.WORKGROUP

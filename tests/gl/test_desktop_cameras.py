@@ -6,7 +6,6 @@ from pathlib import Path
 import glfw
 import numpy as np
 import pytest
-from camera_files import NAMES, assert_same, cameras
 from desktop_stand import run_frames, until_opened
 from widgets import Widgets
 
@@ -14,6 +13,7 @@ from shapeshift.app.editor.state.user.recent import RecentFiles
 from shapeshift.app.editor.window.window import Drag, Drop, KeyDown, Wheel
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.cameras.write_cameras import write_cameras
+from tests.support.camera_files import NAMES, assert_same, cameras
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 

@@ -10,7 +10,7 @@ from desktop_stand import ball, run_frames
 
 from shapeshift.app.editor.state.files.exporting import EVERYTHING, REGIONS, Exporting
 from shapeshift.runtime_models.splats.formats import read_plain
-from tests.writers import EACH_WRITER
+from tests.support.writers import EACH_WRITER
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures: display, window, viewer
 

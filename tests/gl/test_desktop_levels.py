@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from desktop_stand import run_frames, until_opened
 from PIL import Image
-from sog_scenes import write_folder
 from test_desktop_program import start
-from test_streamed import random_sog, rewrite, write_streamed
 
 from shapeshift.app.editor.desktop import Options, Viewer
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -17,6 +15,8 @@ from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.scene_objects import scene_of
 from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.renderer.renderer import Renderer
+from tests.runtime_models.splats.layers.test_streamed import random_sog, rewrite, write_streamed
+from tests.support.sog_scenes import write_folder
 
 pytest_plugins = ["desktop_fixtures"]  # its fixtures display and window
 LEVELS = (400, 90, 20)

@@ -11,7 +11,7 @@ from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.resample import bilinear
 from shapeshift.renderer.settings import DEBUG_VIEWS, RenderSettings
-from tests.splat_scenes import front_view, psnr_db, stereo_views, two_objects
+from tests.support.splat_scenes import front_view, psnr_db, stereo_views, two_objects
 
 
 @pytest.fixture(params=["quads", "tiles"])

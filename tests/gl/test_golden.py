@@ -8,12 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from splat_scenes import alone, front_view, random_layers, random_model, stereo_views, two_objects
 
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.scene.scene import Scene
+from tests.support.splat_scenes import (
+    alone,
+    front_view,
+    random_layers,
+    random_model,
+    stereo_views,
+    two_objects,
+)
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden"
 SIZE = (200, 150)

@@ -14,8 +14,17 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.stereo import stereo_pair
 from tests.gl.conftest import read
-from tests.splat_scenes import psnr_db
-from tests.test_heat import BEHIND, CASES, STOPS, VIEW, decoded, model, random_layers, scene_of
+from tests.renderer.colors.test_heat import (
+    BEHIND,
+    CASES,
+    STOPS,
+    VIEW,
+    decoded,
+    model,
+    random_layers,
+    scene_of,
+)
+from tests.support.splat_scenes import psnr_db
 
 
 @pytest.mark.parametrize("at_once", [False, True])

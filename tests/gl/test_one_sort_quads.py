@@ -3,7 +3,7 @@
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from tests.test_one_sort import (  # noqa: F401  collected here with this module's renderer
+from tests.renderer.test_one_sort import (  # noqa: F401  collected here with this module's renderer
     test_a_hidden_object_takes_no_part,
     test_an_object_that_moves_through_another_is_sorted_anew_in_every_frame,
     test_both_eyes_share_it,

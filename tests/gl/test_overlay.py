@@ -5,7 +5,6 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 import pytest
-from vr_hands import HEAD, OPEN, a_frame, eyes, hand_at, pixel_of
 
 from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.pose import Pose
@@ -23,6 +22,7 @@ from shapeshift.vr.panel.panel_picture import ACCENT, SURFACE, TEXT
 from shapeshift.vr.panel.panel_place import play_point
 from shapeshift.vr.panel.panel_state import Facts, Slider
 from shapeshift.vr.touching import Touched
+from tests.support.vr_hands import HEAD, OPEN, a_frame, eyes, hand_at, pixel_of
 
 SIZE = (500, 450)
 EYES = eyes(SIZE)

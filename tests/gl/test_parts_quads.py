@@ -3,7 +3,7 @@
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from tests.test_parts import (  # noqa: F401  collected here with this module's renderer
+from tests.renderer.reference.test_parts import (  # noqa: F401  collected here with this module's renderer
     test_a_part_at_the_edge_is_drawn_as_in_the_whole_that_it_does_not_know,
     test_a_part_is_drawn_as_in_the_whole,
     test_a_picture_in_tiles_is_the_picture,

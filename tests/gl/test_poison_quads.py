@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from poison_judge import judge
-from splat_scenes import alone, front_view, random_layers
 
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
+from tests.support.poison_judge import judge
+from tests.support.splat_scenes import alone, front_view, random_layers
 
 SEEDS = 300
 MANY = 8000

@@ -9,16 +9,7 @@ from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View
-from tests.frames import draw
-from tests.splat_scenes import (
-    alone,
-    front_view,
-    psnr_db,
-    random_layers,
-    stereo_views,
-    two_objects,
-)
-from tests.test_tiles_stereo import (  # noqa: F401  collected here with this module's renderer
+from tests.renderer.test_tiles_stereo import (  # noqa: F401  collected here with this module's renderer
     eyes,
     test_a_shared_order_is_a_sort_for_each_eye_bit_for_bit,
     test_a_view_of_nothing_beside_one_of_something,
@@ -27,6 +18,15 @@ from tests.test_tiles_stereo import (  # noqa: F401  collected here with this mo
     test_disparity_is_the_baseline_times_the_focal_length_over_depth,
     test_eyes_of_different_sizes_and_more_than_two,
     test_fields_of_view_that_differ_from_eye_to_eye_put_things_where_they_are,
+)
+from tests.support.frames import draw
+from tests.support.splat_scenes import (
+    alone,
+    front_view,
+    psnr_db,
+    random_layers,
+    stereo_views,
+    two_objects,
 )
 
 

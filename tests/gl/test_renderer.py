@@ -4,17 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from splat_scenes import (
-    alone,
-    front_view,
-    only,
-    poisoned,
-    psnr_db,
-    random_layers,
-    random_model,
-    stereo_views,
-    two_objects,
-)
 
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.colors.palette import thermal_blend
@@ -28,7 +17,18 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.models import without_control
+from tests.support.models import without_control
+from tests.support.splat_scenes import (
+    alone,
+    front_view,
+    only,
+    poisoned,
+    psnr_db,
+    random_layers,
+    random_model,
+    stereo_views,
+    two_objects,
+)
 
 DRAWINGS = ("quads", "tiles")
 AWAY = View(look_at((0, 0, 9), (0, 0, 20)), (-0.5, 0.5, -0.5, 0.5), 0.1, 50, (32, 16))

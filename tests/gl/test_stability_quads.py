@@ -1,12 +1,12 @@
 """Every case of `launch.py stability` on a small scene with GL quads."""
 
 import pytest
-from splat_scenes import random_layers
-from stability_stage import failures, make_stage
 
 from shapeshift.app.drawing import open_renderer
 from shapeshift.app.stability_cases.table import CASES
 from shapeshift.renderer.renderer import Renderer
+from tests.support.splat_scenes import random_layers
+from tests.support.stability_stage import failures, make_stage
 
 
 def reopen():

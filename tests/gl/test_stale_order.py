@@ -6,7 +6,7 @@ import pytest
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import View, look_at
-from tests.splat_scenes import psnr_db, two_objects
+from tests.support.splat_scenes import psnr_db, two_objects
 
 
 def orbit(degrees: float) -> View:

@@ -3,7 +3,7 @@
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from tests.test_stereo_colors import (  # noqa: F401  collected here with this module's renderer
+from tests.renderer.test_stereo_colors import (  # noqa: F401  collected here with this module's renderer
     test_a_trained_leg_in_both_eyes,
     test_at_rest_nothing_is_computed_again,
     test_auto_shares_just_where_it_says,
@@ -30,8 +30,8 @@ def renderer(request, session_gpu):
 
 
 def test_memory_of_a_second_eye_comes_and_goes(ctx, session_gpu):
-    from tests.frames import draw_told
-    from tests.test_stereo_colors import SCENES, eyes
+    from tests.renderer.test_stereo_colors import SCENES, eyes
+    from tests.support.frames import draw_told
 
     with Renderer(ctx, "quads") as renderer:
         scene, pair = SCENES["both"](), eyes()

@@ -12,8 +12,8 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
-from tests.scaffold_scenes import random_raw, write_run
-from tests.splat_scenes import (
+from tests.support.scaffold_scenes import random_raw, write_run
+from tests.support.splat_scenes import (
     alone,
     front_view,
     one_splat,

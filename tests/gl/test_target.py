@@ -15,8 +15,8 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.frames import draw
-from tests.splat_scenes import (
+from tests.support.frames import draw
+from tests.support.splat_scenes import (
     alone,
     front_view,
     one_splat,

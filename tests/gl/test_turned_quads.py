@@ -3,7 +3,7 @@
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from tests.test_turned_objects import (  # noqa: F401  collected here with this module's renderer
+from tests.renderer.test_turned_objects import (  # noqa: F401  collected here with this module's renderer
     test_a_turned_object_is_the_object_from_a_turned_eye,
     test_an_object_that_turns_is_coloured_anew_in_every_frame,
     test_both_eyes_of_a_turned_object,

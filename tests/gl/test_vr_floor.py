@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from vr_hands import HEAD, eyes, pixel_of
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.floor import REST, Floor, Grid, clearness, spacing_of
 from shapeshift.vr.locomotion.play_space import Standing
+from tests.support.vr_hands import HEAD, eyes, pixel_of
 
 SIZE = (500, 450)
 EYES = eyes(SIZE)

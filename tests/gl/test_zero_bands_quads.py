@@ -3,7 +3,7 @@
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from tests.test_zero_bands import (  # noqa: F401  collected here with this module's renderer
+from tests.runtime_models.splats.test_zero_bands import (  # noqa: F401  collected here with this module's renderer
     test_nothing_is_coloured_again_where_no_colour_looks_at_the_eye,
     test_pictures_are_equal_to_the_last_bit,
 )

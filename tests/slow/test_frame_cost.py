@@ -9,13 +9,13 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from splat_scenes import alone, shell
 
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.renderer.gl.context import NoContext, open_context
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.scene.pose import View, look_at, perspective
+from tests.support.splat_scenes import alone, shell
 
 SPLATS, SIZE, FRAMES = 400_000, (1280, 720), 6
 # What stands for "the draw pass": a driver finds the pixels of its quads inside it, tiles before.

@@ -1,4 +1,4 @@
-"""The same as tests/test_fuzz.py, 20,000 times and more."""
+"""The same as tests/program/test_fuzz.py, 20,000 times and more."""
 
 import os
 
@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("hypothesis")
 pytest.importorskip("pyopencl")
 
-from test_fuzz import fuzz_all
+from tests.program.test_fuzz import fuzz_all
 
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "22000"))
 

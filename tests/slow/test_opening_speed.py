@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ply_files import some_splats
 
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from tests.support.ply_files import some_splats
 
 SPLATS, TURNS = 1_000_000, 9
 

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from rasterizer_scenes import arena, as_double, device, psnr
-
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.project_arena import project_arena
@@ -17,6 +15,7 @@ from shapeshift.rasterizer.raster import rasterize_rgba
 from shapeshift.rasterizer.reference import project_reference, rasterize_reference
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.read_scene import read_model
+from tests.support.rasterizer_scenes import arena, as_double, device, psnr
 
 pytestmark = pytest.mark.slow
 SIZE = (640, 360)

@@ -1,0 +1,67 @@
+"""launch.py colliders: made once, beside a new scene file, nothing replaced."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from shapeshift.app import cli
+from shapeshift.app.commands.colliders import Options, run
+from shapeshift.app.errors import UsageError
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from shapeshift.scene.colliders.collider_pieces import read_pieces
+from shapeshift.scene.document.read_scene_file import read_scene_file
+from tests.support.collider_shapes import shapes, splatted
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    import numpy as np
+
+    cloud = splatted(shapes()["sphere"], 500)
+    sh = np.zeros((len(cloud.means), 1, 3), np.float32)
+    write_ply(PlainSplats(*(np.float32(c) for c in cloud.columns), sh), tmp_path / "ball.ply")
+    body = {"model": "ball.ply", "collider": "hulls"}
+    things = [{"name": name, **body} for name in ("one", "two", "a/b", "a:b")]
+    things[1]["x"] = 0.5
+    things.append({"name": "seen", "model": "ball.ply"})
+    (tmp_path / "room.scene.json").write_text(json.dumps({"objects": things}))
+    return tmp_path / "room.scene.json"
+
+
+def test_the_new_scene_names_what_was_made(scene, tmp_path, capsys):
+    before = scene.read_bytes()
+    out = tmp_path / "out" / "room.scene.json"
+    assert run(Options(scene, out)) == 0
+    assert scene.read_bytes() == before
+    file = read_scene_file(out)
+    named = {item.name: item.collider for item in file.items}
+    assert named == {"one": "colliders/one.glb", "two": "colliders/two.glb", "seen": None,
+                     "a/b": "colliders/one.glb", "a:b": "colliders/one.glb"}  # fmt: skip
+    for name in ("one", "two"):
+        assert len(read_pieces(file.path(named[name])).points) == 1
+    assert {p.name for p in (out.parent / "colliders").iterdir()} == {"one.glb", "two.glb"}
+    assert capsys.readouterr().err.count("1 convex piece,") == 2
+    with pytest.raises(UsageError, match="exists; choose another --out"):
+        run(Options(scene, out))
+    assert run(Options(scene, out, overwrite=True)) == 0
+    with pytest.raises(UsageError, match='has "hulls" as its collider'):
+        run(Options(out, tmp_path / "again.scene.json"))
+
+
+def test_what_is_read_is_not_written(scene, tmp_path):
+    with pytest.raises(UsageError, match="is read in this run"):
+        run(Options(scene, scene, overwrite=True))
+    with pytest.raises(UsageError, match=r"ends in \.scene\.json"):
+        run(Options(scene, tmp_path / "ball.ply", overwrite=True))
+
+
+def test_a_link_in_place_of_the_folder_is_not_followed(scene, tmp_path, capsys):
+    (tmp_path / "victim").mkdir()
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "colliders").symlink_to(tmp_path / "victim")
+    asked = ["colliders", str(scene), "--out", str(tmp_path / "out" / "room.scene.json")]
+    assert cli.main(asked) == 2
+    assert "through which nothing is written" in capsys.readouterr().err
+    assert not any((tmp_path / "victim").iterdir())

@@ -1,0 +1,89 @@
+"""How kernels and shaders read: each begins with its contract and says why it does what it does."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDERS = ("rasterizer/kernels", "renderer/shaders", "training/kernels", "vr/shaders")
+KINDS = (".cl", ".comp", ".glsl", ".vert", ".frag")
+# Lines with a comment over lines with code.  Shaders by those who explain their maths best have
+# 0.3 to 0.5 (pygfx, splatapult, nvpro): nobody can step through them.
+LEAST_SHARE = 0.30
+LABELS = ("Reads", "Writes", "Defines", "Units")  # in this order
+ENTRY = re.compile(r"^(void main\(\)|__kernel\b)", re.MULTILINE)  # a pass has one, a chunk has none
+
+
+def files(folder: str) -> dict[str, str]:
+    """Text by path of every kernel and shader under a folder of the project."""
+    paths = sorted(p for p in (ROOT / folder).rglob("*") if p.suffix in KINDS)
+    return {str(p.relative_to(ROOT)): p.read_text(encoding="utf-8") for p in paths}
+
+
+FILES = {path: text for folder in FOLDERS for path, text in files(folder).items()}
+
+
+def contract(text: str) -> dict[str, str]:
+    """What the comment at the file's beginning says: its purpose, and each label by its name."""
+    said, label = {"purpose": ""}, "purpose"
+    for line in text.splitlines():
+        if not line.startswith("//"):
+            break
+        found = re.match(r"//\s*(\w+):\s+(.*)", line)
+        if found and found[1] in LABELS:
+            label = found[1]
+            said[label] = ""
+            line = found[2]
+        said[label] += line.lstrip("/ ") + " "
+    return {name: words.strip() for name, words in said.items()}
+
+
+def counted(text: str) -> tuple[int, int]:
+    """Lines with code, and lines with a comment; one line may be both."""
+    code = commented = 0
+    for line in text.splitlines():
+        before = re.split(r"//|/\*", line)[0]
+        code += bool(before.strip(" \\"))
+        commented += before != line
+    return code, commented
+
+
+def test_every_file_begins_with_its_purpose_and_its_contract():
+    wrong = {}
+    for path, text in FILES.items():
+        said = contract(text)
+        writes = "Writes" if ENTRY.search(text) else "Defines"  # passes write, chunks define
+        if [*said] != ["purpose", "Reads", writes, "Units"] or not all(said.values()):
+            wrong[path] = [*said]
+    assert FILES
+    assert not wrong
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_three_lines_in_ten_carry_a_comment(folder):
+    pairs = [counted(text) for text in files(folder).values()]
+    code, commented = (sum(column) for column in zip(*pairs, strict=True))
+    assert commented >= LEAST_SHARE * code, f"{commented} lines of {code}"
+
+
+def test_no_line_is_too_long_and_no_file():
+    """100 columns and 400 lines, as in Python; comments of the one kind that is counted right."""
+    for path, text in FILES.items():
+        lines = text.splitlines()
+        assert len(lines) <= 400, path
+        for number, line in enumerate(lines, 1):
+            assert len(line) <= 100 and line == line.rstrip(), f"{path}:{number}"
+            assert line.count("/*") == line.count("*/"), f"{path}:{number}: over several lines"
+
+
+def test_the_count_knows_what_a_line_is():
+    text = "// purpose\n\nint a;  // why\n  \\\nint b;\n#define C 1 /* of a macro */ \\\n"
+    assert counted(text) == (3, 3)
+
+
+def test_a_contract_needs_its_words():
+    text = (
+        "// draw: splats.\n// more of it\n// Reads:   a,\n//          b\n// Units:   px\nint x;\n"
+    )
+    assert contract(text) == {"purpose": "draw: splats. more of it", "Reads": "a, b", "Units": "px"}

@@ -1,0 +1,234 @@
+"""Captures that cannot be used are refused in one sentence that says what to do."""
+
+import numpy as np
+import pytest
+
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.scene.captures.read_points import read_points
+from tests.support.captures import CLOUD, save_image, simple, write_transforms
+
+
+def spoil(change):
+    """A table entry: frames and settings in, what is broken in them changed in place."""
+    return pytest.param(change, id=change.__name__)
+
+
+def no_poses(frames, more):
+    for f in frames:
+        del f["transform_matrix"]
+    return "has no pose"
+
+
+def nan_pose(frames, more):
+    frames[1]["transform_matrix"][0][3] = float("nan")
+    return r"frame 1 .*NaN"
+
+
+def singular_pose(frames, more):
+    frames[2]["transform_matrix"][0][:3] = [0, 0, 0]
+    return "no rotation"
+
+
+def scaled_pose(frames, more):
+    frames[0]["transform_matrix"] = (np.array(frames[0]["transform_matrix"]) * 1.1).tolist()
+    return "no rotation"
+
+
+def mirrored_pose(frames, more):
+    for row in frames[0]["transform_matrix"]:
+        row[0] = -row[0]
+    return "mirrors"
+
+
+def ragged_pose(frames, more):
+    frames[0]["transform_matrix"] = [[1, 2], [3]]
+    return "no matrix"
+
+
+def small_pose(frames, more):
+    frames[0]["transform_matrix"] = [[1, 0], [0, 1]]
+    return r"shape \(2, 2\)"
+
+
+def wrong_size(frames, more):
+    more["w"] = 32
+    return "16x12 pixels, the capture says 32x12"
+
+
+def missing_images(frames, more):
+    for frame in frames:
+        frame["file_path"] = "images/gone.png"
+    return r"none of its 4 photos is there.*gone.png"
+
+
+def nameless_frame(frames, more):
+    del frames[1]["file_path"]
+    return "names no image"
+
+
+def empty(frames, more):
+    frames.clear()
+    return "'frames' is empty"
+
+
+def no_focal(frames, more):
+    del more["fl_x"]
+    return "no focal length"
+
+
+def negative_focal(frames, more):
+    more["fl_x"] = -3
+    return "above 0"
+
+
+def nan_focal(frames, more):
+    more["fl_x"] = float("nan")
+    return "'fl_x' is nan; a number"
+
+
+def folded_lens(frames, more):
+    more["k1"] = -40
+    return "folds the photo over itself"
+
+
+def bent_k4(frames, more):
+    more["k4"] = 0.4
+    return "only fisheye lenses"
+
+
+def panorama(frames, more):
+    more["camera_model"] = "EQUIRECTANGULAR"
+    return "which no pinhole"
+
+
+def half_a_pixel(frames, more):
+    more["w"] = 16.5
+    return "not pixels"
+
+
+def odd_list(frames, more):
+    more["train_filenames"] = "images/000.png"
+    return "'train_filenames' is"
+
+
+def list_of_others(frames, more):
+    more["train_filenames"] = ["elsewhere.png"]
+    return "name none of its frames"
+
+
+def empty_modality(frames, more):
+    more["modalities"] = [{"name": "RGB", "x": 0}, {"name": "IR", "x": 1}]
+    for f in frames:
+        f["modality"] = "RGB"
+    return "'IR' has no images"
+
+
+def unknown_modality(frames, more):
+    more["modalities"] = [{"name": "RGB", "x": 0}]
+    frames[0]["modality"] = "UV"
+    return "of modality 'UV'"
+
+
+def only_tests(frames, more):
+    for f in frames:
+        f["split"] = "test"
+    return "no photos to train on"
+
+
+def odd_split(frames, more):
+    frames[0]["split"] = "holdout"
+    return "use train or test"
+
+
+def stop_outside(frames, more):
+    more["modalities"] = [{"name": "RGB", "x": 1.5}]
+    return "x = 1.5"
+
+
+def twin_stops(frames, more):
+    more["modalities"] = [{"name": "RGB", "x": 0}, {"name": "RGB", "x": 1}]
+    return "same name"
+
+
+def odd_kind(frames, more):
+    more["modalities"] = [{"name": "RGB", "x": 0, "kind": "sonar"}]
+    return "kind 'sonar'"
+
+
+def upside_range(frames, more):
+    more["modalities"] = [{"name": "RGB", "x": 0, "value_range": [9, 1]}]
+    return "value_range"
+
+
+def newer_version(frames, more):
+    more["version"] = 7
+    return "version 7"
+
+
+def no_up(frames, more):
+    more["up"] = [0, 0, 0]
+    return "'up' must be"
+
+
+def odd_background(frames, more):
+    more["background"] = [0, 0]
+    return "'background'"
+
+
+def missing_points(frames, more):
+    more["points"] = "gone.npz"
+    return "file of points is missing"
+
+
+@pytest.mark.parametrize("change", [spoil(c) for c in (
+    no_poses, nan_pose, singular_pose, scaled_pose, mirrored_pose, ragged_pose, small_pose,
+    wrong_size, missing_images, nameless_frame, empty, no_focal, negative_focal, nan_focal,
+    folded_lens, bent_k4, panorama, half_a_pixel, odd_list, list_of_others, empty_modality,
+    unknown_modality, only_tests, odd_split, stop_outside, twin_stops, odd_kind, upside_range,
+    newer_version, no_up, odd_background, missing_points,
+)])  # fmt: skip
+def test_refused_in_one_sentence(tmp_path, change):
+    frames, more = simple(tmp_path)
+    sentence = change(frames, more)
+    write_transforms(tmp_path, frames, **more)
+    with pytest.raises(BadFile, match=sentence) as caught:
+        read_capture(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_refused_folders_and_files(tmp_path):
+    with pytest.raises(BadFile, match="does not exist"):
+        read_capture(tmp_path / "nowhere")
+    with pytest.raises(BadFile, match="neither photos nor poses"):
+        read_capture(tmp_path)
+    save_image(tmp_path / "images/a.png")
+    with pytest.raises(BadFile, match=r"without poses.*structure from motion"):
+        read_capture(tmp_path)
+    with pytest.raises(BadFile, match="is no capture"):
+        read_capture(tmp_path / "images/a.png")
+    (tmp_path / "transforms.json").write_text('{"frames": [')
+    with pytest.raises(BadFile, match="not JSON"):
+        read_capture(tmp_path)
+    (tmp_path / "transforms.json").write_text("[1]")
+    with pytest.raises(BadFile, match="holds a list"):
+        read_capture(tmp_path)
+    (tmp_path / "transforms.json").write_text('{"poses": []}')
+    with pytest.raises(BadFile, match="no list 'frames'"):
+        read_capture(tmp_path)
+
+
+def test_refused_points(tmp_path):
+    path = tmp_path / "points.npz"
+    for arrays, sentence in (
+        ({"abc": CLOUD}, "'xyz'"),
+        ({"xyz": CLOUD[:, :2]}, r"\(20, 2\)"),
+        ({"xyz": CLOUD * np.nan}, "NaN"),
+        ({"xyz": CLOUD, "rgb": CLOUD[:3]}, "do not fit"),
+    ):
+        np.savez(path, **arrays)
+        with pytest.raises(BadFile, match=sentence):
+            read_points(path)
+    path.write_bytes(path.read_bytes()[:50])
+    with pytest.raises(BadFile, match="cut off"):
+        read_points(path)

@@ -1,0 +1,78 @@
+"""examples/: each runs as a person starts it, and leaves what it says."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "examples"
+SHORT = {"06_train.py": ["1"], "08_film_frames.py": ["4"]}  # seconds, frames
+LEAVES = {
+    "01_load_and_render.py": ["01_workshop.png", "01_depth.png"],
+    "02_slide.py": ["02_slide.png"],
+    "03_regions.py": ["03_regions.png", "03_lens.png"],
+    "04_export.py": ["04_rgb.ply", "04_rgb.spz", "04_part.spz", "04_part.png"],
+    "05_compare.py": ["05_rgb.spz", "05_diff/0000_sheet.png", "05_diff/0007_difference.png"],
+    "06_train.py": ["06_scene.shift", "06_halfway.png"],
+    "07_objects_and_physics.py": ["07_dropped.png", "07_thrown.png"],
+    "08_film_frames.py": ["08_film/0000.png", "08_film/0003.png"],
+    "09_edit_splats.py": ["09_faded.png", "09_wide.png", "09_both.png"],
+    "10_full_speed.py": [],
+}
+
+
+def started(script: Path, folder: Path) -> subprocess.CompletedProcess:
+    """As a person starts it whose current folder is another one, beside a scene.py of his own."""
+    (folder / "scene.py").write_text("raise SystemExit('a stranger was imported')\n")
+    return subprocess.run(
+        [sys.executable, str(script), *SHORT.get(script.name, [])], cwd=folder, timeout=300,
+        capture_output=True, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)])},
+    )  # fmt: skip
+
+
+def test_every_example_is_known_and_told_of():
+    assert {path.name for path in FOLDER.glob("*.py")} == set(LEAVES)
+    told = (FOLDER / "README.md").read_text()
+    assert all(f"`{path.name}`" in told for path in FOLDER.iterdir() if path.suffix != ".md")
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_it_runs_from_anywhere_and_leaves_what_it_says(name, tmp_path):
+    done = started(FOLDER / name, tmp_path)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert not done.stderr, "a library says nothing by itself"
+    for file in LEAVES[name]:
+        path = tmp_path / "out" / file
+        assert path.stat().st_size > 0
+        if path.suffix == ".png":  # something is in the picture
+            assert np.asarray(Image.open(path)).std() > 5
+
+
+def test_the_notebook_runs_cell_by_cell(tmp_path, monkeypatch):
+    """Without Jupyter: what a cell ends with is shown, and pictures show themselves."""
+    import ast
+
+    book = json.loads((FOLDER / "tour.ipynb").read_text())
+    assert book["nbformat"] == 4
+    cells = ["".join(c["source"]) for c in book["cells"] if c["cell_type"] == "code"]
+    assert len(cells) >= 5
+    assert not any(c.get("outputs") for c in book["cells"])
+    monkeypatch.chdir(tmp_path)
+    names, shown = {}, []
+    for cell in cells:
+        tree = ast.parse(cell)
+        last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+        exec(compile(tree, "cell", "exec"), names)
+        if last is not None:
+            value = eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+            shown.append(value._repr_png_() if hasattr(value, "_repr_png_") else repr(value))
+    pictures = [each for each in shown if isinstance(each, bytes)]
+    assert len(pictures) >= 4 and all(p.startswith(b"\x89PNG") for p in pictures)
+    assert any("stops RGB, Thermal, Opened" in each for each in shown if isinstance(each, str))

@@ -1,0 +1,317 @@
+"""Training plain splats: growing by the rules of 3DGS, quality, bits, and what is written."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapeshift.rasterizer.reference import rotations
+from shapeshift.runtime_models.model import BadFile, Stop
+from shapeshift.runtime_models.read_scene import describe, read_model
+from shapeshift.runtime_models.splats.layers.read_layer_list import LIST
+from shapeshift.runtime_models.splats.layers.write_layer_list import layer_name, write_layer_list
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
+from shapeshift.scene.captures.read_capture import read_capture
+from shapeshift.training.baselines.plain import PlainTrainer, one_modality
+from shapeshift.training.baselines.plain_density import (
+    AFTER_RESET,
+    SMALLER,
+    changed_splats,
+    decide,
+    extent_of,
+    halves,
+    reset_opacity,
+)
+from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.baselines.plain_step import GROUPS
+from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
+from shapeshift.training.synthetic.balls import STOPS, make_balls
+from tests.support.training_runs import run
+
+ROOT = Path(__file__).resolve().parents[3]
+SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_every=20, sh_degree=2)
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    return make_balls(tmp_path_factory.mktemp("balls"), size=100, views=16, test_views=3)
+
+
+@pytest.fixture(scope="module")
+def trained(device, balls) -> list[PlainTrainer]:
+    return [run(PlainTrainer(device, one_modality(balls, s.name), SETTINGS)) for s in STOPS]
+
+
+def state_of(count: int, scale: float = 0.01, seed: int = 0) -> dict[str, np.ndarray]:
+    """An optimiser's state of splats of one size, all opaque enough to stay."""
+    rng = np.random.default_rng(seed)
+    shapes = {"means": (3,), "scales": (3,), "wxyz": (4,), "opacity": (), "base": (3,),
+              "rest": (3, 3)}  # fmt: skip
+    state = {"steps": np.array(7)}
+    for name in GROUPS:
+        for part in ("value", "mean", "square"):
+            rows = rng.normal(size=(count, *shapes[name]))
+            state[f"{name}.{part}"] = rows.astype(np.float32)
+    state["scales.value"][:] = np.log(scale)
+    return state
+
+
+def test_small_splats_are_cloned_and_large_ones_split_the_strongest_first():
+    state = state_of(6)
+    state["scales.value"][[1, 3], 2] = np.log(0.2)  # one long axis is enough
+    evidence = np.array([[5, 1], [9, 3], [0, 0], [8, 2], [1, 1], [4, 1]], np.float32)
+    settings = PlainSettings(grow_threshold=2.5, max_splats=9, splats=6)
+    change = decide(state, evidence, settings, extent=10.0, after_reset=False)
+    # pulls 5, 3, 0, 4, 1, 4: over the threshold 0, 3, 5 and 1; room for three
+    assert not change.gone.any()
+    assert change.cloned.tolist() == [0, 5] and change.split.tolist() == [3]
+    out = changed_splats(state, change, np.random.default_rng(0))
+    assert {len(out[f"{name}.{part}"]) for name in GROUPS for part in ("value", "mean")} == {9}
+    stay = [0, 1, 2, 4, 5]
+    for name in GROUPS:
+        for part in ("value", "mean", "square"):
+            np.testing.assert_array_equal(out[f"{name}.{part}"][:5], state[f"{name}.{part}"][stay])
+        np.testing.assert_array_equal(out[f"{name}.value"][5:7], state[f"{name}.value"][[0, 5]])
+        assert not out[f"{name}.mean"][5:].any() and not out[f"{name}.square"][5:].any()
+    np.testing.assert_allclose(
+        out["scales.value"][7:], state["scales.value"][[3, 3]] - np.log(SMALLER), rtol=1e-6
+    )
+    assert out["steps"] == 7
+
+
+def test_what_is_transparent_or_broken_goes_and_what_is_too_large_after_a_reset():
+    state, evidence = state_of(4), np.full((4, 2), 100.0)
+    state["opacity.value"][:] = [-9, np.nan, 1, 1]
+    state["scales.value"][3] = np.log(3.0)
+    settings = PlainSettings()
+    for after_reset, gone in ((False, [1, 1, 0, 0]), (True, [1, 1, 0, 1])):
+        change = decide(state, evidence, settings, extent=10.0, after_reset=after_reset)
+        assert change.gone.tolist() == [bool(g) for g in gone]
+        assert not set(np.flatnonzero(change.gone)) & {*change.cloned, *change.split}
+    state["opacity.value"][:] = -9  # somebody has to stay
+    assert not decide(state, evidence, settings, 10.0, False).gone.any()
+
+
+def test_a_full_scene_does_not_grow():
+    settings = PlainSettings(max_splats=5, splats=5)
+    change = decide(state_of(8), np.full((8, 2), 50.0), settings, 10.0, False)
+    assert not len(change.cloned) and not len(change.split)
+
+
+def test_halves_are_drawn_from_the_splat():
+    """Their places have its mean and covariance: 2 x 20,000 draws, five standard errors."""
+    sigma, wxyz = np.array([0.3, 0.05, 0.01]), np.array([0.5, -0.5, 0.1, 0.7])
+    count = 20_000
+    values = {
+        "means": np.tile([1.0, 2, 3], (count, 1)), "scales": np.tile(np.log(sigma), (count, 1)),
+        "wxyz": np.tile(wxyz, (count, 1)), "opacity": np.zeros(count),
+    }  # fmt: skip
+    means = halves(values, np.random.default_rng(0))["means"]
+    turn = rotations(wxyz[None])[0]
+    local = (means - [1.0, 2, 3]) @ turn  # along the splat's own axes
+    assert np.abs(local.mean(0) / sigma).max() < 5 / np.sqrt(2 * count)
+    covariance = local.T @ local / len(local) / np.outer(sigma, sigma)
+    assert np.abs(covariance - np.eye(3)).max() < 5 * np.sqrt(2 / (2 * count))
+
+
+def test_a_reset_leaves_nothing_brighter_than_a_hundredth():
+    state = state_of(50)
+    state["opacity.value"][:10] = -7
+    out = reset_opacity(state)
+    opacity = 1 / (1 + np.exp(-out["opacity.value"]))
+    assert opacity.max() == pytest.approx(AFTER_RESET, rel=1e-5)
+    np.testing.assert_array_equal(out["opacity.value"][:10], state["opacity.value"][:10])
+    assert not out["opacity.mean"].any() and not out["opacity.square"].any()
+    assert state["opacity.value"].max() > 0  # the one given is left alone
+
+
+def test_the_extent_is_that_of_the_cameras(balls):
+    views = [p.view for p in balls.photos]
+    eyes = np.array([v.world_from_eye.position for v in views])
+    far = np.linalg.norm(eyes - eyes.mean(0), axis=1).max()
+    assert extent_of(views) == pytest.approx(1.1 * far)
+    assert extent_of(views[:1]) > 0
+
+
+def test_first_scales_are_the_distances_to_the_nearest():
+    """Of a line of points 1, 2, 4 ... apart, by hand; and of so few that there are no three."""
+    points = np.zeros((5, 3))
+    points[:, 1] = [0, 1, 3, 7, 15]
+    wanted = [[1, 3, 7], [1, 2, 6], [2, 3, 4], [4, 6, 7], [8, 12, 14]]
+    np.testing.assert_allclose(
+        neighbour_distance(points), np.sqrt(np.mean(np.square(wanted), axis=1))
+    )
+    assert neighbour_distance(points[:2]).tolist() == [1, 1] and neighbour_distance(
+        points[:1]
+    ).tolist() == [1]
+
+
+def test_first_colours_are_the_photos(device, balls):
+    trainer = PlainTrainer(device, one_modality(balls, "Thermal"), SETTINGS)
+    photos = trainer.schedule.photos["Thermal"]
+    colors = seen_colors(np.array([[0.0, 0, 0], [0, 500.0, 0]]), photos, (0.0, 0.0, 0.0))
+    assert (colors[1] == 0.5).all()  # on no photo
+    assert 0 < colors[0].max() < 1 and np.ptp(colors[0]) < 1e-6  # heat is grey
+
+
+def test_a_hundred_steps_reach_a_picture(trained):
+    psnr = trained[0].held_out_psnr(99) | trained[1].held_out_psnr(99)
+    assert psnr["RGB"] > 26 and psnr["Thermal"] > 31, psnr
+    for trainer in trained:
+        assert trainer.guard.trips == 0
+        assert (
+            len(trainer.first_values(trainer.schedule.photos[trainer.stop.name])["means"])
+            < (trainer.count)
+            <= SETTINGS.max_splats
+        )
+
+
+def test_the_same_seed_gives_the_same_bits(device, balls, trained):
+    again = run(PlainTrainer(device, one_modality(balls, "RGB"), SETTINGS)).adam.state()
+    for name, values in trained[0].adam.state().items():
+        np.testing.assert_array_equal(again[name], values, err_msg=name)
+    other = run(PlainTrainer(device, one_modality(balls, "RGB"), replace(SETTINGS, seed=1)), 5)
+    assert not np.array_equal(other.adam.state()["base.value"], again["base.value"])
+
+
+ONE_THREAD = """
+import sys
+from pathlib import Path
+import numpy as np
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
+from tests.training.baselines.test_plain import SETTINGS, run
+from shapeshift.training.baselines.plain import PlainTrainer, one_modality
+capture = one_modality(read_capture(Path(sys.argv[1])), "RGB")
+np.savez(sys.argv[2], **run(PlainTrainer(open_device("cpu"), capture, SETTINGS), 45).adam.state())
+"""
+
+
+def test_one_thread_gives_the_same_bits_as_all(device, balls, tmp_path):
+    capture = one_modality(read_capture(balls.folder), "RGB")
+    here = run(PlainTrainer(device, capture, SETTINGS), 45).adam.state()  # over two changes
+    out = tmp_path / "one.npz"
+    environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": "1", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", ONE_THREAD, str(balls.folder), str(out)]
+    subprocess.run(command, check=True, cwd=ROOT, env=environment, timeout=120)
+    with np.load(out) as there:
+        assert set(there.files) == set(here)
+        for name, values in here.items():
+            np.testing.assert_array_equal(there[name], values, err_msg=name)
+
+
+def test_degrees_come_one_after_the_other(device, balls):
+    settings = replace(SETTINGS, iterations=90, grow=False, sh_degree=3)
+    trainer = PlainTrainer(device, one_modality(balls, "RGB"), settings)
+    seen = []
+    for now in trainer.steps():
+        seen.append(trainer.step.used)
+        rest = trainer.device.download(trainer.adam["rest"])
+        assert not rest[:, trainer.step.used :].any() and now.anchors == trainer.count
+        if now.iteration == 12:
+            break
+    assert seen == [0, 0, 0, 3, 3, 3, 8, 8, 8, 15, 15, 15]
+
+
+def test_growing_never_ends_unsettled(device, balls):
+    trainer = PlainTrainer(device, one_modality(balls, "RGB"), replace(SETTINGS, iterations=85))
+    settled = [trainer.settled for _ in trainer.steps()]
+    assert settled[18] and not settled[19] and not settled[25]  # changed at 20, the last time
+    assert settled[-1]
+
+
+def test_a_broken_state_is_turned_back(device, balls):
+    settings = replace(SETTINGS, iterations=180, grow=False)
+    trainer = PlainTrainer(device, one_modality(balls, "RGB"), settings)
+    for now in trainer.steps():
+        if now.iteration == 120:
+            state = trainer.adam.state()
+            state["means.value"][:] = np.nan
+            trainer.adam.load(state)
+    assert trainer.guard.trips == 1 and trainer.rate_scale == 0.5
+    assert np.isfinite(trainer.splats().means).all()
+    assert trainer.held_out_psnr(99)["RGB"] > 26
+
+
+def test_the_folder_draws_what_was_trained(trained, device, balls, tmp_path):
+    out = tmp_path / "splats"
+    layers = [(t.stop, t.splats()) for t in trained]
+    written = write_layer_list(layers, out)
+    assert written == sum(f.stat().st_size for f in out.iterdir())
+    for path in (out, out / LIST):
+        model = read_model(path)
+        assert model.stops == balls.stops and model.mode == "exclusive"
+    facts = describe(model, out / LIST)
+    assert facts["splats"] == sum(t.count for t in trained) and facts["sh_degree"] == 2
+    for name, score in evaluate_model(device, model, balls).items():
+        trainer = next(t for t in trained if t.stop.name == name)
+        assert score.psnr_db == pytest.approx(trainer.held_out_psnr(99)[name], abs=0.02)
+        assert score.alive <= trainer.count
+
+
+def test_what_cannot_be_trained_is_refused(device, balls):
+    with pytest.raises(BadFile, match="'Xray' has no training photos"):
+        one_modality(balls, "Xray")
+    for wrong in ({"sh_degree": 4}, {"splats": 0}, {"iterations": None}, {"ssim_share": 1.5}):
+        with pytest.raises(ValueError):
+            PlainSettings(**wrong)
+
+
+def one_splat() -> PlainSplats:
+    row = np.zeros((1, 3), np.float32)
+    return PlainSplats(row, row + 0.1, np.float32([[1, 0, 0, 0]]), np.float32([0.5]), row[None])
+
+
+def test_names_of_stops_become_names_of_files():
+    assert layer_name(3, Stop("a/../b: ä", 0.0)) == "3_a____b___.ply"
+    assert layer_name(0, Stop("x" * 500, 0.0)) == f"0_{'x' * 40}.ply"
+
+
+def test_only_a_folder_of_ours_is_written_into(tmp_path):
+    layers = [(Stop("a", 0.0), one_splat()), (Stop("b", 1.0), one_splat())]
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("keep")
+    with pytest.raises(BadFile, match="wanted is a new folder"):
+        write_layer_list(layers, tmp_path / "mine")
+    with pytest.raises(BadFile, match="wanted is a new folder"):
+        write_layer_list(layers, tmp_path / "mine.shift")
+    write_layer_list(layers, tmp_path / "new")
+    write_layer_list(layers, tmp_path / "new")  # again
+    assert len(read_model(tmp_path / "new").means) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        ("{", "not JSON"),
+        ("[]", "has format None"),
+        ('{"format": "shapeshift-layers 2"}', "has format 'shapeshift-layers 2'"),
+        ('{"format": "shapeshift-layers 1", "stops": []}', "at least one stop"),
+        ('{"format": "shapeshift-layers 1", "mode": "both", "stops": [STOP]}', "mode is 'both'"),
+        ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [{"name": "a", "x": 0,'
+         ' "kind": "rgb"}]}', "lacks 'file'"),
+        ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [STOP, {"name": "b", '
+         '"x": 1, "kind": "rgb", "file": "0_a.ply"}]}', "names one file twice"),
+        ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [{"name": "a", "x": 0,'
+         ' "kind": "rgb", "file": "../0_a.ply"}]}', "the name of a file beside it"),
+        ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [{"name": "a", "x": 0,'
+         ' "kind": "rgb", "file": "b.ply"}]}', "is not in"),
+    ],
+)  # fmt: skip
+def test_a_list_that_is_wrong_is_refused(tmp_path, text, match):
+    write_layer_list([(Stop("a", 0.0), one_splat())], tmp_path)
+    stop = '{"name": "a", "x": 0, "kind": "rgb", "file": "0_a.ply"}'
+    (tmp_path / LIST).write_text(text.replace("STOP", stop))
+    with pytest.raises(BadFile, match=match):
+        read_model(tmp_path)
+
+
+def test_a_list_without_end_is_refused(tmp_path):
+    (tmp_path / LIST).write_bytes(b" " * ((1 << 20) + 1))
+    with pytest.raises(BadFile, match="no list of stops is so long"):
+        read_model(tmp_path)

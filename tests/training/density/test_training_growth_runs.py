@@ -1,0 +1,104 @@
+"""Runs that grow in each of the ways, on a small capture: caps, bits, resuming, small photos."""
+
+import csv
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import SETTLE, Trainer
+from tests.support.training_runs import bits
+
+BASE = TrainSettings(iterations=120, grow_every=30, max_anchors=900)
+FIRST = 600  # points that the capture is left with
+WAYS = {
+    "to the cap": {},
+    "at the cap": {"max_anchors": FIRST},
+    "nothing of their own": {"own": ""},
+    "coarse": {"coarse": 4, "coarse_until": 0.5},
+}
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory) -> Capture:
+    made = make_balls(tmp_path_factory.mktemp("balls"), size=100, views=20, test_views=2)
+    return replace(made, points=made.points[:: len(made.points) // FIRST][:FIRST])
+
+
+def run(trainer: Trainer, steps: int | None = None) -> Trainer:
+    for now in trainer.steps():
+        assert now.anchors <= trainer.most_anchors
+        if steps is not None and now.iteration >= steps:
+            break
+    return trainer
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way, tmp_path):
+    settings = replace(BASE, **WAYS[way])
+    whole = run(Trainer(device, balls, settings))
+    cap = settings.max_anchors
+    assert (cap == FIRST or whole.anchors_count > FIRST) and whole.anchors_count <= cap
+    assert whole.grown_at > 0 and whole.guard.trips == 0
+    part = run(Trainer(device, balls, settings), steps=33)  # with some evidence, on small photos
+    write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
+    resumed = run(Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz")))
+    assert bits(resumed) == bits(whole)
+    untrained = Trainer(device, balls, settings).held_out_psnr(9)
+    for name, psnr in whole.held_out_psnr(9).items():
+        assert psnr > untrained[name] + 5, name
+
+
+def test_nothing_changes_within_the_steps_that_a_picture_needs_to_settle(device, balls):
+    """The end of a run is exported, so the last growing lies at least SETTLE steps before it."""
+    for steps in (SETTLE + 19, SETTLE + 20, 100):
+        trainer = run(Trainer(device, balls, replace(BASE, iterations=steps, grow_every=20)))
+        assert trainer.settled, steps
+        assert (trainer.grown_at > 0) == (steps >= SETTLE + 20)
+
+
+def test_coarse_runs_draw_small_pictures_first_and_whole_ones_last(device, balls):
+    trainer = Trainer(device, balls, replace(BASE, grow=False, iterations=40, coarse=4))
+    sizes = []
+    for _ in trainer.steps():
+        sizes.append(trainer.drawing.camera.size)
+    assert list(dict.fromkeys(sizes)) == [(25, 25), (50, 50), (100, 100)]
+    assert [sizes.count((s, s)) for s in (25, 50, 100)] == [7, 7, 26]
+    assert not trainer.coarse.made and {key[2] for key in trainer.targets.kept} == {(100, 100)}
+    picture = trainer.step.draw(trainer.held_out[0].view, trainer.control("RGB"), (0.0, 0.0, 0.0))
+    assert picture.camera.size == (100, 100)
+
+
+def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
+    settings = replace(BASE, max_mb=0.085, max_anchors=12000)
+    trainer = run(Trainer(device, balls, settings))
+    assert FIRST < trainer.anchors_count <= trainer.most_anchors < 12000
+    assert write_package(trainer.model(), tmp_path / "a.shift") <= 0.085e6
+    finite = all(np.isfinite(a).all() for a in trainer.adam.state().values())
+    assert finite
+
+
+def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):
+    root, out = Path(__file__).resolve().parents[3], tmp_path / "growth.csv"
+    ways = ["no growth", "default", "coarse"]
+    program = [sys.executable, "docs/bench/growth.py", str(balls.folder), "--out", str(out)]
+    program += ["--iterations", "90", "--grow-every", "30", "--max-anchors", "400", "--ways", *ways]
+    subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
+    lines = out.read_text().splitlines()
+    assert lines[0].startswith("# python3 docs/bench/growth.py ")
+    rows = list(csv.DictReader(lines[2:]))
+    last = [row for row in rows if row["steps"] == "90"]
+    assert [row["way"] for row in last if row["modality"] == "mean"] == ways
+    assert {row["modality"] for row in last} == {"RGB", "Thermal", "mean"}
+    assert last[3]["psnr_db"] != last[0]["psnr_db"]  # of the same 400 anchors, some have moved
+    for row in rows:
+        assert float(row["psnr_db"]) > 10 and int(row["package_bytes"]) > 10_000
+        assert 0 < int(row["splats"]) <= 5 * int(row["anchors"])

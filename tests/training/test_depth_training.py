@@ -1,0 +1,222 @@
+"""Depth photos in training: the loss, the whole step's gradients, and what they are good for."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from shapeshift.app.training.evaluate import print_table
+from shapeshift.rasterizer.device import open_device
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.rasterizer.surface_reference import render_depth_reference
+from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.scene.captures.depth_photo import load_depth
+from shapeshift.training.baselines.plain_reference import decode_plain_reference
+from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
+from shapeshift.training.coarse import smaller
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.evaluation.evaluate import evaluate_model, report
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.depth_loss import HOLE, DepthLoss, DepthWish
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.photos import read
+from shapeshift.training.reference import decode_reference, image_loss_reference
+from shapeshift.training.settings import TrainSettings
+from shapeshift.training.step import Step
+from shapeshift.training.supervision.targets import Targets
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
+from tests.training.baselines.test_plain_gradients import situation as plain_situation
+from tests.training.test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
+
+SHARE = 0.7
+
+
+def depth_photo(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    depth = rng.uniform(2, 4, SIZE[::-1]).astype(np.float32)
+    depth[rng.random(depth.shape) < 0.3] = 0
+    return depth
+
+
+def depth_loss_reference(metres, through, depth) -> float:
+    known = depth > 0
+    away = np.abs(metres - (1 - through) * depth)[known] / depth[known]
+    return float((away + HOLE * through[known]).mean())
+
+
+@pytest.mark.parametrize("seed", [1])
+def test_every_gradient_of_a_step_with_depth(device, seed):
+    parameters, control, view, rgba = situation(seed)
+    depth, size = depth_photo(seed), SIZE
+    camera, photo = camera_of(view), rgba[..., :3] / 255
+
+    def loss(name, values):
+        splats = decode_reference(
+            LAYOUT, parameters | {name: values}, control, view.world_from_eye.position, VOXEL
+        )
+        image, through, metres = render_depth_reference(splats, camera, BACKGROUND)
+        shown = image_loss_reference(image.transpose(1, 2, 0), photo, 0.2)
+        return shown + SHARE * depth_loss_reference(metres, through, depth)
+
+    rates = {name: np.array([1.0], np.float32) for name in parameters}
+    step = Step(device, LAYOUT, VOXEL, Adam(device, parameters, rates))
+    image_loss, depth_loss = ImageLoss(device, size), DepthLoss(device, size)
+    drawing = step.draw(view, control, BACKGROUND, with_depth=True)
+    target = image_loss.target(device.upload(rgba), BACKGROUND)
+    wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
+    grads = step.gradients(drawing, image_loss, target, 0.2, depth=wish)
+    total = image_loss.value() + SHARE * depth_loss.value()
+    assert total == pytest.approx(loss("anchors", parameters["anchors"]), rel=1e-4)
+    for name, grad in grads.items():
+        have = device.download(grad).astype(np.float64)
+        values = np.asarray(parameters[name], np.float64)
+        want = finite_differences(lambda v, name=name: loss(name, v), values, 1e-7)
+        if name == "weights":  # what no head sees is frozen; the reference does not know it at all
+            want = LAYOUT.pack(LAYOUT.unpack(want))
+        error = np.abs(have - want).max() / np.abs(want).max()
+        assert error < 2e-5, (name, error)
+
+
+def test_every_gradient_of_plain_splats_with_depth(device):
+    parameters, view, rgba = plain_situation(1, 0)
+    depth, camera, photo = depth_photo(3), camera_of(view), rgba[..., :3] / 255
+
+    def loss(name, values):
+        eye = view.world_from_eye.position
+        splats = decode_plain_reference(parameters | {name: values}, eye, 0)
+        image, through, metres = render_depth_reference(splats, camera, BACKGROUND)
+        shown = image_loss_reference(image.transpose(1, 2, 0), photo, 0.2)
+        return shown + SHARE * depth_loss_reference(metres, through, depth)
+
+    adam = Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1)))
+    step, image_loss, depth_loss = (
+        PlainStep(device, adam, 0), ImageLoss(device, SIZE), DepthLoss(device, SIZE)
+    )  # fmt: skip
+    target = image_loss.target(device.upload(rgba), BACKGROUND)
+    wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
+    drawing = step.draw(view, BACKGROUND, with_depth=True)
+    grads = step.gradients(drawing, image_loss, target, 0.2, None, wish)
+    for name in ("means", "scales", "wxyz", "opacity", "base"):
+        have = device.download(grads[name]).astype(np.float64)
+        values = parameters[name].astype(np.float64)
+        want = finite_differences(lambda v, name=name: loss(name, v), values, 1e-7)
+        error = np.abs(have - want).max() / np.abs(want).max()
+        assert error < 2e-5, (name, error)
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory) -> Capture:
+    return make_balls(tmp_path_factory.mktemp("balls"), 64, 12, 3, depth=True)
+
+
+def test_the_depth_photos_of_the_balls_are_exact(balls):
+    photo = balls.photos[0]
+    depth = load_depth(photo)
+    _, fx, fy, cx, cy = photo.view.pinhole()
+    y, x = np.nonzero(depth)
+    rays = np.stack([(x + 0.5 - cx) / fx, -(y + 0.5 - cy) / fy, -np.ones(len(x))], axis=1)
+    to_world = photo.view.world_from_eye.matrix()
+    points = (rays * depth[y, x][:, None]) @ to_world[:3, :3].T + to_world[:3, 3]
+    on_floor = points[:, 1] < 0.002  # the disc lies at 0
+    assert on_floor.mean() > 0.2 and points[:, 1].min() > -0.002
+    assert np.abs(points).max() < 1.2
+    nearest = np.linalg.norm(points - [-0.45, 0.35, 0.25], axis=1).min()
+    assert abs(nearest - 0.35) < 0.002  # the red ball
+
+
+def test_depth_follows_its_photo_through_masks_and_sizes(balls):
+    photo = balls.photos[0]
+    loaded = read(photo, 2, "object")
+    assert loaded.depth.shape == (32, 32) and loaded.depth.any()
+    assert smaller(loaded, 2).depth.shape == (16, 16)
+    targets = Targets(open_device("cpu"))
+    assert targets.wish(loaded, 0.0) is None
+    assert targets.wish(replace(loaded, depth=None), 0.1) is None
+    first = targets.wish(loaded, 0.1)
+    assert targets.wish(loaded, 0.1).target is first.target
+    assert first.target.known == (loaded.depth > 0).sum()
+    nothing = replace(loaded, name="other", depth=loaded.depth * 0)
+    assert targets.wish(nothing, 0.1) is None
+    covered = read(replace(photo, mask=black_half(photo.path)), 1, "object").depth
+    assert covered[:, 32:].any() and not covered[:, :32].any()
+
+
+def black_half(photo: Path) -> Path:
+    """A mask without the left half."""
+    mask = np.zeros((64, 64), np.uint8)
+    mask[:, 32:] = 255
+    path = photo.with_name("mask.png")
+    Image.fromarray(mask).save(path)
+    return path
+
+
+def depth_error(trainer: Trainer) -> float:
+    """Mean over the modalities, as `eval` tells it of the exported model."""
+    scores = evaluate_model(trainer.device, trainer.model(), trainer.capture)
+    return float(np.mean([score.depth_error for score in scores.values()]))
+
+
+def trained(device, capture, **changes) -> Trainer:
+    settings = TrainSettings(iterations=60, max_anchors=400, grow=False, **changes)
+    trainer = Trainer(device, capture, settings)
+    for _ in trainer.steps():
+        pass
+    return trainer
+
+
+def test_depth_photos_bring_the_depth_nearer(device, balls):
+    """Where the first points are a visual hull; measured once: 0.084 against 0.233."""
+    hull = replace(balls, points=None, point_colors=None)
+    with_depth, without = (trained(device, hull, depth_share=share) for share in (0.3, 0.0))
+    one, other = depth_error(with_depth), depth_error(without)
+    assert one < 0.8 * other, (one, other)
+
+
+def test_without_depth_photos_or_a_share_the_bits_are_the_same(device, balls):
+    bare = replace(balls, photos=tuple(replace(p, depth=None) for p in balls.photos))
+    runs = [
+        trained(device, capture, depth_share=share).adam.state()["weights.value"]
+        for capture, share in ((bare, 0.1), (balls, 0.0))
+    ]
+    np.testing.assert_array_equal(*runs)
+
+
+def test_photos_with_and_without_depth_train_together(device, balls):
+    """And small photos first; what has no depth learns from its colours alone."""
+    photos = tuple(replace(p, depth=None) if i % 3 else p for i, p in enumerate(balls.photos))
+    trainer = trained(device, replace(balls, photos=photos), coarse=2, depth_share=0.1)
+    assert min(trainer.held_out_psnr(9).values()) > 15
+    assert all(np.isfinite(values).all() for values in trainer.adam.state().values())
+
+
+def test_eval_tells_how_far_off_depth_is(device, balls, tmp_path, capsys):
+    """By hand: splats on the true surface; and nothing at all, which is wrong by all of it."""
+    scores = evaluate_model(device, wall_of(balls), balls)
+    assert scores["RGB"].depth_error < 0.03 and scores["RGB"].depth_error > 1e-4
+    nothing = replace(wall_of(balls), opacity=np.zeros(len(balls.points), np.float32))
+    assert evaluate_model(device, nothing, balls)["RGB"].depth_error == 1.0
+    bare = replace(balls, photos=tuple(replace(p, depth=None) for p in balls.photos))
+    assert evaluate_model(device, nothing, bare)["RGB"].depth_error is None
+    told = report(tmp_path, scores, 0.0)["modalities"]["RGB"]["depth_error"]
+    assert told == pytest.approx(scores["RGB"].depth_error, abs=1e-5)
+    print_table(report(tmp_path, scores, 0.0))
+    assert f"{100 * told:.2f}" in capsys.readouterr().err
+
+
+def wall_of(capture: Capture) -> SplatLayers:
+    """A round, opaque splat of 1 cm at each of the surface's points, in all stops."""
+    count = len(capture.points)
+    ones = np.ones(count, np.float32)
+    return SplatLayers(
+        capture.points,
+        np.full((count, 3), 0.01, np.float32),
+        np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
+        ones * np.float32(0.99),
+        np.zeros((count, 1, 3), np.float32),
+        np.arange(count, dtype=np.int32) % 2,
+        capture.stops,
+    )

@@ -1,0 +1,209 @@
+"""Training as a whole on a small ray-traced capture: quality, bits, guard, resume, export."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapeshift.runtime_models.evaluate import evaluate
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.write_package import write_package
+from shapeshift.runtime_models.read_scene import read_model
+from shapeshift.scene.captures.capture import Capture
+from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
+from shapeshift.training.evaluation.evaluate import evaluate_model
+from shapeshift.training.settings import TrainSettings, resumed
+from shapeshift.training.synthetic.balls import make_balls
+from shapeshift.training.train import Trainer
+from tests.support.training_runs import run
+
+ROOT = Path(__file__).resolve().parents[2]
+# An even encoding tells two stops apart within fewer steps than one unit a stop does.
+SETTINGS = TrainSettings(iterations=200, grow=False, max_anchors=2000, encoding="even")
+
+
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory) -> Capture:
+    return make_balls(tmp_path_factory.mktemp("balls"), size=100, views=20, test_views=4)
+
+
+def same_bits(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> bool:
+    return a.keys() == b.keys() and all(np.array_equal(a[n], b[n], equal_nan=True) for n in a)
+
+
+@pytest.fixture(scope="module")
+def trained(device, balls) -> Trainer:
+    return run(Trainer(device, balls, SETTINGS))
+
+
+def test_two_hundred_steps_reach_a_picture(trained):
+    psnr = trained.held_out_psnr(most=99)
+    assert psnr["RGB"] > 22.5 and psnr["Thermal"] > 29.5, psnr
+    assert trained.guard.trips == 0
+
+
+def test_the_same_seed_gives_the_same_bits(device, balls, trained):
+    again = run(Trainer(device, balls, SETTINGS))
+    assert same_bits(again.adam.state(), trained.adam.state())
+    other = run(Trainer(device, balls, replace(SETTINGS, seed=1)), steps=20)
+    assert not np.array_equal(
+        other.adam.state()["weights.value"], again.adam.state()["weights.value"]
+    )
+
+
+ONE_THREAD = """
+import sys
+from pathlib import Path
+from shapeshift.rasterizer.device import open_device
+from shapeshift.scene.captures.read_capture import read_capture
+from tests.training.test_training import SETTINGS, run
+from shapeshift.training.checkpoint import write_checkpoint
+from shapeshift.training.train import Trainer
+trainer = run(Trainer(open_device("cpu"), read_capture(Path(sys.argv[1])), SETTINGS), steps=40)
+write_checkpoint(Path(sys.argv[2]), *trainer.checkpoint())
+"""
+
+
+def test_one_thread_gives_the_same_bits_as_all(device, balls, tmp_path):
+    from shapeshift.scene.captures.read_capture import read_capture
+
+    here = run(Trainer(device, read_capture(balls.folder), SETTINGS), steps=40)
+    out = tmp_path / "one.npz"
+    environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": "1", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", ONE_THREAD, str(balls.folder), str(out)]
+    subprocess.run(command, check=True, cwd=ROOT, env=environment, timeout=120)
+    assert same_bits(read_checkpoint(out)[0], here.checkpoint()[0])
+
+
+def test_resuming_equals_never_having_stopped(device, balls, tmp_path):
+    settings = replace(SETTINGS, iterations=100, grow=True, grow_every=20, max_anchors=2500)
+    whole = run(Trainer(device, balls, settings))
+    assert whole.anchors_count != 1977  # growing did something between the stops
+    for stop in (37, 40):  # before a change of anchors, and on one
+        part = run(Trainer(device, balls, settings), steps=stop)
+        write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
+        resumed = run(Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz")))
+        assert resumed.iteration == whole.iteration
+        assert same_bits(resumed.adam.state(), whole.adam.state()), stop
+
+
+@pytest.mark.parametrize("factor", [50.0, 400.0])
+def test_the_guard_rescues_a_poisoned_learning_rate(device, balls, factor):
+    settings = replace(SETTINGS, iterations=250, rate_scale=factor)
+    trainer = run(Trainer(device, balls, settings))
+    assert trainer.guard.trips > 0
+    assert trainer.rate_scale < factor
+    psnr = trainer.held_out_psnr(most=99)
+    assert psnr["RGB"] > 22 and psnr["Thermal"] > 27, psnr
+
+
+def test_the_guard_rescues_weights_that_are_not_numbers(device, balls):
+    trainer = Trainer(device, balls, SETTINGS)
+    for now in trainer.steps():
+        if now.iteration == 60:
+            state = trainer.adam.state()
+            state["weights.value"][::7] = np.nan
+            trainer.adam.load(state)
+        if now.iteration == 120:
+            break
+    assert trainer.guard.trips > 0
+    assert all(np.isfinite(a).all() for a in trainer.adam.state().values())
+
+
+def test_the_package_draws_what_was_trained(trained, device, balls, tmp_path):
+    """The trainer's own kernels, and the five exported networks run by onnxruntime, agree."""
+    path = tmp_path / "balls.shift"
+    write_package(trained.model(), path, features="float32")
+    model = read_model(path)
+    eye = np.array([2.0, 1.5, -0.5])
+    for stop in model.stops:
+        drawn = trained.step.decode(trained.control(stop.name), eye)
+        exported = evaluate(model, stop.x, eye)
+        for name in ("means", "scales", "opacity", "color"):
+            ours = device.download(getattr(drawn, name))
+            np.testing.assert_allclose(getattr(exported, name), ours, atol=2e-5, err_msg=name)
+        wxyz = device.download(drawn.wxyz)
+        wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
+        np.testing.assert_allclose(exported.wxyz, wxyz, atol=2e-5)
+    provenance = model.provenance
+    assert provenance["settings"]["seed"] == 0 and provenance["iterations"] == 200
+    own = trained.held_out_psnr(most=99)
+    for name, score in evaluate_model(device, model, balls).items():
+        assert score.psnr_db == pytest.approx(own[name], abs=0.02)
+        assert 0 < score.alive <= model.splat_count and 0.5 < score.ssim < 1
+
+
+def test_growing_ends_higher(device, balls):
+    settings = replace(SETTINGS, iterations=400)  # after 200 steps the newcomers still cost
+    few = replace(balls, points=balls.points[::40])  # of enough points a run starts at its cap
+    plain = run(Trainer(device, few, settings))
+    growing = replace(settings, grow=True, grow_every=25, max_anchors=3000)
+    grown = run(Trainer(device, few, growing))
+    assert plain.anchors_count < grown.anchors_count <= 3000
+    before = plain.held_out_psnr(most=99)
+    for name, psnr in grown.held_out_psnr(most=99).items():
+        assert psnr > before[name] + 0.1, name
+
+
+def train_command(*arguments) -> list[str]:
+    code = "import sys; from shapeshift.app.cli import main; sys.exit(main(sys.argv[1:]))"
+    return [sys.executable, "-c", code, "train", *map(str, arguments)]
+
+
+def test_ctrl_c_leaves_a_readable_package_and_resume_goes_on(balls, tmp_path):
+    out = tmp_path / "cut.shift"
+    command = train_command(
+        balls.folder, "--out", out, "--iterations", 100000, "--max-anchors", 1500
+    )
+    process = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    lines = []
+    for line in process.stderr:  # "compiling", then the steps
+        lines.append(line)
+        if "apart" in line:
+            break
+    time.sleep(3)
+    process.send_signal(signal.SIGINT)
+    _, rest = process.communicate(timeout=60)
+    assert process.returncode == 130, rest
+    assert "--resume" in rest
+    model = read_model(out)
+    done = model.provenance["iterations"]
+    assert done > 0
+    assert not list(tmp_path.glob("*.partial*"))
+    more = train_command(balls.folder, "--out", out, "--resume", "--iterations", done + 5)
+    subprocess.run(more, cwd=ROOT, check=True, timeout=60, capture_output=True)
+    assert read_model(out).provenance["iterations"] == done + 5
+    changed = train_command(balls.folder, "--out", out, "--resume", "--seed", 7)
+    refused = subprocess.run(changed, cwd=ROOT, timeout=60, capture_output=True, text=True)
+    assert refused.returncode == 2 and "seed is 0, not 7" in refused.stderr
+
+
+def test_a_checkpoint_that_is_cut_off_is_refused(tmp_path):
+    path = checkpoint_path(tmp_path / "a.shift")
+    with pytest.raises(BadFile, match="no checkpoint"):
+        read_checkpoint(path)
+    write_checkpoint(path, {"a": np.zeros(100)}, {"x": 1})
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(BadFile, match="not a readable checkpoint"):
+        read_checkpoint(path)
+
+
+def test_a_checkpoint_of_another_version_is_refused():
+    before = SETTINGS.as_dict()
+    assert resumed(before, {}) == SETTINGS
+    older = {name: value for name, value in before.items() if name != "own"} | {"voxel": None}
+    for other, word in ((older, "own"), (before | {"tomorrow": 1}, "tomorrow")):
+        with pytest.raises(ValueError, match=rf"another version.*\({word}\); train anew"):
+            resumed(other, {})
+
+
+def test_a_modality_without_photos_is_refused(device, balls):
+    one = tuple(p for p in balls.photos if p.modality == "RGB" or p.split == "test")
+    with pytest.raises(BadFile, match="'Thermal' has no training photos"):
+        Trainer(device, replace(balls, photos=one), SETTINGS)
