@@ -1,6 +1,7 @@
 """Regions of a scene that have a control value of their own, as a person edits them; no window."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -152,7 +153,7 @@ class Regions:
         self.choose(stays[0] if stays else -1)
         self._changed()
 
-    def edit(self, number: int, **changes: object) -> None:
+    def edit(self, number: int, **changes: Any) -> None:
         """Changes fields of one region; `version` tells only when something is different."""
         before = self.items[number]
         if all(same(getattr(before, name), value) for name, value in changes.items()):
@@ -210,7 +211,7 @@ class Regions:
 
 def selector_of(region: Region, view: View) -> Selector:
     """What the scene knows a region as; a lens looks along `view`."""
-    inside = {"x": region.x, "border": region.border}
+    inside: dict[str, Any] = {"x": region.x, "border": region.border}
     if region.kind == "box":
         return Box(centre=region.centre, half=region.half, **inside)
     if region.kind == "sphere":
@@ -225,7 +226,7 @@ def selector_of(region: Region, view: View) -> Selector:
 
 def region_of(selector: Selector, name: str, index: int) -> Region:
     """The region that a selector of a command line stands for; the inverse of `selector_of`."""
-    common = {"name": name, "index": index, "x": selector.x}
+    common: dict[str, Any] = {"name": name, "index": index, "x": selector.x}
     if isinstance(selector, Painted):
         return Region("painted", painted=selector.weight > 0.5, **common)
     common["border"] = selector.border

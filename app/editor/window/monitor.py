@@ -1,9 +1,11 @@
 """The monitor on which a window lies, as glfw tells of it."""
 
+from typing import Any
+
 import glfw
 
 
-def monitor_height(handle: object) -> tuple[float, float]:
+def monitor_height(handle: Any) -> tuple[float, float]:
     """Pixels and millimetres of the monitor that most of a window lies on; 0 for none."""
     monitor = _monitor_of(handle)
     if monitor is None:
@@ -11,7 +13,7 @@ def monitor_height(handle: object) -> tuple[float, float]:
     return glfw.get_video_mode(monitor).size.height, glfw.get_monitor_physical_size(monitor)[1]
 
 
-def grow_window(handle: object, times: float) -> None:
+def grow_window(handle: Any, times: float) -> None:
     """Makes a window larger, as far as the desktop leaves room, and puts it in the middle."""
     monitor = _monitor_of(handle)
     if monitor is None:
@@ -33,14 +35,14 @@ def tells_places() -> bool:
     return ask is None or ask() != glfw.PLATFORM_WAYLAND
 
 
-def _monitor_of(handle: object) -> object | None:
+def _monitor_of(handle: Any) -> Any:
     """The monitor that most of a window lies on; under Wayland, which does not tell, the first."""
     if not tells_places():
         return glfw.get_primary_monitor()
     left, top = glfw.get_window_pos(handle)
     width, height = glfw.get_window_size(handle)
 
-    def shared(monitor: object) -> int:
+    def shared(monitor: Any) -> int:
         """Square pixels of the window that the monitor shows."""
         x, y = glfw.get_monitor_pos(monitor)
         size = glfw.get_video_mode(monitor).size
