@@ -37,7 +37,7 @@ def broken(request, ctx, monkeypatch):
 
     def read(name: str, *args, **defines):
         lines = read_shader(name, *args, **defines)
-        if name != f"sort_{file}.comp":
+        if name != f"sort/sort_{file}.comp":
             return lines
         replaced.append(name)
         assert any(text in line for _, _, line in lines), "the shader does not say this any more"
