@@ -107,18 +107,13 @@ def thing(name: str, x: float, stops=STOPS) -> SceneObject:
     return SceneObject(name, model, x=x)
 
 
-class SceneStage:
-    def __init__(self, *things: SceneObject) -> None:
-        self.scene = Scene(things)
-
-
 def test_the_other_side_is_thermal_where_there_is_such_a_stop():
     thermal = (STOPS[0], Stop("Heat", 0.5, "thermal"), STOPS[2])
     for stops, x, wanted in ((thermal, 0.0, 0.5), (thermal, 0.5, 0.0), (STOPS, 0.2, 1.0)):
         state = SplitState()
-        state.toggle(SceneStage(thing("a", x, stops)), 0)
+        state.toggle(thing("a", x, stops))
         assert state.on and abs(state.x - wanted) <= (wanted == 0.0)  # of equals either end
-    state.toggle(SceneStage(thing("a", 0.2)), 0)
+    state.toggle(thing("a", 0.2))
     assert not state.on
 
 
