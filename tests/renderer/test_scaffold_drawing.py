@@ -186,14 +186,15 @@ def test_the_slider_decodes_nothing(renderer, tmp_path):
 def test_a_packages_scene_as_a_run_shows_the_same(renderer, tmp_path):
     """The bundled demo, converted to a Scaffold-GS run at x = 0: at least 60 dB.
 
-    Without the few anchors whose largest scale is held at a package's limit: a run has none.
+    Without the anchors' own axes and sizes, and without the few anchors whose largest scale is held
+    at a package's limit: a run has neither.
     """
     demo = read_model(Path(__file__).resolve().parents[2] / "assets" / "workshop.shift")
-    head = demo.networks["scale"]
+    demo, head = replace(demo, frames=None), demo.networks["scale"]
     scales = evaluate(demo, 0.0, np.ones(3)).scales.reshape(len(demo.anchors), -1)
     free = scales.max(axis=1) < 0.999 * head.gain * np.exp(head.clip[1])
     assert free.mean() > 0.99
-    demo = replace(demo, anchors=demo.anchors[free], features=demo.features[free])
+    demo = demo.with_anchors(free)
     run = read_model(write_run(from_anchors(demo, 0.0), tmp_path / "run", "split"))
     view = default_view(demo, (320, 180))
     (image,), _ = draw_told(renderer, in_scene(demo), [view])

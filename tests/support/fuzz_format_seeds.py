@@ -130,7 +130,7 @@ def checkpoint_seeds() -> list[Seed]:
     arrays = {name: rng.normal(size=(20, side)) for name, side in sides.items()}
     np.savez(packed, **arrays, opacities=rng.normal(size=20))
     arrays = Seed("checkpoint .npz", {"a.npz": packed.getvalue()}, read_model)
-    fixtures = Path(__file__).with_name("fixtures") / "torch_2_15"
+    fixtures = Path(__file__).parents[1] / "fixtures" / "torch_2_15"
     return [arrays] + [
         Seed(
             f"checkpoint {file.suffix}",

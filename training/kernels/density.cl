@@ -3,7 +3,7 @@
 // Writes:  sums over steps: pull (N, 2), opacity_sum (A, 2), given (A, 2).
 // Units:   gradients times `unit`; opacity 0..1; alpha T summed over pixels.
 
-// One work-item an anchor that the step ran: records, gradients and opacities are of these alone, in
+// One work-item an anchor that the step ran: records, gradients, opacities are of these alone, in
 // the order of `rows`.  pull (N, 2): sum of a splat's absolute screen gradient (slots 9 and 10)
 // times `unit`, and the steps in which it was on screen.  opacity_sum (A, 2): sum of its splats'
 // opacity above zero, and the steps it ran.  given (A, 2), of the step's stop: sum of what its

@@ -59,7 +59,10 @@ def test_the_same_calls_give_the_same_hash_here_and_in_another_process():
     carry_on(again)
     assert again.hash() == here
     folder = Path(__file__).resolve().parents[2]
-    code = "from tests.scene.world import test_physics as t; p = t.busy_world(); t.carry_on(p); print(p.hash())"
+    code = (
+        "from tests.scene.world import test_physics as t\n"
+        "p = t.busy_world(); t.carry_on(p); print(p.hash())"
+    )
     paths = os.pathsep.join([str(folder), str(folder.parent)])
     done = subprocess.run(
         [sys.executable, "-c", code],
