@@ -1,4 +1,4 @@
-// How much brighter a photo is than what is drawn of it: sums a row of a channel, one work-item each.
+// How much brighter a photo is than what is drawn of it: sums a row of a channel, a work-item each.
 // Reads:   image (3, H, W), rgba (H, W, 4), weight (H, W) where masked.
 // Writes:  sums (6, 3 * H).
 // Units:   display sRGB 0..1; pixels.
