@@ -8,7 +8,7 @@
 // logit; rotation is left as it comes, wxyz.
 // A frame (A, 7) is an anchor's own sizes, as logarithms s, and axes, as a quaternion q of any
 // length: mean = anchor + R(q) (exp(s) * offset), scale = exp(s) * scale, rotation = q times it.
-// Reads:   raw (A, RAW), anchors (A, 3), frames and base colours; backward the Gaussians' gradients.
+// Reads:   raw (A, RAW), anchors (A, 3), frames, base colours; backward the Gaussians' gradients.
 // Writes:  means, scales, wxyz, opacity, color; backward grad_raw and gradients of what it read.
 // Units:   metres; one sigma; opacity and display sRGB in 0..1.
 

@@ -4,7 +4,7 @@
 // Units:   metres; one sigma; opacity 0..1; pixels.
 #include "common/camera.cl"
 
-// How far from its anchor the splats that are not absent are drawn, metres; -1 where all are absent.
+// How far from its anchor the splats that are not absent are drawn, metres; -1: all are absent.
 // A splat of opacity o ends at sqrt(2 ln(o / least_alpha)) of its sigmas.
 __kernel void measure_reach(int rows_count, int splats, float least_alpha,
                             __global const int *rows, __global const float *anchors,
