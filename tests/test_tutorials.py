@@ -101,6 +101,23 @@ def test_every_page_is_in_the_index():
     assert pages - {index, ROOT / "docs/tutorials/README.md"} <= linked
 
 
+def test_the_thermal_capture_is_read_as_it_is_shown(tmp_path):
+    from PIL import Image
+
+    from shapeshift.scene.captures.read_capture import read_capture
+
+    page = (ROOT / "docs/tutorials/thermal.md").read_text()
+    (text,) = re.findall(r"^```json\n(.*?)^```", page, re.M | re.S)
+    for modality in ("RGB", "Thermal"):
+        (tmp_path / modality).mkdir()
+        Image.new("RGB", (160, 120), (200, 90, 20)).save(tmp_path / modality / "000.png")
+    (tmp_path / "transforms.json").write_text(text)
+    capture = read_capture(tmp_path)
+    assert [stop.name for stop in capture.stops] == ["RGB", "Thermal"]
+    assert capture.stops[1].value_range == (15, 95) and capture.stops[1].unit == "°C"
+    assert [photo.modality for photo in capture.photos] == ["RGB", "Thermal"]
+
+
 def test_the_moving_picture_is_short_and_light():
     from PIL import Image
 
