@@ -1,4 +1,4 @@
-"""The picture in README.md: the bundled demo at its stops and half-way between, from three places.
+"""The picture in docs/viewer.md: the demo at its stops and half-way between, from three places.
 
 python3 docs/bench/demo_picture.py [docs/demo.png]
 """
