@@ -1,4 +1,4 @@
-"""The engine's settings, found by sweeps over the figures of tests/test_physics_figures.py."""
+"""The engine's settings, by sweeps of figures in tests/scene/world/test_physics_figures.py."""
 
 from types import ModuleType
 from typing import Any

@@ -22,7 +22,7 @@ from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, rea
 from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.supervision.exposure import fitted_psnr
 
-MOST_LOOKED_AT = 24  # held-out photos, for the colour behind them
+MOST_LOOKED_AT, LOOKED_AT_PX = 12, 64  # held-out photos, for the colour behind them
 LIKENESS = ("psnr_db", "ssim", "vgg", "depth_error", "fitted_db")  # fields of Score: means
 
 
@@ -136,10 +136,11 @@ def evaluate_model(
             f"{capture.folder}: no photo is held out for testing; mark some with split 'test'."
         )
     known = known_background(model, capture)
-    shown = []  # photos that tell the colour behind them: few, since only one is kept below
+    shown = []  # few and small photos, which tell the colour behind them; below one is in memory
     if background == "auto" and known is None:
-        few = tests[:: math.ceil(len(tests) / MOST_LOOKED_AT)]
-        shown = [read(photo, factor, masks) for photo in few]
+        for photo in tests[:: math.ceil(len(tests) / MOST_LOOKED_AT)]:
+            smaller = math.ceil(max(photo.view.size) / LOOKED_AT_PX)
+            shown.append(read(photo, max(factor, smaller), masks))
     behind = choose_background(background, known, shown) or BLACK
     painter, scores = Painter(device, model), {}
     for stop in capture.stops:

@@ -220,7 +220,7 @@ def test_a_training_finds_the_brightness_of_its_photos(device, balls, tmp_path):
         (tmp_path / name).symlink_to(balls.folder / name)
     planted = np.exp(RNG(1).normal(size=24) / 6)  # of these 24 a standard deviation of 0.103
     capture = uneven(balls, tmp_path, planted)
-    settings = TrainSettings(iterations=500, anchors=600, max_anchors=1200)
+    settings = TrainSettings(iterations=500, max_anchors=1200)
     trainer = run(Trainer(device, capture, settings))
     photos = trainer.schedule.photos
     names = [int(photo.name.rpartition("/")[2].removesuffix(".png")) for photo in photos["RGB"]]
