@@ -112,7 +112,8 @@ class Run(ABC):
         own: it is of the photo's own stop, so that it tells how bright the photo is.
         """
         fraction = self.budget.fraction(self.iteration, self.elapsed)
-        known = self.exposures if fraction >= self.exposures.begin else None
+        begun = self.exposures.has_begun(fraction, self.iteration)
+        known = self.exposures if begun else None
         image = self.drawing.frame.image if own else None
         return self.targets.target(photo, background, known, image)
 

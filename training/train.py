@@ -329,7 +329,7 @@ class Trainer(Run):
         looks = self.rise.steps if self.rise.since == self.iteration else 0
         self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
         self.rate_scale /= 2
-        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
         return True
 
     def go_on_from(self, state: dict[str, np.ndarray]) -> None:

@@ -294,8 +294,7 @@ def test_every_cure_brings_midpoints_nearer_to_the_blend(judged, changed, gain_d
     Two modalities of one shape leave `shapes` little to do: it must not harm.  Its overshoot was
     1.01 times that without it, its gain 0.3 dB.
     """
-    harm = 1.1 if gain_db < 0 else 1.0
-    plain, _, at_stops = judged()
+    harm, (plain, _, at_stops) = 1.1 if gain_db < 0 else 1.0, judged()
     cured, _, cured_at_stops = judged(**changed)
     assert cured.blend_db > plain.blend_db + gain_db
     assert cured.flash < harm * plain.flash and cured.jump < 1.1 * plain.jump

@@ -176,7 +176,7 @@ class PlainTrainer(Run):
         self.adam.load(self.guard.fall_back())
         self.evidence = PlainEvidence(self.device, self.count)
         self.rate_scale /= 2
-        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed))
+        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
         return True
 
     def change(self) -> None:

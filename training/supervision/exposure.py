@@ -17,7 +17,10 @@ from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.photos import LoadedPhoto
 
-FROM = 0.25  # of the run: before that the model shows too little
+# Photos are looked at from this share of the run on, before which the model shows too little, or
+# after so many visits of each if that is earlier: in long runs colours that depend on the view
+# learn the brightness of single photos instead.
+FROM, VISITS = 0.25, 2.5
 NOISE = 0.04  # standard deviation of the gains' logarithms; docs/bench/exposure.csv
 LIKE = 0.8  # squared correlation of drawings and photos, median; docs/bench/exposure.csv
 FEWEST = 6  # known photos of a modality, and half of them: then a mean means something
@@ -40,6 +43,7 @@ class Exposures:
         self.log_gain = np.full((len(names), 3), np.nan)  # NaN: not looked at yet
         self.likeness = np.full(len(names), np.nan)  # squared correlation with what was drawn
         self.begin = FROM  # share of the run from which on photos are looked at
+        self.begin_step = VISITS * len(names)  # or this step, if it comes first
         self.nothing = device.zeros(1)
 
     def look(self, photo: LoadedPhoto, image, rgba) -> None:
@@ -57,10 +61,15 @@ class Exposures:
         self.log_gain[row] = log_gain(product=sums[4], square=sums[3])
         self.likeness[row] = likeness(*sums)
 
-    def forget(self, fraction: float) -> None:
-        """The picture was lost at this share of the run: begin anew, as late as from the start."""
+    def has_begun(self, fraction: float, step: int) -> bool:
+        """Whether photos are looked at, at this share of the run and after so many steps."""
+        return fraction >= self.begin or step >= self.begin_step
+
+    def forget(self, fraction: float, step: int) -> None:
+        """The picture was lost here: begin anew, as late as from the start."""
         self.log_gain[:], self.likeness[:] = np.nan, np.nan
         self.begin = fraction + FROM
+        self.begin_step = step + VISITS * len(self.row)
 
     def spread(self, modality: str) -> float:
         """Of the logarithms of a modality's gains, by their median deviation, as a standard one.
@@ -96,13 +105,15 @@ class Exposures:
 
     def state(self) -> dict[str, np.ndarray]:
         known = {"log_gain": self.log_gain.copy(), "likeness": self.likeness.copy()}
-        return {f"exposure.{n}": v for n, v in (known | {"begin": np.array(self.begin)}).items()}
+        known["begin"] = np.array([self.begin, self.begin_step])
+        return {f"exposure.{n}": array for n, array in known.items()}
 
     def load(self, state: dict[str, np.ndarray]) -> None:
         """Of `state`; a checkpoint that has none, or that of other photos, leaves them unknown."""
         kept = state.get("exposure.log_gain")
         if kept is not None and kept.shape == self.log_gain.shape:
-            self.log_gain, self.begin = kept.copy(), float(state["exposure.begin"])
+            self.log_gain = kept.copy()
+            self.begin, self.begin_step = map(float, state["exposure.begin"])
             self.likeness = state["exposure.likeness"].copy()
 
 

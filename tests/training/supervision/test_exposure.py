@@ -146,7 +146,7 @@ def test_few_or_unknown_photos_are_left_as_they_are(device):
     again.load(other.state())
     np.testing.assert_array_equal(again.log_gain, exposures.log_gain)
     assert again.begin == FROM
-    again.forget(0.25)
+    again.forget(0.25, 100)
     assert np.isnan(again.log_gain).all() and again.begin == 0.25 + FROM
     last, _ = known(device, logs)
     last.load(again.state())
