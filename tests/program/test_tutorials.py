@@ -14,7 +14,7 @@ from shapeshift.app.cli import COMMANDS, LAUNCHED
 from shapeshift.app.command_line import parse, wants_help
 from shapeshift.app.errors import UsageError
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 TUTORIALS = sorted((ROOT / "docs/tutorials").glob("*.md"))
 SHELL = re.compile(r"^```sh\n(.*?)^```", re.M | re.S)
