@@ -11,13 +11,16 @@ import argparse
 import csv
 import io
 import json
-import platform
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from shapeshift.app.measure import processor  # noqa: E402
+
 FRAMES, SWEEP = 20, 20
 SIZES = ("1280x720", "640x360")
 PASSES = ("decode", "project", "sort", "bin", "splat")
@@ -64,7 +67,7 @@ def table(results: list[dict], options: argparse.Namespace) -> str:
     text.write(f"# python3 docs/bench/frames.py {names} --out docs/bench/frames.csv\n")
     gl = next(r["gl_renderer"] for r in results if r["gl_renderer"])
     text.write(
-        f"# {platform.processor() or platform.machine()}, {gl}; psnr_db is the worst of several "
+        f"# {processor()}, {gl}; psnr_db is the worst of several "
         "pictures against the float64 reference\n"
     )
     rows = csv.writer(text, lineterminator="\n")
