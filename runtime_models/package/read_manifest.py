@@ -1,10 +1,11 @@
 """scene.json of a package: every entry is checked here, what is wrong becomes one sentence."""
 
 import json
+import reprlib
 from dataclasses import dataclass
 from itertools import pairwise
-from reprlib import repr as short
 
+from shapeshift.runtime_models.files.plain_text import cut
 from shapeshift.runtime_models.model import (
     BETWEEN_STOPS,
     HEADS,
@@ -20,6 +21,7 @@ LARGEST_COUNT = 4096  # splats an anchor, features, Gaussians of the encoding
 LONGEST_PACE = 257  # weights of one pair of stops
 LARGEST_NUMBER = 1e30  # beyond it float32 products overflow
 PARTS = ("feature", "direction", "control")
+LONGEST_VALUE = 80  # letters of a wrong value in a message
 ACTIVATIONS = ("none", "tanh", "sigmoid", "softplus", "exp")
 
 
@@ -125,6 +127,11 @@ class Wanted:
         return value
 
 
+def short(value: object) -> str:
+    """A wrong value for a message, its middle left out where it is long."""
+    return cut(reprlib.repr(value), LONGEST_VALUE)
+
+
 def is_number(value: object) -> bool:
     """JSON's true is no number here; NaN and what float32 cannot hold are none, too."""
     return type(value) in (int, float) and abs(value) < LARGEST_NUMBER
@@ -162,9 +169,9 @@ def read_stops(rows: object, where: str) -> tuple[Stop, ...]:
         raise BadFile(f"{where}: 'stops' must be a list of at least one stop.")
     stops = tuple(read_stop(Wanted(row, f"{where} stop {i}")) for i, row in enumerate(rows))
     if any(a.x >= b.x for a, b in pairwise(stops)):
-        raise BadFile(f"{where}: the stops' x must rise, they are {[s.x for s in stops]}.")
+        raise BadFile(f"{where}: the stops' x must rise, they are {short([s.x for s in stops])}.")
     if len({stop.name for stop in stops}) < len(stops):
-        raise BadFile(f"{where}: two stops have one name in {[s.name for s in stops]}.")
+        raise BadFile(f"{where}: two stops have one name in {short([s.name for s in stops])}.")
     return stops
 
 

@@ -176,8 +176,8 @@ class Fields:
             if key not in self.asked:
                 near = get_close_matches(key, self.asked, 1)
                 advice = (
-                    f"did you mean '{near[0]}'?"
+                    f"did you mean '{near[0]}'?  Else leave it out."
                     if near
-                    else "known are " + ", ".join(dict.fromkeys(self.asked))
+                    else f"known are {', '.join(dict.fromkeys(self.asked))}."
                 )
                 raise BadFile(f"{self.where}: '{key:.60}' is no key here; {advice}")

@@ -59,15 +59,16 @@ def differs(made: poison.Poisoned, view: View, picture: np.ndarray) -> str:
     # Two eyes may share colours, and share distances of the order, of their middle.
     middle = np.mean([v.world_from_eye.position for v in made.views], axis=0)
     eye = middle if made.settings.stereo_colors == "shared" else None
+    order = middle if made.settings.stereo_sort == "shared" else view.world_from_eye.position
     tolerance = STEEP if poison.steep(made) else TOLERANCE
     least, scenes = np.inf, poison.possible(made)
     for scene in scenes:
-        want = reference_image(scene, view, made.settings, eye, middle)
+        want = reference_image(scene, view, made.settings, eye, order)
         scale = max(1.0, float(np.abs(want).max()))
         least = min(least, float(np.abs(picture - want).max()) / scale)
         if least <= tolerance:
             return ""
-    bare = reference_image(scenes[-1], view, made.settings, eye, middle)
+    bare = reference_image(scenes[-1], view, made.settings, eye, order)
     if poison.wild(made) and (picture[..., 3] >= bare[..., 3] - TOLERANCE).all():
         return ""  # something of no known shape covers the good splats
     return f"off by {least:.4f} from every picture that can be meant"

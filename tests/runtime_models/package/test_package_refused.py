@@ -112,6 +112,8 @@ def pace(**entries):
     return edit(pace=[PACE | entries])
 
 
+LONG = {"file": "x" * 90, "inputs": ["feature", "direction", "control"], "activation": "tanh"}
+NESTED = {name: LONG | {"heads": [LONG] * 9} for name in ("color", "offset", "opacity", "scale")}
 BROKEN = {
     # files
     "missing ONNX": (lambda f: (f / "color.onnx").unlink(), "lacks color.onnx; a package is"),
@@ -175,6 +177,7 @@ BROKEN = {
     "unknown activation": (head("scale", activation="gelu"), "activation is 'gelu'"),
     "unknown input": (head("scale", inputs=["time"]), "inputs are ['time']"),
     "input of another kind": (head("scale", inputs=[["feature"]]), "inputs are [['feature']]"),
+    "inputs of a whole manifest": (head("scale", inputs=NESTED), "\u2026"),
     "input twice": (head("scale", inputs=["control", "control"]), "each once"),
     "geometry that sees the eye": (head("opacity", inputs=["feature", "control", "direction"]),
                                    "expected some of ['feature', 'control'], each once"),
@@ -229,7 +232,9 @@ BROKEN = {
 def test_broken_packages_are_one_sentence(folder, how):
     break_it, words = BROKEN[how]
     break_it(folder)
-    assert words in refused(folder)
+    said = refused(folder)
+    assert words in said
+    assert len(said.replace(str(folder), "")) < 400  # letters that fit a window and a line of a log
 
 
 @pytest.mark.parametrize("name", [MANIFEST, ANCHORS, "color.onnx"])

@@ -253,7 +253,7 @@ def test_unknown_keys_are_refused_by_name(path, way):
 
 def test_a_typing_error_is_told_apart(path):
     sentence = changed(path, ("objects", 0, "frictoin"), 0.5)
-    assert "'frictoin' is no key here; did you mean 'friction'?" in sentence
+    assert "'frictoin' is no key here; did you mean 'friction'?  Else leave it out." in sentence
 
 
 @pytest.mark.parametrize(
