@@ -17,7 +17,12 @@ from shapeshift.runtime_models.checkpoint.tensor_pickle import (
     index_of,
 )
 from shapeshift.runtime_models.files.memory import Account, Memory
-from shapeshift.runtime_models.files.zip_files import DAMAGED, member_names, opened_zip
+from shapeshift.runtime_models.files.zip_files import (
+    DAMAGED,
+    is_zip,
+    member_names,
+    opened_zip,
+)
 from shapeshift.runtime_models.model import BadFile
 
 INDEX = "data.pkl"
@@ -52,7 +57,7 @@ def read_script(
     else the file names is refused, and nothing in it is ever called.  Raises BadFile.
     """
     memory = memory or Memory().of(path)
-    if not zipfile.is_zipfile(path):
+    if not is_zip(path):
         raise BadFile(_no_archive(path))
     with opened_zip(path, path.name, memory) as archive:
         members = _Members(archive, path, memory)

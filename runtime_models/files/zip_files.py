@@ -26,6 +26,14 @@ TAIL = (1 << 16) + END.size + 20 + END_64.size  # bytes in which a directory end
 BIG = 0xFFFFFFFF  # in the place of a size: it stands in the record of 64 bits
 
 
+def is_zip(path: Path) -> bool:
+    """Whether the file ends as a zip of one disk does: zipfile raises at one of several."""
+    try:
+        return zipfile.is_zipfile(path)
+    except DAMAGED:
+        return False
+
+
 @contextmanager
 def opened_zip(source: Path | bytes, where: str, memory: Account) -> Iterator[zipfile.ZipFile]:
     """The archive in a file or in memory; `where` is for messages.  Raises BadFile."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shapeshift.runtime_models.files.memory import Account
-from shapeshift.runtime_models.files.zip_files import opened_zip, read_member
+from shapeshift.runtime_models.files.zip_files import is_zip, opened_zip, read_member
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 
 FORMAT = "shapeshift 1"
@@ -27,7 +27,7 @@ def open_package(path: Path, memory: Account) -> Callable[[str], bytes]:
     """read(name) -> bytes of one file of the package at `path`, charged.  Both raise BadFile."""
     if path.is_dir():
         return lambda name: read_from_folder(path, name, memory)
-    if not zipfile.is_zipfile(path):
+    if not is_zip(path):
         raise BadFile(f"{path} is not a package: it is no zip, or it is cut off; copy it again.")
     return lambda name: read_from_zip(path, name, memory)
 

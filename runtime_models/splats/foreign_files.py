@@ -1,11 +1,10 @@
 """Files that are known and not read: each has a name, and one sentence that says what to do."""
 
 import re
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-from shapeshift.runtime_models.files.zip_files import member_names
+from shapeshift.runtime_models.files.zip_files import is_zip, member_names
 
 ADDRESS = re.compile(r"(?:https?|ftp|s3|gs):/", re.IGNORECASE)
 EXPORT = "export it as a 3DGS PLY, .spz, .sog or .glb"
@@ -92,7 +91,7 @@ def refusal(path: Path, head: bytes, known: str) -> str:
     for foreign in FOREIGN:
         if foreign.fits(head, name):
             return f"{path} is {foreign.what}, which is not read here; {foreign.advice}."
-    if head[:2] == b"PK" and zipfile.is_zipfile(path):
+    if head[:2] == b"PK" and is_zip(path):
         return zip_refusal(path, member_names(path))
     ending = next((e for e in BEGINS if name.endswith(e)), "")
     if ending:
