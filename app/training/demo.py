@@ -10,8 +10,8 @@ from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
-ITERATIONS = 7000  # 20 minutes of a core
-MOST_ANCHORS = 30000
+ITERATIONS = 7000  # 12 minutes of a core
+MOST_ANCHORS = 18000
 BETWEEN, SHARE = "shapes", 0.5  # what lies between the stops, and in how many of the steps
 
 
