@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.app.stability_cases.finding import (
+    Comparison,
     Finding,
     Panel,
     Result,
@@ -12,6 +13,7 @@ from shapeshift.app.stability_cases.finding import (
     at_most,
     clean,
     decibels,
+    worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, front, glossy, splats
 from shapeshift.app.stability_cases.stage import Stage, difference, turned, turned_about
@@ -102,7 +104,7 @@ def shared(stage: Stage) -> list:
 def canted(stage: Stage) -> Result:
     """Eyes turned outwards by 2, 5 and 10 degrees, against an order for each eye."""
     scene = stage.scene()
-    findings, images, worst = [], [], None
+    findings, images, comparisons = [], [], []
     for degrees in (NEARLY_PARALLEL, *CANTED):
         left, right = eyes_of(stage)
         pair = [turned(left, degrees / 2), turned(right, -degrees / 2)]
@@ -123,20 +125,20 @@ def canted(stage: Stage) -> Result:
                 at_least(f"{degrees:g} degrees, against an order each, dB", db, YAW_DB,
                          "one order by rule, a quarter of a degree off for each eye (stale-yaw)")
             )  # fmt: skip
-        if worst is None or db < worst[0]:
-            worst = (db, degrees, one[0], each[0])
-    _, degrees, one, own = worst
+        told = f"left eye, {degrees:g} degrees between the eyes"
+        comparisons.append(Comparison(db, told, one[0], each[0]))
+    _, told, shared, own = worst_of(comparisons)
     panels = [
-        stage.panel(f"left eye, {degrees:g} degrees between the eyes", one),
+        stage.panel(told, shared),
         stage.panel("with an order of its own", own),
-        Panel("8 times the difference", difference(one, own)),
+        Panel("8 times the difference", difference(shared, own)),
     ]
     return Result([clean(*images), *findings], panels)
 
 
 def stereo(stage: Stage) -> Result:
     """Each eye of a stereo frame against that eye drawn alone; lenses that lean, heads askew."""
-    findings, images, worst = [], [], None
+    findings, images, comparisons = [], [], []
     near, reach = stereo_pair(front(stage.size, 1.5), PUPILS_M), f"half a metre away, {SAME_EYE}"
     for what, scene, pair, wish, least, reason in (
         ("the scene", stage.scene(), eyes_of(stage), "auto", AUTO_DB, AUTO_REASON),
@@ -150,10 +152,9 @@ def stereo(stage: Stage) -> Result:
             (decibels(a, b), i) for i, (a, b) in enumerate(zip(frame, single, strict=True))
         )
         findings.append(at_least(f"{what}, an eye against it alone, dB", db, least, reason))
-        if worst is None or db < worst[0]:
-            worst = (db, what, frame[eye], single[eye])
+        comparisons.append(Comparison(db, what, frame[eye], single[eye]))
     leaning, drawn = lean(stage)
-    _, what, together, itself = worst
+    _, what, together, itself = worst_of(comparisons)
     panels = [
         stage.panel(f"{what}, one of two eyes", together),
         stage.panel("the same eye alone", itself),

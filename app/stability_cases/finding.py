@@ -1,7 +1,9 @@
 """What a case of `launch.py stability` finds: figures beside bounds, and panels to look at."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +43,20 @@ class Panel:
 
     caption: str
     image: np.ndarray  # (H, W, 3) display sRGB
+
+
+class Comparison(NamedTuple):
+    """A picture and what it was held against; a case shows its worst one."""
+
+    db: float
+    what: str
+    image: np.ndarray  # (H, W, 4)
+    wanted: np.ndarray  # (H, W, 4)
+
+
+def worst_of(comparisons: Iterable[Comparison]) -> Comparison:
+    """The one of the fewest decibels; of equal ones the first."""
+    return min(comparisons, key=lambda comparison: comparison.db)
 
 
 @dataclass(frozen=True)

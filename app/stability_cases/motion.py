@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from shapeshift.app.stability_cases.finding import (
+    Comparison,
     Finding,
     Panel,
     Result,
@@ -14,6 +15,7 @@ from shapeshift.app.stability_cases.finding import (
     clean,
     decibels,
     not_here,
+    worst_of,
 )
 from shapeshift.app.stability_cases.stage import Stage, difference, turned, turned_about
 from shapeshift.renderer.pace import EVEN_ENOUGH
@@ -25,8 +27,8 @@ UNSEEN = 2 / 255  # two steps of a display: a change of the mean that nobody see
 KEPT = {"resort_frames": 0, "resort_degrees": 180.0}  # an order is made once and then kept
 # Degrees and the least dB.  What an order that old costs where every splat has a colour of its own,
 # measured on 100,000 splats: no scene of surfaces comes near it.  Two dB are for small pictures.
-STALE_ORBIT = {0.25: 50, 0.5: 48, 1: 44, 2: 41, 4: 39, 8: 36, 16: 33}
-STALE_YAW = {0.25: 51, 0.5: 49, 1: 45, 2: 41, 5: 37, 10: 34, 16: 32}
+STALE_ORBIT: dict[float, float] = {0.25: 50, 0.5: 48, 1: 44, 2: 41, 4: 39, 8: 36, 16: 33}
+STALE_YAW: dict[float, float] = {0.25: 51, 0.5: 49, 1: 45, 2: 41, 5: 37, 10: 34, 16: 32}
 WAS_OLD = "else these figures compare a frame with itself"
 STALE_REASON = (
     "the price of an order so old for splats of random colours, less 2 dB; surfaces pay less"
@@ -129,7 +131,7 @@ def stale_yaw(stage: Stage) -> Result:
 def stale(stage: Stage, move, bounds: dict[float, float]) -> Result:
     """dB of a frame in an old order against the frame in its own, at every angle of `bounds`."""
     scene, view = stage.scene(), stage.view()
-    findings, images, kept, worst = [], [], 0, None
+    findings, comparisons, kept = [], [], 0
     for angle, least in bounds.items():
         there = move(view, angle)
         exact = stage.draw(scene, there)
@@ -139,19 +141,17 @@ def stale(stage: Stage, move, bounds: dict[float, float]) -> Result:
         kept += is_old(stage)
         db = decibels(old, exact)
         findings.append(at_least(f"order {angle:g} degrees old, dB", db, least, STALE_REASON))
-        images.append(old)
-        if worst is None or db < worst[0]:
-            worst = (db, angle, old, exact)
-    _, angle, old, exact = worst
+        comparisons.append(Comparison(db, f"order {angle:g} degrees old", old, exact))
+    _, what, old, exact = worst_of(comparisons)
     # A model whose opacities follow the eye is put in order wherever that moves.
     moved = any(map(follows_eye, stage.subject.models)) and move is not turned
     told = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
     panels = [
-        stage.panel(f"order {angle:g} degrees old", old),
+        stage.panel(what, old),
         stage.panel("its own order", exact),
         Panel("8 times the difference", difference(old, exact)),
     ]
-    return Result([clean(*images), told, *findings], panels)
+    return Result([clean(*(c.image for c in comparisons)), told, *findings], panels)
 
 
 def is_old(stage: Stage) -> bool:

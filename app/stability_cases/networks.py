@@ -64,22 +64,21 @@ def broken_heads(stage: Stage) -> Result:
     model = only if isinstance(only, AnchorModel) else small_model()
     view = stage.view() if model is only else front(stage.size)
     whole = stage.draw(alone(model), view)
-    images, worst = {}, None
+    images, broken_by_name = {}, {}
     for head in HEADS:
         for what, value in (("NaN", np.nan), ("Inf", np.inf), ("-Inf", -np.inf)):
             for where in ("all weights", "one bias"):
                 broken = with_broken_head(model, head, value, where)
                 name = f"{what} in {where} of {head}"
                 images[name] = stage.draw(alone(broken), view)
-                bad = broken_pixels(images[name])
-                if worst is None or bad > worst[0]:
-                    worst = (bad, name)
+                broken_by_name[name] = broken_pixels(images[name])
+    worst = max(broken_by_name, key=lambda name: broken_by_name[name])
     one = stage.draw(alone(small_model()), front(stage.size))
     partly, known = half_broken(stage)
     findings = [
         at_most(
-            f"broken pixels in {len(images)} pictures (worst: {worst[1]})",
-            sum(broken_pixels(image) for image in images.values()), 0,
+            f"broken pixels in {len(images)} pictures (worst: {worst})",
+            sum(broken_by_name.values()), 0,
             "what is not finite is not drawn: one NaN fragment would poison its pixel for good",
         ),
         at_least(
@@ -89,9 +88,9 @@ def broken_heads(stage: Stage) -> Result:
         clean(whole, one),
     ]  # fmt: skip
     panels = [
-        stage.panel(worst[1], images[worst[1]]),
+        stage.panel(worst, images[worst]),
         stage.panel("whole networks", whole),
-        Panel("8 times the difference", difference(images[worst[1]], whole)),
+        Panel("8 times the difference", difference(images[worst], whole)),
     ]
     return Result(findings, panels)
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.app.stability_cases.finding import (
+    Comparison,
     Panel,
     Result,
     at_least,
@@ -12,6 +13,7 @@ from shapeshift.app.stability_cases.finding import (
     broken_pixels,
     clean,
     decibels,
+    worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, around, front, shell, splats, turns
 from shapeshift.app.stability_cases.stage import Stage, difference, moved, turned, turned_about
@@ -130,7 +132,7 @@ def within_a_splat(stage: Stage) -> tuple[list, list[Panel]]:
         "on the near plane": near, "next to it": np.nextafter(near, np.float32(1)),
         "just beyond": near * 1.01,
     }  # fmt: skip
-    worst, images, known = None, [], 0
+    comparisons, images = [], []
     for what, depth in places.items():
         scene = alone(splats([[0, 0, -depth], [0.1, 0, -2]], [[0.3] * 3, [0.2] * 3]))
         view = front(SMALL, 0.0, near=float(near))
@@ -140,15 +142,14 @@ def within_a_splat(stage: Stage) -> tuple[list, list[Panel]]:
         wants = [stage.reference(scene, replace(view, near=float(near) * s)) for s in (1, 1.000001)]
         wants.append(stage.reference(scene, replace(view, near=float(near) * 0.999999)))
         db = max(decibels(image, want) for want in wants)
-        known += db >= ORACLE_DB
-        if worst is None or db < worst[0]:
-            worst = (db, what, image)
+        comparisons.append(Comparison(db, what, image, wants[0]))
+    worst = worst_of(comparisons)
     reason = "16 bits leave 78 dB and more; a splat on the plane may be drawn or not"
     findings = [
         clean(*images),
-        at_least(f"splat {worst[1]}, against float64, dB", worst[0], ORACLE_DB, reason),
+        at_least(f"splat {worst.what}, against float64, dB", worst.db, ORACLE_DB, reason),
     ]
-    return findings, [stage.panel(f"a splat {worst[1]}", worst[2])]
+    return findings, [stage.panel(f"a splat {worst.what}", worst.image)]
 
 
 def lenses(stage: Stage) -> Result:
@@ -193,7 +194,7 @@ def parts(stage: Stage) -> tuple[list, list, list]:
         "fifth eighth": (width // 2, 0, eighth, height),
         "ninth in the middle": (width // 3, height // 3, width // 3 + 1, height // 3 + 1),
     }
-    findings, images, worst = [], [], None
+    findings, images, comparisons = [], [], []
     scenes = {"splats around the eye": (alone(around()), front(stage.size, 0.0)),
               "the scene": (stage.scene(), stage.view())}  # fmt: skip
     for what, (scene, view) in scenes.items():
@@ -204,18 +205,18 @@ def parts(stage: Stage) -> tuple[list, list, list]:
             ("inside, of a known whole", middle, "View.whole says how wide the lens is"),
         ):  # fmt: skip
             decided = []
-            for name, (left, top, *size) in boxes.items():
-                part = view.part(left, top, tuple(size))
+            for name, (left, top, across, down) in boxes.items():
+                part = view.part(left, top, (across, down))
                 image = stage.draw(scene, part if boxes is middle else replace(part, whole=None))
-                there = whole[top : top + size[1], left : left + size[0]]
+                there = whole[top : top + down, left : left + across]
                 images.append(image)
                 decided.append((decibels(image, there), name))
-                if worst is None or decided[-1][0] < worst[0]:
-                    worst = (decided[-1][0], f"{name}, {what}", image, there)
+                comparisons.append(Comparison(decided[-1][0], f"{name}, {what}", image, there))
             db, name = min(decided)
             figure = f"{what}, parts {kind} (worst: {name}), dB to the whole"
             findings.append(at_least(figure, db, PART_DB, f"{reason}; {PART_REASON}"))
-    return findings, images, compared(stage, worst[1], worst[2], "in the whole", worst[3])
+    worst = worst_of(comparisons)
+    return findings, images, compared(stage, worst.what, worst.image, "in the whole", worst.wanted)
 
 
 def random_eyes(stage: Stage) -> Result:
@@ -223,19 +224,19 @@ def random_eyes(stage: Stage) -> Result:
     centre, radius = stage.bounds()
     rng = np.random.default_rng(3)
     view = stage.view()
-    broken, worst, images = 0, None, 0
+    broken, most, images = 0, -1, 0
     for wxyz in turns(stage.steps, rng):
         eye = centre + rng.normal(size=3) * radius * rng.uniform(0.01, 2)
         look = replace(view, world_from_eye=Pose(eye, wxyz))
         image = stage.draw(stage.scene(), look)
         bad = broken_pixels(image)
         images += 1
-        if worst is None or bad > worst[0]:
-            worst = (bad, image)
+        if bad > most:
+            most, worst = bad, image
         broken += bad
     reason = "no place of the eye may break a pixel; which ones were tried is fixed by a seed"
     findings = [at_most(f"broken pixels in {images} pictures", broken, 0, reason)]
-    return Result(findings, [stage.panel("one of the eyes", worst[1])])
+    return Result(findings, [stage.panel("one of the eyes", worst)])
 
 
 def compared(stage: Stage, name: str, image, other: str, beside) -> list[Panel]:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,31 +41,40 @@ def popping(stage: Stage) -> Result:
     allowed = float(np.interp(step, list(STALE_YAW), list(STALE_YAW.values())))
     findings = [
         at_least(
-            f"depth order, pop of a step of {step:.3g} degrees, dB", depth["db"], allowed,
+            f"depth order, pop of a step of {step:.3g} degrees, dB", depth.db, allowed,
             "what an order of that age costs splats of random colours (case stale-yaw)",
         ),
         at_least(
-            f"distance order, pop of a step of {step:.3g} degrees, dB", distance["db"], 70,
+            f"distance order, pop of a step of {step:.3g} degrees, dB", distance.db, 70,
             "a turn changes no distance to the eye; only rounding may swap neighbours",
         ),
         at_least(
-            "frames drawn in an old order", depth["kept"] + distance["kept"], 2 * stage.steps,
+            "frames drawn in an old order", depth.kept + distance.kept, 2 * stage.steps,
             WAS_OLD,
         ),
         *fades_alone(stage), *fades_in_the_scene(stage),
     ]  # fmt: skip
     panels = [
-        stage.panel("order of the view before", depth["old"]),
-        stage.panel("its own order", depth["own"]),
-        Panel("8 times the difference", difference(depth["old"], depth["own"])),
+        stage.panel("order of the view before", depth.old),
+        stage.panel("its own order", depth.own),
+        Panel("8 times the difference", difference(depth.old, depth.own)),
     ]
-    return Result([clean(*depth["images"], *distance["images"]), *findings], panels)
+    return Result([clean(*depth.images, *distance.images), *findings], panels)
 
 
-def turn_in_order(stage: Stage, order: str) -> dict:
-    """The worst step of the turn: db, old, own; all pictures in an old order, how many were."""
+class TurnInOrder(NamedTuple):
+    """The worst step of a turn, and all its pictures in the order of the view before."""
+
+    db: float
+    old: np.ndarray  # (H, W, 4) of the worst step
+    own: np.ndarray  # (H, W, 4) in its own order
+    kept: int  # pictures that were really drawn in an old order
+    images: list[np.ndarray]  # each (H, W, 4)
+
+
+def turn_in_order(stage: Stage, order: str) -> TurnInOrder:
     scene, wide = stage.scene(), widened(stage.view())
-    worst, kept, images = {"db": np.inf}, 0, []
+    least, kept, images = np.inf, 0, []
     for before, angle in pairwise(np.linspace(-TURN / 2, TURN / 2, stage.steps + 1)):
         here, there = turned(wide, before), turned(wide, angle)
         own = stage.draw(scene, there, order=order)
@@ -73,9 +83,9 @@ def turn_in_order(stage: Stage, order: str) -> dict:
         kept += is_old(stage)
         images.append(old)
         db = decibels(old, own)
-        if not db >= worst["db"]:
-            worst = {"db": db, "old": old, "own": own}
-    return worst | {"kept": kept, "images": images}
+        if not db >= least:
+            least, worst_old, worst_own = db, old, own
+    return TurnInOrder(least, worst_old, worst_own, kept, images)
 
 
 def widened(view: View) -> View:

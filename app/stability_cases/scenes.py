@@ -1,5 +1,6 @@
 """Small scenes that cases make themselves: their right picture is known, whatever the user's is."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,6 +109,10 @@ def turns(count: int, rng: np.random.Generator) -> np.ndarray:
     return wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)
 
 
+def as_float(arrays: Iterable[np.ndarray]) -> tuple[np.ndarray, ...]:
+    return tuple(array.astype(np.float32) for array in arrays)
+
+
 def small_model(anchors: int = 60, k: int = 5, seed: int = 0) -> AnchorModel:
     """Networks with random weights, bounded as trained ones are: splats of a few centimetres."""
     rng = np.random.default_rng(seed)
@@ -117,8 +122,7 @@ def small_model(anchors: int = 60, k: int = 5, seed: int = 0) -> AnchorModel:
         sizes = (32, 8 + 3 * seen + 16)
         weights = (rng.normal(0, 0.3, sizes), rng.normal(0, 0.15, (width, 32)))
         biases = (rng.normal(0, 0.1, 32), np.full(width, bias))
-        as_float = [tuple(a.astype(np.float32) for a in arrays) for arrays in (weights, biases)]
-        return Mlp(*as_float, inputs=inputs, **kind)
+        return Mlp(as_float(weights), as_float(biases), inputs=inputs, **kind)
 
     networks = {
         "offset": network(3 * k, 0, head="tanh", gain=0.1),

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from shapeshift.app.stability_cases.finding import Panel, Result, at_least, at_most, clean, decibels
+from shapeshift.app.stability_cases.finding import (
+    Comparison,
+    Panel,
+    Result,
+    at_least,
+    at_most,
+    clean,
+    decibels,
+    worst_of,
+)
 from shapeshift.app.stability_cases.places import ORACLE_DB, SMALL, compared
 from shapeshift.app.stability_cases.scenes import alone, faint_layers, front, shell, splats, turns
 from shapeshift.app.stability_cases.stage import Stage, difference
@@ -26,7 +35,7 @@ def needles(stage: Stage) -> Result:
     means = rng.normal(size=(count, 3)) * 0.5
     long = rng.uniform(0.1, 0.5, (count, 1))  # metres
     shapes = {"needles": (1, 1 / LONG, 1 / LONG), "pancakes": (1, 1, 1 / LONG)}
-    findings, images, worst = [], [], None
+    findings, comparisons = [], []
     view = front(SMALL)
     for name, shape in shapes.items():
         model = splats(means, long * shape, 0.7, rng.uniform(size=(count, 3)), turns(count, rng))
@@ -40,12 +49,10 @@ def needles(stage: Stage) -> Result:
                 "here, beside the 0.3 px^2 that every splat has",
             )
         )  # fmt: skip
-        images.append(image)
-        if worst is None or db < worst[0]:
-            worst = (db, name, image, want)
-    _, name, image, want = worst
-    panels = compared(stage, f"{name}", image, "float64", want)
-    return Result([clean(*images), *findings], panels)
+        comparisons.append(Comparison(db, name, image, want))
+    _, name, image, want = worst_of(comparisons)
+    panels = compared(stage, name, image, "float64", want)
+    return Result([clean(*(c.image for c in comparisons)), *findings], panels)
 
 
 def faint(stage: Stage) -> Result:
@@ -73,12 +80,12 @@ def limits(stage: Stage) -> Result:
     """Scales, opacities and colours at and beyond what half floats and 8 bits hold."""
     view = front(SMALL)
     behind = ([0.4, 0, -0.5], [0.2] * 3)  # a plain splat that must stay as it is
-    findings, images, worst = [], [], None
+    comparisons = []
     focal = SMALL[1] / (2 * np.tan(0.4))  # pixels
     at_half = LARGEST_HALF * 3 / focal  # metres, 3 m off: one sigma of 65504 pixels
     sizes = [s * at_half for s in (0.9, 0.916, 1.0, 1.0001, 100, 1e10)] + [1e18, 1e30, 3e38]
-    rows = [("scale", s, 0.5, (1, 0.5, 0.2)) for s in sizes]
-    rows += [("opacity", 0.1, o, (1, 0.5, 0.2)) for o in FLOATS_AT_LIMITS]
+    rows = [("scale", s, 0.5, (1.0, 0.5, 0.2)) for s in sizes]
+    rows += [("opacity", 0.1, o, (1.0, 0.5, 0.2)) for o in FLOATS_AT_LIMITS]
     rows += [("colour", 0.1, 0.5, (c, 0.5, 0.2)) for c in (60000.0, LARGEST_HALF, 1e5, 9e37)]
     for what, scale, opacity, color in rows:
         model = splats(
@@ -86,34 +93,30 @@ def limits(stage: Stage) -> Result:
         )
         alone_there = splats([behind[0]], [behind[1]], 0.8, (0.2, 0.4, 1))
         image = stage.draw(alone(model), view)
-        images.append(image)
         # Drawn as float64 draws it, or left out: nothing in between.
         wants = [stage.reference(alone(m), view) for m in (model, alone_there)]
         scale_of = [max(1.0, float(np.abs(w).max())) for w in wants]
         db = max(decibels(image / s, w / s) for w, s in zip(wants, scale_of, strict=True))
-        if worst is None or db < worst[0]:
-            value = {"scale": scale, "opacity": opacity, "colour": color[0]}[what]
-            worst = (db, f"{what} {value:.6g}", image, wants[0])
-    findings.append(
-        at_least(
-            f"worst of {len(rows)} ({worst[1]}), dB to float64 with or without it", worst[0],
-            ORACLE_DB, "a number past a limit is drawn right or not at all (16 bits: 78)",
-        )
+        value = {"scale": scale, "opacity": opacity, "colour": color[0]}[what]
+        comparisons.append(Comparison(db, f"{what} {value:.6g}", image, wants[0]))
+    worst = worst_of(comparisons)
+    right_or_absent = at_least(
+        f"worst of {len(rows)} ({worst.what}), dB to float64 with or without it", worst.db,
+        ORACLE_DB, "a number past a limit is drawn right or not at all (16 bits: 78)",
     )  # fmt: skip
     rng = np.random.default_rng(4)
     wall = splats(rng.normal(size=(STACKED, 3)) * 0.02, 0.5, 1.0, rng.uniform(size=(STACKED, 3)))
     stack = stage.draw(alone(wall), view)
-    findings.append(
-        at_most(
-            f"coverage under {STACKED} opaque splats", stack[..., 3].max(), 1.002,
-            "0.99 of what is left each time never passes 1; two steps of a half float below 1",
-        )
+    covered = at_most(
+        f"coverage under {STACKED} opaque splats", stack[..., 3].max(), 1.002,
+        "0.99 of what is left each time never passes 1; two steps of a half float below 1",
     )  # fmt: skip
     panels = [
-        *compared(stage, worst[1], worst[2], "float64", np.clip(worst[3], 0, 1)),
+        *compared(stage, worst.what, worst.image, "float64", np.clip(worst.wanted, 0, 1)),
         stage.panel(f"{STACKED} opaque splats", stack),
     ]
-    return Result([clean(*images, stack), *findings], panels)
+    images = [comparison.image for comparison in comparisons]
+    return Result([clean(*images, stack), right_or_absent, covered], panels)
 
 
 def counts(stage: Stage) -> Result:
@@ -134,7 +137,7 @@ def counts(stage: Stage) -> Result:
         image = stage.draw(empty, front(stage.size))
         images.append(image)
         covered[what] = float(np.abs(image).max())
-    worst = max(covered, key=covered.get)
+    worst = max(covered, key=lambda what: covered[what])
     single = stage.draw(alone(one), front(SMALL))
     db = decibels(single, stage.reference(alone(one), front(SMALL)))
     culled = stage.draw(scene, view, max_distance=1e-6)

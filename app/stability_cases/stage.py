@@ -5,6 +5,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 
+import moderngl
 import numpy as np
 
 from shapeshift.app.document import Document
@@ -23,7 +24,7 @@ class Stage:
     """A scene in a renderer; cases draw with it and leave nothing behind but the last frame."""
 
     renderer: Renderer
-    ctx: object  # moderngl.Context, or None with tiles alone
+    ctx: moderngl.Context | None  # None with tiles alone
     subject: Document
     size: tuple[int, int]
     reopen: Callable[[], AbstractContextManager]  # another context and renderer of this kind
@@ -67,7 +68,7 @@ class Stage:
 
     def panel(self, caption: str, image: np.ndarray) -> Panel:
         """A premultiplied picture over the background."""
-        rgb = image[..., :3] + (1 - image[..., 3:]) * np.float32(self.background)
+        rgb = image[..., :3] + (1 - image[..., 3:]) * np.array(self.background, np.float32)
         return Panel(caption, rgb)
 
     def make_current(self) -> None:
