@@ -14,6 +14,8 @@ import numpy as np
 from shapeshift.app.document import Document
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
+from shapeshift.renderer.settings import FrameStats
+from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.cameras.framing import distances_from, orbit_path
 from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.metrics import psnr
@@ -34,14 +36,14 @@ class Measure:
     """One scene at one size in one renderer."""
 
     def __init__(
-        self, renderer: Renderer, ctx, subject: Document, x: float | None, size: tuple[int, int]
+        self, renderer: Renderer, ctx, subject: Document, x: Control | None, size: tuple[int, int]
     ) -> None:
         """x: of all objects on the orbit; None: each at its own."""
         self.renderer, self.ctx, self.subject, self.size = renderer, ctx, subject, size
         self.x = subject.x if x is None else x
         self.centre, self.radius = subject.bounds()
 
-    def scene(self, x: float | None) -> Scene:
+    def scene(self, x: Control | None) -> Scene:
         return self.subject.at(x)
 
     def all(
@@ -87,7 +89,9 @@ class Measure:
             "machine": machine(self.ctx),
         }
 
-    def orbit(self, frames: int) -> tuple[list[float], list[float], dict, list[int], object]:
+    def orbit(
+        self, frames: int
+    ) -> tuple[list[float], list[float], dict[str, dict[str, float]], list[int], FrameStats]:
         """ms of mono and stereo frames, drawn in turns so that other load meets both alike.
 
         Then ms of the passes, sorts and the last stats, all of mono.
@@ -108,7 +112,9 @@ class Measure:
         if settings.resort_frames != 1 or settings.recolor_degrees > 0:
             # What is kept from frame to frame is kept for one kind of frame: no turns then.
             frames_of.sort(key=lambda frame: -len(frame[1]))
-        times, sorts, passes = {1: [], 2: []}, [], {}
+        times: dict[int, list[float]] = {1: [], 2: []}  # ms by the number of eyes
+        sorts: list[int] = []
+        pass_times: dict[str, list[float]] = {}  # ms
         for i, eyes in frames_of:
             ms, told = self.timed(eyes)
             if i < WARM_UP:
@@ -119,11 +125,11 @@ class Measure:
             stats = told
             sorts.append(stats.sorts)
             for name, pass_ms in stats.ms.items():
-                passes.setdefault(name, []).append(pass_ms)
-        passes = {name: percentiles(ms) for name, ms in passes.items()}
+                pass_times.setdefault(name, []).append(pass_ms)
+        passes = {name: percentiles(times_ms) for name, times_ms in pass_times.items()}
         return times[1], times[2], passes, sorts, stats
 
-    def timed(self, views: list) -> tuple[float, object]:
+    def timed(self, views: list[View]) -> tuple[float, FrameStats]:
         """ms until the pixels are there, which for GL means until the driver has finished."""
         start = time.perf_counter()
         stats = self.renderer.draw(views)
@@ -156,7 +162,7 @@ class Measure:
             self.error(x, views[0]) for x in others
         ]
 
-    def error(self, x: float | None, view: View) -> float:
+    def error(self, x: Control | None, view: View) -> float:
         """PSNR in dB of the premultiplied colours and the alpha of one picture, as it was drawn."""
         self.renderer.update(self.scene(x))
         self.renderer.draw([view])

@@ -100,6 +100,11 @@ def least_scale(rows: Sequence[Row], floor_db: float) -> float:
     How far dynamic resolution may go down; 1 where no scale is good enough.
     """
     plain = RenderSettings()
-    same = {"render_scale": 1.0, "target": plain.target, "background": plain.background}
-    alone = [row for row in rows if replace(row.settings, **same) == plain]
-    return min((row.settings.render_scale for row in alone if row.db >= floor_db), default=1.0)
+    alone = []  # render_scale of the rows that differ in nothing else
+    for row in rows:
+        whole = replace(
+            row.settings, render_scale=1.0, target=plain.target, background=plain.background
+        )
+        if whole == plain and row.db >= floor_db:
+            alone.append(row.settings.render_scale)
+    return min(alone, default=1.0)

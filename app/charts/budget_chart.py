@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shapeshift.app.charts.budget import Budget, Choice, choose
 from shapeshift.app.charts.chart_rows import write_text
@@ -157,7 +157,9 @@ def _plain(settings: RenderSettings) -> dict:
 
 def _row(each: dict) -> BudgetRow:
     """Raises what read_rows expects for anything that is no row."""
-    values = {name: math.inf if v is None else v for name, v in each["settings"].items()}
+    values: dict[str, Any] = {
+        name: math.inf if v is None else v for name, v in each["settings"].items()
+    }
     values["background"] = tuple(values["background"])
     ms, db = float(each["ms"]), float(each["db"])
     if not (0 < ms < math.inf and math.isfinite(db)):

@@ -73,23 +73,25 @@ class Pricing:
         path = self._path(named, pictures)
         sweep, sweep_ssim = self._sweep(named, pictures)
         alike = path.ssim + sweep_ssim or [float("nan")]
-        times = (
-            np.median(path.ms),
-            np.percentile(path.ms, 95),
-            np.median(path.exact_ms),
-            np.median(path.ms) / np.median(path.exact_ms),
-            np.mean(path.cpu_ms),
-            np.mean(path.exact_cpu_ms),
-        )
-        likeness = (np.min(path.db), np.mean(path.db), np.min(sweep), np.mean(sweep))
         return ChartRow(
-            named.name,
-            named.eyes,
-            *map(_rounded, (*times, *likeness, np.min(alike), np.mean(alike))),
-            round(np.mean([stats.drawn for stats in path.stats])),
-            path.stats[0].splats,
-            _rounded(np.mean([stats.sorts for stats in path.stats])),
-            told_changes(self._trial.settings),
+            name=named.name,
+            eyes=named.eyes,
+            ms=_rounded(np.median(path.ms)),
+            p95_ms=_rounded(np.percentile(path.ms, 95)),
+            exact_ms=_rounded(np.median(path.exact_ms)),
+            ratio=_rounded(np.median(path.ms) / np.median(path.exact_ms)),
+            cpu_ms=_rounded(np.mean(path.cpu_ms)),
+            exact_cpu_ms=_rounded(np.mean(path.exact_cpu_ms)),
+            psnr_db=_rounded(np.min(path.db)),
+            psnr_mean_db=_rounded(np.mean(path.db)),
+            sweep_psnr_db=_rounded(np.min(sweep)),
+            sweep_psnr_mean_db=_rounded(np.mean(sweep)),
+            ssim=_rounded(np.min(alike)),
+            ssim_mean=_rounded(np.mean(alike)),
+            drawn=round(np.mean([stats.drawn for stats in path.stats])),
+            splats=path.stats[0].splats,
+            sorts=_rounded(np.mean([stats.sorts for stats in path.stats])),
+            changes=told_changes(self._trial.settings),
         )
 
     def _path(self, named: Named, pictures: bool) -> "_Frames":
@@ -118,7 +120,8 @@ class Pricing:
         xs, views = self._stage.xs, self._views(self._stage.middle, named.eyes)
         exact_views = views[: named.beside_eyes or named.eyes]
         compared = set(np.linspace(0, len(xs) - 1, SSIM_SWEEP + 2).astype(int)[1:-1])
-        decibels, alike = [], []
+        decibels: list[float] = []
+        alike: list[float] = []
         # The last x once before: the jump from the end of the path is no motion of the sweep.
         for number, x in enumerate((xs[-1], *xs), -1):
             for renderer, seen in ((self._exact, exact_views), (self._trial, views)):
@@ -163,7 +166,7 @@ class _Frames:
         self.ssim: list[float] = []
 
 
-def _rounded(value: float) -> float:
+def _rounded(value: float | np.floating) -> float:
     """Four digits: more of a time mean nothing, and files stay readable."""
     return float(f"{value:.4g}")
 

@@ -155,7 +155,7 @@ def name_points(axis, places, names, occupied) -> list:
         *(np.hstack([each - pixels, each + pixels]) for each in beads),
     ]
     if axis.get_legend() is not None:
-        taken.append([axis.get_legend().get_window_extent().extents])
+        taken.append(axis.get_legend().get_window_extent().extents.reshape(1, 4))
     boxes = np.concatenate(taken)  # (B, 4) x0, y0, x1, y1 in pixels: what no name may cover
     written = []
     for start, place, name in zip(line, places, names, strict=True):
@@ -210,8 +210,8 @@ def save_figure(figure, path: Path) -> None:
     """path.svg and path.png, each all or nothing; the same rows make the same bytes."""
     import matplotlib
 
-    fixed = {"svg.hashsalt": "shapeshift", "svg.fonttype": "path"}
     for ending, metadata in (("svg", {"Date": None}), ("png", {"Software": "Shapeshift"})):
         whole = whole_file(path.with_name(f"{path.name}.{ending}"))
-        with whole as file, matplotlib.rc_context(fixed):
+        fixed = matplotlib.rc_context({"svg.hashsalt": "shapeshift", "svg.fonttype": "path"})
+        with whole as file, fixed:
             figure.savefig(file, format=ending, dpi=DPI, metadata=metadata)

@@ -5,25 +5,31 @@ import io
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Generic, TypeVar, get_type_hints
 
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.files.whole_file import write_whole
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
-class RowsFile:
+Row = TypeVar("Row", bound="DataclassInstance")
+
+
+class RowsFile(Generic[Row]):
     """A table of dataclass rows behind "# " lines that say what was run, where and on what.
 
     Opened again with the same lines it holds the rows that are there; anything else is refused.
     """
 
-    def __init__(self, path: Path, kind: type, head: Sequence[str]) -> None:
+    def __init__(self, path: Path, kind: type[Row], head: Sequence[str]) -> None:
         self.path, self._kind = path, kind
         self._head = [f"# {line}" for line in head]
-        self.rows: list = []
+        self.rows: list[Row] = []
         if path.exists():
             self.rows = self._read()
 
-    def add(self, row: object) -> None:
+    def add(self, row: Row) -> None:
         """Writes the file anew with one row more, all or nothing."""
         self.rows.append(row)
         text = io.StringIO()
@@ -33,7 +39,7 @@ class RowsFile:
         table.writerows(astuple(each) for each in self.rows)
         write_text(self.path, text.getvalue())
 
-    def _read(self) -> list:
+    def _read(self) -> list[Row]:
         try:
             lines = self.path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError):
@@ -47,13 +53,13 @@ class RowsFile:
                 )
         return self._parse(lines[count:])
 
-    def _parse(self, lines: list[str]) -> list:
+    def _parse(self, lines: list[str]) -> list[Row]:
         names = [field.name for field in fields(self._kind)]
         table = list(csv.reader(lines))
         try:
             if table[0] != names:
                 raise ValueError("other columns")
-            kinds = [field.type for field in fields(self._kind)]
+            kinds = [get_type_hints(self._kind)[name] for name in names]
             return [
                 self._kind(*(kind(word) for kind, word in zip(kinds, row, strict=True)))
                 for row in table[1:]

@@ -16,7 +16,7 @@ from shapeshift.scene.cameras.framing import (
     scene_points,
 )
 from shapeshift.scene.pose import Pose, View
-from shapeshift.scene.scene import IDENTITY, Scene
+from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.stereo import eyes_apart
 
 WARM_UP = 3  # frames before the path that do not count: first use compiles and allocates
@@ -89,7 +89,8 @@ def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
 
 def side_by_side(subjects: Sequence[Document], x: float | None) -> Scene:
     """Along the world's x, framed radii touching; the first stays where it is."""
-    things, at, before = [], 0.0, None
+    things: list[SceneObject] = []
+    at, before = 0.0, None
     for subject in subjects:
         centre, radius = subject.bounds()
         if before is None:

@@ -39,12 +39,12 @@ def measure_error(renderer: Renderer, view: View, settings: RenderSettings) -> f
     The renderer is left with the picture at `settings`, and with those settings.
     """
     settings = replace(settings, debug="")
-    pictures = []
-    for each in (exact(settings, renderer.backends["drawing"]), settings):
-        renderer.settings = each
-        renderer.draw([view])
-        pictures.append(renderer.resolved(0))
-    return min(psnr(*pictures), MOST_DB)
+    renderer.settings = exact(settings, renderer.backends["drawing"])
+    renderer.draw([view])
+    reference = renderer.resolved(0)
+    renderer.settings = settings
+    renderer.draw([view])
+    return min(psnr(reference, renderer.resolved(0)), MOST_DB)
 
 
 @dataclass

@@ -41,6 +41,7 @@ def run_decode(folder: Path, context: str, command: str) -> int:
     from shapeshift.runtime_models.read_scene import read_model
 
     model = read_model(DEMO)
+    assert isinstance(model, AnchorModel)  # the bundled demo has networks
     with open_renderer(context, "auto") as (_, ctx):
         head = (command, machine_line(ctx), f"networks of {DEMO.name}: {told_networks(model)}")
         file = RowsFile(folder / "decode.csv", DecodeRow, head)

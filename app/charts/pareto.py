@@ -10,7 +10,8 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     """
     whole = [i for i, (a, b) in enumerate(points) if a == a and b == b]
     order = sorted(whole, key=lambda i: (-points[i][0], -points[i][1], i))
-    front, best = [], float("-inf")
+    front: list[int] = []
+    best = float("-inf")
     for i in order:
         if points[i][1] > best or (not front):
             front.append(i)

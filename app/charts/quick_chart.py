@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,10 @@ FRAMES = 5  # of each setting that count, along the turn; one before them does n
 BETWEEN = 3  # exact frames that count between two settings, again after one that does not
 STEP = np.radians(2.0)  # of the turn about the scene's centre between two frames
 # Two eyes are off by less than that when one set of colours is right for both of them.
-RECOLORED = {"recolor_degrees": 5.0, "stereo_colors": "shared"}
-LATER = {"resort_frames": 4, **RECOLORED}
-QUICK = {  # name -> what differs from exact; pairs come from what pays most on its own
+RECOLORED: dict[str, Any] = {"recolor_degrees": 5.0, "stereo_colors": "shared"}
+LATER: dict[str, Any] = {"resort_frames": 4, **RECOLORED}
+# Name -> what differs from exact; pairs come from what pays most on its own.
+QUICK: dict[str, dict[str, Any]] = {
     "16-bit keys": {"key_bits": 16},
     "sort every 4": {"resort_frames": 4},
     "sort every 8": {"resort_frames": 8},
