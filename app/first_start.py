@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NoReturn
 
 ROOT = Path(__file__).resolve().parents[1]
 VENV = ROOT / ".venv"
@@ -61,7 +62,7 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def stop(text: str) -> None:
+def stop(text: str) -> NoReturn:
     say(text)
     raise SystemExit(2)
 
@@ -115,14 +116,16 @@ def install_packages(packages: list[str]) -> None:
         say(f"Shapeshift needs system libraries that are not here. Install them with: sudo {line}")
         return
     say(f"Installing system libraries: {' '.join(packages)}")
-    quiet = {
-        "stdout": subprocess.DEVNULL,
-        "cwd": "/",
-        "env": {**os.environ, "DEBIAN_FRONTEND": "noninteractive"},
-    }
-    subprocess.run(["apt-get", "update", "-qq"], check=False, **quiet)
-    if subprocess.run(line.split(), check=False, **quiet).returncode != 0:
+    run_quietly(["apt-get", "update", "-qq"])
+    if run_quietly(line.split()) != 0:
         say(f"apt-get could not install them all; to see why, run: {line}")
+
+
+def run_quietly(command: list[str]) -> int:
+    """The exit code of a tool that asks nothing and prints only what goes wrong."""
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    done = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, cwd="/", env=environment)
+    return done.returncode
 
 
 # The environment.  It is whole where a stamp says so and the mark of a change is absent.
@@ -188,7 +191,7 @@ def one_at_a_time() -> Iterator[int | None]:
 def try_lock(handle: int) -> bool | None:
     """True: locked until the handle is closed; False: somebody else has it; None: cannot be."""
     try:
-        if WINDOWS:
+        if sys.platform == "win32":  # the form of WINDOWS that a type checker knows
             import msvcrt
 
             os.lseek(handle, FAR_BYTE, os.SEEK_SET)
@@ -204,11 +207,11 @@ def try_lock(handle: int) -> bool | None:
     return True
 
 
-def run_python(python: Path | str, *words: str, lock: int | None, **more) -> subprocess.Popen:
+def run_python(python: Path | str, *words: str, lock: int | None, **more: Any) -> subprocess.Popen:
     """A Python that sees nothing of the current folder or of PYTHON* settings."""
-    keep = {} if WINDOWS or lock is None else {"pass_fds": [lock]}
+    keep = () if WINDOWS or lock is None else (lock,)
     command = [str(python), "-I", *words]
-    return subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL, **keep, **more)
+    return subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL, pass_fds=keep, **more)
 
 
 def make_venv(lock: int | None) -> None:
