@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shapeshift.runtime_models.model import AnchorModel, SplatLayers
+    from shapeshift.runtime_models.model import Model
     from shapeshift.scene.cameras.camera_list import CameraList, CameraReading
 
 AUTO = "auto"
@@ -34,17 +34,17 @@ def named_cameras(
     from shapeshift.app.paths import plain
     from shapeshift.scene.cameras.read_cameras import find_cameras, find_floor, read_camera_list
 
-    path = plain(camera)
+    path: Path | None = plain(camera)
     if camera == AUTO:
         path = find_cameras(scene) or find_floor(scene)
-        if path is None and not scene.exists():
+    if path is None:
+        if not scene.exists():
             raise UsageError(f"{scene} does not exist; name a scene.")
-        if path is None:
-            raise UsageError(f"no cameras lie with {scene}; give --camera a file of them.")
+        raise UsageError(f"no cameras lie with {scene}; give --camera a file of them.")
     return read_camera_list(path, camera_reading(options, size))
 
 
-def in_scene(cameras: "CameraList", model: "AnchorModel | SplatLayers") -> "CameraList":
+def in_scene(cameras: "CameraList", model: "Model") -> "CameraList":
     """The cameras where the model is: one that was re-centred has an origin of its own."""
     from shapeshift.scene.cameras.camera_list import moved
 

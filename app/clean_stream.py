@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from io import TextIOBase
+from typing import TextIO, cast
 
 from shapeshift.runtime_models.files.plain_text import several_lines
 
@@ -10,7 +11,7 @@ from shapeshift.runtime_models.files.plain_text import several_lines
 class CleanStream:
     """A stream that writes out what is unsafe, over one that takes all."""
 
-    def __init__(self, beneath: TextIO, name: str, trusting: bool = False) -> None:
+    def __init__(self, beneath: TextIO | TextIOBase, name: str, trusting: bool = False) -> None:
         self.beneath = beneath
         self._name, self._trusting = name, trusting
 
@@ -46,4 +47,7 @@ class CleanStream:
 
 
 def trusted(stream: TextIO) -> TextIO:
-    return stream.trusted() if isinstance(stream, CleanStream) else stream
+    """The stream for what is clean already."""
+    if isinstance(stream, CleanStream):
+        return cast(TextIO, stream.trusted())  # by __getattr__ it has all that a stream has
+    return stream

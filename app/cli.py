@@ -134,8 +134,10 @@ def report_fault(command: str, error: Exception) -> int:
 
     if os.environ.get("SHAPESHIFT_DEBUG"):
         raise error
-    kept = {"prefix": "shapeshift-", "suffix": ".log", "delete": False, "encoding": "utf-8"}
-    with tempfile.NamedTemporaryFile("w", **kept, errors="backslashreplace") as log:
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="shapeshift-", suffix=".log", delete=False, encoding="utf-8",
+        errors="backslashreplace",
+    ) as log:  # fmt: skip
         traceback.print_exception(error, file=log)
     text = str(error).splitlines()[0] if str(error) else type(error).__name__
     warn(
@@ -159,7 +161,7 @@ def run_command(command: str, arguments: list[str]) -> int:
     if wants_help(arguments):
         from shapeshift.app.command_help import help_text
 
-        defaults = getattr(module, "defaults", dict)()
+        defaults = module.defaults() if hasattr(module, "defaults") else {}
         tell(help_text(module.Options, prog, defaults))
         return 0
     options = begin_at_start(parse(module.Options, arguments, prog))

@@ -22,11 +22,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from shapeshift.app.errors import UsageError
 
-Options = TypeVar("Options")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Options = TypeVar("Options", bound="DataclassInstance")
 LIKE = 0.6  # of difflib's ratio: as alike a word is taken for a slip of the hand
 SWITCHED = {"True": True, "False": False}  # a switch may be followed by either
 NUMBER = re.compile(r"-[\d.]")  # how a value begins that is no option
@@ -92,7 +95,7 @@ class Argument:
             word = f"{self.name} ..." if self.many else self.name
             return word if self.required else f"[{word}]"
         word = self.metavar
-        values = f"{word} [{word} ...]" if self.many else " ".join([word] * self.count)
+        values = f"{word} [{word} ...]" if self.count is None else " ".join([word] * self.count)
         return f"{self.name} {values}"
 
 
@@ -150,7 +153,9 @@ def _values_of(
     words: Sequence[str], known: Mapping[str, Argument], prog: str
 ) -> tuple[dict[str, Any], list[str]]:
     """Values by field of the options among the words, and the words that are none."""
-    rest, values, loose = list(words), {}, []
+    rest = list(words)
+    values: dict[str, Any] = {}
+    loose: list[str] = []
     while rest:
         word = rest.pop(0)
         if word == "--":
@@ -280,8 +285,9 @@ def _docs_of(kind: type) -> dict[str, str]:
         if "__annotations__" not in vars(base):
             continue
         (node,) = ast.parse(textwrap.dedent(inspect.getsource(base))).body
+        assert isinstance(node, ast.ClassDef)  # the source of a class
         for field, text in zip(node.body, node.body[1:], strict=False):
             if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
                 said = " ".join(ast.literal_eval(text.value).split())
-                found.setdefault(field.target.id, said)
+                found.setdefault(ast.unparse(field.target), said)
     return found

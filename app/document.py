@@ -124,7 +124,7 @@ class Document:
         """Cameras of the file's world where the scene is."""
         from shapeshift.scene.cameras.camera_list import moved
 
-        return replace(cameras, views=tuple(moved(cameras.views, -self.origin)))
+        return replace(cameras, views=tuple(moved(cameras.views, (-self.origin).tolist())))
 
 
 def placed(

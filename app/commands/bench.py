@@ -5,12 +5,17 @@ import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say, tell_json
+
+if TYPE_CHECKING:
+    from shapeshift.app.document import Document
+    from shapeshift.renderer.renderer import Renderer
+    from shapeshift.renderer.settings import RenderSettings
 
 STANDARD_OUTPUT = Path("-")
 LARGEST_RESULT = 1_000_000  # bytes
@@ -87,7 +92,9 @@ def run(options: Options) -> int:
     return 0
 
 
-def asked_settings(options: Options, renderer, subject, size: tuple[int, int]):
+def asked_settings(
+    options: Options, renderer: "Renderer", subject: "Document", size: tuple[int, int]
+) -> "RenderSettings":
     """RenderSettings of --settings and --target; UsageError where there is none such."""
     from dataclasses import replace
 

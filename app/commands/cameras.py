@@ -3,11 +3,14 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import POSITIONAL
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say, tell_json
+
+if TYPE_CHECKING:
+    from shapeshift.scene.cameras.camera_list import CameraList
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,7 @@ def run(options: Options) -> int:
     for note in cameras.notes:
         say(note)
     if options.out is not None:
-        write(options, cameras)
+        write(options, options.out, cameras)
     elif options.json:
         tell_json(facts_of(cameras))
     else:
@@ -53,18 +56,18 @@ def run(options: Options) -> int:
     return 0
 
 
-def write(options: Options, cameras) -> None:
+def write(options: Options, out: Path, cameras: "CameraList") -> None:
     """Writes the views in the wished form, beside what is there, never over the input."""
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.cameras.write_cameras import paths_of, write_cameras
 
-    form = options.to or ("ours" if options.out.suffix else "colmap-bin")
-    for path in paths_of(options.out, form):
+    form = options.to or ("ours" if out.suffix else "colmap-bin")
+    for path in paths_of(out, form):
         if path.exists() and is_part(path.resolve(), options.cameras.resolve()):
             raise UsageError(f"{path} belongs to what is read; choose another --out.")
         if path.exists() and not options.overwrite:
             raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
-    written = write_cameras(cameras, options.out, form)
+    written = write_cameras(cameras, out, form)
     count = len(cameras.views)
     if form == "vr" and count > 1:
         say(f"A floor has one view: the first of {count} is taken.")

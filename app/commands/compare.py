@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import open_console, say, tell_json
+
+if TYPE_CHECKING:
+    from shapeshift.app.commands.compare_sides import SceneSide
+    from shapeshift.scene.pose import View
 
 VIEWS = 8  # of the orbit where no cameras are given
 DEFAULT_SIZE = (640, 360)
@@ -130,7 +134,7 @@ def picture_pairs(a, b) -> Iterator[Compared]:
         yield Compared(name, one, two)
 
 
-def choose_views(options: Options, a) -> list:
+def choose_views(options: Options, a: "SceneSide") -> list["View"]:
     """Views in A's own coordinates."""
     from shapeshift.app.camera_files import camera_reading
     from shapeshift.app.drawing import parse_size
@@ -141,7 +145,7 @@ def choose_views(options: Options, a) -> list:
     size = parse_size(options.size) if options.size else None
     if options.cameras is not None:
         cameras = read_camera_list(options.cameras, camera_reading(options, size))
-        return moved(cameras.views, -a.subject.origin)
+        return moved(cameras.views, (-a.subject.origin).tolist())
     return orbit_path(VIEWS, *a.subject.bounds(), size or DEFAULT_SIZE)
 
 
@@ -209,13 +213,13 @@ def score(
         "largest": max(row["largest"] for row in rows),
         "equal_views": len(rows) - len(numbers),
     }
-    result = {"a": names[0], "b": names[1], "views": rows, "mean": mean}
+    result: dict[str, object] = {"a": names[0], "b": names[1], "views": rows, "mean": mean}
     if options.out is not None:
-        result["amplified"] = write_sheets(kept, names, options)
+        result["amplified"] = write_sheets(kept, names, options.out, options.overwrite)
     return result
 
 
-def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options) -> int:
+def write_sheets(pairs: list[Compared], names: tuple[str, str], out: Path, overwrite: bool) -> int:
     """A sheet and a difference picture a view; returns by how much differences are amplified."""
     from shapeshift.app.commands.compare_sheet import (
         amplification,
@@ -228,13 +232,12 @@ def write_sheets(pairs: list[Compared], names: tuple[str, str], options: Options
     from shapeshift.app.errors import UsageError
 
     paths = [
-        (options.out / f"{pair.name}_sheet.png", options.out / f"{pair.name}_difference.png")
-        for pair in pairs
+        (out / f"{pair.name}_sheet.png", out / f"{pair.name}_difference.png") for pair in pairs
     ]
     taken = [path for both in paths for path in both if path.exists()]
-    if taken and not options.overwrite:
+    if taken and not overwrite:
         raise UsageError(f"{taken[0]} exists; choose another --out or add --overwrite.")
-    make_folder(options.out)
+    make_folder(out)
     amplify = amplification([pair.b - pair.a for pair in pairs])
     for pair, (both, alone) in zip(pairs, paths, strict=True):
         save_png(sheet(pair.a, pair.b, names, amplify), both)

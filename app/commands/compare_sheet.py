@@ -20,7 +20,7 @@ def amplification(differences: list[np.ndarray]) -> int:
 
 def difference_picture(a: np.ndarray, b: np.ndarray, amplify: int) -> np.ndarray:
     """(H, W, 3) grey where the two are equal, lighter where b is brighter, by channel."""
-    return np.clip(np.float32(NO_DIFFERENCE) + amplify * (b - a) / 2, 0, 1)
+    return np.clip(np.array(NO_DIFFERENCE, np.float32) + amplify * (b - a) / 2, 0, 1)
 
 
 def written(picture: np.ndarray, text: str) -> np.ndarray:

@@ -131,8 +131,10 @@ def open_scene(path: Path, options: Options):
     if not is_scene_file(path):
         return Document.of(open_model(path, options))
     subject = open_document(path, options)
-    read = {name for item in subject.file.all_items for name in (item.model, item.collider) if name}
-    inputs = [subject.file.path(name) for name in read if name != HULLS]
+    file = subject.file
+    assert file is not None  # it is a scene file
+    read = {name for item in file.all_items for name in (item.model, item.collider) if name}
+    inputs = [file.path(name) for name in read if name != HULLS]
     check_output(options.out, inputs, options.overwrite)
     chosen = options.object if len(options.scenes) == 1 else ""
     things = [

@@ -60,7 +60,8 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
         baked.append(bake_part(part, look))
     told(f"writing {path.name}", len(parts) / (len(parts) + 1))
     splats = cut(merged(baked), look.sh_degree)
-    splats = replace(splats, origin=tuple(map(float, np.add(splats.origin, look.origin))))
+    x, y, z = np.add(splats.origin, look.origin).tolist()
+    splats = replace(splats, origin=(x, y, z))
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         writer.write(splats, path)

@@ -1,14 +1,19 @@
 """launch.py headless: the bundled demo and touch scene, pictures and frame times, no window."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from shapeshift.app.command_line import SIZE
 from shapeshift.app.paths import DEMO
 from shapeshift.app.program import program
 from shapeshift.app.terminal import say, tell_json
+
+if TYPE_CHECKING:
+    from shapeshift.app.document import Document
+    from shapeshift.renderer.renderer import Renderer
 
 TOUCH = "touch.png"
 QUALITY_SIZE = (192, 128)  # of the pictures that are compared with the float64 reference
@@ -87,7 +92,7 @@ def told_pictures(result: dict) -> str:
     return f"Pictures (sheet.png shows all{touch})"
 
 
-def draw_sheet(renderer, subject, size: tuple[int, int], out: Path) -> None:
+def draw_sheet(renderer: "Renderer", subject: "Document", size: tuple[int, int], out: Path) -> None:
     """A row a viewpoint; columns are the stops and the middles between them, of a scene file one:
     its objects each at its own x.
     """
@@ -96,17 +101,17 @@ def draw_sheet(renderer, subject, size: tuple[int, int], out: Path) -> None:
     from shapeshift.app.drawing import save_png
 
     stops = list(subject.stops)
-    controls = sorted(stops + [(a + b) / 2 for a, b in pairwise(stops)])
-    controls = [None] if subject.file else controls
+    between = [(a + b) / 2 for a, b in pairwise(stops)]
+    controls: Sequence[float | None] = [None] if subject.file else sorted(stops + between)
     views = viewpoints(subject, size)
     names = [[picture_name(v, x) for x in controls] for v in range(len(views))]
     check_ours([out / name for row in names for name in row] + [out / "sheet.png"])
-    rows = [[None] * len(controls) for _ in views]
+    rows: list[list[np.ndarray]] = [[] for _ in views]
     for column, x in enumerate(controls):  # geometry is decoded once a column
         renderer.update(subject.at(x))
         for row, view in enumerate(views):
             renderer.draw([view])
-            rows[row][column] = renderer.resolved(0)
+            rows[row].append(renderer.resolved(0))
             save_png(rows[row][column], out / names[row][column])
     save_png(np.concatenate([np.concatenate(row, axis=1) for row in rows]), out / "sheet.png")
 

@@ -35,10 +35,11 @@ def draw_outputs(
     from shapeshift.app.progress import tracked
     from shapeshift.scene.stereo import stereo_pair
 
-    legend = {"output": output, "meaning": MEANINGS[output]}
+    told: dict[str, dict] = {}
+    legend: dict[str, object] = {"output": output, "meaning": MEANINGS[output]}
     if output == "depth":
         legend["metres_per_step"] = metres_per_step
-    legend["pictures"] = told = {}
+    legend["pictures"] = told
     work = list(zip(scenes, views, paths, strict=True))
     for scene, view, path in tracked(work, "drawing"):
         renderer.update(scene)

@@ -1,14 +1,19 @@
 """launch.py render: a scene into PNG files, without a window."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, REGIONS, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+
+if TYPE_CHECKING:
+    from shapeshift.app.document import Document
+    from shapeshift.scene.pose import View
 
 AROUND = ("orbit", "front")  # cameras that take their place from the scene
 LIMITS = ("max_pixels", "max_distance", "min_pixels", "fade")
@@ -91,7 +96,7 @@ def run(options: Options) -> int:
     )
     from shapeshift.app.errors import UsageError
 
-    controls = split_controls(options.x) or [None]
+    controls: Sequence[float | str | None] = split_controls(options.x) or [None]
     size = parse_size(options.size) if options.size else None
     if not 1 <= options.frames <= MOST_VALUES:
         raise UsageError(f"--frames is {options.frames}, expected 1 to {MOST_VALUES}.")
@@ -200,11 +205,11 @@ def check_output(options: Options) -> None:
         raise UsageError(f"--depth-unit is {options.depth_unit}, expected metres above 0.")
 
 
-def unit_of(options: Options, subject, views: list) -> float:
+def unit_of(options: Options, document: "Document", views: list) -> float:
     """Metres a step of a depth picture."""
     from shapeshift.app.commands.outputs import choose_unit
 
-    return options.depth_unit or choose_unit(*subject.bounds(), views)
+    return options.depth_unit or choose_unit(*document.bounds(), views)
 
 
 def choose_settings(options: Options):
@@ -258,14 +263,14 @@ def choose_paths(
     return rows, paths
 
 
-def own_views(options: Options, subject, size: tuple[int, int] | None) -> list:
+def own_views(options: Options, document: "Document", size: tuple[int, int] | None) -> list["View"]:
     """The views around the scene: as many as --frames on the orbit, else the one from the front."""
     from shapeshift.scene.cameras.framing import orbit_path
 
     size = size or (640, 360)
     if options.camera == "front" or options.frames == 1:
-        return [subject.view(size)]
-    return orbit_path(options.frames, *subject.bounds(), size)
+        return [document.view(size)]
+    return orbit_path(options.frames, *document.bounds(), size)
 
 
 def choose_selectors(texts: tuple[str, ...], model, view) -> tuple:

@@ -32,7 +32,8 @@ def film(renderer: Renderer, ctx, size: tuple[int, int], path: Path) -> dict:
     world = simulation.world
     view = first_view(file, world.drawn(), size)
     renderer.settings = replace(renderer.settings, background=BACKGROUND)
-    frames, physics, pictures, changes, wanted = [], [], [], 0, list(MOMENTS_S)
+    frames, physics, changes, wanted = [], [], 0, list(MOMENTS_S)
+    pictures: list[np.ndarray] = []
     while wanted:
         start = time.perf_counter()
         records = [simulation.step() for _ in range(STEPS)] if pictures else []
