@@ -106,7 +106,8 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
         state.reframe()
     names = {change.before.name: change.after for change in changed if change.before}
     if state.chosen in names:
-        state.chosen = names[state.chosen].name if names[state.chosen] else ""
+        chosen = names[state.chosen]
+        state.chosen = chosen.name if chosen is not None else ""
 
 
 def fresh_row(

@@ -26,6 +26,10 @@ class Bodies:
     """Colliders by object, and the world once all that are asked for are there."""
 
     def __init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        """Nothing is open yet."""
         self.world: World | None = None  # None: nothing can be touched, or not yet
         self.problem = ""  # one sentence: why something cannot be touched; "" = nothing is wrong
         self.notes: list[str] = []  # what the physics has changed on the way in
@@ -51,7 +55,7 @@ class Bodies:
     def forget(self) -> None:
         """Another scene; a collider that is being made is not waited for."""
         self._unwanted.set()
-        self.__init__()
+        self._begin()
 
     @property
     def busy(self) -> bool:
@@ -88,7 +92,7 @@ class Bodies:
             return
         file = edited.file
         touched = [item for item in file.all_items if item.collider is not None]
-        missing = [item for item in touched if self._collider(item) is MISSING]
+        missing = [item for item in touched if not self._is_made(item)]
         if missing:
             self._start(edited, missing[0])
             return
@@ -116,12 +120,18 @@ class Bodies:
             follow(self.world, file, models, colliders)
         self.notes += [sentence(finding) for finding in self.world.findings[known:]]
 
-    def _collider(self, item: SceneItem) -> "Collider | object | None":
-        """What was made for the object, for its like, or MISSING; x may have moved since."""
-        before = self._of.get(item.name)
-        if before is not None and before[0] == made_of(item):
-            return before[1]
-        return self._made.get(making_of(item), MISSING)
+    def _is_made(self, item: SceneItem) -> bool:
+        return self._of_before(item) is not None or making_of(item) in self._made
+
+    def _collider(self, item: SceneItem) -> "Collider | None":
+        """What was made for the object or for its like; None: it has none."""
+        before = self._of_before(item)
+        return self._made[making_of(item)] if before is None else before
+
+    def _of_before(self, item: SceneItem) -> "Collider | None":
+        """What the object has had so far, where that still fits; x may have moved since."""
+        made, collider = self._of.get(item.name, (None, None))
+        return collider if made == made_of(item) else None
 
     def _start(self, edited: EditedFile, item: SceneItem) -> None:
         """Makes one collider in a thread that the program's end does not wait for."""
@@ -148,9 +158,6 @@ class Bodies:
 
 class Unwanted(Exception):
     """Nobody waits for the collider any more."""
-
-
-MISSING = object()
 
 
 def made_of(item: SceneItem) -> tuple[str | None, ModelKey, bool]:

@@ -216,7 +216,7 @@ class EditorState:
                 regions.choose(numbers[-1])
             else:
                 regions.add("painted", 0, self.scene.objects[0], np.zeros(3))
-        thing = self.scene.objects[regions.current.index]
+        thing = self.scene.objects[regions.items[regions.chosen].index]
         regions.paint(view, cursor, radius, thing, erase)
 
     @property
@@ -231,8 +231,8 @@ class EditorState:
 
     def follow_world(self) -> None:
         """Takes over where the world's objects are and what their x is."""
-        drawn = self.world.drawn()
-        if drawn is not self._followed:
+        drawn = self.world.drawn() if self.world is not None else None
+        if drawn is not None and drawn is not self._followed:
             stood = {thing.name: thing for thing in drawn.objects}
             things = [stood_as(thing, stood.get(thing.name)) for thing in self.scene.objects]
             self.scene, self._followed = Scene(tuple(things)), drawn

@@ -53,7 +53,7 @@ def lay_out(
     room.
     """
     if not overlay:
-        return Layout((0.0, 0.0, *map(float, size)))
+        return Layout((0.0, 0.0, float(size[0]), float(size[1])))
     width, height = (side / scale for side in size)
     if panel_open is None:
         room = width - PANEL_ROOM - LEGEND * legend
@@ -74,16 +74,22 @@ def lay_out(
     top = 0.0 if panel_open else MARGIN + FOLDED  # below the button
     if not panel_open:
         panel = (MARGIN, MARGIN, MARGIN + FOLDED, MARGIN + FOLDED)
-    parts = {
-        "free": free,
-        "panel": panel,
-        "bar": bar,
-        "legend": _legend(free[2], free) if keep_legend else None,
-        "left_legend": _legend(free[0] - LEGEND, free, top) if keep_legend and both else None,
-        "status": (0.0, status_top, width, height),
-    }
-    scaled = {name: box and tuple(side * scale for side in box) for name, box in parts.items()}
-    return Layout(folded=not panel_open, **scaled)
+    right_legend = _legend(free[2], free) if keep_legend else None
+    left_legend = _legend(free[0] - LEGEND, free, top) if keep_legend and both else None
+    return Layout(
+        free=_scaled(free, scale),
+        panel=_scaled(panel, scale),
+        folded=not panel_open,
+        bar=bar and _scaled(bar, scale),
+        legend=right_legend and _scaled(right_legend, scale),
+        left_legend=left_legend and _scaled(left_legend, scale),
+        status=_scaled((0.0, status_top, width, height), scale),
+    )
+
+
+def _scaled(box: Box, scale: float) -> Box:
+    left, top, right, bottom = box
+    return (left * scale, top * scale, right * scale, bottom * scale)
 
 
 def bar_height(rows: int) -> float:

@@ -66,12 +66,14 @@ class QualityController:
 
     def step(self) -> bool:
         """Measures for a moment; True once it is complete and a choice was made."""
-        until = time.perf_counter() + STEP_S
-        while not self._chart.done:
-            self._chart.step()
+        chart, until = self._chart, time.perf_counter() + STEP_S
+        if chart is None:
+            return False
+        while not chart.done:
+            chart.step()
             if time.perf_counter() >= until:
                 return False
-        self.rows, self._chart = tuple(self._chart.rows), None
+        self.rows, self._chart = tuple(chart.rows), None
         self.choose()
         return True
 
@@ -101,5 +103,6 @@ class QualityController:
 
     def applied(self, settings: RenderSettings) -> RenderSettings:
         """The chosen setting over the background, and in the debug view, that `settings` has."""
-        chosen = self.choice.settings
-        return replace(chosen, background=settings.background, debug=settings.debug)
+        if self.choice is None:
+            return settings
+        return replace(self.choice.settings, background=settings.background, debug=settings.debug)

@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.pick import anchor_places
-from shapeshift.scene.pose import View
+from shapeshift.scene.pose import View, quadruple, triple
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Selector, Sphere
 
@@ -199,11 +199,12 @@ class Regions:
 
         cursor and radius are in pixels of the view, from its top left.
         """
-        region = self.current
+        before = self.items[self.chosen].painted
+        assert before is not None  # a painted region has a mask from `add` on
         under = brushed(view, anchor_places(thing.model), thing, cursor, radius)
-        painted = region.painted.copy()
+        painted = before.copy()
         painted[under] = not erase
-        changed = int((painted != region.painted).sum())
+        changed = int(np.count_nonzero(painted != before))
         if changed:
             self.edit(self.chosen, painted=painted)
         return changed
@@ -213,14 +214,17 @@ def selector_of(region: Region, view: View) -> Selector:
     """What the scene knows a region as; a lens looks along `view`."""
     inside: dict[str, Any] = {"x": region.x, "border": region.border}
     if region.kind == "box":
-        return Box(centre=region.centre, half=region.half, **inside)
+        return Box(centre=triple(region.centre), half=triple(region.half), **inside)
     if region.kind == "sphere":
-        return Sphere(centre=region.centre, radius=float(region.half[0]), **inside)
+        return Sphere(centre=triple(region.centre), radius=float(region.half[0]), **inside)
     if region.kind == "half-space":
-        return HalfSpace(point=region.centre, normal=-region.normal, **inside)
+        normal = triple(-region.normal)
+        return HalfSpace(point=triple(region.centre), normal=normal, **inside)
     if region.kind == "lens":
         eye, angle = view.world_from_eye, float(np.arctan(region.tangent))
-        return Lens(position=eye.position, wxyz=eye.wxyz, half_angle=angle, **inside)
+        position, wxyz = triple(eye.position), quadruple(eye.wxyz)
+        return Lens(position=position, wxyz=wxyz, half_angle=angle, **inside)
+    assert region.painted is not None  # a painted region has a mask from `add` on
     return Painted(region.painted, region.x)
 
 
@@ -239,10 +243,11 @@ def region_of(selector: Selector, name: str, index: int) -> Region:
     if isinstance(selector, HalfSpace):
         centre, normal = np.array(selector.point), -np.array(selector.normal)
         return Region("half-space", centre=centre, normal=normal, **common)
+    assert selector.half_angle is not None  # a command line has cones alone
     return Region("lens", tangent=float(np.tan(selector.half_angle)), **common)
 
 
-def same(one: object, other: object) -> bool:
+def same(one: Any, other: Any) -> bool:
     """Equal numbers, texts or arrays; NaN is never the same."""
     return one is other or bool(np.array_equal(one, other))
 

@@ -15,7 +15,7 @@ from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 
 def scene_of(sources: Sequence[Source], x: float | None = None) -> Scene:
     """The scene of what has been opened: each at x or its first stop, in the first one's place."""
-    objects = []
+    objects: list[SceneObject] = []
     for source in sources:
         path, model = source.path, source.model
         moved = origin_of(model) - origin_of(sources[0].model)

@@ -112,22 +112,27 @@ class TouchState:
     def toggle(self) -> None:
         """Lets things move, or holds them still."""
         self.let_go()
-        self.world.paused = not self.world.paused
-        self._state.say("Things hold still. T lets them move." if self.world.paused else HOW)
+        world = self.world
+        if world is None:
+            return
+        world.paused = not world.paused
+        self._state.say("Things hold still. T lets them move." if world.paused else HOW)
 
     def step(self) -> None:
         """One step by hand; things hold still after it."""
         self.let_go()
-        self.world.paused = True
-        self.follow([self.world.step()])
+        if self.world is not None:
+            self.world.paused = True
+            self.follow([self.world.step()])
 
     def put_back(self) -> None:
         """Everything where it was before it was touched."""
         self.let_go()
         state = self._state
         state.bodies.follow(state.edited)  # edits that the world has not heard of
-        put_back(self.world)
-        self.follow([])
+        if self.world is not None:
+            put_back(self.world)
+            self.follow([])
 
     def control(self, name: str, x: Control) -> None:
         """A pad puts an object's x there."""
@@ -150,10 +155,13 @@ class TouchState:
 
     def advance(self, seconds: float) -> None:
         """Lets time pass in the world, and for what fades over it."""
-        records = self.world.advance(seconds)
-        if not self.world.paused:
-            self.follow(records)
-        for mark in (*self.labels, *self.flashes):
+        world = self.world
+        if world is not None:
+            records = world.advance(seconds)
+            if not world.paused:
+                self.follow(records)
+        marks: tuple[Label | Flash, ...] = (*self.labels, *self.flashes)
+        for mark in marks:
             mark.age_s += seconds
         self.labels = [label for label in self.labels if label.age_s < LABEL_S]
         self.flashes = [flash for flash in self.flashes if flash.age_s < FLASH_S]

@@ -41,6 +41,11 @@ def axes_of(
     return cosine * right + sine * up, cosine * up - sine * right, forward
 
 
+def fov_y_of(view: View) -> float:
+    """Radians from top to bottom."""
+    return float(np.arctan(view.tangents[3]) - np.arctan(view.tangents[2]))
+
+
 @dataclass(frozen=True)
 class Push:
     """What the movement keys ask for: -1, 0 or 1 along the eye's right, up and forward."""
@@ -137,7 +142,7 @@ class Camera:
     def pan(self, right: float, up: float) -> None:
         """Shifts eye and anchor by parts of the picture's height, measured at the anchor."""
         metres = 2 * np.tan(self.fov_y / 2) * self.distance
-        axis_right, axis_up, _ = axes_of(*self._goal[3:5], self._goal[ROLL])
+        axis_right, axis_up, _ = self._axes()
         goal = self._goal.copy()
         goal[ANCHOR] += metres * (right * axis_right + up * axis_up)
         self._move_to(goal)
@@ -154,7 +159,7 @@ class Camera:
     def step(self, seconds: float, push: Push = Push()) -> None:
         """Lets time pass: the keys move the camera, the picture catches up with its goal."""
         self.framed = BY_HAND if push.any else self.framed
-        right, _, forward = axes_of(*self._goal[3:5], self._goal[ROLL])
+        right, _, forward = self._axes()
         up = np.array([0, self._upright, 0])
         wanted = push.right * right + push.up * up + push.forward * forward
         length = np.linalg.norm(wanted)
@@ -196,7 +201,8 @@ class Camera:
 
     def frame(self, centre: np.ndarray, distance: float) -> None:
         """Looks at the centre (3,) from that many metres, in the same direction as before."""
-        self._stand(np.asarray(centre, np.float64), *self._goal[3:5], distance, self._goal[ROLL])
+        yaw, pitch, roll = self._goal[[YAW, PITCH, ROLL]]
+        self._stand(np.asarray(centre, np.float64), yaw, pitch, distance, roll)
         self.framed = EVERYTHING
 
     def stand(self, pose: Pose, fov_y: float) -> None:
@@ -225,7 +231,7 @@ class Camera:
         """Back to the first view of the scene."""
         view, centre, radius = self._home
         self.radius = radius
-        self.fov_y = float(np.arctan(view.tangents[3]) - np.arctan(view.tangents[2]))
+        self.fov_y = fov_y_of(view)
         eye, forward = view.world_from_eye.position, -view.world_from_eye.matrix()[:3, 2]
         yaw = np.arctan2(-forward[0], -forward[2])
         yaw = self._goal[YAW] + _half_turn_at_most(yaw - self._goal[YAW])
@@ -240,6 +246,10 @@ class Camera:
         """Another first view, of a window of another size."""
         self._home = (view, *self._home[1:])
         self.reset()
+
+    def _axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Right, up and forward (3,) of where the camera is going."""
+        return axes_of(self._goal[YAW], self._goal[PITCH], self._goal[ROLL])
 
     def _stand(
         self, target: np.ndarray, yaw: float, pitch: float, distance: float, roll: float = 0.0

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapeshift.app.editor.state.camera.camera import fov_y_of
 from shapeshift.scene.cameras.framing import default_view, framing_view
 from shapeshift.scene.document.scene_file import SceneFile, first_view
 from shapeshift.scene.pose import View, perspective
@@ -17,18 +18,13 @@ class FirstLook:
     home: View | None = None  # on a floor
     front: float | None = None  # the side that was photographed, radians about +Y from +Z
 
-    @property
-    def fov_y(self) -> float:
-        """Radians from top to bottom of the home view."""
-        return float(np.arctan(self.home.tangents[3]) - np.arctan(self.home.tangents[2]))
-
     def view(
         self, file: SceneFile, scene: Scene, points: tuple[np.ndarray, np.ndarray],
         size: tuple[int, int],
     ) -> View:  # fmt: skip
         """The view in size (W, H); `points` are those of the scene, and how opaque they are."""
         if self.home is not None:
-            return replace(self.home, tangents=perspective(self.fov_y, size), size=size)
+            return replace(self.home, tangents=perspective(fov_y_of(self.home), size), size=size)
         if file.view is not None:
             return first_view(file, scene, size)
         if len(scene.objects) == 1:

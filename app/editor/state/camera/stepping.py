@@ -8,7 +8,7 @@ from shapeshift.app.editor.state.camera.camera import Box
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.camera_path import slerp
 from shapeshift.scene.control import ease
-from shapeshift.scene.pose import Pose, View
+from shapeshift.scene.pose import Pose, View, quadruple
 
 FLIGHT_S = 0.4  # from one camera to the next
 LONGEST_NAME = 40  # letters in the status line
@@ -35,13 +35,19 @@ class Steps:
         return len(self.cameras.views) if self.cameras else 0
 
     @property
+    def stood_at(self) -> View:
+        """The camera that is looked through, while `standing`."""
+        assert self.cameras is not None  # nobody stands at a camera where there is none
+        return self.cameras.views[self.index]
+
+    @property
     def moving(self) -> bool:
         return self.standing and self._seconds < FLIGHT_S
 
     @property
     def text(self) -> str:
         """ "camera 3 of 96 NAME" while standing at one, else how many there are."""
-        if not self.count:
+        if self.cameras is None or not self.count:
             return ""
         if not self.standing:
             return f"{self.count} cameras" if self.count > 1 else "1 camera"
@@ -73,7 +79,7 @@ class Steps:
 
     def view(self, size: tuple[int, int], free: Box, near: float, far: float) -> View:
         """What is seen now in size (W, H) pixels: the camera's whole picture fits into `free`."""
-        wanted = fitted(self.cameras.views[self.index], size, free)
+        wanted = fitted(self.stood_at, size, free)
         wanted = replace(wanted, near=min(near, wanted.near), far=max(far, wanted.far))
         if not self.moving or self._from is None:
             return wanted
@@ -110,5 +116,7 @@ def between(one: View, other: View, part: float) -> View:
     a, b = one.world_from_eye, other.world_from_eye
     turn = slerp(a.wxyz[None], b.wxyz[None], np.array([part]))[0]
     pose = Pose(a.position + (b.position - a.position) * part, turn)
-    tangents = tuple(s + (t - s) * part for s, t in zip(one.tangents, other.tangents, strict=True))
+    tangents = quadruple(
+        s + (t - s) * part for s, t in zip(one.tangents, other.tangents, strict=True)
+    )
     return replace(other, world_from_eye=pose, tangents=tangents)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.app.editor.state.camera.camera import EVERYTHING, FIRST, SMOOTH_S, Camera
+from shapeshift.app.editor.state.camera.camera import EVERYTHING, FIRST, SMOOTH_S, Camera, fov_y_of
 from shapeshift.app.editor.state.camera.kept_views import KeptViews
 from shapeshift.app.editor.state.camera.stepping import Steps
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -39,9 +39,10 @@ class Viewpoint:
         """The camera of a new scene: on its floor where one is given, else the whole in view."""
         state = self._state
         camera = Camera(state.first_view(self.free_size()), state.first_target, state.radius)
-        if state.first_look.home is not None:
+        home = state.first_look.home
+        if home is not None:
             camera.toggle_flying()
-            camera.stand(state.first_look.home.world_from_eye, state.first_look.fov_y)
+            camera.stand(home.world_from_eye, fov_y_of(home))
         return camera
 
     def start_anew(self) -> None:
@@ -61,7 +62,7 @@ class Viewpoint:
     def plain_view(self) -> View:
         """The same without what the overlay covers: a camera as filed, or centred."""
         if self.steps.standing and not self.steps.moving:
-            return self.steps.cameras.views[self.steps.index]
+            return self.steps.stood_at
         return self.camera.view(self.free_size())
 
     def free_size(self) -> tuple[int, int]:
@@ -142,7 +143,7 @@ class Viewpoint:
 
     def keep_view(self) -> None:
         """Writes the view of now, as it would be without the panel, behind those kept before."""
-        (view,) = moved([self.plain_view()], self._state.origin)
+        (view,) = moved([self.plain_view()], self._state.origin.tolist())
         try:
             path = self.kept.keep(view)
         except BadFile as error:

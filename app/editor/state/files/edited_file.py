@@ -12,6 +12,7 @@ from shapeshift.scene.document import edits
 from shapeshift.scene.document.edits import History
 from shapeshift.scene.document.scene_file import ENDING, HULLS, SceneFile, SceneItem
 from shapeshift.scene.document.write_scene_file import moved
+from shapeshift.scene.pose import quadruple, triple
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
 
@@ -23,8 +24,8 @@ class EditedFile:
     """Edits change `history`; a model that was read once stays in `sources`, for undo."""
 
     history: History
+    saved: SceneFile  # as it was opened or lies there; an edit gives another object
     path: Path | None = None  # of the scene file; None: it is none yet
-    saved: SceneFile | None = None  # as it lies there; an edit gives another object
     saved_regions: tuple = ()  # the regions then
     stamp: tuple = ()  # of the file when it was read or written here: changed by others since?
     sources: dict[ModelKey, Source] = field(default_factory=dict)
@@ -117,7 +118,7 @@ def edited_from_file(path: Path, file: SceneFile, sources: Sequence[Source]) -> 
     """A scene file that was opened, and the models of its objects in their order."""
     by_key = {key_of(item): source for item, source in zip(file.all_items, sources, strict=True)}
     stamp = stamp_of(path)
-    return EditedFile(History.of(file), path, saved=file, stamp=stamp, sources=by_key)
+    return EditedFile(History.of(file), file, path, stamp=stamp, sources=by_key)
 
 
 def edited_from_scene(scene: Scene, sources: Sequence[Source]) -> EditedFile:
@@ -128,14 +129,14 @@ def edited_from_scene(scene: Scene, sources: Sequence[Source]) -> EditedFile:
         item = replace(
             item_of(source),
             name=thing.name,
-            position=tuple(map(float, thing.world_from_object.position)),
-            wxyz=tuple(map(float, thing.world_from_object.wxyz)),
+            position=triple(thing.world_from_object.position),
+            wxyz=quadruple(thing.world_from_object.wxyz),
             x=thing.x,
         )
         items.append(item)
         by_key[key_of(item)] = source
     file = SceneFile(folder=Path.cwd(), items=tuple(items))
-    return EditedFile(History.of(file), saved=file, sources=by_key)
+    return EditedFile(History.of(file), file, sources=by_key)
 
 
 def item_of(source: Source) -> SceneItem:

@@ -32,6 +32,7 @@ def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, EditedFile]:
         scene = scene_of(found.sources)
         scene = Scene(placed(scene.objects, x)) if x else scene
         return scene, edited_from_scene(scene, found.sources)
+    assert found.path is not None  # of the scene file
     file, inside = found.file, len(found.file.all_items)
     edited = edited_from_file(found.path, file, found.sources[:inside])
     for source in found.sources[inside:]:

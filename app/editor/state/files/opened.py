@@ -85,13 +85,13 @@ def read_files(
     if sources and file is None and beside:
         first = sources[0].path
         for found, find in ((lists, find_cameras), (floors, find_floor)):
-            path = None if found else find(first)
-            if path is not None:
-                more, note = read_beside(path, reading)
+            near = None if found else find(first)
+            if near is not None:
+                more, note = read_beside(near, reading)
                 found += more
                 notes += note
-    path = scene_files[0] if scene_files else None
-    return OpenedFiles(tuple(sources), file, path, last(lists), last(floors), tuple(notes))
+    scene_file = scene_files[0] if scene_files else None
+    return OpenedFiles(tuple(sources), file, scene_file, last(lists), last(floors), tuple(notes))
 
 
 def read_scene(path: Path, plain: Reading, told: Told | None) -> tuple[SceneFile, list[Source]]:

@@ -25,7 +25,7 @@ class Refiner:
     def __init__(self, options: ReadingOptions) -> None:
         self._options = options
         self._opened: list[tuple[SplatLayers, Iterator[SplatLayers]]] = []  # not followed yet
-        self._finer: queue.Queue[tuple[Model, Model]] = queue.Queue(maxsize=1)
+        self._finer: queue.Queue[tuple[SplatLayers, SplatLayers]] = queue.Queue(maxsize=1)
         self._unwanted = threading.Event()
         self._thread: threading.Thread | None = None
         self._level = ""
@@ -60,7 +60,7 @@ class Refiner:
         self._thread = threading.Thread(target=self._read, args=given, daemon=True)
         self._thread.start()
 
-    def take(self) -> tuple[Model, Model] | None:
+    def take(self) -> tuple[SplatLayers, SplatLayers] | None:
         """(a model that is shown, a finer one for its place), or None while there is none."""
         try:
             before, after = self._finer.get_nowait()

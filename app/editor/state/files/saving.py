@@ -40,7 +40,7 @@ class Saving:
     def save(self) -> bool:
         """Writes over what was saved before, else asks for a name; True when it did."""
         edited = self._state.edited
-        if not self.in_place:
+        if edited.path is None or not self.in_place:
             self.ask_name()
             return False
         if edited.stamp != stamp_of(edited.path):  # somebody else has written it since
@@ -51,8 +51,8 @@ class Saving:
     def ask_name(self) -> None:
         """Opens the box that asks for a name; nothing that is there is replaced unasked."""
         edited = self._state.edited
-        folder = self._folder
-        path = edited.path if self.in_place else free_path(folder / edited.name)
+        path = edited.path if self.in_place else None
+        path = path or free_path(self._folder / edited.name)
         self.name, self.taken = str(path.absolute()), False
 
     @property
@@ -80,7 +80,8 @@ class Saving:
 
     def ask_over(self) -> None:
         """The file that was opened is meant: that is asked once more."""
-        self.name, self.taken = str(self.original.absolute()), True
+        if self.original is not None:
+            self.name, self.taken = str(self.original.absolute()), True
 
     def retype(self, text: str) -> None:
         """Another name is in the box, which stays open."""

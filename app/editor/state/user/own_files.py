@@ -55,7 +55,6 @@ def _read(path: Path) -> dict[str, Stamp]:
     found = {}
     for row in rows if isinstance(rows, list) else []:
         name, stamp = (row.get("path"), row.get("stamp")) if isinstance(row, dict) else (0, 0)
-        numbers = isinstance(stamp, list) and all(type(n) is int for n in stamp)
-        if isinstance(name, str) and numbers:
+        if isinstance(name, str) and isinstance(stamp, list) and all(type(n) is int for n in stamp):
             found[name] = tuple(stamp)
     return found

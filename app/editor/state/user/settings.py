@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from shapeshift.runtime_models.files.whole_file import write_whole
 
@@ -31,12 +32,16 @@ class Settings:
             data = json.loads(path.read_bytes())
         except (OSError, ValueError, RecursionError):
             return Settings(folder)
-        found = data if isinstance(data, dict) else {}
+        found: dict[str, Any] = data if isinstance(data, dict) else {}
         size, panel = found.get("text_size"), found.get("panel_open")
-        sound = isinstance(size, int | float) and not isinstance(size, bool)
-        sound = sound and TEXT_SIZES[0] <= size <= TEXT_SIZES[-1]
+        if isinstance(size, bool) or not isinstance(size, int | float):
+            size = None
+        elif not TEXT_SIZES[0] <= size <= TEXT_SIZES[-1]:
+            size = None
         return Settings(
-            folder, float(size) if sound else None, panel if isinstance(panel, bool) else None
+            folder,
+            None if size is None else float(size),
+            panel if isinstance(panel, bool) else None,
         )
 
     def keep(self) -> None:
