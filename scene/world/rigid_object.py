@@ -1,6 +1,7 @@
 """One object of a world: what the file says of it, where it stands now, and how it is drawn."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.world.reactions import Machine, Standing, start
 from shapeshift.scene.world.read_script import between
+
+if TYPE_CHECKING:
+    from shapeshift.scene.colliders.collider import Collider
 
 LEADS, FOLLOWS = 6, 18  # steps in which a thing that is taken, or let go, changes its lead
 
@@ -25,7 +29,7 @@ class Thing:
     pose: Pose
     before: Pose  # at the step before, for pictures between two steps
     drawn: SceneObject  # as it was drawn last
-    collider: object | None = None  # scene.collider.Collider
+    collider: "Collider | None" = None
     lead: float = 0.0  # of a step: drawn so much ahead of others, 1 in a hand, that it cannot lag
 
     @property
@@ -83,6 +87,7 @@ def drawn_thing(thing: Thing, part: float | None) -> Thing:
 
 def middle_of(thing: Thing) -> np.ndarray:
     """(3,) metres, world: of the box around what can be touched of it."""
+    assert thing.collider is not None  # nobody asks for the middle of what cannot be touched
     corners = np.concatenate(thing.collider.hulls)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]
