@@ -1,5 +1,6 @@
 """launch.py view: opens files in a window, as its options ask."""
 
+from contextlib import AbstractContextManager
 from dataclasses import replace
 
 import numpy as np
@@ -58,6 +59,7 @@ def run(options: Options) -> int:
             attach_refiner(refiner, state, hooks, upload, viewer.dial.scene_changed)
             viewer.files.read = refiner.open
             viewer.files.started(found)
+            two: AbstractContextManager[object]
             if options.compare:
                 two = comparing(window, renderer, state, hooks, options, viewer.free)
             else:

@@ -61,7 +61,7 @@ class Adding:
     def take(self, found: OpenedFiles) -> None:
         """One object more of each source; a scene that the device cannot hold stays without."""
         state = self._state
-        if found.file is not None:
+        if found.path is not None:
             state.problem = (
                 f"{found.path.name} is a scene file: open it instead, or add its models one by one."
             )

@@ -157,8 +157,10 @@ class Files:
     def remember_all(self, found: OpenedFiles) -> None:
         """What was opened by name: the scene file, not what is in it."""
         inside = len(found.file.all_items) if found.file else 0
-        for path in [found.path] * (inside > 0) + [s.path for s in found.sources[inside:]]:
-            self.remember(path)
+        if found.path is not None and inside > 0:
+            self.remember(found.path)
+        for source in found.sources[inside:]:
+            self.remember(source.path)
 
     def remember(self, path: Path) -> None:
         """Puts a file first in the list of recent ones."""

@@ -1,5 +1,7 @@
 """Handles on the chosen object that move and turn it: ImGuizmo, drawn over the picture."""
 
+from typing import TypeAlias
+
 import glfw
 import numpy as np
 from imgui_bundle import imgui, imguizmo
@@ -23,7 +25,7 @@ from shapeshift.scene.document.scene_file import FAR_M
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import SceneObject
 
-Matrix16 = imguizmo.im_guizmo.Matrix16
+Matrix16: TypeAlias = imguizmo.im_guizmo.Matrix16
 Vec = imgui.ImVec2
 CORNER = 0.2  # of an edge of the box that shows what is chosen
 _, MOVE, TURN = HANDLES

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.refine import Refiner, show_level
 from shapeshift.app.editor.window.hooks import Hooks
-from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.scene.scene import Scene
 
 
@@ -29,7 +29,7 @@ def attach_refiner(
             state.problem, refiner.problem = refiner.problem, ""
         return refiner.running
 
-    def show(index: int, before: Model, after: Model) -> None:
+    def show(index: int, before: SplatLayers, after: SplatLayers) -> None:
         show_level(state, index, after)
         try:
             upload(state.scene)

@@ -48,13 +48,14 @@ def splitting(
     free: Callable[[], Box], make_renderer: Callable[[], Renderer],
 ) -> Iterator[None]:  # fmt: skip
     """Adds the split view to a viewer; its renderer is made when it is first wanted."""
-    split_state, made = state.split, []
+    split_state = state.split
+    made: list[tuple[Split, Renderer]] = []  # of one, once it is wanted
 
     def split() -> Split:
         if not made:
             renderer = make_renderer()
-            made.extend((Split(window, renderer, split_state, free()), renderer))
-        return made[0]
+            made.append((Split(window, renderer, split_state, free()), renderer))
+        return made[0][0]
 
     def draw(request: FrameRequest) -> None:
         split_state.on = split_state.on and any(
@@ -93,9 +94,8 @@ def splitting(
         hooks.over.remove(draw)
         hooks.marks.remove(draw_marks)
         hooks.takes.remove(take)
-        for thing in made[:1]:
-            thing.release()
-        for renderer in made[1:]:
+        for picture, renderer in made:
+            picture.release()
             renderer.close()
 
 

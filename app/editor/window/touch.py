@@ -22,8 +22,18 @@ from shapeshift.app.editor.window.window import (
     Window,
 )
 from shapeshift.scene.pose import View
-from shapeshift.scene.world.mouse_hand import moved, pose, pushed, ray, rolled, take, turned
+from shapeshift.scene.world.mouse_hand import (
+    MouseHand,
+    moved,
+    pose,
+    pushed,
+    ray,
+    rolled,
+    take,
+    turned,
+)
 from shapeshift.scene.world.rigid_object import middle_of
+from shapeshift.scene.world.world import World
 
 KEYS = (
     ("T", "let things move, hold them still"),
@@ -76,17 +86,18 @@ class MouseTouch:
 
     def take(self, event: Event) -> bool:
         """True for what concerns the hand, its ray and the physics."""
-        if self._touch.world is None:
+        world, hand = self._touch.world, self._touch.hand
+        if world is None:
             return False
         if isinstance(event, KeyDown):
-            return self.press_key(event)
-        if self._touch.hand is None:
-            return isinstance(event, Press) and event.button == "left" and self.grab(event)
+            return self.press_key(event, world)
+        if hand is None:
+            return isinstance(event, Press) and event.button == "left" and self.grab(event, world)
         match event:
             case Drag(button="left"):
-                self.drag(event.dx, event.dy)
+                self.drag(hand, event.dx, event.dy)
             case Wheel():
-                self.turn_wheel(event.notches)
+                self.turn_wheel(hand, event.notches)
             case Release(button="left"):
                 self._touch.let_go()
             case Press() | DoubleClick():  # another button, or the camera is meant
@@ -96,7 +107,7 @@ class MouseTouch:
                 return False
         return True
 
-    def press_key(self, event: KeyDown) -> bool:
+    def press_key(self, event: KeyDown, world: World) -> bool:
         match event.key:
             case glfw.KEY_T if event.shift:
                 self._touch.step()
@@ -105,7 +116,7 @@ class MouseTouch:
             case glfw.KEY_R:
                 self._touch.put_back()
             case glfw.KEY_X:
-                self.shoot()
+                self.shoot(world)
             case glfw.KEY_J:
                 self._touch.colliders = not self._touch.colliders
             case glfw.KEY_ESCAPE if self._touch.hand is not None:
@@ -114,50 +125,51 @@ class MouseTouch:
                 return False
         return True
 
-    def grab(self, press: Press) -> bool:
+    def grab(self, press: Press, world: World) -> bool:
         """Takes what lies under the mouse, if it can be carried."""
         regions, window = self._state.regions, self._window
-        if self._touch.world.paused or self._hands.is_painting or regions.placing:
+        if world.paused or self._hands.is_painting or regions.placing:
             return False
         view, size = self._viewpoint.view(), window.logical_size
         name = self.under(view, (press.x, press.y))
         if name is None:
             return False
-        middle = middle_of(self._touch.world.things[name])  # about which it is turned
-        self._touch.hand = take(view, size, middle)
-        self._touch.world.move_hand(HAND, pose(self._touch.hand, view, size))
-        self._touch.world.grab_body(HAND, name, middle)
+        middle = middle_of(world.things[name])  # about which it is turned
+        hand = self._touch.hand = take(view, size, middle)
+        world.move_hand(HAND, pose(hand, view, size))
+        world.grab_body(HAND, name, middle)
         self._state.chosen = name
         return True
 
     def under(self, view: View, place: tuple[float, float]) -> str | None:
         """What could be carried that lies under a place of the picture, logical pixels."""
-        hit = self._touch.world.aim(*ray(view, place, self._window.logical_size))
-        thing = self._touch.world.things.get(hit.object) if hit else None
+        world = self._touch.world
+        hit = world.aim(*ray(view, place, self._window.logical_size)) if world else None
+        if world is None or hit is None:
+            return None
+        thing = world.things.get(hit.object)
         return hit.object if thing is not None and thing.moves else None
 
-    def drag(self, dx: float, dy: float) -> None:
+    def drag(self, hand: MouseHand, dx: float, dy: float) -> None:
         if self._hands.shift:
-            self._touch.hand = turned(self._touch.hand, dx, dy, self._viewpoint.view())
+            self._touch.hand = turned(hand, dx, dy, self._viewpoint.view())
         else:
-            self._touch.hand = moved(self._touch.hand, dx, dy, self._window.logical_size)
+            self._touch.hand = moved(hand, dx, dy, self._window.logical_size)
 
-    def turn_wheel(self, notches: float) -> None:
+    def turn_wheel(self, hand: MouseHand, notches: float) -> None:
         view = self._viewpoint.view()
-        self._touch.hand = (rolled if self._hands.shift else pushed)(
-            self._touch.hand, notches, view
-        )
+        self._touch.hand = (rolled if self._hands.shift else pushed)(hand, notches, view)
 
-    def shoot(self) -> None:
+    def shoot(self, world: World) -> None:
         """A ray from the eye through the mouse: what it meets answers."""
         window = self._window
         if not window.on_scene:
             return
         at = ray(self._viewpoint.view(), window.cursor, window.logical_size)
-        hit = self._touch.world.ray(*at)
+        hit = world.ray(*at)
         if hit is not None:
             self._touch.flashes.append(Flash(hit.point))
-        if self._touch.world.paused:  # nobody else would let it answer
+        if world.paused:  # nobody else would let it answer
             self._touch.step()
 
     def each_frame(self) -> bool:
@@ -165,7 +177,7 @@ class MouseTouch:
         touch = self._touch
         if not touch.meet_world():
             return False
-        if touch.hand is not None:
+        if touch.world is not None and touch.hand is not None:
             where = pose(touch.hand, self._viewpoint.view(), self._window.logical_size)
             touch.world.move_hand(HAND, where)
         touch.advance(self._state.seconds)

@@ -1,6 +1,7 @@
 """What touching shows over the picture: the grip, rays, reactions that fade, colliders as lines."""
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from imgui_bundle import imgui
@@ -18,10 +19,11 @@ from shapeshift.scene.colliders.collider import Collider
 from shapeshift.scene.colliders.collider_edges import hull_edges, mesh_edges
 from shapeshift.scene.document.scene_file import BACKGROUND
 from shapeshift.scene.pose import View
-from shapeshift.scene.world.mouse_hand import pose
+from shapeshift.scene.world.mouse_hand import MouseHand, Size, pose
 from shapeshift.scene.world.rigid_object import Thing, middle_of
+from shapeshift.scene.world.world import World
 
-Vec = imgui.ImVec2
+Vec: TypeAlias = imgui.ImVec2
 RISE = 26.0  # logical pixels that a label goes up meanwhile
 MOVES_INK, STAYS_INK = (0.35, 0.9, 0.55), (0.45, 0.65, 1.0)
 HELD_INK = theme.ACCENT
@@ -53,31 +55,24 @@ class Marks:
         gpu_lines = self._lines or Lines(Gpu(self._window.ctx))
         self._lines = gpu_lines
         wires = [
-            Wire(self.edges(thing), self._where(request, name), self._ink(name, thing))
+            Wire(self.edges(thing, thing.collider), where(request, thing), self._ink(name, thing))
             for name, thing in touch.world.things.items()
             if thing.collider is not None
         ]
         gpu_lines.draw(self._window.screen(), request.view, wires)
-
-    def _where(self, request: FrameRequest, name: str) -> np.ndarray:
-        """(4, 4) where the object is drawn, else where it stands."""
-        for thing in request.scene.objects:
-            if thing.name == name:
-                return thing.world_from_object.matrix()
-        return self._touch.world.things[name].pose.matrix()
 
     def _ink(self, name: str, thing: Thing) -> tuple[float, float, float, float]:
         held = name == self._touch.held
         rgb = HELD_INK if held else MOVES_INK if thing.moves else STAYS_INK
         return (*rgb, 0.9 if held else 0.6)
 
-    def edges(self, thing: Thing) -> np.ndarray:
+    def edges(self, thing: Thing, collider: Collider) -> np.ndarray:
         """(S, 2, 3) of its collider, made once."""
         is_mesh = thing.item.name == BACKGROUND
-        key = (id(thing.collider), is_mesh)
+        key = (id(collider), is_mesh)
         if key not in self._edges:
-            made = (mesh_edges if is_mesh else hull_edges)(thing.collider)
-            self._edges[key] = thing.collider, made
+            made = (mesh_edges if is_mesh else hull_edges)(collider)
+            self._edges[key] = collider, made
         return self._edges[key][1]
 
     # ---- over the picture
@@ -89,7 +84,7 @@ class Marks:
             return
         view, size = self._viewpoint.view(), self._window.logical_size
         if touch.hand is not None:
-            self._grip(view, size, ui_scale)
+            self._grip(touch.hand, touch.world, view, size, ui_scale)
         elif not touch.world.paused and self._window.on_scene:
             self._could_take(view, ui_scale)
         for flash in touch.flashes:
@@ -97,16 +92,16 @@ class Marks:
             ink = theme.color(theme.ACCENT, 1 - part)
             self._circle(view, size, flash.point, (4 + 26 * part) * ui_scale, ink, ui_scale)
         for label in touch.labels:
-            self._label(label, view, size, ui_scale)
+            draw_label(label, touch.world, view, size, ui_scale)
 
-    def _grip(self, view: View, size: tuple, ui_scale: float) -> None:
+    def _grip(self, hand: MouseHand, world: World, view: View, size: Size, ui_scale: float) -> None:
         """A disc where the hand is, and a line to what it holds where that is kept back."""
-        touch = self._touch
-        at = on_picture(view, pose(touch.hand, view, size).position, size)
+        at = on_picture(view, pose(hand, view, size).position, size)
         if at is None:
             return
         draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT, 0.8)
-        thing = touch.world.things.get(touch.held)
+        held = self._touch.held
+        thing = None if held is None else world.things.get(held)
         middle = on_picture(view, middle_of(thing), size) if thing else None
         if middle is not None:
             draw.add_line(Vec(*middle), Vec(*at), ink, 2 * ui_scale)
@@ -130,16 +125,26 @@ class Marks:
             draw = imgui.get_background_draw_list()
             draw.add_circle(Vec(*at), radius, ink, 0, 2 * ui_scale)
 
-    def _label(self, label: Label, view: View, size: tuple, ui_scale: float) -> None:
-        thing = self._touch.world.things.get(label.object)
-        at = on_picture(view, thing.pose.position, size) if thing else None
-        if at is not None:
-            part = label.age_s / LABEL_S
-            at = Vec(at[0], at[1] - (24 + RISE * part) * ui_scale)
-            draw_word(label.text, at, min(2 * (1 - part), 1.0), ui_scale)
+
+def where(request: FrameRequest, touched: Thing) -> np.ndarray:
+    """(4, 4) where the object is drawn, else where it stands."""
+    for thing in request.scene.objects:
+        if thing.name == touched.item.name:
+            return thing.world_from_object.matrix()
+    return touched.pose.matrix()
 
 
-def on_picture(view: View, point: np.ndarray, size: tuple) -> np.ndarray | None:
+def draw_label(label: Label, world: World, view: View, size: Size, ui_scale: float) -> None:
+    """What a thing has become, rising from it; nothing where the thing is gone."""
+    thing = world.things.get(label.object)
+    at = on_picture(view, thing.pose.position, size) if thing else None
+    if at is not None:
+        part = label.age_s / LABEL_S
+        left = Vec(at[0], at[1] - (24 + RISE * part) * ui_scale)
+        draw_word(label.text, left, min(2 * (1 - part), 1.0), ui_scale)
+
+
+def on_picture(view: View, point: np.ndarray, size: Size) -> np.ndarray | None:
     """(2,) logical pixels of a point (3,) of the world; None behind the eye."""
     in_eye = (view.eye_from_world() @ np.append(point, 1.0))[:3]
     return pixels(view, in_eye, size) if -in_eye[2] > view.near else None

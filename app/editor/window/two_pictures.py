@@ -1,6 +1,7 @@
 """Two pictures in one window: left of a line that the mouse moves is A, right of it B."""
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import glfw
 import moderngl
@@ -23,7 +24,7 @@ from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.resolve import Resolve
 from shapeshift.renderer.renderer import Renderer
 
-Vec = imgui.ImVec2
+Vec: TypeAlias = imgui.ImVec2
 Rgb = tuple[float, float, float]
 GRAB = 10.0  # logical pixels on either side of the line that take hold of it
 STEP = 0.02  # of the window's width, for a press of , or .

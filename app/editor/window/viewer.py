@@ -282,7 +282,7 @@ class Viewer:
     def _moving(self) -> bool:
         by_hand = self.viewpoint.moving or self.hands.push.any
         state = self.state
-        living = state.running and not state.world.resting
+        living = state.world is not None and state.running and not state.world.resting
         return by_hand or state.playing or living
 
     def _idle_work_due(self, now: float) -> bool:
@@ -322,7 +322,7 @@ class Viewer:
         covered = []
         if not state.save_picture:
             self._draw_marks(scale)
-        if state.overlay:
+        if state.overlay and layout.status is not None:
             right = state.split.right(state.scene) if state.split.on else state.scene
             for scene, box in ((state.scene, layout.left_legend), (right, layout.legend)):
                 if box is not None:

@@ -278,7 +278,8 @@ class Window:
         glfw.set_cursor_pos_callback(handle, self._on_cursor)
         glfw.set_mouse_button_callback(handle, self._on_button)
         glfw.set_scroll_callback(handle, self._on_scroll)
-        glfw.set_drop_callback(handle, self._on_drop)
+        # The annotations of glfw say (window, int, str); what comes is (window, list of paths).
+        glfw.set_drop_callback(handle, self._on_drop)  # type: ignore[arg-type]
         glfw.set_window_refresh_callback(handle, lambda _: self._note())
         glfw.set_framebuffer_size_callback(handle, lambda *_: self._note())
         glfw.set_window_content_scale_callback(handle, self._on_content_scale)

@@ -83,7 +83,7 @@ class Wipe(TwoPictures):
         """Lays B over the right part of the window, in which A's picture is."""
         if not self.on or not request.scene.objects:
             return
-        (view,) = moved([request.view], self._offset(request.scene))
+        (view,) = moved([request.view], self._offset(request.scene).tolist())
         same = FrameRequest(self._scene_at(request.scene), view, request.settings, request.moving)
         self.draw_right(same)
         self._measure(request, same)
