@@ -25,3 +25,9 @@ def test_at_rest_all_pixels_that_were_chosen_are_drawn():
     dial, settings = slow_dial(), RenderSettings(render_scale=0.75)
     dial.dynamic = False
     assert dial.while_moving(settings) is settings
+
+
+def test_a_dial_that_has_measured_nothing_changes_nothing():
+    dial, settings = QualityController(), RenderSettings(max_pixels=3)
+    assert not dial.step() and dial.rows == ()
+    assert dial.applied(settings) is settings
