@@ -384,12 +384,12 @@ def test_the_command_takes_them_and_refuses_what_the_capture_has_not(device, rig
 
 
 def test_the_program_of_the_table_at_a_tiny_size(rig, tmp_path):
-    program = [sys.executable, ROOT / "docs/bench/between.py", rig.folder]
+    program = [sys.executable, ROOT / "tools/training/between.py", rig.folder]
     program += ["--iterations", "120", "--max-anchors", "300", "--steps", "10", "--views", "2"]
     program += ["--ways", "stops", "frequencies", "--out", tmp_path / "rows.csv"]
     subprocess.run(program, check=True, timeout=120, cwd=tmp_path)
     command, machine, *lines = (tmp_path / "rows.csv").read_text().splitlines()
-    assert command.startswith("# python3 docs/bench/between.py") and "PoCL" in machine
+    assert command.startswith("# python3 tools/training/between.py") and "PoCL" in machine
     rows = list(csv.DictReader(lines))
     where = ["RGB", "Thermal", "mean", "RGB to Thermal"]
     assert [(row["way"], row["where"]) for row in rows] == [

@@ -1,6 +1,6 @@
 """The GL passes beside their floors, in CPU milliseconds of the process, all in one run.
 
-    python3 docs/bench/passes_gl.py [--splats 100000 400000 800000] > docs/bench/passes_gl.csv
+    python3 tools/renderer/passes_gl.py [--splats 100000 400000 800000] > docs/bench/passes_gl.csv
 
 project: a compute kernel that streams the same bytes.  sort: a counting sort of the same 16-bit
 keys in compiled code.  draw: splats that fill the screen, with the fragments of tight quads.
@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT)]
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.renderer import layout  # noqa: E402
@@ -237,7 +237,7 @@ def main() -> None:
     counts = parser.parse_args().splats
     with open_context() as ctx, Gpu(ctx) as gpu:
         lines = [
-            "# python3 docs/bench/passes_gl.py",
+            "# python3 tools/renderer/passes_gl.py",
             f"# {ctx.info['GL_RENDERER']}; 1280x720; CPU ms; load {os.getloadavg()[0]:.1f}",
             "splats,pass,cpu_ms,floor_ms,over_floor,limit",
         ]

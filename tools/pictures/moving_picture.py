@@ -1,6 +1,6 @@
 """The moving picture in README.md: the demo's slider through its stops, then a thrown cube.
 
-python3 docs/bench/moving_picture.py [docs/shapeshift.webp]
+python3 tools/pictures/moving_picture.py [docs/shapeshift.webp]
 """
 
 import sys

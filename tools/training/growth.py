@@ -1,6 +1,6 @@
 """What anchors have and how they grow: decibels against seconds, splats and bytes.
 
-    python3 docs/bench/growth.py CAPTURE [CAPTURE ...] --seconds 120 --out docs/bench/growth.csv
+    python3 tools/training/growth.py CAPTURE [CAPTURE ...] --seconds 120 --out docs/bench/growth.csv
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  A way is
 a row of WAYS below: the settings of training that it changes.  Every way of a capture has the same

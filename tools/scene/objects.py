@@ -1,6 +1,6 @@
 """What a frame costs when the same splats are several objects instead of one model.
 
-    python docs/bench/objects.py LEG_FOLDER --out docs/bench/objects.csv
+    python tools/scene/objects.py LEG_FOLDER --out docs/bench/objects.csv
 
 The splats (anchors) of a scene are dealt to 3 to 20 objects, so that all of them lie in each other
 and only one order over all of them is right; the merged model holds the same in the same order.
@@ -163,7 +163,7 @@ def main() -> int:
             rows += measure(name, model, drawing, ctx, options)
     from shapeshift.rasterizer.device import open_device
 
-    words = f"python docs/bench/objects.py {options.leg.name} --frames {options.frames}"
+    words = f"python tools/scene/objects.py {options.leg.name} --frames {options.frames}"
     words += f" --out {options.out.name}" if options.out else ""
     load = f"load average {os.getloadavg()[0]:.1f} at the end"
     head = [f"# {words}", f"# OpenCL {open_device().platform}; GL {gl}; {load}", COLUMNS]

@@ -1,6 +1,6 @@
 """Viewers that install from package registries beside ours: same splats, poses and sizes, no GPU.
 
-    python docs/bench/peers.py LEG_FOLDER --out docs/bench/peers.csv
+    python tools/renderer/peers.py LEG_FOLDER --out docs/bench/peers.csv
 
 Ours draws with OpenCL tiles.  gausscam (PyPI) wants a Vulkan driver for the CPU: name one newer
 than Mesa 23 with VK_ICD_FILENAMES where the system's is older.  gaussian-splats-3d and spark (npm)
@@ -155,7 +155,7 @@ def main() -> int:
     rows = []
     for size in SIZES:
         rows += measure(options, model, size)
-    words = f"python docs/bench/peers.py {options.scene.name} --out peers.csv"
+    words = f"python tools/renderer/peers.py {options.scene.name} --out peers.csv"
     head = [f"# {words} --poses {options.poses}", f"# load average {os.getloadavg()[0]:.1f}"]
     columns = "peer,version,size,splats,cpu_ms,wall_ms,cpu_over_ours,psnr_db"
     options.out.write_text("\n".join([*head, columns, *rows]) + "\n")

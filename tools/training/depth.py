@@ -1,6 +1,6 @@
 """What depth photos are worth: decibels and depth with and without them, from few photos and many.
 
-    python3 docs/bench/depth.py --seconds 60 --out docs/bench/depth.csv
+    python3 tools/training/depth.py --seconds 60 --out docs/bench/depth.csv
 
 The capture is balls (training/synthetic/balls.py) or a folder whose photos have depth.  start is
 where the first anchors come from: the capture's points, or, without them, a visual hull.  views
@@ -57,7 +57,7 @@ def main() -> None:
     )
     device = open_device()
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 docs/bench/depth.py {' '.join(sys.argv[1:])}\n")
+        file.write(f"# python3 tools/training/depth.py {' '.join(sys.argv[1:])}\n")
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         rows.writeheader()

@@ -1,6 +1,6 @@
 """How colliders of captures turn out: pieces, seconds, how well they cover the splats.
 
-    python docs/bench/colliders.py --out docs/bench/colliders.csv FILE ...
+    python tools/scene/colliders.py --out docs/bench/colliders.csv FILE ...
 
 Seconds are those of both processors together: the wrap in this process, CoACD in one of its own.
 Of the splats at least half opaque, "outside" are those whose centre is farther from every hull
@@ -82,7 +82,7 @@ def main() -> None:
     if told.out:
         with told.out.open("w", newline="") as file:
             file.write(
-                "# python docs/bench/colliders.py --out docs/bench/colliders.csv FILE ...\n"
+                "# python tools/scene/colliders.py --out docs/bench/colliders.csv FILE ...\n"
                 f"# CoACD {version('coacd')}, 2,500 faces and 16 hulls at most\n"
             )
             csv.writer(file, lineterminator="\n").writerows([FIELDS, *rows])

@@ -1,6 +1,7 @@
 """What a training step costs as scenes grow: milliseconds of each pass, bytes on the device.
 
-    python docs/bench/training_scale.py [--anchors 50000] [--size 1000x750] [--steps 5] --out FILE
+    python tools/training/training_scale.py [--anchors 50000] [--size 1000x750] [--steps 5] \
+        --out FILE
 
 Anchors lie on a ball's surface in front of the camera, networks are fresh, photos are noise: the
 arithmetic and the memory of a real scene of that size, without its data.  slots: pairs of a splat
@@ -108,7 +109,7 @@ def main(arguments: list[str]) -> None:
     given = parser.parse_args(arguments)
     device = open_device()
     lines = [
-        f"# python docs/bench/training_scale.py {' '.join(arguments)}",
+        f"# python tools/training/training_scale.py {' '.join(arguments)}",
         f"# {device.name}, {device.platform}", COLUMNS,
     ]  # fmt: skip
     for text in given.size:

@@ -1,6 +1,6 @@
 """What a frame of the OpenCL tiles costs, pass by pass and as a whole, mono and stereo.
 
-    python docs/bench/tiles.py LEG_FOLDER --out docs/bench/tiles.csv
+    python tools/renderer/tiles.py LEG_FOLDER --out docs/bench/tiles.csv
 
 CPU ms are those of this process with all its threads, so that other load does not count; wall ms
 do on a quiet machine only.  "frame" is project + sort + bin + raster without waiting in between;
@@ -251,7 +251,7 @@ def main() -> int:
     leg = read_model(options.leg)
     three = side_by_side(leg, 3)
     sys.stderr.write("The scene of 410k splats is the first one three times, without SH.\n")
-    words = f"python docs/bench/tiles.py {options.leg.name} --poses {options.poses}"
+    words = f"python tools/renderer/tiles.py {options.leg.name} --poses {options.poses}"
     words += " --prototype raster.cl" if prototype else ""
     words += f" --out {options.out.name}" if options.out else ""
     load = f"load average {os.getloadavg()[0]:.1f} at the start"

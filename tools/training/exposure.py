@@ -1,6 +1,6 @@
 """Photos of other brightness: what evening them out gives, and how much it finds where all is even.
 
-    python3 docs/bench/exposure.py CAPTURE ... --out docs/bench/exposure.csv
+    python3 tools/training/exposure.py CAPTURE ... --out docs/bench/exposure.csv
         [--iterations 600] [--downscale N] [--seeds 0 1] [--size 200] [--spreads 0 0.08 0.2]
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, made on the spot.  Each training

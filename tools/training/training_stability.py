@@ -1,6 +1,6 @@
 """Where training fails, and what it says then: a row a case, decibels beside the untouched capture.
 
-    python3 docs/bench/training_stability.py --out docs/bench/training-stability.md
+    python3 tools/training/training_stability.py --out docs/bench/training-stability.md
         [--tankard FOLDER] [--fern FOLDER] [--iterations 600] [--size 100] [--cases NAME ...]
 
 Each case is `launch.py train` on a capture of which something is wrong (training_cases.py).  What
@@ -205,7 +205,7 @@ def main() -> None:
     given = {"tankard": options.tankard, "fern": options.fern}
     words = [Path(word).name if Path(word).is_dir() else word for word in without_cases()]
     device = open_device()
-    head = f"    python3 docs/bench/training_stability.py {shlex.join(words)}\n"
+    head = f"    python3 tools/training/training_stability.py {shlex.join(words)}\n"
     head += f"    {device.name}, {device.platform}\n"
     read, rows = before(options.out)
     with tempfile.TemporaryDirectory() as folder:

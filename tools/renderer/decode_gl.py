@@ -1,6 +1,6 @@
 """Decoding beside onnxruntime with one thread, in CPU milliseconds of the process, all in one run.
 
-    python3 docs/bench/decode_gl.py [--anchors 4000 40000 100000] > docs/bench/decode_gl.csv
+    python3 tools/renderer/decode_gl.py [--anchors 4000 40000 100000] > docs/bench/decode_gl.csv
 
 floor: the networks as a package holds them, inputs ready in memory, outputs left where they fall.
 The back ends end with splats in the arena, uploaded and packed; "networks alone" is what of it
@@ -19,7 +19,7 @@ from statistics import median
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT)]
 
 from shapeshift.rasterizer.device import NoDevice  # noqa: E402
 from shapeshift.renderer.gl.buffers import Arena  # noqa: E402
@@ -126,7 +126,7 @@ def main() -> None:
     counts = parser.parse_args().anchors
     with open_context() as ctx, Gpu(ctx) as gpu:
         lines = [
-            f"# python3 docs/bench/decode_gl.py --anchors {' '.join(map(str, counts))}",
+            f"# python3 tools/renderer/decode_gl.py --anchors {' '.join(map(str, counts))}",
             f"# {ctx.info['GL_RENDERER']}; CPU ms; load {os.getloadavg()[0]:.1f}",
             "anchors,back_end,networks,cpu_ms,floor_ms,over_floor,limit",
         ]

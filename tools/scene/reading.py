@@ -1,6 +1,6 @@
 """What it costs to read the photos of a large capture: processor time and memory a photo.
 
-    python3 docs/bench/reading.py CAPTURE ... --out docs/bench/reading.csv [--photos 2000]
+    python3 tools/scene/reading.py CAPTURE ... --out docs/bench/reading.csv [--photos 2000]
 
 The photos of each CAPTURE are taken again and again until there are --photos of them; with a bent
 lens (k1 = 0.1) and without one, with sides up to 640 pixels and whole.  capture_s: the capture
@@ -108,7 +108,7 @@ def main() -> None:
 
     with options.out.open("w", newline="") as file:
         words = [Path(w).name if Path(w) in options.captures else w for w in sys.argv[1:]]
-        file.write(f"# python3 docs/bench/reading.py {shlex.join(words)}\n# {processor()}, ")
+        file.write(f"# python3 tools/scene/reading.py {shlex.join(words)}\n# {processor()}, ")
         file.write(f"{os.cpu_count()} cores\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         rows.writeheader()

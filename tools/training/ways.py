@@ -99,7 +99,7 @@ def table(
     """Rows into --out, a run at a time, below the command and the machine."""
     with options.out.open("w", newline="") as file:
         words = [Path(w).name if w in options.captures else w for w in sys.argv[1:]]
-        file.write(f"# python3 docs/bench/{Path(sys.argv[0]).name} {shlex.join(words)}\n")
+        file.write(f"# python3 tools/training/{Path(sys.argv[0]).name} {shlex.join(words)}\n")
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, columns, lineterminator="\n")
         rows.writeheader()

@@ -1,6 +1,6 @@
 """The picture in docs/viewer.md: the demo at its stops and half-way between, from three places.
 
-python3 docs/bench/demo_picture.py [docs/demo.png]
+python3 tools/pictures/demo_picture.py [docs/demo.png]
 """
 
 import sys

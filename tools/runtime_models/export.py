@@ -1,6 +1,6 @@
 """What an export keeps: bytes, splats and likeness of the written file, by format and SH degree.
 
-    python3 docs/bench/export.py --out docs/bench/export.csv [--leg FOLDER_OF_LAYERS]
+    python3 tools/runtime_models/export.py --out docs/bench/export.csv [--leg FOLDER_OF_LAYERS]
 
 The bundled demo at its stops and between them, and the Leg at x = 0.5.  Each file is written as
 `launch.py export` does, read back, and drawn from an orbit beside the scene itself at that x.

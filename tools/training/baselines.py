@@ -1,7 +1,7 @@
 """One shape-shifting model beside separate models and plain splats: dB against seconds and bytes.
 
-    python3 docs/bench/baselines.py CAPTURE [CAPTURE ...] --seconds 60 240 900 --sizes 0.1 0.3 1 \
-        --out WORK --csv docs/bench/baselines.csv [--methods joint] [--vgg FILE]
+    python3 tools/training/baselines.py CAPTURE [CAPTURE ...] --seconds 60 240 900 \
+        --sizes 0.1 0.3 1 --out WORK --csv docs/bench/baselines.csv [--methods joint] [--vgg FILE]
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot.  Each
 budget of `--seconds` is a `launch.py table` of all methods at full size; then, with the last
@@ -108,7 +108,7 @@ def read_table(path: Path, with_vgg: bool) -> tuple[list[Row], str]:
 
 def command_of(asked: argparse.Namespace) -> str:
     names = " ".join(Path(name).name for name in asked.captures)
-    words = [f"python3 docs/bench/baselines.py {names}"]
+    words = [f"python3 tools/training/baselines.py {names}"]
     words += [f"--seconds {' '.join(f'{s:g}' for s in asked.seconds)}"]
     words += [f"--sizes {' '.join(f'{s:g}' for s in asked.sizes)}"] if asked.sizes else []
     words += [f"--methods {' '.join(asked.methods)}"] if asked.methods != METHODS else []

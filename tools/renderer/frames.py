@@ -1,6 +1,6 @@
 """Frame times beside image errors of the demo and of two scenes of others: frames.csv.
 
-    python3 docs/bench/frames.py anatomy_leg_ml3dgs plant.splat --out docs/bench/frames.csv
+    python3 tools/renderer/frames.py anatomy_leg_ml3dgs plant.splat --out docs/bench/frames.csv
 
 Each row is a run of `launch.py bench` in a process of its own, which alternates nothing: compare
 within a run (stereo_over_mono, draw_pass_ratio), or rows of the same scene.  The demo and the first
@@ -64,7 +64,7 @@ def bench(scene: Path, x: float, size: str, drawing: str, sweep: int) -> dict:
 def table(results: list[dict], options: argparse.Namespace) -> str:
     text = io.StringIO()
     names = f"{options.layers.name} {options.splats.name}"
-    text.write(f"# python3 docs/bench/frames.py {names} --out docs/bench/frames.csv\n")
+    text.write(f"# python3 tools/renderer/frames.py {names} --out docs/bench/frames.csv\n")
     gl = next(r["gl_renderer"] for r in results if r["gl_renderer"])
     text.write(
         f"# {processor()}, {gl}; psnr_db is the worst of several "

@@ -1,6 +1,6 @@
 """How fast files open, and in how much memory, beside reading their bytes and beside other readers.
 
-    python docs/bench/open.py --out docs/bench/open.csv [FILE ...]
+    python tools/runtime_models/open.py --out docs/bench/open.csv [FILE ...]
 
 Made here: 3DGS PLY of 100,000 and 1,000,000 splats (SH degree 0 and 3), and 100,000 splats of
 degree 3 in every format that we write; FILE: others, as they are.  In one process, in turns, each
@@ -238,7 +238,8 @@ def main() -> None:
     if options.out:
         names = " ".join(path.name for path in options.files)
         with options.out.open("w", newline="") as file:
-            file.write(f"# python docs/bench/open.py --out docs/bench/{options.out.name} {names}\n")
+            program = "tools/runtime_models/open.py"
+            file.write(f"# python {program} --out docs/bench/{options.out.name} {names}\n")
             load = f"load average {os.getloadavg()[0]:.1f} at the end" if os.name != "nt" else ""
             file.write(f"# {platform.machine()}, {os.cpu_count()} units; {load}\n")
             writer = csv.DictWriter(file, FIELDS, lineterminator="\n")

@@ -1,6 +1,7 @@
 """What lies between the stops: cures beside what they cost at the stops and gain between them.
 
-    python3 docs/bench/between.py CAPTURE [CAPTURE ...] --seconds 120 --out docs/bench/between.csv
+    python3 tools/training/between.py CAPTURE [CAPTURE ...] --seconds 120 \
+        --out docs/bench/between.csv
 
 CAPTURE is a folder of posed photos, or `balls` or `workshop`, which are made on the spot, or `rig`:
 balls whose modalities are photographed from the same places.  A way is a row of WAYS below: the

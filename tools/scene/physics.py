@@ -1,6 +1,6 @@
 """The figures of the physics, measured: what a step costs, how deep things go, how hands hold.
 
-    python docs/bench/physics.py --out docs/bench/physics.csv
+    python tools/scene/physics.py --out docs/bench/physics.csv
 
 Costs are CPU ms of this process a step of 1/90 s, while objects fall in layers onto a table,
 collide, roll and settle for 4 s: other load does not count in full.  Everything else is the worst
@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT)]
 
 from shapeshift.scene.world.physics import Physics  # noqa: E402
 from tests.support.physics_things import PLATE, at, box, cup, lowest, run, table  # noqa: E402
@@ -339,7 +339,7 @@ def main() -> int:
     if told.out:
         with told.out.open("w", newline="") as file:
             file.write(
-                "# python docs/bench/physics.py --out docs/bench/physics.csv\n"
+                "# python tools/scene/physics.py --out docs/bench/physics.csv\n"
                 f"# Rapier {version('rapier3d')}, 90 Hz, 4 substeps, one thread; "
                 f"Python {platform.python_version()}, {platform.machine()}\n"
             )

@@ -1,6 +1,7 @@
 """What captures need of a model: the need report of `launch.py fit`, a row a part and modality.
 
-    python docs/bench/need.py CAPTURE ... --out docs/bench/need.csv [--iterations 600] [--seeds 2]
+    python tools/training/need.py CAPTURE ... --out docs/bench/need.csv \
+        [--iterations 600] [--seeds 2]
 
 `change_db` is to the model before, `total_db` to the largest, each with its standard error over
 held-out photos and seeds; bytes, ms and s are what the part costs.  The rows "largest" and
@@ -93,7 +94,7 @@ def main() -> None:
         rows += measure(folder, settings, options.tolerance_db, options.seeds)
     if options.out:
         words = [Path(word).name if Path(word).is_dir() else word for word in sys.argv[1:]]
-        command = f"# python docs/bench/need.py {' '.join(words)}"
+        command = f"# python tools/training/need.py {' '.join(words)}"
         machine = f"# {platform.machine()}, {open_device().name}"
         options.out.write_text("\n".join([command, machine, COLUMNS, *rows, ""]))
 

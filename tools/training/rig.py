@@ -1,6 +1,6 @@
 """What `train --calibrate` finds of planted offsets of the demo's thermal cameras, a row each.
 
-    python docs/bench/rig.py [--capture FOLDER] [--steps 2000] [--planted 0 1] \
+    python tools/training/rig.py [--capture FOLDER] [--steps 2000] [--planted 0 1] \
         --out docs/bench/rig.csv
 
 Without a capture the demo's is made first.  The shape is trained once: its photos are not touched.
@@ -65,7 +65,7 @@ def row_of(device, capture, settings: TrainSettings, shape: tuple, six: tuple) -
 
 def command_of(asked: argparse.Namespace) -> str:
     which = " ".join(map(str, asked.planted))
-    return f"# python3 docs/bench/rig.py --steps {asked.steps} --planted {which}"
+    return f"# python3 tools/training/rig.py --steps {asked.steps} --planted {which}"
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """What --max-splats costs in the picture: ways to choose the splats that stay, at half and less.
 
-    python docs/bench/thin.py SCENE ... --out docs/bench/thin.csv
+    python tools/runtime_models/thin.py SCENE ... --out docs/bench/thin.csv
 
 Each scene is drawn whole and with a part of its splats from views around it; the rows are the mean
 PSNR (dB of the mean squared error over all views) against the whole one.  "thin" is what
@@ -103,7 +103,9 @@ def main() -> None:
         for path in options.scenes:
             rows += measure(path, renderer)
     if options.out:
-        command = "python docs/bench/thin.py " + " ".join(path.name for path in options.scenes)
+        command = "python tools/runtime_models/thin.py " + " ".join(
+            path.name for path in options.scenes
+        )
         head = [f"# {command} --out docs/bench/{options.out.name}"]
         head += ["scene,splats,way,part,kept,psnr_db"]
         options.out.write_text("\n".join([*head, *rows, ""]))

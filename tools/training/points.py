@@ -1,7 +1,8 @@
 """What first points are worth: `--points` by held-out PSNR, a row a source, seed and modality.
 
-    python3 docs/bench/points.py CAPTURE ... [--scan CAPTURE FILE ...] --out docs/bench/points.csv
-        [--iterations 600] [--seeds 1 2] [--max-anchors 6000] [--densities 2000 10000 100000]
+    python3 tools/training/points.py CAPTURE ... [--scan CAPTURE FILE ...] \
+        --out docs/bench/points.csv [--iterations 600] [--seeds 1 2] [--max-anchors 6000] \
+        [--densities 2000 10000 100000]
 
 CAPTURE is a folder of posed photos, or `workshop`: the demo's bench, made on the spot in small with
 depth photos and a scan of its surfaces (2 mm of noise).  --scan: PLY or NPZ files that together are
@@ -132,7 +133,7 @@ def main() -> None:
     options, device = asked(), open_device()
     scans = {files[0]: [Path(f) for f in files[1:]] for files in options.scan}
     with options.out.open("w", newline="") as file, tempfile.TemporaryDirectory() as folder:
-        file.write(f"# python3 docs/bench/points.py {command()}\n")
+        file.write(f"# python3 tools/training/points.py {command()}\n")
         file.write(f"# {device.name}, {device.platform}\n")
         rows = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
         rows.writeheader()
