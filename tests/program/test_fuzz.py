@@ -15,12 +15,12 @@ import pytest
 pytest.importorskip("hypothesis")
 pytest.importorskip("pyopencl")
 
-import tests.support.fuzz_run as fuzz_run
+import tests.support.hostile.fuzz_run as fuzz_run
 from shapeshift.renderer.renderer import Renderer
-from tests.support.fuzz_mutations import mutate
-from tests.support.fuzz_run import Hung, fuzz, watched
-from tests.support.fuzz_seeds import all_seeds
-from tests.support.fuzz_then import Then
+from tests.support.hostile.fuzz_mutations import mutate
+from tests.support.hostile.fuzz_run import Hung, fuzz, watched
+from tests.support.hostile.fuzz_seeds import all_seeds
+from tests.support.hostile.fuzz_then import Then
 
 EXAMPLES = 800  # over all seeds together
 

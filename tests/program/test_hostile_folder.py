@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tests.support.poisoned_folder as poisoned_folder
+import tests.support.hostile.poisoned_folder as poisoned_folder
 from shapeshift.app import first_start
 from shapeshift.app.cli import COMMANDS
 from tests.support.splat_scenes import random_layers

@@ -16,7 +16,7 @@ from shapeshift.runtime_models.splats.operations.recentre import COARSE, FINE, p
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.write_plain import told_lost, writer_of
-from tests.support.ply_files import names_of, random_rows, write_rows
+from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
 FAR = (5e6 + 0.25, -3_141_592.5, 4e5)  # metres, in the file's axes
 DOUBLES = {"x": "double", "y": "double", "z": "double"}

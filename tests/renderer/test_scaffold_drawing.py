@@ -19,9 +19,9 @@ from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted
 from shapeshift.scene.stereo import stereo_pair
 from shapeshift.training.evaluation.evaluate import Painter
-from tests.support.frames import draw_told
-from tests.support.scaffold_scenes import from_anchors, random_raw, write_run
+from tests.support.renderer.frames import draw_told
 from tests.support.splat_scenes import psnr_db, random_layers
+from tests.support.splats.scaffold_scenes import from_anchors, random_raw, write_run
 
 SIZE = (160, 100)
 TURNED = Pose(np.array([0.3, -0.2, 0.4]), np.array([0.8, 0.0, 0.6, 0.0]))

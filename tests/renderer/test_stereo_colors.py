@@ -16,8 +16,8 @@ from shapeshift.scene.cameras.framing import frame_points, scene_points
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.stereo import stereo_pair
-from tests.support.frames import draw_told
 from tests.support.models import without_direction
+from tests.support.renderer.frames import draw_told
 from tests.support.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model, shell
 
 APART = 0.064  # metres between the eyes of a person

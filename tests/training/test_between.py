@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tests.support.fit_scenes as fit_scenes
+import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.app import cli
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
@@ -26,7 +26,7 @@ from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
 from shapeshift.training.train import Trainer
-from tests.support.training_runs import bits, run
+from tests.support.training.training_runs import bits, run
 from tests.training.test_training_gradients import LAYOUT, VOXEL, situation
 
 ROOT = Path(__file__).resolve().parents[2]

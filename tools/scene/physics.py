@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
 from shapeshift.scene.world.physics import Physics  # noqa: E402
-from tests.support.physics_things import PLATE, at, box, cup, lowest, run, table  # noqa: E402
+from tests.support.scene.physics_things import PLATE, at, box, cup, lowest, run, table  # noqa: E402
 
 FIELDS = ("figure", "case", "value", "unit", "limit", "holds")
 COSTS = {5: 0.5, 20: 1.0, 100: 8.0}  # objects: ms, mean

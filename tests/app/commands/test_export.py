@@ -18,7 +18,7 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.runtime_models.splats.test_gltf import plain_splats
 from tests.support.models import make_random_model
-from tests.support.writers import EACH_WRITER
+from tests.support.splats.writers import EACH_WRITER
 
 
 @pytest.fixture(scope="module")

@@ -35,7 +35,7 @@ from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted, Sphere
 from shapeshift.training.drawing import camera_of
 from tests.support.models import make_random_model, without_control
-from tests.support.rasterizer_scenes import device
+from tests.support.renderer.rasterizer_scenes import device
 from tests.support.splat_scenes import front_view, psnr_db, random_layers
 
 VIEW = front_view((96, 72), distance=3.0)

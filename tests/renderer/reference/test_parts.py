@@ -13,7 +13,7 @@ from shapeshift.renderer.debug.classify import classify
 from shapeshift.renderer.reference.reference import reference_image, reference_reasons
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at, perspective
-from tests.support.frames import draw
+from tests.support.renderer.frames import draw
 from tests.support.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model
 
 SIZE = (256, 128)

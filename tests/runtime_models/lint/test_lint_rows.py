@@ -10,7 +10,7 @@ from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 LARGEST = float(np.finfo(np.float32).max)
 LONGEST_LOG = float(np.log(np.float64(LARGEST)))  # exp of the next float32 is Inf

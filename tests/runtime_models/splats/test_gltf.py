@@ -15,7 +15,7 @@ from shapeshift.runtime_models.splats.gltf.read_gltf import display_from_linear,
 from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, turn
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
-from tests.support.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
+from tests.support.splats.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
 
 SIZES = (1, 2, 255, 256, 257)
 

@@ -18,7 +18,7 @@ from shapeshift.runtime_models.splats.write_plain import cut
 from shapeshift.scene.cameras.framing import frame_points, orbit_path
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.support.writers import EACH_WRITER
+from tests.support.splats.writers import EACH_WRITER
 
 ALIKE = 50.0  # dB between our picture and theirs of one file
 COST = {  # dB at least

@@ -9,7 +9,7 @@ import pytest
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.read_capture import read_capture
-from tests.support.captures import (
+from tests.support.scene.captures import (
     CLOUD,
     opencv_pose,
     projected,

@@ -14,9 +14,9 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_points import read_points
-from tests.support.captures import CLOUD, whole, write_transforms
-from tests.support.fuzz_mutations import SPECIAL_VALUES, places_of
-from tests.support.fuzz_run import check_sentence, watched
+from tests.support.hostile.fuzz_mutations import SPECIAL_VALUES, places_of
+from tests.support.hostile.fuzz_run import check_sentence, watched
+from tests.support.scene.captures import CLOUD, whole, write_transforms
 
 
 def told(folder) -> str:

@@ -8,7 +8,7 @@ import pytest
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.grab import jumped
 from shapeshift.scene.world.physics import Physics
-from tests.support.physics_things import at, box
+from tests.support.scene.physics_things import at, box
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

@@ -10,7 +10,7 @@ from shapeshift.scene.document.scene_file import SceneFile
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import FLOOR_NAME, World
 from tests.scene.world.test_simulation import STATES, UP, Points, item, model, reaction
-from tests.support.physics_things import box
+from tests.support.scene.physics_things import box
 
 pytest.importorskip("rapier3d")
 HALF = 0.05

@@ -15,7 +15,7 @@ from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import SETTLE, Trainer
-from tests.support.training_runs import bits
+from tests.support.training.training_runs import bits
 
 BASE = TrainSettings(iterations=120, grow_every=30, max_anchors=900)
 FIRST = 600  # points that the capture is left with

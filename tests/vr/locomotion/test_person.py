@@ -10,7 +10,7 @@ from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import resized, underfoot
 from tests.scene.world.test_simulation import item, reaction
 from tests.scene.world.test_world import real
-from tests.support.vr_frames import at, frame, hand, tilted
+from tests.support.vr.vr_frames import at, frame, hand, tilted
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 HZ = 90

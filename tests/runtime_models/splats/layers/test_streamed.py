@@ -17,7 +17,7 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
     read_tree,
     steps,
 )
-from tests.support.sog_scenes import random_sog, write_folder, write_zip
+from tests.support.splats.sog_scenes import random_sog, write_folder, write_zip
 
 COUNTS = (400, 150, 60, 20)  # splats of each level, finest first
 
