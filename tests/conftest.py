@@ -7,6 +7,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
+pytest.register_assert_rewrite("tests.support")  # asserts there tell their values, too
+
 
 # Started as a background job whose parent ignores Ctrl-C, so would the programs that are tested.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -10,7 +10,7 @@ from shapeshift.renderer.reference.reference import reference_counts, reference_
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.scene.scene import Scene
-from tests.renderer.gl.test_culls import FRONT, LIMITS, SCENES, THRESHOLDS
+from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, THRESHOLDS
 from tests.support.splat_scenes import alone, front_view, psnr_db, stereo_views, two_objects
 
 

@@ -26,8 +26,8 @@ from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
 from shapeshift.training.train import Trainer
+from tests.support.training.situations import LAYOUT, VOXEL, situation
 from tests.support.training.training_runs import bits, run
-from tests.training.test_training_gradients import LAYOUT, VOXEL, situation
 
 ROOT = Path(__file__).resolve().parents[2]
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))

@@ -8,7 +8,7 @@ import pytest
 
 from shapeshift.app.commands.lint import Options, run, summary
 from shapeshift.runtime_models.model import BadFile
-from tests.app.test_cli import assert_refused, launch
+from tests.support.program import assert_refused, launch
 from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
 KEYS = {"file", "refused", "format", "splats", "sh_degree", "bytes", "extent_m", "origin_m",

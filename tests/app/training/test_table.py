@@ -27,7 +27,7 @@ from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.training.test_vgg_distance import write_small
+from tests.support.training.vgg_files import write_small
 
 SMALL = {"max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
 

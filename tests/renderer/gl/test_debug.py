@@ -21,7 +21,7 @@ from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.renderer.gl.test_culls import FRONT, LIMITS, SCENES, row_of
+from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, row_of
 from tests.support.splat_scenes import (
     alone,
     front_view,

@@ -17,7 +17,7 @@ from shapeshift.renderer.gl.networks import ACTIVATIONS, pack_mlp
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, Mlp, SplatLayers
 from shapeshift.runtime_models.rotation import covariance
-from tests.runtime_models.package.test_frames import with_frames
+from tests.support.models import with_frames
 from tests.support.renderer.gl_models import f32, make_layers, make_mlp, make_model, read
 
 EYE = np.array([0.3, -0.2, 2.0])

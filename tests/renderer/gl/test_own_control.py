@@ -15,9 +15,9 @@ from shapeshift.runtime_models.evaluate import directions
 from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, Stop
 from shapeshift.runtime_models.rotation import covariance, normalize
 from shapeshift.scene.scene import Scene
-from tests.renderer.test_selected import VIEW, selected_scene
 from tests.support.models import psi_of, run_in_numpy
 from tests.support.renderer.gl_models import make_layers, make_mlp, make_model, read
+from tests.support.renderer.selected_scenes import VIEW, selected_scene
 from tests.support.splat_scenes import psnr_db
 
 EYE = np.array([0.3, -0.2, 2.0])

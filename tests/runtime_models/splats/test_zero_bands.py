@@ -15,7 +15,7 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
-from tests.app.test_cli import launch
+from tests.support.program import launch
 from tests.support.renderer.frames import draw
 from tests.support.splat_scenes import alone, front_view, random_layers, stereo_views
 

@@ -86,7 +86,7 @@ def test_the_sentence_names_what_all_frames_share(tmp_path, key):
 @pytest.mark.parametrize("value", [7, [], {}, True], ids=str)
 def test_capture_json_beside_colmap(tmp_path, key, value):
     pytest.importorskip("pycolmap")
-    from tests.scene.captures.test_capture_colmap import colmap_model
+    from tests.support.scene.captures import colmap_model
 
     colmap_model(tmp_path, text=False)
     heat = {"name": "Heat", "x": 1, "folder": "thermal", "value_range": [1, 2]}

@@ -1,5 +1,8 @@
 """What the tests of the window share: a ball to look at and a renderer that counts."""
 
+import os
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -86,3 +89,21 @@ def run_frames(viewer, count: int, seconds: float = 0.02) -> None:
     for _ in range(count):
         viewer.window.wait(0)
         viewer.frame(seconds)
+
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def start(display: str | None, *arguments, code: str | None = None) -> subprocess.CompletedProcess:
+    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    if display:
+        environment["DISPLAY"] = display
+    program = ["-c", code] if code else ["-m", "shapeshift"]
+    return subprocess.run(
+        [sys.executable, *program, *map(str, arguments)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=120,
+    )

@@ -194,7 +194,7 @@ def thermal_seeds(folder: Path) -> list[Seed]:
     from shapeshift.runtime_models.model import Stop
     from shapeshift.runtime_models.splats.layers.write_layer_list import write_layer_list
     from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-    from tests.runtime_models.splats.layers.test_output_folder import with_thermal_harmonics
+    from tests.support.splats.layer_folders import with_thermal_harmonics
 
     (folder / "pair").mkdir()
     for name in ("rgb", "thermal"):

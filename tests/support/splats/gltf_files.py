@@ -6,6 +6,9 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
 P = "KHR_gaussian_splatting:"
 CODES = {"i1": 5120, "u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126}
@@ -76,3 +79,34 @@ def write_glb(path: Path, asset: dict | bytes, data: bytes = b"") -> Path:
 
 def as_data_uri(data: bytes) -> str:
     return "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+
+
+def plain_splats(count: int, degree: int = 3, seed: int = 0) -> PlainSplats:
+    arrays = splat_arrays(count, degree, seed)
+    sh = np.stack([a for name, a in arrays.items() if "SH_" in name], 1)
+    return PlainSplats(
+        arrays["POSITION"], arrays[P + "SCALE"], arrays[P + "ROTATION"],
+        arrays[P + "OPACITY"][:, 0], sh,
+    )  # fmt: skip
+
+
+def attributes_in(path: Path) -> dict[str, np.ndarray]:
+    """The arrays of the only primitive by pygltflib's reading of offsets and counts."""
+    pygltflib = pytest.importorskip("pygltflib")
+    found = pygltflib.GLTF2().load(path)
+    blob, (primitive,) = found.binary_blob(), found.meshes[0].primitives
+    assert primitive.mode == pygltflib.POINTS
+    names = {name: i for name, i in vars(primitive.attributes).items() if i is not None}
+    arrays = {}
+    for name, index in names.items():
+        accessor = found.accessors[index]
+        view = found.bufferViews[accessor.bufferView]
+        kind = {pygltflib.FLOAT: "<f4", pygltflib.UNSIGNED_BYTE: "u1"}[accessor.componentType]
+        start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
+        assert start % 4 == 0
+        array = np.frombuffer(blob, kind, view.byteLength // np.dtype(kind).itemsize, start)
+        arrays[name] = array.reshape(accessor.count, -1)
+    box = found.accessors[names["POSITION"]]
+    assert box.min == arrays["POSITION"].min(0).tolist()
+    assert box.max == arrays["POSITION"].max(0).tolist()
+    return arrays

@@ -1,6 +1,6 @@
 """Scaffold-GS folders made by our own code, and their decode by hand, anchor by anchor."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +8,9 @@ import numpy as np
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import AnchorModel, Mlp
 from shapeshift.runtime_models.package.write_onnx import write_onnx
+from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, turn_quaternions
+from shapeshift.scene.pose import Pose, View, look_at, perspective
 from tests.support.models import psi_of
 from tests.support.splats.torch_files import write_tensors
 
@@ -248,3 +250,23 @@ def folded(mlp: Mlp, psi: np.ndarray) -> Layers:
     rest = [(w.astype(np.float64), b.astype(np.float64))
             for w, b in zip(mlp.weights[1:], mlp.biases[1:], strict=True)]  # fmt: skip
     return [(first[:, : -len(psi)].copy(), bias), *rest]
+
+
+SIZE = (160, 100)
+TURNED = Pose(np.array([0.3, -0.2, 0.4]), np.array([0.8, 0.0, 0.6, 0.0]))
+CASES = {
+    "plain": {"anchors": 60},
+    "all inputs": {"anchors": 60, "bank": True, "distance": True, "appearance": 4},
+    "octree": {"anchors": 120, "levels": 4},
+}
+
+
+def made(folder: Path, **how):
+    """A scene a metre across."""
+    raw = random_raw(**how)
+    raw = replace(raw, anchors=raw.anchors / 3, log_scales=raw.log_scales - 0.7)
+    return read_model(write_run(raw, folder))
+
+
+def seen_from(*eye: float) -> View:
+    return View(look_at(eye, (0, 0, 0)), perspective(0.8, SIZE), 0.05, 50.0, SIZE)

@@ -13,10 +13,8 @@ from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.scene_objects import scene_of
 from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.renderer.renderer import Renderer
-from tests.app.editor.window.test_desktop_program import start
-from tests.runtime_models.splats.layers.test_streamed import random_sog, rewrite, write_streamed
-from tests.support.desktop.desktop_stand import run_frames, until_opened
-from tests.support.splats.sog_scenes import write_folder
+from tests.support.desktop.desktop_stand import run_frames, start, until_opened
+from tests.support.splats.sog_scenes import random_sog, rewrite, write_folder, write_streamed
 
 LEVELS = (400, 90, 20)
 COLORS = ((0, 255, 0), (0, 0, 255), (255, 0, 0))  # of each level, the finest green

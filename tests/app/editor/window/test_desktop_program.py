@@ -1,9 +1,6 @@
 """The viewer as a person starts it, under Xvfb or without a display: pictures and sentences."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,25 +12,9 @@ from Xlib.display import Display
 from shapeshift.app.editor.window.window import Window
 from shapeshift.renderer.gl.context import NoContext
 from shapeshift.scene.pose import look_at
-from tests.support.desktop.desktop_stand import ball
+from tests.support.desktop.desktop_stand import ROOT, ball, start
 
-ROOT = Path(__file__).resolve().parents[4]
 ACCENT = np.array([242, 161, 69])  # app/editor/panels/widgets/theme.py
-
-
-def start(display: str | None, *arguments, code: str | None = None) -> subprocess.CompletedProcess:
-    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    if display:
-        environment["DISPLAY"] = display
-    program = ["-c", code] if code else ["-m", "shapeshift"]
-    return subprocess.run(
-        [sys.executable, *program, *map(str, arguments)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=120,
-    )
 
 
 def assert_one_sentence(done, code: int, *words: str) -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from shapeshift.renderer.renderer import Renderer
-from tests.renderer.reference.test_antialiased import CASES, check_eyes, check_frame
+from tests.support.renderer.antialiased_scenes import CASES, check_eyes, check_frame
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import pytest
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.renderer.test_scaffold_drawing import CASES, TURNED, made, seen_from
 from tests.support.models import make_random_model
 from tests.support.splat_scenes import psnr_db
+from tests.support.splats.scaffold_scenes import CASES, TURNED, made, seen_from
 
 
 @pytest.mark.parametrize("case", CASES)

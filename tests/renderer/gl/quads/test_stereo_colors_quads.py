@@ -30,7 +30,7 @@ def renderer(request, session_gpu):
 
 
 def test_memory_of_a_second_eye_comes_and_goes(ctx, session_gpu):
-    from tests.renderer.test_stereo_colors import SCENES, eyes
+    from tests.support.renderer.eye_scenes import SCENES, eyes
     from tests.support.renderer.frames import draw_told
 
     with Renderer(ctx, "quads") as renderer:
