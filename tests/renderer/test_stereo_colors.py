@@ -40,7 +40,7 @@ def test_each_eye_is_the_eye_drawn_alone(renderer, name, wish):
 
 def same_picture(renderer: Renderer, image: np.ndarray, wanted: np.ndarray) -> None:
     if (
-        getattr(renderer._drawing, "_stereo_pair", None) is not None
+        getattr(renderer.drawing, "stereo_pair", None) is not None
     ):  # rounded otherwise: test_one_draw
         assert psnr_db(image, wanted) > 80
     else:

@@ -41,7 +41,7 @@ def test_a_threshold_met_exactly(renderer, name):
     layers, settings, want = THRESHOLDS[name]
     told = counts(renderer, alone(layers), [FRONT], settings)
     assert told == {reason: want.split().count(reason) for reason in told}
-    reasons, _, _ = classify(renderer._drawing.splat_points(), np.eye(4)[None], FRONT, settings)
+    reasons, _, _ = classify(renderer.drawing.splat_points(), np.eye(4)[None], FRONT, settings)
     assert [("drawn", *CULL_REASONS)[reason] for reason in reasons] == want.split()
 
 

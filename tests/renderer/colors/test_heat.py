@@ -235,7 +235,7 @@ def test_a_pure_thermal_stop_is_the_palette_over_the_picture_of_values(renderer)
 def test_a_slider_that_moves_before_a_still_eye_decodes_colours_once(renderer):
     made = model()
     shown(renderer, scene_of(made, x=0.1))
-    memory = renderer._drawing._slots[0].colors
+    memory = renderer.drawing._slots[0].colors
     kept = {part: entry.colors for part, entry in memory._parts.items()}
     assert sorted(kept) == [(0, 0), (0, 1)]
     for x in (0.2, 0.35, 0.49):
@@ -246,7 +246,7 @@ def test_a_slider_that_moves_before_a_still_eye_decodes_colours_once(renderer):
     shown(renderer, Scene(()))
     np.testing.assert_array_equal(shown(renderer, scene_of(made, x=0.35)), picture)
     shown(renderer, scene_of(made, x=0.8))
-    assert sorted(renderer._drawing._slots[0].colors._parts) == [(0, 0)]
+    assert sorted(renderer.drawing._slots[0].colors._parts) == [(0, 0)]
 
 
 def test_colours_that_are_no_numbers_are_culled_and_no_pixel_is(renderer):

@@ -189,7 +189,7 @@ def test_overdraw_counts_the_fragments(renderer, limits):
     renderer.update(scene)
     renderer.draw(views)
     for i, view in enumerate(views):
-        got = renderer._drawing.overdraw(i, view, settings)
+        got = renderer.drawing.overdraw(i, view, settings)
         want = fragments(scene, view, settings)
         assert got.shape == want.shape and want.max() > 4
         assert np.abs(got - want).max() <= 1 and (got != want).mean() < 0.01  # rounding at edges

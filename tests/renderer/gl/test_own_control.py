@@ -165,10 +165,10 @@ def test_quads_draw_the_oracles_picture(ctx, mlps):
         renderer.update(scene)
         renderer.draw([VIEW])
         assert psnr_db(renderer.image(), reference_image(scene, VIEW)) > 60
-        made = renderer._drawing.allocations
+        made = renderer.drawing.allocations
         for step in range(1, 4):
             ball = replace(scene.objects[0].selectors[0], radius=0.5 + 0.05 * step)
             things = (replace(scene.objects[0], selectors=(ball,)), *scene.objects[1:])
             renderer.update(Scene(things))
             renderer.draw([VIEW])
-        assert renderer._drawing.allocations == made, "a selector that moves allocates nothing"
+        assert renderer.drawing.allocations == made, "a selector that moves allocates nothing"

@@ -246,11 +246,11 @@ def test_a_sweep_of_x_allocates_nothing_and_keeps_the_count(opened, drawing):
         return renderer.draw([view]).splats
 
     frame(0.0)
-    before = renderer._drawing.allocations
+    before = renderer.drawing.allocations
     assert {frame(x) for x in np.linspace(0, 1, 200)} == {900}
-    assert renderer._drawing.allocations == before
+    assert renderer.drawing.allocations == before
     renderer.update(alone(scene.objects[0].model))
-    assert renderer._drawing.allocations > before, "another set of objects is a new arena"
+    assert renderer.drawing.allocations > before, "another set of objects is a new arena"
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS)

@@ -65,7 +65,7 @@ def test_the_format_is_that_which_holds_the_colours(ctx, name):
     with Renderer(ctx, "quads") as renderer:
         (image,) = draw(renderer, scene, [VIEW])
         assert renderer.backends["drawing"] == f"quads ({target})"
-        assert (renderer._drawing.unit_of(0) == 1) == plain
+        assert (renderer.drawing.unit_of(0) == 1) == plain
         (fine,) = draw(renderer, scene, [VIEW], target="rgba32f")
     scale = max(1.0, float(np.abs(fine).max()))
     assert psnr_db(image / scale, fine / scale) > (76 if target == "rgba16" else 45)
@@ -79,7 +79,7 @@ def test_another_object_changes_the_unit(ctx):
         units = []
         for more in ((), (SceneObject("lamp", bright(9.0)),), ()):
             draw(renderer, Scene((dim, *more)), [VIEW])
-            units.append(renderer._drawing.unit_of(0))
+            units.append(renderer.drawing.unit_of(0))
     assert units[0] == units[2] == 1 < 4 < units[1]
 
 
@@ -120,7 +120,7 @@ def test_every_way_to_read_the_picture_counts_in_its_unit(ctx):
                     *(renderer.resolved(i) for i in range(2)),
                     pixels.reshape(72, 96, 3)[::-1],
                 ]
-                units = [renderer._drawing.unit_of(i) for i in range(2)]
+                units = [renderer.drawing.unit_of(i) for i in range(2)]
                 assert (min(units) > 2) == (name == "auto")
                 for part in (window.color_attachments[0], window):
                     part.release()

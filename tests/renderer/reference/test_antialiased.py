@@ -113,7 +113,7 @@ def test_reasons_of_the_debug_pictures_are_the_oracle_s(renderer, name, limits):
     renderer.update(decoded_all(scene))
     renderer.update(scene)
     renderer.draw([view])
-    points = renderer._drawing.splat_points()
+    points = renderer.drawing.splat_points()
     flags = tuple(thing.model.antialiased for thing in scene.objects)
     reason, _, _ = classify(points, object_poses(scene), view, settings, flags)
     off = np.count_nonzero(reason != reference_reasons(scene, view, settings))

@@ -194,7 +194,7 @@ def test_the_debug_view_s_reasons_are_the_reference_s(renderer, name, settings):
     scene, view = alone(around_the_eye(3000)), wide()
     view = part_of(view, name) if name else view
     draw(renderer, scene, [view])
-    reason, _, _ = classify(renderer._drawing.splat_points(), np.eye(4)[None], view, settings)
+    reason, _, _ = classify(renderer.drawing.splat_points(), np.eye(4)[None], view, settings)
     assert np.count_nonzero(reason != reference_reasons(scene, view, settings)) <= 1
 
 

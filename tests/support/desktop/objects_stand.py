@@ -49,12 +49,12 @@ def place_of(viewer, point) -> tuple[float, float]:
 
 
 def mouse(viewer, x: float, y: float) -> None:
-    viewer.window._on_cursor(None, x, y)
+    viewer.window.on_cursor(None, x, y)
     run_frames(viewer, 2)
 
 
 def button(viewer, down: bool) -> None:
-    viewer.window._on_button(None, 0, glfw.PRESS if down else glfw.RELEASE, 0)
+    viewer.window.on_button(None, 0, glfw.PRESS if down else glfw.RELEASE, 0)
     run_frames(viewer, 2)
 
 
@@ -79,7 +79,7 @@ def drag(viewer, start, end, steps: int = 8) -> None:
 
 def key(viewer, key: int, mods: int = 0) -> None:
     for action in (glfw.PRESS, glfw.RELEASE):
-        viewer.window._on_key(None, key, 0, action, mods)
+        viewer.window.on_key(None, key, 0, action, mods)
         run_frames(viewer, 2)
 
 

@@ -35,7 +35,7 @@ class RealHands:
 
     def move(self, x: float, y: float) -> None:
         """The pointer goes to logical pixels from the window's upper left."""
-        left, top = glfw.get_window_pos(self.viewer.window._handle)
+        left, top = glfw.get_window_pos(self.viewer.window.handle)
         x, y = round(x), round(y)
         xtest.fake_input(self._display, X.MotionNotify, x=left + x, y=top + y)
         self._settle()
@@ -62,7 +62,7 @@ class RealHands:
 
     def flick(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         """Press, move and let go before the program draws another frame."""
-        left, top = glfw.get_window_pos(self.viewer.window._handle)
+        left, top = glfw.get_window_pos(self.viewer.window.handle)
         self.move(*start)
         xtest.fake_input(self._display, X.ButtonPress, BUTTONS["left"])
         for part in (0.3, 0.7, 1.0):
@@ -74,11 +74,11 @@ class RealHands:
     def key(self, name: str, *held: str) -> None:
         """One press of a key by its X name ("Left", "KP_1", "s") while others are held."""
         for modifier in held:
-            self._key(modifier, True)
-        self._key(name, True)
-        self._key(name, False)
+            self.hold_key(modifier, True)
+        self.hold_key(name, True)
+        self.hold_key(name, False)
         for modifier in reversed(held):
-            self._key(modifier, False)
+            self.hold_key(modifier, False)
 
     def type(self, text: str) -> None:
         names = {".": "period", " ": "space", ",": "comma", "/": "slash", "-": "minus"}
@@ -87,7 +87,7 @@ class RealHands:
             name = "minus" if letter == "_" else names.get(letter, letter)
             self.key(name, *["Shift_L"] * shifted)
 
-    def _key(self, name: str, down: bool) -> None:
+    def hold_key(self, name: str, down: bool) -> None:
         code = self._display.keysym_to_keycode(XK.string_to_keysym(name))
         assert code, f"the keyboard has no {name}"
         xtest.fake_input(self._display, X.KeyPress if down else X.KeyRelease, code)

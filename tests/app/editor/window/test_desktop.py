@@ -28,8 +28,8 @@ def bright(picture: np.ndarray, box: tuple) -> float:
 
 def screenshot(viewer) -> np.ndarray:
     viewer.window.begin_frame()
-    viewer._draw_splats()
-    viewer._draw_overlay()
+    viewer.draw_splats()
+    viewer.draw_overlay()
     viewer.window.end_frame()
     return viewer.window.picture().copy()
 
@@ -41,7 +41,7 @@ def test_at_rest_nothing_is_drawn_and_the_loop_sleeps(viewer):
     drawn = viewer.renderer.draws
     run_frames(viewer, 5)
     assert viewer.renderer.draws == drawn  # the overlay alone: the splats are only shown again
-    assert not viewer._busy()
+    assert not viewer.busy()
     start, cpu = time.perf_counter(), time.process_time()
     while viewer.window.wait(0.2):
         viewer.frame(0.0)
@@ -59,7 +59,7 @@ def test_a_change_draws_until_it_has_come_to_rest(viewer, event):
     viewer.take(event)
     run_frames(viewer, 60)
     assert drawn < viewer.renderer.draws < drawn + 60
-    assert not viewer._busy()
+    assert not viewer.busy()
 
 
 def test_the_background_needs_no_new_splats(viewer):
@@ -148,32 +148,32 @@ def test_double_click_centres_the_near_side_under_the_cursor(viewer):
     assert np.linalg.norm(point) == pytest.approx(1, abs=0.1)  # on the ball
     assert point[0] > 0.05 and point[1] > 0.05
     viewer.take(DoubleClick(width - 1, 1))  # the empty corner: nothing happens
-    assert not viewer._busy()
+    assert not viewer.busy()
 
 
 # Mouse and keyboard as glfw reports them
 
 
 def glfw_click(window, x, y, button=glfw.MOUSE_BUTTON_LEFT):
-    window._on_cursor(None, x, y)
-    window._on_button(None, button, glfw.PRESS, 0)
+    window.on_cursor(None, x, y)
+    window.on_button(None, button, glfw.PRESS, 0)
 
 
 def glfw_release(window, button=glfw.MOUSE_BUTTON_LEFT):
-    window._on_button(None, button, glfw.RELEASE, 0)
+    window.on_button(None, button, glfw.RELEASE, 0)
 
 
 def test_a_drag_in_the_scene_turns_the_camera_and_one_on_the_panel_does_not(viewer):
     before = viewer.viewpoint.view().eye_from_world()
     glfw_click(viewer.window, 60, 40)  # on the panel
-    viewer.window._on_cursor(None, 120, 90)
+    viewer.window.on_cursor(None, 120, 90)
     glfw_release(viewer.window)
     run_frames(viewer, 30)
     np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
     glfw_click(viewer.window, 600, 200)
-    viewer.window._on_cursor(None, 660, 200)
+    viewer.window.on_cursor(None, 660, 200)
     glfw_release(viewer.window)
-    viewer.window._on_cursor(None, 800, 300)  # no button is down any more
+    viewer.window.on_cursor(None, 800, 300)  # no button is down any more
     run_frames(viewer, 60)
     centre = viewer.state.centre
     eyes = [np.linalg.inv(before)[:3, 3], viewer.viewpoint.view().world_from_eye.position]
@@ -192,7 +192,7 @@ def test_the_slider_follows_the_mouse_and_snaps(viewer):
     run_frames(viewer, 4)
     x = viewer.state.scene.objects[0].x
     assert 0.4 < x < 0.6
-    viewer.window._on_cursor(None, end - 4, y)
+    viewer.window.on_cursor(None, end - 4, y)
     run_frames(viewer, 4)
     assert viewer.state.scene.objects[0].x == 1.0  # caught by the stop
     glfw_release(viewer.window)
@@ -208,7 +208,7 @@ def test_alt_lets_the_slider_stand_beside_a_stop(viewer, monkeypatch):
     glfw_click(viewer.window, right - 120, y)
     found = []
     for x in np.arange(right - 100, right - 70, 1.5):
-        viewer.window._on_cursor(None, x, y)
+        viewer.window.on_cursor(None, x, y)
         run_frames(viewer, 3)
         found.append(viewer.state.scene.objects[0].x)
     glfw_release(viewer.window)

@@ -22,10 +22,10 @@ def press(viewer, key: int, shift: bool = False) -> None:
 
 def click(viewer, x: float, y: float) -> None:
     window = viewer.window
-    window._on_cursor(None, x, y)
+    window.on_cursor(None, x, y)
     run_frames(viewer, 2)
     for action in (glfw.PRESS, glfw.RELEASE):
-        window._on_button(None, glfw.MOUSE_BUTTON_LEFT, action, 0)
+        window.on_button(None, glfw.MOUSE_BUTTON_LEFT, action, 0)
         run_frames(viewer, 2)
 
 
@@ -49,7 +49,7 @@ def test_dropped_cameras_are_stood_at_and_the_scene_stays(dropped):
         viewer.viewpoint.view().world_from_eye.matrix(), first.world_from_eye.matrix(), atol=1e-9
     )
     assert viewer.viewpoint.steps.text == f"camera 1 of 3 {NAMES[0]}"
-    assert not viewer._busy()
+    assert not viewer.busy()
 
 
 def test_n_and_p_step_and_moving_leaves(dropped):
@@ -57,9 +57,9 @@ def test_n_and_p_step_and_moving_leaves(dropped):
     drawn = viewer.renderer.draws
     press(viewer, glfw.KEY_N)
     run_frames(viewer, 1)
-    assert viewer._busy()  # in flight
+    assert viewer.busy()  # in flight
     run_frames(viewer, 40)
-    assert viewer.renderer.draws > drawn + 5 and not viewer._busy()
+    assert viewer.renderer.draws > drawn + 5 and not viewer.busy()
     assert viewer.viewpoint.steps.index == 1
     press(viewer, glfw.KEY_P)
     press(viewer, glfw.KEY_P)
@@ -163,14 +163,14 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
     gone.unlink()
     run_frames(viewer, 2)
     click(viewer, *widgets.middle("Recent"))
-    assert viewer.window._popup  # the list is open
+    assert viewer.window.popup_open  # the list is open
     click(viewer, *widgets.middle("gone.shift"))  # which is not there any more
-    assert not viewer.files.busy and viewer.window._popup
+    assert not viewer.files.busy and viewer.window.popup_open
     click(viewer, *widgets.middle("one.shift"))
     until_opened(viewer)
     assert viewer.state.scene.objects[0].name == "one" and not viewer.state.problem
     assert viewer.state.scene is not before
-    assert not viewer.window._popup
+    assert not viewer.window.popup_open
     told = json.loads((tmp_path / "settings/recent.json").read_text())
     assert told["recent"] == [str(scene), str(gone)]
 
@@ -188,8 +188,8 @@ def test_the_status_line_is_there_with_the_overlay(viewer):
     width, height = viewer.window.logical_size
     assert (left, right, low) == (0, width, height) and 20 <= low - top <= 40
     viewer.window.begin_frame()
-    viewer._draw_splats()
-    viewer._draw_overlay()
+    viewer.draw_splats()
+    viewer.draw_overlay()
     viewer.window.end_frame()
     line = viewer.window.picture()[int(top) : int(low)].astype(int)
     assert (line.max(axis=2) > 120).sum() > 40  # letters

@@ -21,7 +21,7 @@ SIZES = [(800, 600), (1280, 720), (3840, 2160)]
 
 def resize(viewer, size: tuple[int, int]) -> None:
     """Another size of the window, as somebody drags its corner."""
-    glfw.set_window_size(viewer.window._handle, *size)
+    glfw.set_window_size(viewer.window.handle, *size)
     for _ in range(50):
         glfw.poll_events()
         if viewer.window.logical_size == size:
@@ -143,8 +143,8 @@ def test_another_size_and_back_leaves_the_same_picture(any_size):
     def picture() -> np.ndarray:
         run_frames(viewer, 3)
         viewer.window.begin_frame()
-        viewer._draw_splats()
-        viewer._draw_overlay()
+        viewer.draw_splats()
+        viewer.draw_overlay()
         viewer.window.end_frame()
         return viewer.window.picture().copy()
 
@@ -259,7 +259,7 @@ def test_right_of_the_line_is_the_picture_of_the_other_x(split_viewer):
     viewer.state.split.toggle(viewer.state.scene.objects[0])
     run_frames(viewer, 4)
     viewer.window.begin_frame()
-    viewer._draw_splats()
+    viewer.draw_splats()
     viewer.window.end_frame()
     picture = viewer.window.picture().copy()
     other = viewer.state.split.right(viewer.state.scene)
@@ -282,7 +282,7 @@ def test_a_window_grows_with_its_text_as_far_as_the_monitor_goes(any_size, times
     """The X server's screen has 1280x720; 900x640 grows in both directions or not at all."""
     viewer = any_size
     before = viewer.window.logical_size
-    monitor.grow_window(viewer.window._handle, times)
+    monitor.grow_window(viewer.window.handle, times)
     for _ in range(20):
         glfw.wait_events_timeout(0.01)
     size = viewer.window.logical_size
@@ -290,6 +290,6 @@ def test_a_window_grows_with_its_text_as_far_as_the_monitor_goes(any_size, times
         assert size == before
     else:
         assert size == tuple(min(a, b) for a, b in zip(wanted, (1280, 720), strict=True))
-        left, top = glfw.get_window_pos(viewer.window._handle)
+        left, top = glfw.get_window_pos(viewer.window.handle)
         assert abs(2 * left + size[0] - 1280) <= 1 and abs(2 * top + size[1] - 720) <= 1
-    glfw.set_window_pos(viewer.window._handle, 0, 0)
+    glfw.set_window_pos(viewer.window.handle, 0, 0)

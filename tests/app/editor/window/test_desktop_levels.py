@@ -76,7 +76,7 @@ def test_the_first_frame_is_coarse_and_the_camera_stays(window, scene, tmp_path)
         before = viewer.viewpoint.camera.view((900, 640))
         for _ in range(200):
             run_frames(viewer, 1)
-            if not viewer._polling:
+            if not viewer.polling:
                 break
         red, green, blue = shares(window.picture())
         assert green > 0.03 and red < 0.002 and blue < 0.002

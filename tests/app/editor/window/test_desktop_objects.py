@@ -44,7 +44,7 @@ def plain(splats_viewer):
 def test_a_scene_file_is_open_with_its_world(viewer):
     assert names(viewer) == NAMES
     assert set(viewer.state.world.things) == set(NAMES) and viewer.state.world.paused
-    assert viewer.window._window.title.startswith("touch.scene.json")
+    assert viewer.window.title.startswith("touch.scene.json")
 
 
 def test_a_click_chooses_what_is_under_it_and_a_drag_turns_the_camera(viewer):

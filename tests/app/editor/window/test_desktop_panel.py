@@ -238,9 +238,9 @@ def test_painting_is_undone_by_the_keyboard_and_the_slider_stays(viewer, hands):
     left, top, right, bottom = viewer.layout.free
     middle = ((left + right) / 2, (top + bottom) / 2)
     hands.move(*middle)
-    hands._key("b", True)
+    hands.hold_key("b", True)
     hands.drag(middle, (middle[0] + 30, middle[1]))
-    hands._key("b", False)
+    hands.hold_key("b", False)
     regions = viewer.state.regions
     assert regions.items[0].painted.sum() > 0
     hands.key("Right")
@@ -257,9 +257,9 @@ def test_each_stroke_is_a_step_of_its_own(viewer, hands):
     counts = []
     hands.move(x, y)
     for step in range(2):
-        hands._key("b", True)
+        hands.hold_key("b", True)
         hands.drag((x + 60 * step, y), (x + 60 * step + 20, y))
-        hands._key("b", False)
+        hands.hold_key("b", False)
         counts.append(int(viewer.state.regions.items[0].painted.sum()))
     assert counts[0] < counts[1]
     hands.key("z", "Control_L")

@@ -49,7 +49,7 @@ def test_exact_costs_no_comparison(viewer):
     drawn = viewer.renderer.draws
     time.sleep(1.1 * REST_S)
     run_frames(viewer, 3)
-    assert viewer.renderer.draws == drawn and not viewer._busy()
+    assert viewer.renderer.draws == drawn and not viewer.busy()
 
 
 def test_the_loop_wakes_for_the_comparison_without_any_input(viewer):
@@ -58,7 +58,7 @@ def test_the_loop_wakes_for_the_comparison_without_any_input(viewer):
     until = time.perf_counter() + 5
     while viewer.readings.error_db is None and time.perf_counter() < until:
         viewer.window.wait(0.05)
-        if viewer._idle_work_due(time.perf_counter()):
+        if viewer.idle_work_due(time.perf_counter()):
             viewer.frame(0.0)
     assert viewer.readings.error_db is not None
 
@@ -69,7 +69,7 @@ def test_the_loop_wakes_for_the_comparison_without_any_input(viewer):
 def test_the_dial_measures_between_frames_and_chooses(viewer):
     viewer.dial.floor_db, viewer.dial.wanted = 30.0, True
     run_frames(viewer, 1)
-    assert viewer.dial.measuring and viewer._busy()
+    assert viewer.dial.measuring and viewer.busy()
     for _ in range(500):
         viewer.take(Drag("left", 1, 0))  # the hand is not held up
         run_frames(viewer, 1)
@@ -160,7 +160,7 @@ def test_the_lens_follows_the_camera(viewer):
     run_frames(viewer, 60)
     (moved,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
     np.testing.assert_array_equal(moved.position, viewer.viewpoint.view().world_from_eye.position)
-    assert moved != lens and not viewer._busy()
+    assert moved != lens and not viewer.busy()
     press(viewer, glfw.KEY_L)
     assert viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors == ()
 

@@ -145,7 +145,7 @@ def test_a_name_is_typed_and_what_goes_wrong_is_said_until_it_is_read(viewer, tm
         key(viewer, glfw.KEY_S, CTRL | SHIFT)
         run_frames(viewer, 3)
         for letter in str(tmp_path / name):  # over what stands there, all of it
-            viewer.window._on_char(None, ord(letter))
+            viewer.window.on_char(None, ord(letter))
         run_frames(viewer, 3)
         key(viewer, glfw.KEY_ENTER)
         run_frames(viewer, 3)
@@ -176,19 +176,19 @@ def test_splats_are_saved_as_a_scene_file_and_opened_again(plain, tmp_path):
     assert item.model == "models/ball.ply"  # it can be moved with the folder
     assert [type(selector).__name__ for selector in item.selectors] == ["Sphere"]
     run_frames(plain, 1)
-    assert "mine.scene.json" in plain.window._window.title
+    assert "mine.scene.json" in plain.window.title
     again = read_files([tmp_path / "mine.scene.json"], None, CameraReading(), lambda *_: None)
     np.testing.assert_allclose(again.sources[0].model.means, ball(50).means, atol=1e-6)
 
 
 def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
-    assert viewer._may_close()
+    assert viewer.may_close()
     viewer.state.chosen = "ball"
     viewer.objects.edits.delete()
     run_frames(viewer, 1)
-    assert viewer.window._window.title.startswith("* touch.scene.json")
+    assert viewer.window.title.startswith("* touch.scene.json")
     assert viewer.objects.status() == "not saved"
-    assert not viewer._may_close() and not viewer.window.closing
+    assert not viewer.may_close() and not viewer.window.closing
     run_frames(viewer, 3)
     key(viewer, glfw.KEY_ESCAPE)
     run_frames(viewer, 2)
@@ -205,7 +205,7 @@ def test_closing_and_opening_ask_before_something_is_lost(viewer, tmp_path):
 def test_a_slider_alone_asks_nothing(viewer):
     steer(viewer.state, 1, 0.5)
     run_frames(viewer, 1)
-    assert viewer.objects.status() == "" and viewer._may_close()
+    assert viewer.objects.status() == "" and viewer.may_close()
     assert viewer.state.edited.file.all_items[1].x == 0.5  # saved when something else is
 
 
@@ -233,10 +233,10 @@ def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
 def test_paint_on_what_is_no_file_yet_is_asked_about_and_a_lens_is_not(plain):
     plain.state.toggle_lens()
     run_frames(plain, 1)
-    assert not plain.objects.unsaved and plain._may_close()
+    assert not plain.objects.unsaved and plain.may_close()
     plain.state.add_region("sphere")
     run_frames(plain, 1)
-    assert plain.objects.unsaved and not plain._may_close()
+    assert plain.objects.unsaved and not plain.may_close()
     plain.objects.saving.answer("Cancel")
     plain.objects.edits.undo()
-    assert not plain.objects.unsaved and plain._may_close()
+    assert not plain.objects.unsaved and plain.may_close()

@@ -30,8 +30,8 @@ def put(viewer, x: float) -> None:
 def knob(viewer) -> tuple[float, float, float]:
     """Middle (x, y) and radius of the knob as it is seen in the picture, pixels."""
     viewer.window.begin_frame()
-    viewer._draw_splats()
-    viewer._draw_overlay()
+    viewer.draw_splats()
+    viewer.draw_overlay()
     viewer.window.end_frame()
     left, top, right, bottom = map(int, viewer.window.covered[1])
     part = viewer.window.picture()[top + NAMES_PX : bottom, left:right].astype(int)
@@ -182,9 +182,9 @@ def test_the_seconds_of_playing_are_beside_the_play_button(viewer, hands):
     left, top, _, bottom = viewer.window.covered[1]
     y = knob(viewer)[1]
     hands.click(left + 80, y)  # the seconds: a list opens
-    assert viewer.window._popup
+    assert viewer.window.popup_open
     hands.key("Escape")
-    assert not viewer.window._popup
+    assert not viewer.window.popup_open
     hands.click(left + 30, (top + bottom) / 2)
     assert viewer.state.playing
     hands.click(left + 30, (top + bottom) / 2)

@@ -163,13 +163,13 @@ def test_it_lets_go(viewer, event):
 
 def test_a_second_button_ends_what_the_first_one_held(viewer):
     window = viewer.window
-    window._cursor = on_screen(viewer, place(viewer))
-    window._on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
+    window.on_cursor(None, *on_screen(viewer, place(viewer)))
+    window.on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
     run_frames(viewer, 2)
     assert viewer.state.world.held(HAND) == "cube"
-    window._on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.PRESS, 0)
-    window._on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
-    window._on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
+    window.on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.PRESS, 0)
+    window.on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
+    window.on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
     run_frames(viewer, 2)
     assert viewer.state.world.held(HAND) is None and window._pressed is None
 
@@ -208,7 +208,7 @@ def test_keys_play_step_and_put_back(viewer):
 def test_a_ray_at_the_mouse_is_answered(viewer, paused):
     world = viewer.state.world
     world.paused = paused
-    viewer.window._cursor = on_screen(viewer, place(viewer))
+    viewer.window.on_cursor(None, *on_screen(viewer, place(viewer)))
     press_key(viewer, glfw.KEY_X)
     assert len(viewer.touch.flashes) == 1
     run_frames(viewer, 2)
@@ -221,15 +221,15 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
     assert [label.text for label in viewer.touch.labels] == ["hot"]
     run_frames(viewer, 20, seconds=0.1)
     assert not viewer.touch.fading
-    viewer.window._cursor = (450.0, 5.0)  # the sky
+    viewer.window.on_cursor(None, 450.0, 5.0)  # the sky
     press_key(viewer, glfw.KEY_X)
     assert not viewer.touch.flashes
 
 
 def picture(viewer) -> np.ndarray:
     viewer.window.begin_frame()
-    viewer._draw_splats()
-    viewer._draw_overlay()
+    viewer.draw_splats()
+    viewer.draw_overlay()
     viewer.window.end_frame()
     return viewer.window.picture().astype(int)
 
@@ -255,13 +255,13 @@ def test_at_rest_the_loop_sleeps_though_things_may_move(viewer):
     for _ in range(400):
         viewer.state.world.step()
     run_frames(viewer, 3)
-    assert viewer.state.world.resting and not viewer._busy() and not viewer._polling
+    assert viewer.state.world.resting and not viewer.busy() and not viewer.polling
     drawn = viewer.renderer.draws
     run_frames(viewer, 5)
     assert viewer.renderer.draws == drawn
     hold(viewer)
     run_frames(viewer, 1)
-    assert viewer._busy()
+    assert viewer.busy()
 
 
 def test_without_a_world_nothing_is_taken(viewer):

@@ -89,10 +89,10 @@ def test_steps_by_hand_and_turning_with_shift(viewer):
     button(viewer, True)
     glide(viewer, [at, (at[0], at[1] - 120)], steps=6)
     for _ in range(3):
-        viewer.window._on_scroll(None, 0, 1)
+        viewer.window.on_scroll(None, 0, 1)
         run_frames(viewer, 3)
     away = np.linalg.norm(place(viewer, "cube") - viewer.viewpoint.camera.position)
     assert away > np.linalg.norm(np.array([-0.22, 0.05, 0.05]) - viewer.viewpoint.camera.position)
-    viewer.window._on_key(None, glfw.KEY_ESCAPE, 0, glfw.PRESS, 0)
+    viewer.window.on_key(None, glfw.KEY_ESCAPE, 0, glfw.PRESS, 0)
     run_frames(viewer, 2)
     assert world.held("mouse") is None

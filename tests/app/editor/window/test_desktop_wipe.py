@@ -39,7 +39,7 @@ def stand(window, tmp_path, request):
 
 def screen(viewer) -> np.ndarray:
     viewer.window.begin_frame()
-    viewer._draw_splats()
+    viewer.draw_splats()
     viewer.window.end_frame()
     return viewer.window.picture().copy()
 

@@ -36,8 +36,8 @@ def renderer(request, session_gpu):
     sort = request.param.replace("pair", "numpy")
     with session_gpu.ctx, Renderer(session_gpu.ctx, "quads", "auto", sort, "rgba32f") as made:
         if request.param != "pair":
-            made._drawing._stereo_pair = None
-        elif made._drawing._stereo_pair is None:
+            made.drawing.stereo_pair = None
+        elif made.drawing.stereo_pair is None:
             pytest.skip("a GPU draws the views one after the other")
         yield made
 
@@ -76,17 +76,15 @@ def test_one_draw_is_two(ctx, monkeypatch, name, apart, leaning):
         for side, t in zip((-0.5, 0.5), tangents, strict=True)
     ]  # fmt: skip
     with Renderer(ctx, "quads", target="rgba32f") as renderer:
-        drawing = renderer._drawing
-        if drawing._stereo_pair is None:
+        drawing = renderer.drawing
+        if drawing.stereo_pair is None:
             pytest.skip("a GPU draws the views one after the other")
         monkeypatch.setattr("shapeshift.renderer.gl.stereo_pair.MAX_RESIDUAL_DISPARITY", 1e9)
         shifts = []
-        keep = drawing._stereo_pair.draw
-        monkeypatch.setattr(
-            drawing._stereo_pair, "draw", lambda *a: shifts.append(a[2]) or keep(*a)
-        )
+        keep = drawing.stereo_pair.draw
+        monkeypatch.setattr(drawing.stereo_pair, "draw", lambda *a: shifts.append(a[2]) or keep(*a))
         together = draw(renderer, scene, views, **SETTINGS[name])
-        monkeypatch.setattr(drawing, "_stereo_pair", None)
+        monkeypatch.setattr(drawing, "stereo_pair", None)
         apart_ = draw(renderer, scene, views, **SETTINGS[name])
     assert len(shifts) == 1 and (abs(shifts[0]) > 15) == leaning
     for one, two in zip(together, apart_, strict=True):
@@ -98,10 +96,10 @@ def test_one_draw_is_two(ctx, monkeypatch, name, apart, leaning):
 def test_eyes_too_far_apart_are_drawn_one_by_one(ctx, monkeypatch):
     scene, views = two_objects(1000), eyes((-0.5, 0.5, -0.3, 0.3))
     with Renderer(ctx, "quads") as renderer:
-        if renderer._drawing._stereo_pair is None:
+        if renderer.drawing.stereo_pair is None:
             pytest.skip("a GPU draws the views one after the other")
         calls = []
-        monkeypatch.setattr(renderer._drawing._stereo_pair, "draw", lambda *a: calls.append(a))
+        monkeypatch.setattr(renderer.drawing.stereo_pair, "draw", lambda *a: calls.append(a))
         poses = [v.world_from_eye for v in views]
         wide = [
             replace(v, world_from_eye=Pose(pose.position * (60, 1, 1), pose.wxyz))
@@ -131,17 +129,17 @@ def test_a_moving_head_allocates_once_and_a_narrow_driver_draws_twice(ctx, monke
         ]
 
     with Renderer(ctx, "quads") as renderer:
-        pair = renderer._drawing._stereo_pair
+        pair = renderer.drawing.stereo_pair
         if pair is None:
             pytest.skip("a GPU draws the views one after the other")
         monkeypatch.setattr("shapeshift.renderer.gl.stereo_pair.MAX_RESIDUAL_DISPARITY", 1e9)
         renderer.update(scene)
         renderer.draw(at(0.6))
-        made = renderer._drawing.allocations
+        made = renderer.drawing.allocations
         widest = pair._targets.width
         for distance in (0.8, 3.0, 9.0, 0.7, 0.6):
             renderer.draw(at(distance))
-        assert renderer._drawing.allocations == made and pair._targets.width == widest > 320
+        assert renderer.drawing.allocations == made and pair._targets.width == widest > 320
         near = [renderer.image(i).copy() for i in range(2)]
         monkeypatch.setattr(renderer._gpu, "max_side", 320)
         monkeypatch.setattr(pair, "draw", lambda *a: pytest.fail("the grid is too wide"))
@@ -167,7 +165,7 @@ def test_views_one_by_one_are_views_at_once(renderer, monkeypatch, order, key_bi
     monkeypatch.setattr("shapeshift.renderer.gl.buffers.Arena.holds_views", lambda arena, n: n == 1)
     one_by_one = draw(renderer, scene, views, order=order, key_bits=key_bits)
     for a, b in zip(at_once, one_by_one, strict=True):
-        if key_bits == 32 and renderer._drawing._stereo_pair is None:
+        if key_bits == 32 and renderer.drawing.stereo_pair is None:
             np.testing.assert_array_equal(a, b)
         assert np.abs(a - b).max() < 0.05  # 16 bits: the range of the keys is another
 

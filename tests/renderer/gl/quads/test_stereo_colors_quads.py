@@ -23,8 +23,8 @@ def renderer(request, session_gpu):
     mlps = request.param.replace("pair", "onnxruntime")
     with session_gpu.ctx, Renderer(session_gpu.ctx, "quads", mlps, target="rgba32f") as made:
         if request.param != "pair":
-            made._drawing._stereo_pair = None
-        elif made._drawing._stereo_pair is None:
+            made.drawing.stereo_pair = None
+        elif made.drawing.stereo_pair is None:
             pytest.skip("a GPU draws the views one after the other")
         yield made
 
@@ -36,10 +36,10 @@ def test_memory_of_a_second_eye_comes_and_goes(ctx, session_gpu):
     with Renderer(ctx, "quads") as renderer:
         scene, pair = SCENES["both"](), eyes()
         draw_told(renderer, scene, pair)
-        arena, made = renderer._drawing._arena, renderer._drawing.allocations
+        arena, made = renderer.drawing._arena, renderer.drawing.allocations
         assert len(arena.colors) == 2
         for _ in range(3):
             draw_told(renderer, scene, pair)
-        assert renderer._drawing.allocations == made, "nothing is made anew in a frame"
+        assert renderer.drawing.allocations == made, "nothing is made anew in a frame"
         draw_told(renderer, scene, pair[:1])
         assert len(arena.colors) == 1
