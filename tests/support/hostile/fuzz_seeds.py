@@ -14,6 +14,7 @@ from shapeshift.scene.selectors.read_selector import read_selector
 from tests.support.hostile.fuzz_format_seeds import format_seeds
 from tests.support.hostile.fuzz_run import Seed
 from tests.support.models import make_random_model
+from tests.support.splats.ply_files import some_splats as random_splats
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 COUNT = 300  # splats: more than one chunk of 256
@@ -27,16 +28,8 @@ def some_splats(count: int, coefficients: int, **kind) -> PlainSplats:
         rows = slice(0, 40 * count, 40)
         arrays = (leg.means, leg.scales, leg.wxyz, leg.opacity, leg.sh[:, :coefficients])
         return PlainSplats(*(np.ascontiguousarray(a[rows]) for a in arrays), **kind)
-    rng = np.random.default_rng(count)
-    wxyz = rng.normal(size=(count, 4))
-    arrays = (
-        rng.normal(size=(count, 3)),
-        rng.uniform(0.005, 0.1, (count, 3)),
-        wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
-        rng.uniform(0.05, 0.95, count),
-        rng.normal(size=(count, coefficients, 3)) * 0.4,
-    )
-    return PlainSplats(*(a.astype(np.float32) for a in arrays), **kind)
+    bounds = {"sizes": (0.005, 0.1), "opacities": (0.05, 0.95), "color": 0.4}
+    return random_splats(count, coefficients, count, **bounds, **kind)
 
 
 def files_of(folder: Path) -> dict[str, bytes]:

@@ -6,19 +6,11 @@ import numpy as np
 
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
+from tests.support.splats.ply_files import some_splats
 
 
 def splats(count: int, seed: int = 0, coefficients: int = 4) -> PlainSplats:
-    rng = np.random.default_rng(seed)
-    wxyz = rng.normal(size=(count, 4))
-    arrays = (
-        rng.normal(size=(count, 3)),
-        rng.uniform(0.01, 0.1, (count, 3)),
-        wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
-        rng.uniform(0.1, 0.9, count),
-        rng.normal(size=(count, coefficients, 3)),
-    )
-    return PlainSplats(*(a.astype(np.float32) for a in arrays))
+    return some_splats(count, coefficients, seed, sizes=(0.01, 0.1), opacities=(0.1, 0.9))
 
 
 def put(path: Path, count: int, **kind) -> Path:

@@ -10,17 +10,20 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 CODES = {"float": "f", "double": "d", "uchar": "B", "short": "h", "int": "i"}
 
 
-def some_splats(count=20, coefficients=16, seed=0) -> PlainSplats:
+def some_splats(
+    count=20, coefficients=16, seed=0, sizes=(0.01, 1), opacities=(0.01, 0.99), color=1.0, **kind
+) -> PlainSplats:
+    """Random ones within these bounds; color: the standard deviation of the harmonics."""
     rng = np.random.default_rng(seed)
     wxyz = rng.normal(size=(count, 4))
     arrays = (
         rng.normal(size=(count, 3)),
-        rng.uniform(0.01, 1, (count, 3)),
+        rng.uniform(*sizes, (count, 3)),
         wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
-        rng.uniform(0.01, 0.99, count),
-        rng.normal(size=(count, coefficients, 3)),
+        rng.uniform(*opacities, count),
+        color * rng.normal(size=(count, coefficients, 3)),
     )
-    return PlainSplats(*(a.astype(np.float32) for a in arrays))
+    return PlainSplats(*(a.astype(np.float32) for a in arrays), **kind)
 
 
 def names_of(coefficients: int) -> list[str]:

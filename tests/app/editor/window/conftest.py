@@ -93,3 +93,14 @@ def splats_viewer(window, tmp_path):
     viewer = viewer_of(window, OpenedFiles((Source(path, b),)), tmp_path)
     yield viewer
     release(viewer)
+
+
+@pytest.fixture
+def hands(viewer, display):
+    """Real input through the display; at the end the pointer rests on the picture."""
+    from tests.support.desktop.real_hands import RealHands  # python-xlib, where there is X
+
+    with RealHands(viewer, display) as hands:
+        yield hands
+        hands.button(False)
+        hands.move(600, 200)

@@ -68,14 +68,6 @@ def test_what_is_for_developers_is_folded_at_first(viewer, monkeypatch):
         assert label not in widgets.boxes
 
 
-@pytest.fixture
-def hands(viewer, display):
-    with RealHands(viewer, display) as hands:
-        yield hands
-        hands.button(False)
-        hands.move(600, 200)
-
-
 def test_a_problem_stays_until_its_cross_is_clicked(viewer, hands):
     viewer.state.problem = "one.ply is empty."
     viewer.state.problem = "two.ply is empty."

@@ -4,18 +4,9 @@ import numpy as np
 import pytest
 
 from tests.support.desktop.desktop_stand import run_frames
-from tests.support.desktop.real_hands import RealHands
 
 ACCENT = np.array([242, 161, 69])  # app/editor/panels/widgets/theme.py
 NAMES_PX = 34  # of the bar, from its upper edge: padding, and the names of the stops
-
-
-@pytest.fixture
-def hands(viewer, display):
-    with RealHands(viewer, display) as hands:
-        yield hands
-        hands.button(False)
-        hands.move(600, 200)
 
 
 def x_of(viewer) -> float:
