@@ -17,6 +17,10 @@ OLDEST_PYTHON = (3, 11)
 
 # Answered without the environment, by whatever Python started this.
 ASKING = ("-h", "--help", "help", "--version")
+# The whole suite runs in two processes, each file in one of them, in the order of
+# tests/conftest.py; where words choose tests, or look into them, it is one process.
+WHOLE_SUITE = {"-q", "-v", "-x", "-qq", "-vv"}
+TWO_PROCESSES = ["-n", "2", "--dist", "loadfile", "--no-loadscope-reorder"]
 TEST_HELP = """usage: python3 launch.py test [file] [options of pytest]
 
 Runs the tests; the first time it installs what they need into .venv.
@@ -26,6 +30,7 @@ Runs the tests; the first time it installs what they need into .venv.
   -x                    stop at the first that fails
   -q, -v                say less, say more
   --regenerate          make the golden pictures anew
+  -n 0                  one process; without words that choose tests, two run side by side
   tests/app/test_cli.py     only the tests of a file
 
 All others, once they are installed: .venv/bin/python -m pytest --help"""
@@ -50,6 +55,12 @@ def hand_over(python, arguments):
             return child.wait()
         except KeyboardInterrupt:
             continue  # the child has it too and decides
+
+
+def pytest_words(arguments):
+    """What pytest is started with: in two processes where all tests run and there are two cores."""
+    together = set(arguments) <= WHOLE_SUITE and (os.cpu_count() or 1) >= 2
+    return ["-m", "pytest", *(TWO_PROCESSES if together else []), *arguments]
 
 
 def main(arguments):
@@ -77,7 +88,7 @@ def main(arguments):
         stop(f"The environment cannot be made: {error.strerror}: {error.filename or ROOT}.")
     if testing:
         os.chdir(ROOT)
-        return hand_over(str(PYTHON), ["-m", "pytest", *arguments[1:]])
+        return hand_over(str(PYTHON), pytest_words(arguments[1:]))
     return hand_over(str(PYTHON), [CLI, *arguments])
 
 

@@ -80,17 +80,17 @@ class Renderer:
             # Needs OpenCL, which quads do without.
             from shapeshift.renderer.tiles.tiles import TilesDrawing
 
-            self._drawing = TilesDrawing()
+            self.drawing = TilesDrawing()
         else:
             from shapeshift.renderer.gl.quads import QuadsDrawing
 
-            self._drawing = QuadsDrawing(self._gpu, mlps, sort)
+            self.drawing = QuadsDrawing(self._gpu, mlps, sort)
         self._timer = PassTimer(ctx)
         self._scene = Scene(())
         self._decoded: list[DecodedObject] = []
         self._false_key: list | None = None  # what the next was chosen for
         self._false_colors = FalseColors()
-        self._drawing.allocate([])
+        self.drawing.allocate([])
         self._geometry_runs = self._color_runs = 0
         self._sizes: list[tuple[int, int]] = []  # of the views of the last frame
         self._debug: list[tuple[np.ndarray, dict[str, float]]] = []  # picture and numbers, a view
@@ -98,11 +98,11 @@ class Renderer:
     @property
     def backends(self) -> dict[str, str]:
         """What is in use: drawing, mlps, sort."""
-        return self._drawing.backends
+        return self.drawing.backends
 
     def update(self, scene: Scene) -> None:
         """Takes over poses and control values; decodes only what is new or has another x."""
-        with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
+        with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             if [id(d.model) for d in self._decoded] != [id(o.model) for o in scene.objects]:
                 self._rebuild(scene)
             for i, (thing, decoded) in enumerate(zip(scene.objects, self._decoded, strict=True)):
@@ -111,7 +111,7 @@ class Renderer:
                     decoded.key = key
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
-        self._drawing.place(poses)
+        self.drawing.place(poses)
         self._scene = scene
 
     def _decode_geometry(self, i: int, decoded: DecodedObject, x: Controls) -> None:
@@ -122,7 +122,7 @@ class Renderer:
         if not (
             shaped or follows_eye(decoded.model)
         ):  # else with the colours, once the eye is known
-            self._drawing.decode_geometry(i, x)
+            self.drawing.decode_geometry(i, x)
             self._geometry_runs += 1
         decoded.x = x
         decoded.version += 1
@@ -146,9 +146,9 @@ class Renderer:
         models = [o.model for o in scene.objects]
         self._scene, self._decoded, self._false_key = Scene(()), [], None
         try:
-            self._drawing.allocate(models)
+            self.drawing.allocate(models)
         except ValueError:
-            self._drawing.allocate([])
+            self.drawing.allocate([])
             raise
         self._decoded = [DecodedObject(model, [ColorCache(centre_of(model))]) for model in models]
 
@@ -167,32 +167,32 @@ class Renderer:
         if not views or (targets is not None and len(targets) != len(views)):
             raise ValueError("draw wants at least one view, and no or one framebuffer a view.")
         settings = self._settings_of_frame()
-        self._drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
+        self.drawing.draws_heat = self._false_colors.way == BESIDE and not settings.debug
         self._sizes = [view.size for view in views]  # of what is shown
         full, views = views, [scaled(view, settings.render_scale) for view in views]
         own, sorts = self._own_colors(full), 0
         with self._framebuffer_kept():
             for group in drawn_together(self._scene, len(full), own):
                 self._decode_colors(full[group], own)
-                if prepare_debug(self._drawing, views, self._scene, settings.debug):
+                if prepare_debug(self.drawing, views, self._scene, settings.debug):
                     for decoded in self._decoded:
                         forget_colors(decoded.colored)  # their own are to come back
-                self._drawing.draw(views[group], settings, self._timer, group.start)
-                sorts += self._drawing.sorts
+                self.drawing.draw(views[group], settings, self._timer, group.start)
+                sorts += self.drawing.sorts
             self._debug = [
-                debug_image(self._drawing, i, view, self._scene, settings)
+                debug_image(self.drawing, i, view, self._scene, settings)
                 for i, view in enumerate(views if settings.debug else [])
             ]
         if targets is not None:
             with self._timer.time("resolve"):
                 for i, framebuffer in enumerate(targets):
                     self.present(framebuffer, i)
-        culled = self._drawing.counts()
+        culled = self.drawing.counts()
         drawn = culled.pop("drawn")
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
         stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
-        stats.sorts, stats.order_age = sorts, self._drawing.order_age
+        stats.sorts, stats.order_age = sorts, self.drawing.order_age
         stats.color_sets = len(full) if own else 1
         if self._debug:
             stats.debug = self._debug[0][1]
@@ -219,11 +219,11 @@ class Renderer:
         for decoded in self._decoded:
             fresh = (ColorCache(decoded.colored[0].centre) for _ in groups[len(decoded.colored) :])
             decoded.colored = [*decoded.colored[: len(groups)], *fresh]
-        with self._timer.time("decode", on_gpu=self._drawing.decodes_on_gpu):
+        with self._timer.time("decode", on_gpu=self.drawing.decodes_on_gpu):
             for which, group in enumerate(groups):
-                self._drawing.color_set(which, len(groups))
+                self.drawing.color_set(which, len(groups))
                 self._decode_color_set(which, group)
-            self._drawing.wait_decoded()
+            self.drawing.wait_decoded()
 
     def _decode_color_set(self, which: int, views: list[View]) -> None:
         """Runs one set of colours for the middle of some eyes, where it moved.
@@ -245,14 +245,14 @@ class Renderer:
                 if not due:
                     continue
                 colored.key, colored.anchors = key, wanted
-                self._drawing.decode_geometry(i, decoded.x, eye, wanted)
+                self.drawing.decode_geometry(i, decoded.x, eye, wanted)
                 self._geometry_runs += 1
             else:
                 wanted = self._wanted_anchors(i, thing, decoded, colored, stale, views)
                 if not colored.take(key, wanted, stale):
                     continue  # all that is seen has its colours
             at_once = self._false_colors.way == SPLATS
-            self._drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
+            self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
             self._color_runs += 1
 
     def _wanted_anchors(
@@ -275,7 +275,7 @@ class Renderer:
             if stale:  # how far splats reach is worth knowing once x rests
                 return None
         if colored.reach is None:
-            mean_opacity, owner, covariance = self._drawing.splat_points()
+            mean_opacity, owner, covariance = self.drawing.splat_points()
             mine = owner == i
             k = math.sqrt(2 * math.log(1 / self.settings.min_alpha))
             parts = (thing.model.anchors, mean_opacity[mine], covariance[mine], k)
@@ -306,9 +306,9 @@ class Renderer:
         """(H, W, 4) float32 of view i as drawn (settings.render_scale), premultiplied over nothing,
         row 0 on top.  At a pure thermal stop it holds values, else colours.
         """
-        if not self._drawing.draws_heat:
-            return self._drawing.image(i)
-        return lay_heat(self._drawing.image(i), self._drawing.heat(i), self._false_colors.palette)
+        if not self.drawing.draws_heat:
+            return self.drawing.image(i)
+        return lay_heat(self.drawing.image(i), self.drawing.heat(i), self._false_colors.palette)
 
     def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
@@ -316,9 +316,9 @@ class Renderer:
         """
         if self._debug:
             return bilinear(self._debug[i][0], self._sizes[i])
-        palette, rgba = self._false_colors.palette, bilinear(self._drawing.image(i), self._sizes[i])
-        if self._drawing.draws_heat:
-            rgba = lay_heat(rgba, bilinear(self._drawing.heat(i), self._sizes[i]), palette)
+        palette, rgba = self._false_colors.palette, bilinear(self.drawing.image(i), self._sizes[i])
+        if self.drawing.draws_heat:
+            rgba = lay_heat(rgba, bilinear(self.drawing.heat(i), self._sizes[i]), palette)
         elif self._false_colors.way == PICTURE:
             rgba = apply_palette(rgba, palette)
         return over_background(rgba, self.settings.background, out)
@@ -329,30 +329,30 @@ class Renderer:
             raise ValueError("this renderer has no GL context to present with; use resolved().")
         name = "" if self._debug else self._false_colors.palette
         palette = palette_colors(name) if name else None
-        image = opaque(self._debug[i][0]) if self._debug else self._drawing.presentable(i)
-        heat = self._drawing.presentable_heat(i) if self._drawing.draws_heat else None
+        image = opaque(self._debug[i][0]) if self._debug else self.drawing.presentable(i)
+        heat = self.drawing.presentable_heat(i) if self.drawing.draws_heat else None
         background = self.settings.background
         as_array = isinstance(image, np.ndarray) and not self._debug
         with self._framebuffer_kept():
             if as_array and self._resolve.takes_bytes(framebuffer, image.shape[1::-1]):
-                pixels = self._drawing.presentable_rgba8(i, background, palette)
+                pixels = self.drawing.presentable_rgba8(i, background, palette)
                 self._resolve.copy(pixels, framebuffer)
             else:
-                unit = 1.0 if self._debug else self._drawing.unit_of(i)
+                unit = 1.0 if self._debug else self.drawing.unit_of(i)
                 self._resolve.draw(image, framebuffer, background, palette, heat, unit)
 
     def coverage(self, i: int = 0) -> moderngl.Texture | np.ndarray:
         """How much splats hide of what is behind them in view i, as drawn: the alpha of a GL
         texture, row 0 at the bottom, or without GL (H, W) float32, row 0 on top.
         """
-        image = self._drawing.presentable(i)
+        image = self.drawing.presentable(i)
         return image[..., 3] if isinstance(image, np.ndarray) else image
 
     def surface(self, view: View) -> Surface:
         """Depth, normals and coverage of what `update` was given, from a view; no frame is lost."""
         self._decode_colors([view])
         with self._framebuffer_kept():
-            return self._drawing.surface(view, self._settings_of_frame())
+            return self.drawing.surface(view, self._settings_of_frame())
 
     def stale_order_db(self, views: list[View]) -> float:
         """PSNR of the order in use against one sorted for these views: what keeping it costs, dB.
@@ -366,8 +366,8 @@ class Renderer:
         pictures = []
         for frames in (1, 0):  # sorted now, then the order that is kept
             once = replace(settings, resort_frames=frames, resort_degrees=0.0)
-            with self._framebuffer_kept(), self._drawing.order_set_aside():
-                self._drawing.draw(views, once, PassTimer(self._ctx))
+            with self._framebuffer_kept(), self.drawing.order_set_aside():
+                self.drawing.draw(views, once, PassTimer(self._ctx))
                 pictures.append([self.image(i)[..., :3].copy() for i in range(len(views))])
         return min(psnr(kept, exact) for exact, kept in zip(*pictures, strict=True))
 
@@ -383,7 +383,7 @@ class Renderer:
 
     def close(self) -> None:
         """Gives the memory of the scene and the programs back; the context stays."""
-        self._drawing.close()
+        self.drawing.close()
         for part in (self._resolve, self._gpu):
             if part is not None:
                 part.release()

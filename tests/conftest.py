@@ -7,6 +7,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 
+pytest.register_assert_rewrite("tests.support")  # asserts there tell their values, too
+
 
 # Started as a background job whose parent ignores Ctrl-C, so would the programs that are tested.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -67,3 +69,31 @@ def device():
     from shapeshift.rasterizer.device import open_device
 
     return open_device("cpu")
+
+
+@pytest.fixture(scope="session")
+def session_gpu():
+    """One context for all tests, so that every program is compiled once."""
+    from shapeshift.renderer.gl.context import NoContext, open_context
+    from shapeshift.renderer.gl.gpu import Gpu
+
+    try:
+        made = open_context()
+    except NoContext as reason:
+        pytest.skip(str(reason))
+    with made, Gpu(made) as gpu:
+        yield gpu
+
+
+@pytest.fixture
+def ctx(session_gpu):
+    """The context, current; a test that leaves a GL error fails."""
+    with session_gpu.ctx as made:
+        assert made.error == "GL_NO_ERROR", "an earlier test left a GL error"
+        yield made
+        assert made.error == "GL_NO_ERROR"
+
+
+@pytest.fixture
+def gpu(ctx, session_gpu):
+    return session_gpu

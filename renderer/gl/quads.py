@@ -48,7 +48,7 @@ class QuadsDrawing:
         self._gpu = gpu
         self._projector = Projector(gpu)
         self._splatter = Splatter(gpu)
-        self._stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
+        self.stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
         self.sorts = self.order_age = 0  # of the last frame, see FrameStats
         self._sort_policy = SortPolicy()
         self._changed = True  # since the last frame: a pose, a control value, the set of objects
@@ -161,12 +161,12 @@ class QuadsDrawing:
         """Draws views that were projected together, from image i on; two at once where it pays."""
         arena, disparity = self._arena, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
-        paired = self._stereo_pair is not None and alike and not self.draws_heat
+        paired = self.stereo_pair is not None and alike and not self.draws_heat
         if paired and settings.low_pass >= LEAST_LOW_PASS:
-            disparity = self._stereo_pair.disparity(arena, group[0].size[0])
+            disparity = self.stereo_pair.disparity(arena, group[0].size[0])
         if disparity is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
-            self._stereo_pair.draw(
+            self.stereo_pair.draw(
                 arena, pictures, disparity, settings.min_alpha, self._splatter.unit
             )
             return

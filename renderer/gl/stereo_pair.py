@@ -5,7 +5,7 @@ Software GL pays for triangles and for the 4 x 4 pixels that they touch, and lit
 target.  So the right picture is moved along x by the disparity of the median splat, where the two
 ellipses of most splats nearly coincide, and moved back afterwards.  What is left of the disparity
 makes the triangles larger: above MAX_RESIDUAL_DISPARITY two draws are as fast
-(docs/bench/passes_gl.py).
+(tools/renderer/passes_gl.py).
 """
 
 import moderngl

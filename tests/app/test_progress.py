@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from shapeshift.app import cli, progress
-from tests.conftest import ROOT
 from tests.support.models import random_package
+
+ROOT = Path(__file__).resolve().parents[2]
 
 WORK = """
 from shapeshift.app.opening import progress_after

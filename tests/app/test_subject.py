@@ -21,8 +21,8 @@ from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
-from tests.runtime_models.splats.test_gltf import plain_splats
-from tests.support.object_scenes import ODD, turned_view
+from tests.support.scene.object_scenes import ODD, turned_view
+from tests.support.splats.gltf_files import plain_splats
 
 SIZE = (120, 90)
 WORLD_PART = {"kind": "sphere", "centre": [0.4, 0, 0], "radius": 0.6, "x": 1, "space": "world"}

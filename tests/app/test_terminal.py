@@ -113,7 +113,7 @@ def test_names_that_are_no_text(tmp_path):
 
 @pytest.mark.parametrize("name", ["escape", "direction", "markup", "long"])
 def test_names_of_cameras(tmp_path, name, run):
-    from tests.support.camera_files import cameras
+    from tests.support.scene.camera_files import cameras
 
     few = cameras(count=2)
     write_cameras(replace(few, names=(NAMES[name], "b")), tmp_path / "a.json", "ours")

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-import tests.support.format_bombs  # noqa: F401  which adds its own to BOMBS
+import tests.support.hostile.format_bombs  # noqa: F401  which adds its own to BOMBS
 from shapeshift.scene.captures.photo import FREE_PIXELS, PIXEL
-from tests.support.bombs import BOMBS
+from tests.support.hostile.bombs import BOMBS
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="memory is told by /proc"

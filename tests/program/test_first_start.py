@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-import tests.support.poisoned_folder as poisoned_folder
+import tests.support.hostile.poisoned_folder as poisoned_folder
 from shapeshift.app import first_start
 
 ROOT = Path(__file__).resolve().parents[2]

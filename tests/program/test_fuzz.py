@@ -3,51 +3,24 @@
 import gzip
 import io
 import json
-import os
 import sys
-import time
 import zipfile
 import zlib
 
 import numpy as np
 import pytest
 
+from tests.support.hostile.fuzz_rounds import fuzz_all
+
 pytest.importorskip("hypothesis")
 pytest.importorskip("pyopencl")
 
-import tests.support.fuzz_run as fuzz_run
-from shapeshift.renderer.renderer import Renderer
-from tests.support.fuzz_mutations import mutate
-from tests.support.fuzz_run import Hung, fuzz, watched
-from tests.support.fuzz_seeds import all_seeds
-from tests.support.fuzz_then import Then
+import tests.support.hostile.fuzz_run as fuzz_run
+from tests.support.hostile.fuzz_mutations import mutate
+from tests.support.hostile.fuzz_run import Hung, watched
+from tests.support.hostile.fuzz_seeds import all_seeds
 
 EXAMPLES = 800  # over all seeds together
-
-
-def fuzz_all(folder, examples: int, word: str = "") -> tuple[int, Then]:
-    """(wrong files opened, what came of them); fails with every seed that found something."""
-    seeds = [sown for sown in all_seeds(folder / "seeds") if word in sown.name]
-    each = -(-examples // len(seeds))
-    failures, count = [], 0
-    with Renderer(None, "tiles") as renderer:
-        then = Then(renderer)
-        for i, sown in enumerate(seeds):
-            began = time.perf_counter()
-            try:
-                fuzz(sown, folder / f"{i}", each, then)
-            except (Exception, Hung) as error:
-                notes = " | ".join(getattr(error, "__notes__", ()))
-                failures.append(f"{sown.name}: {type(error).__name__}: {error} {notes}"[:1500])
-                if os.environ.get("FUZZ_TRACE"):
-                    import traceback
-
-                    traceback.print_exc()
-            count += each
-            if os.environ.get("FUZZ_TRACE"):
-                print(f"{sown.name}: {time.perf_counter() - began:.1f} s")
-    assert not failures, "\n".join(failures)
-    return count, then
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="watched on Linux alone")

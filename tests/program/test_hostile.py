@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import tests.support.hostile_things  # noqa: F401  adds its cases
+import tests.support.hostile.hostile_things  # noqa: F401  adds its cases
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
-from tests.support.fuzz_run import check_sentence, watched
-from tests.support.hostile_files import CASES, put
+from tests.support.hostile.fuzz_run import check_sentence, watched
+from tests.support.hostile.hostile_files import CASES, put
 
 ROOT = Path(__file__).resolve().parents[2]
 # Audit events of the interpreter that no reader may cause.
@@ -173,7 +173,7 @@ def test_the_command_line_says_one_line_and_ends_with_2(tmp_path, name):
 
 
 def some(count: int = 3, coefficients: int = 1, **kind):
-    from tests.support.fuzz_seeds import some_splats
+    from tests.support.hostile.fuzz_seeds import some_splats
 
     return some_splats(count, coefficients, **kind)
 

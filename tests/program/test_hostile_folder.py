@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tests.support.poisoned_folder as poisoned_folder
+import tests.support.hostile.poisoned_folder as poisoned_folder
 from shapeshift.app import first_start
 from shapeshift.app.cli import COMMANDS
 from tests.support.splat_scenes import random_layers
@@ -48,7 +48,7 @@ def folder(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def capture(folder) -> Path:
     from shapeshift.training.synthetic.balls import make_balls
-    from tests.training.first_anchors.test_first_points import write_las
+    from tests.support.training.point_files import write_las
 
     make_balls(folder / "capture", views=6, test_views=1, size=32)
     write_las(folder / "points.laz", np.random.default_rng(0).uniform(-1, 1, (500, 3)))

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.operations.activate import to_own_units
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, turn
 from shapeshift.runtime_models.splats.plain_splats import AXES, RawSplats, Reading
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 COUNTS = (1, 256, 257, BLOCK, BLOCK + 1, WORTH_A_THREAD * BLOCK + 1)
 POISON = (np.nan, np.inf, -np.inf, 3e38, -3e38, 1e-42, 0.0, 81.0, 79.0)

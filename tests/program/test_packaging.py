@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-NOT_SHIPPED = {"tests", "docs", "examples", "build", "dist", ".venv", "out"}
+NOT_SHIPPED = {"tests", "tools", "docs", "examples", "build", "dist", ".venv", "out"}
 SHIPPED_KINDS = ("*.py", "*.glsl", "*.comp", "*.vert", "*.frag", "*.cl", "*.shift", "*.pyi")
 
 
@@ -55,7 +55,23 @@ def test_top_level_of_the_readme_tree_is_the_top_level():
     tree = (ROOT / "README.md").read_text().split("```")
     block = next(b for b in tree if "launch.py " in b and "renderer/" in b)
     named = {line.split()[0] for line in block.splitlines() if line and not line.startswith(" ")}
-    folders = {f"{p.parent.name}/" for p in ROOT.glob("*/__init__.py")} | {"docs/", "tests/"}
+    folders = {f"{p.parent.name}/" for p in ROOT.glob("*/__init__.py")} | {
+        "docs/",
+        "tests/",
+        "tools/",
+    }
     assert folders <= named, f"README's tree lacks {folders - named}"
     missing = {n for n in named if n.endswith(("/", ".py", ".md")) and not (ROOT / n).exists()}
     assert not missing, f"README's tree names {missing}"
+
+
+def test_committed_rows_name_a_program_that_is_there():
+    programs = {}
+    for path in sorted((ROOT / "docs" / "bench").rglob("*")):
+        if path.suffix in (".csv", ".md") and "at commit" not in path.read_text()[:2000]:
+            first = path.read_text().splitlines()[0].strip("# ")
+            programs[path.name] = re.match(r"python3? (\S+\.py) ?", first)
+    rows = {name: found for name, found in programs.items() if name.endswith(".csv")}
+    assert len(rows) > 20 and all(rows.values()), rows
+    missing = {found[1] for found in programs.values() if found and not (ROOT / found[1]).is_file()}
+    assert not missing

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-import tests.support.poison as poison
+import tests.support.renderer.poison as poison
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from tests.support.poison_judge import is_precise, judge
+from tests.support.renderer.poison_judge import is_precise, judge
 from tests.support.splat_scenes import alone, front_view, random_layers
 
 SEEDS = 600

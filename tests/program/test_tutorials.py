@@ -21,7 +21,9 @@ SHELL = re.compile(r"^```sh\n(.*?)^```", re.M | re.S)
 INLINE = re.compile(r"`((?:python3 )?launch\.py [^`]+)`")
 USAGE = re.compile(r"\[-|[|]|\.\.\.|\b(COMMAND|SCENE SCENE)\b")  # a form to fill in, no command
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
-FOLDERS = "app|assets|docs|examples|rasterizer|renderer|runtime_models|scene|shapeshift|tests|"
+FOLDERS = (
+    "app|assets|docs|examples|rasterizer|renderer|runtime_models|scene|shapeshift|tests|tools|"
+)
 NAMED = re.compile(rf"`((?:{FOLDERS}training|vr)/[\w./-]+\.\w+)`")
 
 

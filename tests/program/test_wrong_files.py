@@ -8,8 +8,8 @@ import pytest
 
 from shapeshift.app import cli
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.support.captures import save_image, simple, write_transforms
-from tests.support.ply_files import some_splats
+from tests.support.scene.captures import save_image, simple, write_transforms
+from tests.support.splats.ply_files import some_splats
 
 COMMANDS = {
     "info": ("info", "FILE"), "lint": ("lint", "FILE"), "bench": ("bench", "FILE"),

@@ -11,7 +11,7 @@ import pytest
 
 from shapeshift.rasterizer.device import INSTALL, NoDevice, open_device
 from shapeshift.rasterizer.program import BuildError, read_source
-from tests.support.rasterizer_scenes import device
+from tests.support.renderer.rasterizer_scenes import device
 
 ROOT = Path(__file__).resolve().parents[2]
 

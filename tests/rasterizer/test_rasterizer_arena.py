@@ -6,7 +6,7 @@ import pytest
 from shapeshift.rasterizer.project import CULL_REASONS, LEAST_ALPHA, Camera, project
 from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
 from shapeshift.rasterizer.reference import project_reference, rotations
-from tests.support.rasterizer_scenes import (
+from tests.support.renderer.rasterizer_scenes import (
     arena,
     as_double,
     device,

@@ -9,7 +9,12 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Projected, project
 from shapeshift.rasterizer.raster import FORMS as RASTER_FORMS
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
-from tests.support.rasterizer_scenes import device, off_centre_camera, random_splats, upload
+from tests.support.renderer.rasterizer_scenes import (
+    device,
+    off_centre_camera,
+    random_splats,
+    upload,
+)
 
 FORMS = ("cpu", "gpu")
 BOX = 2 << 24  # of a place, as in common/tiles.cl

@@ -17,7 +17,7 @@ from shapeshift.rasterizer.raster import (
     rasterize_rgba_views,
 )
 from shapeshift.rasterizer.reference import project_reference, rasterize_reference
-from tests.support.rasterizer_scenes import (
+from tests.support.renderer.rasterizer_scenes import (
     as_double,
     device,
     off_centre_camera,

@@ -12,7 +12,7 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera, project, project_backward
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
 from shapeshift.rasterizer.reference import finite_differences, render_reference
-from tests.support.rasterizer_scenes import (
+from tests.support.renderer.rasterizer_scenes import (
     GROUPS,
     as_double,
     device,

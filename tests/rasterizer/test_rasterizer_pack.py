@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
 from shapeshift.rasterizer.reference import rotations
-from tests.support.rasterizer_scenes import device
+from tests.support.renderer.rasterizer_scenes import device
 
 BEFORE, AFTER = 3, 5  # rows of other objects
 

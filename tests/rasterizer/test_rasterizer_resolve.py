@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.renderer.colors.palette import apply_palette, lay_heat, palette_colors
-from tests.support.rasterizer_scenes import device
+from tests.support.renderer.rasterizer_scenes import device
 
 
 def image(height: int, width: int, seed: int = 0) -> np.ndarray:

@@ -6,7 +6,7 @@ import pytest
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.evaluate import directions
-from tests.support.rasterizer_scenes import device
+from tests.support.renderer.rasterizer_scenes import device
 
 EYE = np.array([0.3, -0.2, 2.0], np.float32)
 BEFORE, AFTER = 3, 5  # rows of other objects

@@ -7,7 +7,7 @@ from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import project
 from shapeshift.rasterizer.raster import rasterize, rasterize_backward
 from shapeshift.rasterizer.reference import render_reference
-from tests.support.rasterizer_scenes import (
+from tests.support.renderer.rasterizer_scenes import (
     as_double,
     device,
     off_centre_camera,

@@ -15,7 +15,7 @@ from shapeshift.rasterizer.surface import (
     surface_backward,
 )
 from shapeshift.rasterizer.surface_reference import render_depth_reference
-from tests.support.rasterizer_scenes import (
+from tests.support.renderer.rasterizer_scenes import (
     GROUPS,
     arena,
     as_double,

@@ -16,7 +16,7 @@ from shapeshift.runtime_models.splats.operations.recentre import COARSE, FINE, p
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.write_plain import told_lost, writer_of
-from tests.support.ply_files import names_of, random_rows, write_rows
+from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
 FAR = (5e6 + 0.25, -3_141_592.5, 4e5)  # metres, in the file's axes
 DOUBLES = {"x": "double", "y": "double", "z": "double"}
@@ -146,7 +146,7 @@ def layers_of(plain) -> SplatLayers:
 def test_outliers_do_not_frame_the_scene():
     """As MCMC leaves them: 20,000 km away, while the scene is 3 m wide."""
     from shapeshift.scene.cameras.framing import default_view
-    from tests.runtime_models.lint.test_lint_whole import cloud, ours
+    from tests.support.splats.lint_scenes import cloud, ours
 
     raw = cloud(5000, 0.02)
     core = default_view(layers_of(ours(raw)), (640, 360)).world_from_eye.position
@@ -167,7 +167,7 @@ def camera_file(path, place):
 
 
 def test_cameras_of_the_file_see_the_same_picture_there(near_and_far, tmp_path):
-    from tests.app.test_cli import launch
+    from tests.support.program import launch
 
     pictures = []
     for scene, place in zip(near_and_far, ((0, 0, 0), FAR), strict=True):

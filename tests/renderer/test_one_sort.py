@@ -10,8 +10,8 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.support.frames import draw_told
-from tests.support.object_scenes import (
+from tests.support.renderer.frames import draw_told
+from tests.support.scene.object_scenes import (
     CYCLE,
     UPRIGHT,
     dealt,

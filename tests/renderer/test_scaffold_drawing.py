@@ -19,28 +19,17 @@ from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted
 from shapeshift.scene.stereo import stereo_pair
 from shapeshift.training.evaluation.evaluate import Painter
-from tests.support.frames import draw_told
-from tests.support.scaffold_scenes import from_anchors, random_raw, write_run
+from tests.support.renderer.frames import draw_told
 from tests.support.splat_scenes import psnr_db, random_layers
-
-SIZE = (160, 100)
-TURNED = Pose(np.array([0.3, -0.2, 0.4]), np.array([0.8, 0.0, 0.6, 0.0]))
-CASES = {
-    "plain": {"anchors": 60},
-    "all inputs": {"anchors": 60, "bank": True, "distance": True, "appearance": 4},
-    "octree": {"anchors": 120, "levels": 4},
-}
-
-
-def made(folder: Path, **how):
-    """A scene a metre across."""
-    raw = random_raw(**how)
-    raw = replace(raw, anchors=raw.anchors / 3, log_scales=raw.log_scales - 0.7)
-    return read_model(write_run(raw, folder))
-
-
-def seen_from(*eye: float) -> View:
-    return View(look_at(eye, (0, 0, 0)), perspective(0.8, SIZE), 0.05, 50.0, SIZE)
+from tests.support.splats.scaffold_scenes import (
+    CASES,
+    SIZE,
+    TURNED,
+    from_anchors,
+    made,
+    seen_from,
+    write_run,
+)
 
 
 def in_scene(model, pose: Pose = IDENTITY, **how) -> Scene:

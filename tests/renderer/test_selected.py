@@ -8,18 +8,12 @@ import pytest
 from shapeshift.renderer.colors.palette import thermal_blend, thermal_weights
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.runtime_models.evaluate import evaluate
-from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopBlend
 from shapeshift.scene.control import control_of
-from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Sphere
+from shapeshift.scene.selectors.selector import HalfSpace, Painted, Sphere
+from tests.support.renderer.selected_scenes import ASIDE, BALL, VIEW, selected_scene, thermal
 from tests.support.splat_scenes import front_view, psnr_db, random_layers, random_model
-
-VIEW = front_view((160, 120))
-BALL = Sphere(centre=(0.2, 0, 0), radius=0.5, x=1.0, border=0.4)
-ASIDE = Pose(np.array([0.4, 0.1, 0]), np.array([0.8, 0, 0.6, 0]))
-STOPS = (Stop("RGB", 0.0), Stop("Hot", 0.5, "thermal", "ironbow"), Stop("Open", 1.0))
 
 
 def scene_of(model, **changes) -> Scene:
@@ -39,8 +33,8 @@ def test_the_arena_holds_what_the_plain_networks_give_at_every_control_value(ren
     x = control_of(scene.objects[0])
     assert np.ndim(x) == 1 and len(np.unique(x)) > 10
     wanted = evaluate(model, x, VIEW.world_from_eye.position)
-    mean_opacity = renderer._drawing.splat_points()[0]
-    color = renderer._drawing.device.download(renderer._drawing._color)
+    mean_opacity = renderer.drawing.splat_points()[0]
+    color = renderer.drawing.device.download(renderer.drawing._color)
     np.testing.assert_allclose(mean_opacity[:, :3], wanted.means, atol=1e-5)
     np.testing.assert_allclose(mean_opacity[:, 3], wanted.opacity, atol=1e-5)
     np.testing.assert_allclose(color[:, :3], wanted.color, atol=2e-5)
@@ -78,10 +72,6 @@ def test_decoded_when_something_changed_and_only_then(renderer):
     assert runs(renderer, scene_of(model, world_from_object=ASIDE)) == (1, 1)
     far = (Sphere(centre=(9, 9, 9), radius=1, x=1),)
     assert runs(renderer, scene_of(model, world_from_object=ASIDE, selectors=far)) == (0, 0)
-
-
-def thermal(model):
-    return replace(model, stops=STOPS)
 
 
 def test_a_legend_tells_of_a_selector_too():
@@ -131,20 +121,6 @@ def test_two_values_are_two_objects(renderer):
     parts = [model.with_anchors(rows) for rows in (inside, ~inside)]
     both = Scene((SceneObject("in", parts[0], x=0.9), SceneObject("out", parts[1], x=0.2)))
     assert psnr_db(got, drawn(renderer, both)) > 80
-
-
-def selected_scene() -> Scene:
-    """Two thermal objects with several selectors, one of them in the world, and plain layers."""
-    selectors = (
-        replace(BALL, x=0.5, space="world"),
-        Box(centre=(-0.4, 0, 0), half=(0.3, 0.5, 0.4), wxyz=(0.8, 0, 0.6, 0), x=1.0, border=0.1),
-        Lens(position=(0, 0, 4), wxyz=(1, 0, 0, 0), half_angle=0.06, x=0.25, border=0.2),
-    )
-    return Scene((
-        SceneObject("a", thermal(random_model(150)), ASIDE, 0.1, selectors=selectors),
-        SceneObject("b", thermal(random_model(80, seed=1)), x=0.6),
-        SceneObject("c", random_layers(100, layers=2), x=0.2, selectors=selectors[1:]),
-    ))  # fmt: skip
 
 
 def test_the_picture_is_the_oracles(renderer):

@@ -10,46 +10,15 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.colors.color_slope import color_slope
 from shapeshift.runtime_models.evaluate import Evaluator
-from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.cameras.framing import frame_points, scene_points
-from shapeshift.scene.pose import Pose, View, look_at, perspective
-from shapeshift.scene.scene import Scene, SceneObject
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.scene.scene import Scene
 from shapeshift.scene.stereo import stereo_pair
-from tests.support.frames import draw_told
 from tests.support.models import without_direction
-from tests.support.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model, shell
-
-APART = 0.064  # metres between the eyes of a person
-SIZE = (96, 80)
-TURNED = Pose(np.array([0.2, -0.1, 0.1]), np.array([0.8, 0.0, 0.6, 0.0]))
-
-
-def heat(count: int = 400) -> SplatLayers:
-    """Harmonics of degree 3 with a thermal stop, so that a palette is laid over part of a scene."""
-    layers = random_layers(count, seed=9, coefficients=16)
-    return replace(layers, stops=(Stop("rgb", 0.0), Stop("heat", 1.0, "thermal", "ironbow")))
-
-
-SCENES = {
-    "harmonics": lambda: alone(shell(800, 16), world_from_object=TURNED),
-    "networks": lambda: alone(random_model(120), x=0.3, world_from_object=TURNED),
-    "both": lambda: Scene((
-        SceneObject("shell", shell(500, 16)),
-        SceneObject("networks", random_model(60), TURNED, 0.6),
-        SceneObject("hidden", random_layers(100), visible=False),
-    )),
-    "tinted": lambda: Scene((
-        SceneObject("heat", heat(), x=0.7), SceneObject("networks", random_model(60), TURNED, 0.6),
-    )),
-    "one splat": lambda: alone(one_splat(sh=np.full((1, 16, 3), 0.3))),
-    "nothing": lambda: alone(random_layers(0)),
-}  # fmt: skip
-
-
-def eyes(apart: float = APART, away: float = 1.8, **lens) -> list[View]:
-    pose = look_at((0.3, 0.4, away), (0, 0, 0), up=(0.2, 1.0, 0.0))  # a head askew
-    return stereo_pair(View(pose, perspective(0.9, SIZE), 0.05, 50.0, SIZE, **lens), apart)
+from tests.support.renderer.eye_scenes import APART, SCENES, TURNED, eyes
+from tests.support.renderer.frames import draw_told
+from tests.support.splat_scenes import alone, psnr_db, random_layers, random_model
 
 
 def by_itself(renderer: Renderer, scene: Scene, view: View) -> np.ndarray:
@@ -71,7 +40,7 @@ def test_each_eye_is_the_eye_drawn_alone(renderer, name, wish):
 
 def same_picture(renderer: Renderer, image: np.ndarray, wanted: np.ndarray) -> None:
     if (
-        getattr(renderer._drawing, "_stereo_pair", None) is not None
+        getattr(renderer.drawing, "stereo_pair", None) is not None
     ):  # rounded otherwise: test_one_draw
         assert psnr_db(image, wanted) > 80
     else:

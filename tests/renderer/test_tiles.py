@@ -225,7 +225,7 @@ def test_colours_without_direction_ignore_the_eye():
 
 def test_a_sweep_of_x_allocates_nothing_and_keeps_the_count(renderer):
     scene, view = alone(random_layers(3000, layers=3)), front_view((48, 48))
-    pool = renderer._drawing.device.pool
+    pool = renderer.drawing.device.pool
 
     def frame(x: float) -> int:
         renderer.update(alone(scene.objects[0].model, x=float(x)))
@@ -234,11 +234,11 @@ def test_a_sweep_of_x_allocates_nothing_and_keeps_the_count(renderer):
     sweep = np.linspace(0, 1, 200)
     counts = {frame(x) for x in sweep}
     before = pool.managed_bytes  # the pool has met lists of every length by now
-    allocations = renderer._drawing.allocations
+    allocations = renderer.drawing.allocations
     counts |= {frame(x) for x in sweep}
     assert counts == {3000}
     assert pool.managed_bytes == before
-    assert renderer._drawing.allocations == allocations
+    assert renderer.drawing.allocations == allocations
 
 
 def test_layers_come_with_x(renderer):

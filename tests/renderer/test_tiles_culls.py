@@ -10,7 +10,7 @@ from shapeshift.renderer.reference.reference import reference_counts, reference_
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.scene.scene import Scene
-from tests.gl.test_culls import FRONT, LIMITS, SCENES, THRESHOLDS
+from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, THRESHOLDS
 from tests.support.splat_scenes import alone, front_view, psnr_db, stereo_views, two_objects
 
 
@@ -41,7 +41,7 @@ def test_a_threshold_met_exactly(renderer, name):
     layers, settings, want = THRESHOLDS[name]
     told = counts(renderer, alone(layers), [FRONT], settings)
     assert told == {reason: want.split().count(reason) for reason in told}
-    reasons, _, _ = classify(renderer._drawing.splat_points(), np.eye(4)[None], FRONT, settings)
+    reasons, _, _ = classify(renderer.drawing.splat_points(), np.eye(4)[None], FRONT, settings)
     assert [("drawn", *CULL_REASONS)[reason] for reason in reasons] == want.split()
 
 

@@ -125,7 +125,7 @@ def test_an_order_by_distance_outlives_a_turn_of_the_head(renderer):
 
 
 def orders_of(renderer: Renderer) -> np.ndarray:
-    drawing = renderer._drawing
+    drawing = renderer.drawing
     return drawing.device.download(drawing._orders[0]).astype(np.uint32)
 
 
@@ -134,7 +134,7 @@ def test_sixteen_bit_keys_are_the_order_of_quantize(renderer, order):
     scene, view = alone(random_layers(5000)), orbit(30)
     film(renderer, scene, [view], order=order, key_bits=16)
     quantised = orders_of(renderer)
-    drawing = renderer._drawing
+    drawing = renderer.drawing
     status = drawing.device.download(drawing._projected[0].scratch.status)
     assert (status[:, 3] <= 65534).all()
     film(renderer, scene, [view], order=order)
@@ -157,7 +157,7 @@ def test_sixteen_bit_keys_are_the_order_of_quantize(renderer, order):
 def test_two_hundred_frames_of_change_allocate_nothing(renderer):
     """x, camera, limits, order and sort policy change; arena, pool and counts do not."""
     layers = random_layers(3000, layers=3)
-    drawing = renderer._drawing
+    drawing = renderer.drawing
     settings = [
         RenderSettings(),
         RenderSettings(max_pixels=4.0, min_pixels=1.0, fade=0.3),
@@ -187,7 +187,7 @@ def test_closing_gives_the_memory_back():
         renderer = Renderer(None)
     except NoDevice as reason:
         pytest.skip(str(reason))
-    pool = renderer._drawing.device.pool
+    pool = renderer.drawing.device.pool
     pool.free_held()
     before = pool.managed_bytes
     film(renderer, alone(random_layers(50_000)), [orbit(0)])
@@ -203,13 +203,13 @@ def test_closing_gives_the_memory_back():
 def test_the_price_of_a_stale_order_is_told_and_paid_by_no_frame(renderer, order):
     scene, views = two_objects(3000), [orbit(0), orbit(25)]
     told = film(renderer, scene, views, order=order, resort_frames=0)
-    kept, counts = renderer.image().copy(), renderer._drawing.counts()
+    kept, counts = renderer.image().copy(), renderer.drawing.counts()
     exact = reference_image(scene, views[1], RenderSettings(order=order))
     db = renderer.stale_order_db([views[1]])
     assert db == pytest.approx(psnr_db(kept[..., :3], exact[..., :3]), abs=0.05)
     assert 15 < db < 45
     np.testing.assert_array_equal(renderer.image(), kept)
-    assert renderer._drawing.counts() == counts
+    assert renderer.drawing.counts() == counts
     after = renderer.draw([views[1]])
     assert (told[1].order_age, after.sorts, after.order_age) == (1, 0, 2)
     np.testing.assert_array_equal(renderer.image(), kept)

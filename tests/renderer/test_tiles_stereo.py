@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.scene.pose import Pose, View, look_at
-from tests.support.frames import draw
+from tests.support.renderer.frames import draw
 from tests.support.splat_scenes import (
     alone,
     front_view,

@@ -11,8 +11,8 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Sphere
-from tests.support.frames import draw
-from tests.support.object_scenes import ODD, put, turned_view
+from tests.support.renderer.frames import draw
+from tests.support.scene.object_scenes import ODD, put, turned_view
 from tests.support.splat_scenes import (
     alone,
     front_view,

@@ -27,8 +27,8 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted, Sphere
 from tests.support.models import make_random_model
-from tests.support.scaffold_scenes import random_raw, write_run
 from tests.support.splat_scenes import random_layers
+from tests.support.splats.scaffold_scenes import random_raw, write_run
 
 FAR = 1e7  # metres: seen from there all directions are the same
 

@@ -21,7 +21,7 @@ from shapeshift.runtime_models.splats.operations.prune_by_importance import thin
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.support.ply_files import names_of
+from tests.support.splats.ply_files import names_of
 
 COUNT = 8_660_000
 DISK, MEMORY = 3 << 30, 9 << 30  # bytes

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("hypothesis")
 pytest.importorskip("pyopencl")
 
-from tests.program.test_fuzz import fuzz_all
+from tests.support.hostile.fuzz_rounds import fuzz_all
 
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "22000"))
 

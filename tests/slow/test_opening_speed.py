@@ -10,7 +10,7 @@ import pytest
 
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 SPLATS, TURNS = 1_000_000, 9
 

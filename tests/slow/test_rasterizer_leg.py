@@ -15,7 +15,7 @@ from shapeshift.rasterizer.raster import rasterize_rgba
 from shapeshift.rasterizer.reference import project_reference, rasterize_reference
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.read_scene import read_model
-from tests.support.rasterizer_scenes import arena, as_double, device, psnr
+from tests.support.renderer.rasterizer_scenes import arena, as_double, device, psnr
 
 pytestmark = pytest.mark.slow
 SIZE = (640, 360)

@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.mark.slow
 def test_fifty_thousand_anchors(tmp_path):
     out = tmp_path / "scale.csv"
-    program = [sys.executable, str(ROOT / "docs" / "bench" / "training_scale.py")]
+    program = [sys.executable, str(ROOT / "tools" / "training" / "training_scale.py")]
     asked = ["--anchors", "50000", "--size", "1000x750", "--steps", "2", "--out", str(out)]
     subprocess.run([*program, *asked], check=True, timeout=300, capture_output=True)
     *_, columns, row = out.read_text().splitlines()

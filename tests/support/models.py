@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
+    AnchorFrames,
     AnchorModel,
     ControlEncoding,
     Mlp,
@@ -125,3 +126,12 @@ def random_package(folder: Path, anchors: int, **kind) -> Path:
     kind.setdefault("encoding", encoding_for([stop.x for stop in STOPS]))
     write_package(make_random_model(anchors, **kind), path)
     return path
+
+
+def with_frames(model: AnchorModel, seed: int = 0) -> AnchorModel:
+    """The model with random axes and sizes from a fifth to five times."""
+    rng, count = np.random.default_rng(seed), len(model.anchors)
+    wxyz = rng.normal(size=(count, 4))
+    wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
+    scales = np.exp(rng.uniform(-1.6, 1.6, (count, 3)))
+    return replace(model, frames=AnchorFrames(scales.astype(np.float32), wxyz.astype(np.float32)))

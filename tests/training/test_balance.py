@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import tests.support.fit_scenes as fit_scenes
+import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.losses.smooth import roughness, smooth_picture

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tests.support.fit_scenes as fit_scenes
+import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.app import cli
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
@@ -26,8 +26,8 @@ from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
 from shapeshift.training.train import Trainer
-from tests.support.training_runs import bits, run
-from tests.training.test_training_gradients import LAYOUT, VOXEL, situation
+from tests.support.training.situations import LAYOUT, VOXEL, situation
+from tests.support.training.training_runs import bits, run
 
 ROOT = Path(__file__).resolve().parents[2]
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))
@@ -384,12 +384,12 @@ def test_the_command_takes_them_and_refuses_what_the_capture_has_not(device, rig
 
 
 def test_the_program_of_the_table_at_a_tiny_size(rig, tmp_path):
-    program = [sys.executable, ROOT / "docs/bench/between.py", rig.folder]
+    program = [sys.executable, ROOT / "tools/training/between.py", rig.folder]
     program += ["--iterations", "120", "--max-anchors", "300", "--steps", "10", "--views", "2"]
     program += ["--ways", "stops", "frequencies", "--out", tmp_path / "rows.csv"]
     subprocess.run(program, check=True, timeout=120, cwd=tmp_path)
     command, machine, *lines = (tmp_path / "rows.csv").read_text().splitlines()
-    assert command.startswith("# python3 docs/bench/between.py") and "PoCL" in machine
+    assert command.startswith("# python3 tools/training/between.py") and "PoCL" in machine
     rows = list(csv.DictReader(lines))
     where = ["RGB", "Thermal", "mean", "RGB to Thermal"]
     assert [(row["way"], row["where"]) for row in rows] == [

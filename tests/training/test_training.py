@@ -21,7 +21,7 @@ from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.settings import TrainSettings, resumed
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.support.training_runs import run
+from tests.support.training.training_runs import run
 
 ROOT = Path(__file__).resolve().parents[2]
 # An even encoding tells two stops apart within fewer steps than one unit a stop does.

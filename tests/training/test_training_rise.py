@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import tests.support.fit_scenes as fit_scenes
+import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
@@ -21,7 +21,7 @@ from shapeshift.training.rise import (
 )
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
-from tests.support.training_runs import bits, run
+from tests.support.training.training_runs import bits, run
 
 SETTINGS = TrainSettings(iterations=450, grow=False, max_anchors=600)
 

@@ -29,9 +29,8 @@ from shapeshift.vr.touching import (
     strongest,
     touch,
 )
-from tests.scene.world.test_simulation import item, reaction
-from tests.scene.world.test_world import real
-from tests.support.vr_frames import LOST, at, frame, hand, tilted, yawed
+from tests.support.scene.world_scenes import item, reaction, real
+from tests.support.vr.vr_frames import LOST, at, frame, hand, tilted, yawed
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 HZ = 90

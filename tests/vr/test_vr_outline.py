@@ -13,7 +13,7 @@ from shapeshift.vr.locomotion.locomotion import Rules
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.openxr.bindings import PROFILES
 from shapeshift.vr.outline import AWAY_M, BY_HAND, Outlines, hull_of, outline
-from tests.support.vr_hands import HEAD, a_frame, hand_at
+from tests.support.vr.vr_hands import HEAD, a_frame, hand_at
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float) * 0.05
 THERE = Pose(np.array([0.3, 0.9, -0.6]), np.array([1.0, 0.0, 0.0, 0.0]))

@@ -5,9 +5,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from person import Person
-from validation import complaints, switched_on
-from xr_stand import Program, Runtime, Stand, find_runtime, start_program
+
+from tests.support.xr.person import Person
+from tests.support.xr.validation import complaints, switched_on
+from tests.support.xr.xr_stand import Program, Runtime, Stand, find_runtime, start_program
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from show_colour import PATCHES
 
-PROGRAM = Path(__file__).with_name("show_colour.py")
+from tests.support.xr.show_colour import PATCHES
+
+PROGRAM = Path(__file__).resolve().parents[1] / "support" / "xr" / "show_colour.py"
 WHITE = 255
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import ImageGrab
-from xr_stand import PATIENCE_S, Program
+
+from tests.support.xr.xr_stand import PATIENCE_S, Program
 
 HELD_S = 3.0  # a viewer that lives so long has opened
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from person import Person, place
-from xr_stand import Stand
 
 from shapeshift.scene.pose import Pose
+from tests.support.xr.person import Person, place
+from tests.support.xr.xr_stand import Stand
 
 CUBE_TOP_M, HELD_AT_M = 0.05, 0.2  # over its middle; over the table
 HOLD_LAG_M = 0.005

@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
-from remote import EYE_DEGREES, EYES_APART_M
-from validation import complaints, switched_on
-from xr_stand import start_program
 
 from shapeshift.scene.pose import Pose
+from tests.support.xr.remote import EYE_DEGREES, EYES_APART_M
+from tests.support.xr.validation import complaints, switched_on
+from tests.support.xr.xr_stand import start_program
 
 WHOLE_LIFE = [
     "IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED",

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from person import pose_of
 
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import heading
+from tests.support.xr.person import pose_of
 
 
 def standing(line: dict) -> Standing:

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from person import Person, pose_of
 from PIL import Image
 from test_headset_life import WHOLE_LIFE
 from test_headset_pictures import SIZE, pixel_of
 
 from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import SIDES
+from tests.support.xr.person import Person, pose_of
 
 BEFORE = 0.03  # metres from the panel, where a finger is close and does not press
 CARRIES, FREE = (-0.05, 1.2, -0.45), (0.25, 1.25, -0.25)  # metres of the room

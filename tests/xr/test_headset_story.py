@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from person import Person, place
 from test_headset_panel import CARRIES, FREE, direction, in_front, open_panel
 from test_headset_touch import CUBE_TOP_M, events, heading_deg
-from xr_stand import Stand
 
 from shapeshift.scene.pose import Pose
+from tests.support.xr.person import Person, place
+from tests.support.xr.xr_stand import Stand
 
 NO_HEADSET = 4  # exit code
 

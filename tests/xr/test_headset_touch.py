@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from person import place, pose_of
+
+from tests.support.xr.person import place, pose_of
 
 CUBE_TOP_M, RING_TOP_M = 0.05, 0.03  # above their middles
 HOLD_LAG_M = 0.005  # of what is held behind its hand, at rest

@@ -12,7 +12,7 @@ from PIL import Image
 
 from shapeshift.app.headset.mirror import SIZE
 
-PROGRAM = Path(__file__).with_name("look_at_mirror.py")
+PROGRAM = Path(__file__).resolve().parents[1] / "support" / "xr" / "look_at_mirror.py"
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.vr.openxr.spaces import EYE_HEIGHT_M, KINDS
 
-PROGRAM = Path(__file__).with_name("tell_room.py")
+PROGRAM = Path(__file__).resolve().parents[1] / "support" / "xr" / "tell_room.py"
 STANDS_M = 1.6  # where Monado's remote head is until a script moves it, above STAGE's floor
 
 

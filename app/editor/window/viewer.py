@@ -72,7 +72,7 @@ class Viewer:
         self._pictures = folders.pictures
         self.hooks = Hooks()
         self.shell = Shell(window, self.settings, state.messages, time.perf_counter)
-        self._polling = False  # a hook waits for something that is under way
+        self.polling = False  # a hook waits for something that is under way
         names = describe(window.ctx) | renderer.backends
         self.readings = FrameStatsView(
             machine={key.replace("_", " "): str(v) for key, v in names.items()},
@@ -184,9 +184,9 @@ class Viewer:
     def loop(self) -> None:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
         last = time.perf_counter()
-        while not (self.window.closing and self._may_close()):
-            busy = self._busy()
-            redraw = self.window.wait(0.0 if busy else POLL_S if self._polling else SLEEP_S)
+        while not (self.window.closing and self.may_close()):
+            busy = self.busy()
+            redraw = self.window.wait(0.0 if busy else POLL_S if self.polling else SLEEP_S)
             now = time.perf_counter()
             if self.window.minimised:
                 last = now
@@ -194,13 +194,13 @@ class Viewer:
                 continue
             seconds = min(now - last, LONGEST_STEP_S) if busy else 0.0
             last = now
-            due = self.state.messages.ended(now) or self._idle_work_due(now)
-            if busy or redraw or self._polling or due:
+            due = self.state.messages.ended(now) or self.idle_work_due(now)
+            if busy or redraw or self.polling or due:
                 self.frame(seconds)
             if self.options.screenshot and self._last_frame:
                 return
 
-    def _may_close(self) -> bool:
+    def may_close(self) -> bool:
         """Whether nothing would be lost; else the window stays, and a box asks."""
         may = all([asked() for asked in self.hooks.closing])
         if not may:
@@ -219,13 +219,13 @@ class Viewer:
             viewpoint.leave_camera()
         viewpoint.camera.step(seconds, pushed)
         viewpoint.steps.advance(seconds)
-        self._polling = any([work() for work in self.hooks.each_frame])
+        self.polling = any([work() for work in self.hooks.each_frame])
         self.set_title()
         viewpoint.follow_overlay(seconds)
         self._turn_dial()
-        fresh = self._draw_splats()
+        fresh = self.draw_splats()
         drawn = time.perf_counter()
-        self._draw_overlay()
+        self.draw_overlay()
         self.window.end_frame()
         self._overlay_ms = (time.perf_counter() - drawn) * 1e3
         self.frames += 1
@@ -246,7 +246,7 @@ class Viewer:
         """Opens files and folders, scenes or cameras, while the window goes on."""
         self.files.open_soon(paths)
 
-    def _busy(self) -> bool:
+    def busy(self) -> bool:
         """Whether the next frame is due without waiting for input."""
         waiting = self.options.screenshot is not None
         measuring = self.dial.wanted or self.dial.measuring
@@ -285,7 +285,7 @@ class Viewer:
         living = state.world is not None and state.running and not state.world.resting
         return by_hand or state.playing or living
 
-    def _idle_work_due(self, now: float) -> bool:
+    def idle_work_due(self, now: float) -> bool:
         """Whether the picture has rested so long that its error is to be measured."""
         return self.shown.due(self._request(), now)
 
@@ -301,7 +301,7 @@ class Viewer:
             if dial.step():
                 state.settings = dial.applied(state.settings)
 
-    def _draw_splats(self) -> bool:
+    def draw_splats(self) -> bool:
         """Draws the scene into the window; True when the splats had to be drawn anew."""
         request, now = self._request(), time.perf_counter()
         if self.state.measure_now or self.shown.due(request, now):
@@ -316,7 +316,7 @@ class Viewer:
         self.shown.read(request, now)
         return fresh
 
-    def _draw_overlay(self) -> None:
+    def draw_overlay(self) -> None:
         scale, state, layout = self.window.ui_scale, self.state, self.layout
         self.readings.flying = self.viewpoint.camera.flying
         covered = []
@@ -374,7 +374,7 @@ class Viewer:
     def _last_frame(self) -> bool:
         """Whether a --screenshot is due: enough frames, the budget has chosen, all is read."""
         measuring = self.dial.wanted or self.dial.measuring
-        return self.frames >= self.options.frames and not measuring and not self._polling
+        return self.frames >= self.options.frames and not measuring and not self.polling
 
     def _save_pictures(self) -> None:
         """Writes the picture that a key or --screenshot asked for, of what is on the screen."""

@@ -109,7 +109,7 @@ class Window:
 
     def __init__(self, title: str, size: tuple[int, int], text_size: float | None = None) -> None:
         self._window = _open(title, size)
-        self._handle = self._window._window  # moderngl-window keeps glfw's own handle private
+        self.handle = self._window._window  # glfw's own, private in moderngl-window
         self._window.exit_key = None  # Escape belongs to the overlay
         self.ctx: moderngl.Context = self._window.ctx
         clean_texts()
@@ -121,7 +121,7 @@ class Window:
         self._restyle = False  # the next frame's type has another size
         self._overlay = ModernGLRenderer(wnd=None, ctx=self.ctx, display_size=self.logical_size)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
-        self._popup = False  # a list or a box is open, and the next click is for it
+        self.popup_open = False  # a list or a box is open, and the next click is for it
         self._raw: list[Event] = []
         self._chorded: set[int] = set()  # keys that are down for a shortcut, not for moving
         self._pressed: str | None = None  # the button whose drag the scene owns
@@ -153,7 +153,7 @@ class Window:
     @property
     def _desktop_scale(self) -> float:
         """What is set for the monitor; where input is in finer units already (macOS), 1."""
-        content = glfw.get_window_content_scale(self._handle)[0]
+        content = glfw.get_window_content_scale(self.handle)[0]
         return max(1.0, content / self._window.pixel_ratio)
 
     @property
@@ -169,7 +169,7 @@ class Window:
 
     def _size_for_monitor(self) -> float:
         """What the monitor under the window asks for, where nobody has chosen a size."""
-        high_px, high_mm = monitor_height(self._handle)
+        high_px, high_mm = monitor_height(self.handle)
         return default_text_size(high_px / self._window.pixel_ratio, high_mm, self._desktop_scale)
 
     @property
@@ -179,7 +179,7 @@ class Window:
 
     def grow_with_text(self) -> None:
         """A window as much larger as its text is, in the middle of its monitor."""
-        grow_window(self._handle, self.text_size)
+        grow_window(self.handle, self.text_size)
 
     @property
     def closing(self) -> bool:
@@ -187,7 +187,7 @@ class Window:
 
     @property
     def minimised(self) -> bool:
-        return 0 in self.size or bool(glfw.get_window_attrib(self._handle, glfw.ICONIFIED))
+        return 0 in self.size or bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
 
     def close(self) -> None:
         self._window.is_closing = True
@@ -206,13 +206,18 @@ class Window:
         """Whether the mouse is over the picture rather than over the overlay."""
         return not self._over_overlay(*self._cursor)
 
+    @property
+    def title(self) -> str:
+        """What stands in its bar."""
+        return self._window.title
+
     def set_title(self, title: str) -> None:
         self._window.title = one_line(title)
 
     def held(self, key: int) -> bool:
         """Whether a key is down right now and not typed into the overlay."""
         busy = imgui.get_io().want_text_input or key in self._chorded
-        return not busy and glfw.get_key(self._handle, key) == glfw.PRESS
+        return not busy and glfw.get_key(self.handle, key) == glfw.PRESS
 
     def wait(self, seconds: float) -> bool:
         """Takes input, sleeping up to that long for it; True when the overlay must be redrawn."""
@@ -240,18 +245,18 @@ class Window:
         io.delta_time = max(now - self._clock, 1e-4)
         self._clock = now
         for modifier, keys in MODIFIERS.items():
-            down = any(glfw.get_key(self._handle, key) == glfw.PRESS for key in keys)
+            down = any(glfw.get_key(self.handle, key) == glfw.PRESS for key in keys)
             io.add_key_event(modifier, down)
         self._unsettled = max(self._unsettled - 1, 0)
         imgui.new_frame()
-        if self._popup and imgui.is_key_pressed(imgui.Key.escape, False):
+        if self.popup_open and imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.internal.close_popups_except_modals()  # ImGui does so by its own keys alone
         events, self._raw = self._raw, []
         return events
 
     def end_frame(self) -> None:
         """Draws the overlay over whatever the scene has drawn into `screen()`."""
-        self._popup = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+        self.popup_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
         imgui.render()
         self.screen().use()
         self._overlay.render(imgui.get_draw_data())
@@ -262,7 +267,7 @@ class Window:
         return self.ctx.screen
 
     def swap(self) -> None:
-        glfw.swap_buffers(self._handle)
+        glfw.swap_buffers(self.handle)
 
     def picture(self) -> np.ndarray:
         """(H, W, 3) uint8 of all that has been drawn and not yet swapped, row 0 on top."""
@@ -272,14 +277,14 @@ class Window:
 
     def _listen(self) -> None:
         """Registers the callbacks; each only notes what happened."""
-        handle = self._handle
-        glfw.set_key_callback(handle, self._on_key)
-        glfw.set_char_callback(handle, self._on_char)
-        glfw.set_cursor_pos_callback(handle, self._on_cursor)
-        glfw.set_mouse_button_callback(handle, self._on_button)
-        glfw.set_scroll_callback(handle, self._on_scroll)
+        handle = self.handle
+        glfw.set_key_callback(handle, self.on_key)
+        glfw.set_char_callback(handle, self.on_char)
+        glfw.set_cursor_pos_callback(handle, self.on_cursor)
+        glfw.set_mouse_button_callback(handle, self.on_button)
+        glfw.set_scroll_callback(handle, self.on_scroll)
         # The annotations of glfw say (window, int, str); what comes is (window, list of paths).
-        glfw.set_drop_callback(handle, self._on_drop)  # type: ignore[arg-type]
+        glfw.set_drop_callback(handle, self.on_drop)  # type: ignore[arg-type]
         glfw.set_window_refresh_callback(handle, lambda _: self._note())
         glfw.set_framebuffer_size_callback(handle, lambda *_: self._note())
         glfw.set_window_content_scale_callback(handle, self._on_content_scale)
@@ -289,7 +294,7 @@ class Window:
         if event is not None:
             self._raw.append(event)
 
-    def _on_key(self, handle, key: int, scancode: int, action: int, mods: int) -> None:
+    def on_key(self, handle, key: int, scancode: int, action: int, mods: int) -> None:
         io = imgui.get_io()
         self._note()
         if key in TEXT_KEYS:
@@ -302,7 +307,7 @@ class Window:
             return
         if key == glfw.KEY_F11:
             self._window.fullscreen = not self._window.fullscreen
-        if key == glfw.KEY_ESCAPE and self._popup:
+        if key == glfw.KEY_ESCAPE and self.popup_open:
             return  # for what is open
         shortcut = self._shortcut(key, scancode, mods)
         if shortcut:
@@ -317,18 +322,18 @@ class Window:
         with_ctrl = mods & (glfw.MOD_CONTROL | glfw.MOD_SUPER)
         return letter if with_ctrl and letter in SHORTCUTS and not moving else ""
 
-    def _on_char(self, handle, codepoint: int) -> None:
+    def on_char(self, handle, codepoint: int) -> None:
         imgui.get_io().add_input_character(codepoint)
         self._note()
 
-    def _on_cursor(self, handle, x: float, y: float) -> None:
+    def on_cursor(self, handle, x: float, y: float) -> None:
         imgui.get_io().add_mouse_pos_event(x, y)
         dx, dy = x - self._cursor[0], y - self._cursor[1]
         self._cursor = (x, y)
         self._look_again = glfw.get_time() + HOVER_S
         self._note(Drag(self._pressed, dx, dy, x, y) if self._pressed else None)
 
-    def _on_button(self, handle, button: int, action: int, mods: int) -> None:
+    def on_button(self, handle, button: int, action: int, mods: int) -> None:
         if button not in BUTTONS:
             return
         io = imgui.get_io()
@@ -355,7 +360,7 @@ class Window:
                 now = -1.0  # a third click starts anew
             self._last_click = (x, y, now)
 
-    def _on_scroll(self, handle, dx: float, dy: float) -> None:
+    def on_scroll(self, handle, dx: float, dy: float) -> None:
         imgui.get_io().add_mouse_wheel_event(dx, dy)
         self._note(None if self._over_overlay(*self._cursor) else Wheel(dy))
 
@@ -365,7 +370,7 @@ class Window:
         self._restyle = True
         self._note()
 
-    def _on_drop(self, handle, paths: list[str]) -> None:
+    def on_drop(self, handle, paths: list[str]) -> None:
         self._note(Drop(tuple(map(plain, paths))))
 
     def _over_overlay(self, x: float, y: float) -> bool:
@@ -375,7 +380,7 @@ class Window:
         was then, which may be 100 ms ago where there is no GPU.
         """
         inside = (left <= x < right and top <= y < low for left, top, right, low in self.covered)
-        return self._popup or any(inside)
+        return self.popup_open or any(inside)
 
 
 def _open(title: str, size: tuple[int, int]) -> GlfwWindow:

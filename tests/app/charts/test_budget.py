@@ -24,8 +24,8 @@ from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
-from tests.app.test_cli import assert_refused, launch
 from tests.support.models import make_random_model, random_package
+from tests.support.program import assert_refused, launch
 
 EXACT = BudgetRow("exact", RenderSettings(), 20.0, 200.0)
 

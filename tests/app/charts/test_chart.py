@@ -30,8 +30,8 @@ from shapeshift.app.document import Document
 from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.cameras.framing import frame_points, model_points
-from tests.app.test_cli import assert_refused, launch
 from tests.support.models import make_random_model, random_package
+from tests.support.program import assert_refused, launch
 
 NUMBER = st.one_of(st.integers(0, 4).map(float), st.floats())
 

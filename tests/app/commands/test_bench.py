@@ -15,8 +15,8 @@ from shapeshift.renderer.settings import FrameStats, RenderSettings
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.scene.metrics import psnr
-from tests.app.test_cli import assert_refused, launch
 from tests.support.models import make_random_model
+from tests.support.program import assert_refused, launch
 
 
 class Clock:

@@ -12,7 +12,7 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.colliders.collider_pieces import read_pieces
 from shapeshift.scene.document.read_scene_file import read_scene_file
-from tests.support.collider_shapes import shapes, splatted
+from tests.support.scene.collider_shapes import shapes, splatted
 
 
 @pytest.fixture

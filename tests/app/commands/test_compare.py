@@ -25,7 +25,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.metrics import psnr, ssim
-from tests.runtime_models.splats.layers.test_output_folder import put, splats
+from tests.support.splats.layer_folders import put, splats
 
 SMALL = "64x48"
 

@@ -16,9 +16,9 @@ from shapeshift.runtime_models.splats.gltf.read_gltf import read_raw_gltf
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.runtime_models.splats.test_gltf import plain_splats
 from tests.support.models import make_random_model
-from tests.support.writers import EACH_WRITER
+from tests.support.splats.gltf_files import plain_splats
+from tests.support.splats.writers import EACH_WRITER
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import pytest
 
 from shapeshift.app.commands.lint import Options, run, summary
 from shapeshift.runtime_models.model import BadFile
-from tests.app.test_cli import assert_refused, launch
-from tests.support.ply_files import names_of, random_rows, write_rows
+from tests.support.program import assert_refused, launch
+from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
 KEYS = {"file", "refused", "format", "splats", "sh_degree", "bytes", "extent_m", "origin_m",
         "splats_over_a_pixel", "findings"}  # fmt: skip
@@ -114,7 +114,7 @@ def test_packages_folders_and_anchors(data, capsys):
 
 
 def test_scaffold_folders(tmp_path, capsys):
-    from tests.support.scaffold_scenes import random_raw, write_run
+    from tests.support.splats.scaffold_scenes import random_raw, write_run
 
     assert run(Options(write_run(random_raw(), tmp_path), json=True)) == 0
     assert json.loads(capsys.readouterr().out)["format"].startswith("Scaffold")

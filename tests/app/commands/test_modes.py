@@ -11,8 +11,8 @@ from PIL import Image
 
 from shapeshift.app.commands.bench import command_line
 from shapeshift.scene.pose import look_at
-from tests.app.test_cli import assert_refused, launch
 from tests.support.models import random_package
+from tests.support.program import assert_refused, launch
 
 ROOT = Path(__file__).resolve().parents[3]
 BENCH_KEYS = {

@@ -25,7 +25,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import first_view, read_models, scene_of
-from tests.runtime_models.splats.test_gltf import plain_splats
+from tests.support.splats.gltf_files import plain_splats
 
 SCENE = Path(__file__).resolve().parents[3] / "assets" / "touch.scene.json"
 SIZE = (96, 54)

@@ -18,9 +18,9 @@ from shapeshift.app.stability_cases.table import CASES, COLUMNS, open_table
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import Pace
-from tests.app.test_cli import assert_refused, launch
+from tests.support.program import assert_refused, launch
+from tests.support.renderer.stability_stage import SIZE, failures, make_stage
 from tests.support.splat_scenes import random_layers
-from tests.support.stability_stage import SIZE, failures, make_stage
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -13,8 +13,8 @@ from shapeshift.app.errors import UsageError
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.runtime_models.splats.test_gltf import plain_splats
 from tests.support.models import make_random_model
+from tests.support.splats.gltf_files import plain_splats
 
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 0.4, "thermal"), Stop("Opened", 1.0))
 TINY = ("--size", "24x16")

@@ -34,7 +34,7 @@ from shapeshift.vr.panel.panel_state import (
 )
 from shapeshift.vr.touching import Touched
 from tests.support.splat_scenes import random_layers
-from tests.support.vr_hands import HEAD, OPEN, a_frame, hand_at
+from tests.support.vr.vr_hands import HEAD, OPEN, a_frame, hand_at
 
 LEFT = hand_at((-0.15, 1.15, -0.45))
 HEAT = (Stop("seen", 0.0), Stop("half", 0.5), Stop("heat", 1.0, "thermal", "ironbow", (0, 9), "K"))

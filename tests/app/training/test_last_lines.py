@@ -9,8 +9,9 @@ import pytest
 from shapeshift.app import cli, program
 from shapeshift.app.paths import full
 from shapeshift.app.training.train import FEW_STEPS, Options, what_next
-from tests.conftest import ROOT
 from tests.support.models import random_package
+
+ROOT = Path(__file__).resolve().parents[3]
 
 SMALL = ("--size", "16x12", "--drawing", "tiles", "--context", "none")
 VIEW = '[{"matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], "fov_y": 0.8}]'

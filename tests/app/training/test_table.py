@@ -27,7 +27,7 @@ from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.training.test_vgg_distance import write_small
+from tests.support.training.vgg_files import write_small
 
 SMALL = {"max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
 
@@ -264,8 +264,8 @@ def test_ctrl_c_keeps_what_was_trained(balls, tmp_path, monkeypatch, capsys, kin
 
 
 def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
-    """docs/bench/baselines.py at its smallest: budgets, sizes, and nothing is run twice."""
-    path = Path(__file__).resolve().parents[3] / "docs" / "bench" / "baselines.py"
+    """tools/training/baselines.py at its smallest: budgets, sizes, and nothing is run twice."""
+    path = Path(__file__).resolve().parents[3] / "tools" / "training" / "baselines.py"
     spec = importlib.util.spec_from_file_location("baselines", path)
     program = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(program)
@@ -277,7 +277,9 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["baselines.py", *words])
     assert program.main() == 0
     lines = (tmp_path / "rows.csv").read_text().splitlines()
-    assert lines[0].startswith(f"# python3 docs/bench/baselines.py {balls.folder.name} --seconds")
+    assert lines[0].startswith(
+        f"# python3 tools/training/baselines.py {balls.folder.name} --seconds"
+    )
     rows = list(csv.DictReader(lines[2:]))
     assert len(rows) == 4 * 3 + 3 * 3 and {row["size"] for row in rows} == {"1.0", "0.02"}
     assert program.main() == 0

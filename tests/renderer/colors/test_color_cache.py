@@ -59,13 +59,13 @@ def test_what_is_skipped_is_never_seen(renderer):
 
 def decoded(renderer, monkeypatch) -> list[int]:
     """How many anchors each call of decode_color was asked for; filled while frames are drawn."""
-    asked, whole = [], renderer._drawing.decode_color
+    asked, whole = [], renderer.drawing.decode_color
 
     def count(i, shade, eye, seen=None, at_once=False):
         asked.append(-1 if seen is None else int(np.count_nonzero(seen)))
         whole(i, shade, eye, seen, at_once)
 
-    monkeypatch.setattr(renderer._drawing, "decode_color", count)
+    monkeypatch.setattr(renderer.drawing, "decode_color", count)
     return asked
 
 
@@ -128,7 +128,7 @@ def test_visible_anchors_hold_every_drawn_splat(renderer):
     """Against what projection draws, anchor by anchor, from many places and with wide splats."""
     model = random_model(500, seed=3)
     rng = np.random.default_rng(0)
-    drawing, left_out = renderer._drawing, {False: 0, True: 0}
+    drawing, left_out = renderer.drawing, {False: 0, True: 0}
     for number in range(60):
         eye = rng.normal(size=3) * 1.5
         tangents = np.array([-1, 1, -1, 1]) * rng.uniform(0.05, 1.5, 4)

@@ -32,27 +32,11 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.stop_weights import StopWeights
 from shapeshift.scene.scene import Scene, SceneObject
-from shapeshift.scene.selectors.selector import Painted, Sphere
+from shapeshift.scene.selectors.selector import Painted
 from shapeshift.training.drawing import camera_of
-from tests.support.models import make_random_model, without_control
-from tests.support.rasterizer_scenes import device
+from tests.support.renderer.heat_scenes import BEHIND, CASES, STOPS, VIEW, decoded, model, scene_of
+from tests.support.renderer.rasterizer_scenes import device
 from tests.support.splat_scenes import front_view, psnr_db, random_layers
-
-VIEW = front_view((96, 72), distance=3.0)
-STOPS = (
-    Stop("RGB", 0.0), Stop("Hot", 0.5, "thermal", "ironbow"), Stop("Open", 0.8),
-    Stop("Hotter", 1.0, "thermal", "turbo"),
-)  # fmt: skip
-BEHIND = (0.2, 0.1, 0.05)
-
-
-def model(count: int = 60, *names: str, **changes):
-    """Of networks; those named do not see the control."""
-    return replace(without_control(make_random_model(count, k=3), *names), stops=STOPS, **changes)
-
-
-def scene_of(model, **changes) -> Scene:
-    return Scene((SceneObject("thing", model, **changes),))
 
 
 def shown(renderer: Renderer, scene: Scene, view=VIEW) -> np.ndarray:
@@ -129,12 +113,6 @@ def test_layers_are_heat_where_their_stop_is():
 # The passes.
 
 
-def decoded(count: int, seed: int = 0) -> np.ndarray:
-    color = np.random.default_rng(seed).uniform(-0.1, 1.3, (count, 3))
-    color[0, 1] = np.nan
-    return color.astype(np.float32)
-
-
 @pytest.mark.parametrize("at_once", [False, True])
 @pytest.mark.parametrize(("anchors", "k"), [(1, 1), (63, 1), (64, 1), (65, 3), (300, 10)])
 def test_the_passes_are_their_slow_twins(anchors, k, at_once):
@@ -199,19 +177,6 @@ def test_heat_is_blended_as_colours_are(form, views):
 # The pictures.
 
 
-CASES = {
-    "a way": {"x": 0.2}, "near its end": {"x": 0.49}, "two palettes": {"x": 0.9},
-    "three stops": {"x": StopWeights((("RGB", 0.3), ("Hot", 0.3), ("Open", 0.4)))},
-    "three stops, two palettes": {
-        "x": StopWeights((("RGB", 0.3), ("Hot", 0.3), ("Hotter", 0.4))),
-    },
-    "a region": {"selectors": (Sphere(centre=(0, 0, 0), radius=0.5, border=0.3, x=0.5),)},
-    "a region of two": {
-        "x": 0.5, "selectors": (Sphere(centre=(0, 0, 0), radius=0.5, border=0.3, x=1.0),),
-    },
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_the_picture_is_the_oracles(renderer, case):
     scene = scene_of(model(), **CASES[case])
@@ -270,7 +235,7 @@ def test_a_pure_thermal_stop_is_the_palette_over_the_picture_of_values(renderer)
 def test_a_slider_that_moves_before_a_still_eye_decodes_colours_once(renderer):
     made = model()
     shown(renderer, scene_of(made, x=0.1))
-    memory = renderer._drawing._slots[0].colors
+    memory = renderer.drawing._slots[0].colors
     kept = {part: entry.colors for part, entry in memory._parts.items()}
     assert sorted(kept) == [(0, 0), (0, 1)]
     for x in (0.2, 0.35, 0.49):
@@ -281,7 +246,7 @@ def test_a_slider_that_moves_before_a_still_eye_decodes_colours_once(renderer):
     shown(renderer, Scene(()))
     np.testing.assert_array_equal(shown(renderer, scene_of(made, x=0.35)), picture)
     shown(renderer, scene_of(made, x=0.8))
-    assert sorted(renderer._drawing._slots[0].colors._parts) == [(0, 0)]
+    assert sorted(renderer.drawing._slots[0].colors._parts) == [(0, 0)]
 
 
 def test_colours_that_are_no_numbers_are_culled_and_no_pixel_is(renderer):

@@ -13,7 +13,7 @@ from shapeshift.renderer.debug.classify import classify
 from shapeshift.renderer.reference.reference import reference_image, reference_reasons
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at, perspective
-from tests.support.frames import draw
+from tests.support.renderer.frames import draw
 from tests.support.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model
 
 SIZE = (256, 128)
@@ -194,7 +194,7 @@ def test_the_debug_view_s_reasons_are_the_reference_s(renderer, name, settings):
     scene, view = alone(around_the_eye(3000)), wide()
     view = part_of(view, name) if name else view
     draw(renderer, scene, [view])
-    reason, _, _ = classify(renderer._drawing.splat_points(), np.eye(4)[None], view, settings)
+    reason, _, _ = classify(renderer.drawing.splat_points(), np.eye(4)[None], view, settings)
     assert np.count_nonzero(reason != reference_reasons(scene, view, settings)) <= 1
 
 

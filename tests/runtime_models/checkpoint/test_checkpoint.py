@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tests.support.torch_files as torch_files
+import tests.support.splats.torch_files as torch_files
 from shapeshift.runtime_models.checkpoint.read_checkpoint import read_raw_checkpoint
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from tests.support.ply_files import write_rows
+from tests.support.splats.ply_files import write_rows
 
 TORCH = Path(__file__).parents[2] / "fixtures" / "torch_2_15"
 SAVED = np.load(TORCH / "ckpt_splats.npz")

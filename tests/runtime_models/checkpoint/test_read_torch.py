@@ -15,8 +15,8 @@ from shapeshift.runtime_models.checkpoint.read_torch import (
 )
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.scaffold.scaffold_networks import ACTIVATIONS, STEMS, mlp_of
-from tests.support import torch_files as made
 from tests.support.models import run_in_numpy
+from tests.support.splats import torch_files as made
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "torch_2_15"
 OLDER = FIXTURES.with_name("torch_1_12")  # what Scaffold-GS asks for

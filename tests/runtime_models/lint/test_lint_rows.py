@@ -1,7 +1,6 @@
 """What is done with single splats, against the rules in words, one row and one number at a time."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
-from tests.support.ply_files import some_splats
+from tests.support.splats.lint_scenes import copied, raw_splats
 
 LARGEST = float(np.finfo(np.float32).max)
 LONGEST_LOG = float(np.log(np.float64(LARGEST)))  # exp of the next float32 is Inf
@@ -18,17 +17,6 @@ POISON = (
     math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, -1.0, 1e-45, -1e-45, 1e-38, 79.9, 80.0, 80.1,
     88.7, 88.8, -103.0, -104.0, 1e15, 1e16, 1e-15, 1e-16, 1e30, LARGEST, -LARGEST, 1.0000001,
 )  # fmt: skip
-
-
-def raw_splats(count: int, coefficients: int = 4, seed: int = 0, **coding) -> RawSplats:
-    """In our axes, so that a test reads its own numbers again."""
-    plain = some_splats(count, coefficients, seed)
-    arrays = [plain.means, plain.scales, plain.wxyz * 3, plain.opacity, plain.sh]
-    if coding.get("logits", True):
-        arrays[3] = 8 * plain.opacity - 4
-    if coding.get("log_scales", True):
-        arrays[1] = np.log(plain.scales)
-    return RawSplats(*(a.copy() for a in arrays), file="a.ply", format="ply", up="+Y", **coding)
 
 
 def said(raw: RawSplats, i: int) -> dict:
@@ -79,11 +67,6 @@ def said(raw: RawSplats, i: int) -> dict:
             what.append("an opacity outside 0..1")
         shown = min(max(opacity, 0.0), 1.0)
     return {"what": what, "scales": sigma, "opacity": shown if any(sigma) else 0.0}
-
-
-def copied(raw: RawSplats) -> RawSplats:
-    names = ("means", "scales", "wxyz", "opacity", "sh")
-    return replace(raw, **{name: getattr(raw, name).copy() for name in names})
 
 
 @pytest.mark.parametrize("coding", [(True, True), (False, False), (True, False), (False, True)])

@@ -16,7 +16,7 @@ from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import read_plain, read_raw
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, RawSplats, Reading
-from tests.runtime_models.lint.test_lint_rows import copied, raw_splats
+from tests.support.splats.lint_scenes import cloud, copied, ours
 
 FIXTURES = (
     ("anatomy_leg_ml3dgs", "layer*.ply", 3),
@@ -27,16 +27,6 @@ FIXTURES = (
     ("splats_playcanvas", "playcanvas-logo", 1),
     ("splats_playcanvas/playbot", "[1-6]_0", 6),
 )
-
-
-def cloud(count: int, sigma: float, extent: float = 3.0, seed: int = 0) -> RawSplats:
-    """A scene as trainers make them: spread over `extent`, sizes about sigma, logs and logits."""
-    rng = np.random.default_rng(seed)
-    raw = raw_splats(count, 1, seed)
-    raw.means[:] = rng.uniform(-extent / 2, extent / 2, (count, 3))
-    raw.scales[:] = np.log(sigma) + rng.normal(0, 0.7, (count, 3))
-    raw.opacity[:] = rng.normal(1, 3, count)
-    return raw
 
 
 def uncoded(raw: RawSplats, scales: bool, opacity: bool) -> RawSplats:
@@ -51,11 +41,6 @@ def uncoded(raw: RawSplats, scales: bool, opacity: bool) -> RawSplats:
 
 def fill_of(plain: PlainSplats | SplatLayers) -> float:
     return fill_ratio(sample_of(plain.means, plain.scales, plain.opacity))
-
-
-def ours(raw: RawSplats) -> PlainSplats:
-    """Judged, whatever it fills."""
-    return judge(copied(raw), Reading(allow_huge=True))
 
 
 @pytest.mark.parametrize("scales, opacity", [(True, False), (False, True), (True, True)])

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
-from shapeshift.runtime_models.model import AnchorFrames, AnchorModel, BadFile
+from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.package.drop_unused import compact
 from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST
@@ -17,19 +17,9 @@ from shapeshift.runtime_models.package.read_package import read_files, read_pack
 from shapeshift.runtime_models.package.write_package import package_files, write_package
 from shapeshift.runtime_models.read_scene import describe
 from shapeshift.runtime_models.rotation import product
-from tests.support.models import make_random_model, without_control
+from tests.support.models import make_random_model, with_frames, without_control
 
-RNG = np.random.default_rng
 EYE = np.array([0.3, -0.2, 2.0])
-
-
-def with_frames(model: AnchorModel, seed: int = 0) -> AnchorModel:
-    """The model with random axes and sizes from a fifth to five times."""
-    rng, count = RNG(seed), len(model.anchors)
-    wxyz = rng.normal(size=(count, 4))
-    wxyz /= np.linalg.norm(wxyz, axis=1, keepdims=True)
-    scales = np.exp(rng.uniform(-1.6, 1.6, (count, 3)))
-    return replace(model, frames=AnchorFrames(scales.astype(np.float32), wxyz.astype(np.float32)))
 
 
 def turned(wxyz: np.ndarray) -> Rotation:
@@ -55,7 +45,7 @@ def test_splats_are_those_of_the_networks_turned_by_scipy(k, x):
 
 
 def test_the_product_of_quaternions_is_that_of_scipy():
-    a, b = RNG(1).normal(size=(2, 50, 4))
+    a, b = np.random.default_rng(1).normal(size=(2, 50, 4))
     found = turned(product(a, b)).as_matrix()
     np.testing.assert_allclose(found, (turned(a) * turned(b)).as_matrix(), atol=1e-12)
 
@@ -129,7 +119,7 @@ def test_a_quaternion_of_no_length_turns_nothing():
 
 def test_what_nothing_shows_goes_with_its_frame():
     model = with_frames(make_random_model(40, k=2))
-    alive = RNG(2).random((40, 2)) < 0.4
+    alive = np.random.default_rng(2).random((40, 2)) < 0.4
     smaller, removed = compact(model, alive)
     kept = alive.any(axis=1)
     assert removed.anchors == (~kept).sum() > 0

@@ -16,7 +16,7 @@ from shapeshift.runtime_models.scaffold.evaluate_scaffold import drawn_anchors, 
 from shapeshift.runtime_models.scaffold.read_scaffold import read_scaffold
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from tests.support.scaffold_scenes import decode_by_hand, random_raw, write_cloud, write_run
+from tests.support.splats.scaffold_scenes import decode_by_hand, random_raw, write_cloud, write_run
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 VERSIONS = ("torch_1_12", "torch_2_15")

@@ -12,8 +12,8 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.scaffold.read_scaffold import is_scaffold
 from shapeshift.runtime_models.splats.plain_splats import Reading
-from tests.support.scaffold_scenes import random_raw, write_cloud, write_run
-from tests.support.torch_files import write_tensors
+from tests.support.splats.scaffold_scenes import random_raw, write_cloud, write_run
+from tests.support.splats.torch_files import write_tensors
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures"
 

@@ -84,7 +84,7 @@ def test_brush_s_own_test_scene_is_refused_by_name(data):
 
 def test_ply_of_splats_with_plain_colours(tmp_path):
     """red, green, blue in place of f_dc, as some converters write: no point cloud."""
-    from tests.support.ply_files import names_of, random_rows, write_rows
+    from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
     names = [n for n in names_of(1) if not n.startswith(("f_dc", "n"))]
     rows = random_rows(5, names)

@@ -14,23 +14,23 @@ from shapeshift.runtime_models.splats.formats import format_of, read_plain
 from shapeshift.runtime_models.splats.gltf.read_gltf import display_from_linear, read_raw_gltf
 from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, turn
-from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
-from tests.support.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
+from shapeshift.runtime_models.splats.plain_splats import Reading
+from tests.support.splats.gltf_files import (
+    P,
+    as_data_uri,
+    attributes_in,
+    glb,
+    make_asset,
+    plain_splats,
+    splat_arrays,
+    write_glb,
+)
 
 SIZES = (1, 2, 255, 256, 257)
 
 
 def raw(path):
     return read_raw_gltf(path, Reading())
-
-
-def plain_splats(count: int, degree: int = 3, seed: int = 0) -> PlainSplats:
-    arrays = splat_arrays(count, degree, seed)
-    sh = np.stack([a for name, a in arrays.items() if "SH_" in name], 1)
-    return PlainSplats(
-        arrays["POSITION"], arrays[P + "SCALE"], arrays[P + "ROTATION"],
-        arrays[P + "OPACITY"][:, 0], sh,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("degree", range(4))
@@ -296,28 +296,6 @@ def test_drafts_have_colour_and_opacity_in_color_0(tmp_path, prefix):
 
 
 # Third parties
-
-
-def attributes_in(path: Path) -> dict[str, np.ndarray]:
-    """The arrays of the only primitive by pygltflib's reading of offsets and counts."""
-    pygltflib = pytest.importorskip("pygltflib")
-    found = pygltflib.GLTF2().load(path)
-    blob, (primitive,) = found.binary_blob(), found.meshes[0].primitives
-    assert primitive.mode == pygltflib.POINTS
-    names = {name: i for name, i in vars(primitive.attributes).items() if i is not None}
-    arrays = {}
-    for name, index in names.items():
-        accessor = found.accessors[index]
-        view = found.bufferViews[accessor.bufferView]
-        kind = {pygltflib.FLOAT: "<f4", pygltflib.UNSIGNED_BYTE: "u1"}[accessor.componentType]
-        start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
-        assert start % 4 == 0
-        array = np.frombuffer(blob, kind, view.byteLength // np.dtype(kind).itemsize, start)
-        arrays[name] = array.reshape(accessor.count, -1)
-    box = found.accessors[names["POSITION"]]
-    assert box.min == arrays["POSITION"].min(0).tolist()
-    assert box.max == arrays["POSITION"].max(0).tolist()
-    return arrays
 
 
 def test_a_third_party_finds_our_numbers(tmp_path):

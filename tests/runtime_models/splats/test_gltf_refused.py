@@ -14,8 +14,15 @@ from shapeshift.runtime_models.splats.gltf.gltf_files import MOST_MARKS, parse_j
 from shapeshift.runtime_models.splats.gltf.read_gltf import read_raw_gltf
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
-from tests.runtime_models.splats.test_gltf import plain_splats
-from tests.support.gltf_files import P, as_data_uri, glb, make_asset, splat_arrays, write_glb
+from tests.support.splats.gltf_files import (
+    P,
+    as_data_uri,
+    glb,
+    make_asset,
+    plain_splats,
+    splat_arrays,
+    write_glb,
+)
 
 HUGE = 1 << 60
 ATTRIBUTES = "meshes.0.primitives.0.attributes."

@@ -9,7 +9,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.splats.read_ksplat import read_raw_ksplat
-from tests.support.ksplat_files import HandSection, ksplat
+from tests.support.splats.ksplat_files import HandSection, ksplat
 
 
 @pytest.fixture

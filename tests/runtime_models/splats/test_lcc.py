@@ -19,9 +19,9 @@ from shapeshift.runtime_models.splats.lcc.read_lcc import INDEX, find_meta, read
 from shapeshift.runtime_models.splats.lcc.read_lcc2 import read_meta as read_meta2
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
-from tests.support.fuzz_seeds import some_splats
-from tests.support.lcc_files import RANGES, put, random_rows, write_lcc, write_lcc2
-from tests.support.sog_scenes import random_sog, write_zip
+from tests.support.hostile.fuzz_seeds import some_splats
+from tests.support.splats.lcc_files import RANGES, put, random_rows, write_lcc, write_lcc2
+from tests.support.splats.sog_scenes import random_sog, write_zip
 
 HUGE = Reading(allow_huge=True)
 

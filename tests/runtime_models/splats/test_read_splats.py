@@ -16,7 +16,7 @@ from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.read_splat import ROW
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 

@@ -4,21 +4,16 @@ The third party is gaussforge, a C++ converter with readers of its own for each 
 (there pygltflib checks the numbers: test_gltf.py).  It hands over what it read as a plain PLY.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shapeshift.renderer.renderer import Renderer
-from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.write_plain import cut
-from shapeshift.scene.cameras.framing import frame_points, orbit_path
-from shapeshift.scene.metrics import psnr
-from shapeshift.scene.scene import Scene, SceneObject
-from tests.support.writers import EACH_WRITER
+from tests.support.splats.round_trips import compare, rows
+from tests.support.splats.writers import EACH_WRITER
 
 ALIKE = 50.0  # dB between our picture and theirs of one file
 COST = {  # dB at least
@@ -30,7 +25,6 @@ COST = {  # dB at least
     ".usdz": 140,
 }
 THEIRS = {".compressed.ply": "compressed.ply", ".ply": "ply", ".spz": "spz", ".splat": "splat"}
-SIZE = (240, 160)
 
 
 @pytest.fixture(scope="module")
@@ -54,30 +48,6 @@ def extremes() -> PlainSplats:
     means[::100] *= 3
     arrays = means, scales, wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True), opacity, sh
     return PlainSplats(*(array.astype(np.float32) for array in arrays))
-
-
-def rows(splats: PlainSplats, part: slice) -> PlainSplats:
-    names = ("means", "scales", "wxyz", "opacity", "sh")
-    return replace(splats, **{name: getattr(splats, name)[part].copy() for name in names}, extra={})
-
-
-def drawn(renderer: Renderer, splats: PlainSplats, views: list) -> list[np.ndarray]:
-    means = (splats.means + np.array(splats.origin)).astype(np.float32)
-    arrays = (means, splats.scales, splats.wxyz, splats.opacity, splats.sh)
-    model = SplatLayers(*arrays, np.zeros(len(means), np.int32), (Stop("only", 0.0),))
-    renderer.update(Scene((SceneObject("splats", model),)))
-    pictures = []
-    for view in views:
-        renderer.draw([view])
-        pictures.append(renderer.resolved(0).copy())
-    return pictures
-
-
-def compare(renderer: Renderer, one: PlainSplats, other: PlainSplats) -> float:
-    """The worst of three pictures from all around, dB."""
-    views = orbit_path(3, *frame_points(one.means, one.opacity), SIZE)
-    pairs = zip(drawn(renderer, one, views), drawn(renderer, other, views), strict=True)
-    return min(psnr(a, b) for a, b in pairs)
 
 
 def read_by_them(path: Path, ending: str, folder: Path) -> PlainSplats:

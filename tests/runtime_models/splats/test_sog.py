@@ -10,7 +10,7 @@ from shapeshift.runtime_models.read_scene import describe, is_package, read_mode
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.sog.read_sog import read_raw_sog
-from tests.support.sog_scenes import random_sog, splat_by_hand, write_folder, write_zip
+from tests.support.splats.sog_scenes import random_sog, splat_by_hand, write_folder, write_zip
 
 FIELDS = ("means", "scales", "wxyz", "opacity", "sh")
 

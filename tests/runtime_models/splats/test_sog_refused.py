@@ -15,7 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.sog.read_sog import read_raw_sog
-from tests.support.sog_scenes import random_sog, webp, write_folder, write_zip
+from tests.support.splats.sog_scenes import random_sog, webp, write_folder, write_zip
 
 
 def refused(path: Path, words: str, megabytes: float = 20) -> None:

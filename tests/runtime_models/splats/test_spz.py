@@ -18,7 +18,7 @@ from shapeshift.runtime_models.splats.spz.read_spz import read_spz_bytes
 from shapeshift.runtime_models.splats.spz.spz_file import is_spz
 from shapeshift.scene.pose import View, look_at
 from tests.support.splat_scenes import alone, psnr_db
-from tests.support.spz_files import legacy, modern, random_streams, splat_by_hand
+from tests.support.splats.spz_files import legacy, modern, random_streams, splat_by_hand
 
 BIKER = View(look_at((0.5, 1.2, -3), (0, 1.0, 0)), (-0.25, 0.25, -0.4, 0.4), 0.05, 50, (160, 256))
 

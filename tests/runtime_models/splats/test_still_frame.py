@@ -10,7 +10,7 @@ from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 from shapeshift.runtime_models.splats.still_frame import still
-from tests.support.ply_files import names_of, random_rows, write_rows
+from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
 MOVING = [
     "trbf_center", "trbf_scale", *(f"motion_{i}" for i in range(9)),

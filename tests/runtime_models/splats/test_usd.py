@@ -18,7 +18,7 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.usd import read_usd
 from shapeshift.runtime_models.splats.usd.write_usd import write_usd
 from shapeshift.runtime_models.splats.write_plain import writer_of
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 pytest.importorskip("pxr", reason="usd-core is not installed (an optional extra)")
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdVol, Vt

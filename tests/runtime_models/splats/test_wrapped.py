@@ -17,7 +17,7 @@ from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_comp
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 from shapeshift.runtime_models.splats.write_splat import write_splat
-from tests.support.fuzz_seeds import some_splats
+from tests.support.hostile.fuzz_seeds import some_splats
 
 WRITERS = {
     "a.ply": write_ply, "a.splat": write_splat, "a.spz": write_spz, "a.glb": write_gltf,

@@ -15,8 +15,8 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
-from tests.app.test_cli import launch
-from tests.support.frames import draw
+from tests.support.program import launch
+from tests.support.renderer.frames import draw
 from tests.support.splat_scenes import alone, front_view, random_layers, stereo_views
 
 WRITERS = {
@@ -98,7 +98,7 @@ def test_layers_have_the_bands_that_any_of_them_has(tmp_path):
 
 @pytest.mark.parametrize("kept", COEFFICIENTS[:3])
 def test_pictures_are_equal_to_the_last_bit(renderer, kept):
-    """Of both drawings (tests/gl), from one eye and from two: zeros add nothing."""
+    """Of both drawings (tests/renderer/gl), from one eye and from two: zeros add nothing."""
     splats = with_zero_bands(kept, 2000)
     layers = random_layers(2000, 6, 16)
     whole = replace(layers, sh=splats.sh)

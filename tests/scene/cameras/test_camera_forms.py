@@ -14,7 +14,7 @@ from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, move
 from shapeshift.scene.cameras.read_cameras import find_cameras, find_floor, read_camera_list
 from shapeshift.scene.cameras.write_cameras import FORMS, paths_of, write_cameras
 from shapeshift.scene.pose import View, look_at, perspective
-from tests.support.camera_files import HALF, NAMES, assert_same, cameras, target, views
+from tests.support.scene.camera_files import HALF, NAMES, assert_same, cameras, target, views
 
 
 @pytest.mark.parametrize("form", [form for form in FORMS if form not in ("nerfstudio", "vr")])

@@ -10,7 +10,7 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.read_cameras import read_camera_list
 from shapeshift.scene.cameras.write_cameras import FORMS, paths_of, write_cameras
-from tests.support.camera_files import cameras
+from tests.support.scene.camera_files import cameras
 
 TIMES = 150  # a form
 NUMBERS = [

@@ -9,7 +9,7 @@ import pytest
 
 from shapeshift.scene.cameras.camera_path import along, slerp
 from shapeshift.scene.cameras.read_cameras import read_camera_list
-from tests.support.camera_files import HALF, views
+from tests.support.scene.camera_files import HALF, views
 
 
 def key(matrix, **more) -> dict:

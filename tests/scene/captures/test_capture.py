@@ -18,7 +18,7 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import View, look_at
-from tests.support.captures import (
+from tests.support.scene.captures import (
     CLOUD,
     RANDOM,
     projected,

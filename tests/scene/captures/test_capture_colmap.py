@@ -1,47 +1,18 @@
 """COLMAP folders, text and binary, against COLMAP itself."""
 
 import json
-from pathlib import Path
 
 import numpy as np
-import pycolmap
 import pytest
 
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.read_capture import read_capture
-from tests.support.captures import (
+from tests.support.scene.captures import (
     CLOUD,
-    opencv_pose,
+    colmap_model,
     projected,
     save_image,
 )
-
-
-def colmap_model(folder: Path, text: bool, model="SIMPLE_PINHOLE", params=(20.0, 8.0, 6.0)):
-    """Four colour photos and three thermal ones of another size, posed apart from each other."""
-    model_folder = folder / "sparse" / "0"
-    model_folder.mkdir(parents=True)
-    out = pycolmap.Reconstruction()
-    sizes = {1: (16, 12), 2: (10, 8)}
-    kinds = {1: (model, params), 2: ("PINHOLE", (15.0, 14.0, 5.5, 4.0))}
-    for number, (kind, values) in kinds.items():
-        width, height = sizes[number]
-        camera = pycolmap.Camera(
-            model=kind, width=width, height=height, params=values, camera_id=number
-        )
-        out.add_camera_with_trivial_rig(camera)
-    names = [f"rgb/{i}.png" for i in range(4)] + [f"thermal/{i}.png" for i in range(3)]
-    for i, name in enumerate(names):
-        number = 1 if name.startswith("rgb") else 2
-        grey = number == 2
-        save_image(folder / "images" / name, sizes[number], i, "L" if grey else "RGB")
-        camera_from_world = pycolmap.Rigid3d(np.linalg.inv(opencv_pose(i))[:3])
-        image = pycolmap.Image(name=name, camera_id=number, image_id=i + 1)
-        out.add_image_with_trivial_frame(image, camera_from_world)
-    for xyz in CLOUD:
-        out.add_point3D(xyz, pycolmap.Track(), np.array([255, 128, 0], np.uint8))
-    (out.write_text if text else out.write_binary)(model_folder)
-    return out
 
 
 @pytest.mark.parametrize("text", [True, False])

@@ -6,7 +6,7 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_points import read_points
-from tests.support.captures import CLOUD, save_image, simple, write_transforms
+from tests.support.scene.captures import CLOUD, save_image, simple, write_transforms
 
 
 def spoil(change):

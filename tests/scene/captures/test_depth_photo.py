@@ -13,7 +13,7 @@ from shapeshift.scene.captures.depth_photo import load_depth, refuse_other_units
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.synthetic.balls import DEPTH_UNIT, make_balls
-from tests.support.captures import simple, write_transforms
+from tests.support.scene.captures import simple, write_transforms
 
 STEPS = np.array([[0, 1, 2, 1000], [65534, 65535, 7, 30000], [5, 5, 5, 5]], np.uint16)
 

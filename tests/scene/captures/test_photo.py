@@ -11,7 +11,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.photo import area_weights, load_photo
 from shapeshift.scene.pose import Pose, View
-from tests.support.captures import (
+from tests.support.scene.captures import (
     save_image,
 )
 

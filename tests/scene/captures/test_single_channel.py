@@ -17,7 +17,7 @@ from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.synthetic.balls import make_balls
-from tests.support.captures import simple, write_transforms
+from tests.support.scene.captures import simple, write_transforms
 
 KELVIN = 273.15
 HEAT = {"name": "Heat", "x": 1, "kind": "thermal", "palette": "ironbow",

@@ -24,7 +24,7 @@ from shapeshift.scene.captures.undistort import (
 )
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.photos import load_photos
-from tests.support.captures import simple, write_transforms
+from tests.support.scene.captures import simple, write_transforms
 
 SIZE = (200, 150)
 F, CENTRE = 160.0, (103.0, 72.0)

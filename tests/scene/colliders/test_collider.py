@@ -27,9 +27,9 @@ from shapeshift.scene.colliders.collider import (
 )
 from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_hulls
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
-from tests.support.collider_shapes import Cloud, distances, shapes, splatted
 from tests.support.models import make_random_model
-from tests.support.scaffold_scenes import random_raw, write_run
+from tests.support.scene.collider_shapes import Cloud, distances, shapes, splatted
+from tests.support.splats.scaffold_scenes import random_raw, write_run
 
 FRESH = Making(kept=False)
 

@@ -17,7 +17,7 @@ from shapeshift.scene.colliders.collider_cache import (
     unpack,
 )
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
-from tests.support.collider_shapes import shapes, splatted
+from tests.support.scene.collider_shapes import shapes, splatted
 
 KEY = "0123456789abcdef" * 4
 posix = pytest.mark.skipif(os.name == "nt", reason="links need rights on Windows")

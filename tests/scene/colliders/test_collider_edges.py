@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.colliders.collider_edges import edges_of, hull_edges, mesh_edges
-from tests.support.physics_things import box, cup
+from tests.support.scene.physics_things import box, cup
 
 
 def lengths(edges: np.ndarray) -> list[float]:

@@ -21,7 +21,7 @@ from shapeshift.scene.colliders.collider_wrap import volume
 from shapeshift.scene.colliders.stitch_mesh import is_watertight
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.document.read_scene_file import read_scene_file
-from tests.support.collider_shapes import shapes
+from tests.support.scene.collider_shapes import shapes
 
 ROOT = Path(__file__).resolve().parents[3]
 ASSETS = ROOT / "assets"

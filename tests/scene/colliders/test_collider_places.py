@@ -19,8 +19,8 @@ from shapeshift.scene.colliders.convex_parts import run_coacd
 from shapeshift.scene.colliders.stitch_mesh import is_watertight
 from shapeshift.scene.world.physics import Physics
 from shapeshift.scene.world.physics_rules import engine
-from tests.support.collider_shapes import Cloud, refined, splatted
-from tests.support.physics_things import at, box, run
+from tests.support.scene.collider_shapes import Cloud, refined, splatted
+from tests.support.scene.physics_things import at, box, run
 
 FRESH = Making(kept=False)
 ROOM = Making(kept=False, hollow=True, faces=10_000)

@@ -6,7 +6,7 @@ import pytest
 from shapeshift.scene.colliders.thicken import THICKNESS, thickened
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.world.physics import Physics
-from tests.support.physics_things import at, box, run, sheet
+from tests.support.scene.physics_things import at, box, run, sheet
 
 BOX_FACES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],

@@ -5,7 +5,7 @@ import pytest
 
 from shapeshift.scene.world.contacts import Touch, share_out
 from shapeshift.scene.world.physics import FLOOR, Physics
-from tests.support.physics_things import at, box, cup, run, table
+from tests.support.scene.physics_things import at, box, cup, run, table
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

@@ -13,7 +13,7 @@ from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.grab import hand_velocity, turn_between
 from shapeshift.scene.world.physics import FLOOR, Physics
-from tests.support.physics_things import at, box, cup, run, sheet, table
+from tests.support.scene.physics_things import at, box, cup, run, sheet, table
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.world.physics import FLOOR, Physics
-from tests.support.physics_things import PLATE, at, box, cup, lowest, run, sheet, table
+from tests.support.scene.physics_things import PLATE, at, box, cup, lowest, run, sheet, table
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 

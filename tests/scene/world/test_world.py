@@ -5,27 +5,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.document.scene_file import SceneFile
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import FLOOR_NAME, World
-from tests.scene.world.test_simulation import STATES, UP, Points, item, model, reaction
-from tests.support.physics_things import box
+from tests.support.scene.world_scenes import (
+    BOX,
+    HALF,
+    STATES,
+    Points,
+    at,
+    item,
+    model,
+    place,
+    reaction,
+    real,
+)
 
 pytest.importorskip("rapier3d")
-HALF = 0.05
-BOX = Collider((box(HALF, HALF, HALF),), box_around(box(HALF, HALF, HALF)))
-
-
-def at(*place: float, wxyz=UP) -> Pose:
-    return Pose(np.array(place, float), np.array(wxyz, float))
-
-
-def real(*items, floor_y: float | None = 0.0, **file) -> World:
-    """A world of boxes 10 cm wide with the engine in it."""
-    scene = SceneFile(folder=Path(), items=items, floor_y=floor_y, **file)
-    names = [thing.name for thing in scene.all_items]
-    return World(scene, dict.fromkeys(names, model()), dict.fromkeys(names, BOX))
 
 
 def thought(*items, **file) -> World:
@@ -33,10 +29,6 @@ def thought(*items, **file) -> World:
     scene = SceneFile(folder=Path(), items=items, **file)
     names = [thing.name for thing in scene.all_items]
     return World(scene, dict.fromkeys(names, model()), dict.fromkeys(names, BOX), Points())
-
-
-def place(world: World, name: str = "a") -> np.ndarray:
-    return world.things[name].pose.position
 
 
 # Hands

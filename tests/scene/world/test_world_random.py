@@ -9,8 +9,7 @@ import pytest
 from shapeshift.scene.document.scene_file import SceneFile
 from shapeshift.scene.world.follow import follow, put_back
 from shapeshift.scene.world.world import World
-from tests.scene.world.test_simulation import STATES, item, model, reaction
-from tests.scene.world.test_world import BOX, at, real
+from tests.support.scene.world_scenes import BOX, STATES, at, item, model, reaction, real
 
 pytest.importorskip("rapier3d")
 HANDS = ("left", "right", "mouse")

@@ -31,7 +31,7 @@ from shapeshift.training.baselines.plain_step import GROUPS
 from shapeshift.training.evaluation.evaluate import evaluate_model
 from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
 from shapeshift.training.synthetic.balls import STOPS, make_balls
-from tests.support.training_runs import run
+from tests.support.training.training_runs import run
 
 ROOT = Path(__file__).resolve().parents[3]
 SETTINGS = PlainSettings(iterations=100, splats=4000, max_splats=6000, grow_every=20, sh_degree=2)

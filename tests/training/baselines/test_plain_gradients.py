@@ -4,36 +4,16 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.reference import finite_differences
-from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.baselines.plain_reference import decode_plain_reference
 from shapeshift.training.baselines.plain_step import GROUPS, REST, PlainEvidence, PlainStep
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.reference import step_loss_reference
+from tests.support.training.plain_situations import SIZE, situation
 
-SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
 BACKGROUND = (0.2, 0.5, 0.9)
 SHARES = (0.2, 0.0, 0.0)
-
-
-def situation(seed: int, degree: int, count: int = 7):
-    """(parameters, view, rgba): a few large splats of strong harmonics, some colours below zero."""
-    rng = np.random.default_rng(seed)
-    parameters = {
-        "means": rng.uniform(-0.6, 0.6, (count, 3)),
-        "scales": np.log(rng.uniform(0.1, 0.3, (count, 3))),
-        "wxyz": rng.normal(size=(count, 4)),
-        "opacity": rng.normal(size=count),
-        "base": 2 * rng.normal(size=(count, 3)),
-        "rest": 0.6 * rng.normal(size=(count, REST[degree], 3)),
-    }
-    parameters = {name: values.astype(np.float32) for name, values in parameters.items()}
-    eye = look_at(np.array([0.5, 0.7, 3.0]), np.zeros(3))
-    view = View(eye, perspective(np.deg2rad(40), SIZE), 0.05, 100.0, SIZE)
-    rgba = rng.integers(0, 256, (SIZE[1], SIZE[0], 4)).astype(np.uint8)
-    rgba[..., 3] = 255
-    return parameters, view, rgba
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
-from tests.training.test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
+from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 RNG = np.random.default_rng
 STOPS = (Stop("RGB", 0.0), Stop("Thermal", 1.0))

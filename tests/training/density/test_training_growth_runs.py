@@ -15,7 +15,7 @@ from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import SETTLE, Trainer
-from tests.support.training_runs import bits
+from tests.support.training.training_runs import bits
 
 BASE = TrainSettings(iterations=120, grow_every=30, max_anchors=900)
 FIRST = 600  # points that the capture is left with
@@ -89,11 +89,11 @@ def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
 def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):
     root, out = Path(__file__).resolve().parents[3], tmp_path / "growth.csv"
     ways = ["no growth", "default", "coarse"]
-    program = [sys.executable, "docs/bench/growth.py", str(balls.folder), "--out", str(out)]
+    program = [sys.executable, "tools/training/growth.py", str(balls.folder), "--out", str(out)]
     program += ["--iterations", "90", "--grow-every", "30", "--max-anchors", "400", "--ways", *ways]
     subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)
     lines = out.read_text().splitlines()
-    assert lines[0].startswith("# python3 docs/bench/growth.py ")
+    assert lines[0].startswith("# python3 tools/training/growth.py ")
     rows = list(csv.DictReader(lines[2:]))
     last = [row for row in rows if row["steps"] == "90"]
     assert [row["way"] for row in last if row["modality"] == "mean"] == ways

@@ -11,7 +11,7 @@ from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.step import Step
 from shapeshift.training.visibility import LOOK, Visibility
-from tests.training.test_training_gradients import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
+from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 RNG = np.random.default_rng
 K = 3

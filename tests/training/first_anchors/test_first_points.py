@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import laspy
 import numpy as np
 import pytest
 
@@ -25,6 +24,7 @@ from shapeshift.training.first_anchors.initial import (
 )
 from shapeshift.training.photos import LoadedPhoto, load_photos
 from shapeshift.training.synthetic.balls import make_balls
+from tests.support.training.point_files import write_las
 
 RNG = np.random.default_rng
 HEADER = "ply\nformat ascii 1.0\nelement vertex {}\n" + "".join(
@@ -144,13 +144,6 @@ def test_many_depths_are_thinned(balls, photos, monkeypatch):
     monkeypatch.setattr(point_sources, "MOST_POINTS", 500)
     points = initial_points(balls, photos, RNG(0), "depth")[0]
     assert 400 < len(points) < 600
-
-
-def write_las(path, points: np.ndarray) -> None:
-    cloud = laspy.LasData(laspy.LasHeader(point_format=3, version="1.2"))
-    cloud.header.scales, cloud.header.offsets = np.full(3, 1e-4), np.zeros(3)
-    cloud.x, cloud.y, cloud.z = points.T
-    cloud.write(path)
 
 
 @pytest.mark.parametrize("ending", ["las", "laz"])

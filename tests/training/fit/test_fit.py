@@ -14,7 +14,7 @@ from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.training.fit.ablation import DROPPED, KEPT, PARTS, SHAPE
 from shapeshift.training.fit.fit import Fit
 from shapeshift.training.settings import TrainSettings
-from tests.support.fit_scenes import make_shapes
+from tests.support.training.fit_scenes import make_shapes
 
 SMALL = TrainSettings(
     iterations=250,

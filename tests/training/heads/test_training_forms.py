@@ -20,8 +20,8 @@ from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.training.baselines.test_plain_gradients import situation as plain_situation
-from tests.training.test_training_gradients import (
+from tests.support.training.plain_situations import situation as plain_situation
+from tests.support.training.situations import (
     BACKGROUND,
     LAYOUT,
     OTHERS,

@@ -14,8 +14,8 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @pytest.fixture(scope="module")
 def scale():
-    """The program docs/bench/training_scale.py."""
-    path = ROOT / "docs" / "bench" / "training_scale.py"
+    """The program tools/training/training_scale.py."""
+    path = ROOT / "tools" / "training" / "training_scale.py"
     spec = importlib.util.spec_from_file_location("training_scale", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -30,7 +30,7 @@ def test_the_program_writes_rows_and_memory_is_what_is_said(scale, form, tmp_pat
          "--form", form, "--out", str(out)]
     )  # fmt: skip
     command, machine, columns, *rows = out.read_text().splitlines()
-    assert command.startswith("# python docs/bench/") and machine.startswith("# ")
+    assert command.startswith("# python tools/training/") and machine.startswith("# ")
     assert len(rows) == 2
     for row in rows:
         cells = dict(zip(columns.split(","), row.split(","), strict=True))

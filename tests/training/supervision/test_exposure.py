@@ -29,7 +29,7 @@ from shapeshift.training.supervision.exposure import (
 from shapeshift.training.supervision.targets import Targets
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
-from tests.support.training_runs import run
+from tests.support.training.training_runs import run
 
 RNG = np.random.default_rng
 

@@ -20,7 +20,7 @@ from shapeshift.vr.locomotion.locomotion import (
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.locomotion.teleport import Arc, level_ground, throw_arc
-from tests.support.vr_frames import LOST, at, frame, hand, tilted, yawed
+from tests.support.vr.vr_frames import LOST, at, frame, hand, tilted, yawed
 
 HZ = 90
 START = Standing(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)

@@ -9,7 +9,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.vr.locomotion.locomotion import LONGEST_S, RULES, Rules, Travel, move
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import FAR_M, LEAST_SCALE, MOST_SCALE
-from tests.support.vr_frames import LOST, frame, hand, yawed
+from tests.support.vr.vr_frames import LOST, frame, hand, yawed
 
 START = Standing(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)
 

@@ -8,9 +8,8 @@ import pytest
 from shapeshift.app.headset.xr_user import XrUser
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import resized, underfoot
-from tests.scene.world.test_simulation import item, reaction
-from tests.scene.world.test_world import real
-from tests.support.vr_frames import at, frame, hand, tilted
+from tests.support.scene.world_scenes import item, reaction, real
+from tests.support.vr.vr_frames import at, frame, hand, tilted
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 HZ = 90

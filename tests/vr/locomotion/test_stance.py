@@ -20,7 +20,7 @@ from shapeshift.vr.locomotion.stance import (
     turned,
     underfoot,
 )
-from tests.support.vr_frames import at, tilted, yawed
+from tests.support.vr.vr_frames import at, tilted, yawed
 
 POINTS = np.random.default_rng(3).uniform(-2, 2, (20, 3))  # metres
 ANYWHERE = Standing(Pose(np.array([3.0, -1, 7]), yawed(0.7)), 2.5)

@@ -13,7 +13,7 @@ from shapeshift.vr.panel.carried import Carried, carry, panel_row
 from shapeshift.vr.panel.panel_layout import knob_place, lay_out
 from shapeshift.vr.panel.panel_place import ABOVE_M, ASIDE, NEAR_M, RAY_M, hang, play_point
 from shapeshift.vr.panel.panel_state import Facts, Recentre, SetX, Slider
-from tests.support.vr_hands import HEAD, OPEN, a_frame, hand_at, moved
+from tests.support.vr.vr_hands import HEAD, OPEN, a_frame, hand_at, moved
 
 STOPS = (Stop("normal", 0.0), Stop("ice", 0.25), Stop("fire", 1.0))
 FACTS = Facts((Slider("cube", STOPS, 0.25),))

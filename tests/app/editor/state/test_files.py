@@ -25,7 +25,7 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.cameras.write_cameras import write_cameras
-from tests.support.camera_files import cameras
+from tests.support.scene.camera_files import cameras
 from tests.support.splat_scenes import random_layers
 
 NAME = "Möbel 3 ツ/stuhl äöü.ply"

@@ -15,8 +15,8 @@ from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.runtime_models.model import BadFile
-from tests.runtime_models.splats.layers.test_streamed import COUNTS, write_streamed
 from tests.support.splat_scenes import one_splat
+from tests.support.splats.sog_scenes import COUNTS, write_streamed
 
 LONGEST_S = 10.0
 

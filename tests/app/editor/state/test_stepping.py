@@ -16,7 +16,7 @@ from shapeshift.app.editor.state.camera.stepping import (
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.framing import orbit_path
 from shapeshift.scene.pose import Pose, look_at
-from tests.support.camera_files import NAMES, cameras, views
+from tests.support.scene.camera_files import NAMES, cameras, views
 
 SIZE, FREE = (1280, 720), (292.0, 0.0, 1280.0, 604.0)
 NOW = orbit_path(1, np.zeros(3), 1.0, SIZE)[0]

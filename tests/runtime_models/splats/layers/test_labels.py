@@ -11,7 +11,7 @@ from shapeshift.runtime_models.splats.read_labels import (
     read_classifier,
     with_labels,
 )
-from tests.support.torch_files import write_tensors
+from tests.support.splats.torch_files import write_tensors
 
 
 def raw(count: int, extra: dict) -> RawSplats:

@@ -12,26 +12,7 @@ from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.read_output_folder import newest_cloud, thermal_pair
 from shapeshift.runtime_models.stop_names import guess_kind, is_thermal_name
-
-
-def splats(count: int, seed: int = 0, coefficients: int = 4) -> PlainSplats:
-    rng = np.random.default_rng(seed)
-    wxyz = rng.normal(size=(count, 4))
-    arrays = (
-        rng.normal(size=(count, 3)),
-        rng.uniform(0.01, 0.1, (count, 3)),
-        wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True),
-        rng.uniform(0.1, 0.9, count),
-        rng.normal(size=(count, coefficients, 3)),
-    )
-    return PlainSplats(*(a.astype(np.float32) for a in arrays))
-
-
-def put(path: Path, count: int, **kind) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_ply(splats(count, **kind), path)
-    return path
-
+from tests.support.splats.layer_folders import put, splats, with_thermal_harmonics
 
 PAIRS = [
     ("point_cloud_color/iteration_900/point_cloud.ply",
@@ -96,21 +77,6 @@ def test_one_half_of_a_thermal_run_opens_alone(tmp_path):
     put(tmp_path / "point_cloud_thermal/iteration_1/point_cloud.ply", 3)
     model = read_model(tmp_path)
     assert model.splat_count == 3 and len(model.stops) == 1
-
-
-def with_thermal_harmonics(path: Path, count: int, coefficients: int = 4) -> np.ndarray:
-    """A PLY as ThermalGaussian's OMMG writes it; returns its thermal harmonics (N, M, 3)."""
-    write_ply(splats(count, 1, coefficients), path)
-    data = path.read_bytes()
-    start = data.index(b"end_header\n")
-    names = [f"t_dc_{i}" for i in range(3)] + [f"t_rest_{i}" for i in range(3 * coefficients - 3)]
-    thermal = splats(count, 2, coefficients).sh
-    rest = thermal[:, 1:].transpose(0, 2, 1).reshape(count, -1)  # all of red first
-    columns = np.concatenate([thermal[:, 0], rest], 1).astype("<f4")
-    rows = np.frombuffer(data[start + 11 :], "<f4").reshape(count, -1)
-    header = data[:start] + "".join(f"property float {name}\n" for name in names).encode()
-    path.write_bytes(header + data[start : start + 11] + np.hstack([rows, columns]).tobytes())
-    return thermal
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 16])

@@ -1,6 +1,5 @@
 """Streamed SOG: which splats each level has, what a budget reads, and what is refused."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -17,37 +16,14 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
     read_tree,
     steps,
 )
-from tests.support.sog_scenes import random_sog, write_folder, write_zip
-
-COUNTS = (400, 150, 60, 20)  # splats of each level, finest first
-
-
-def write_streamed(folder: Path, counts=COUNTS, **changes) -> Path:
-    """Two nodes below the root; level i in file i, the second node's splats first in it."""
-    folder.mkdir()
-    first, second = {}, {}
-    for level, count in enumerate(counts):
-        write_folder(folder / f"{level}_0", *random_sog(count, bands=1, seed=level))
-        part = count // 3
-        second[str(level)] = {"file": level, "offset": 0, "count": part}
-        first[str(level)] = {"file": level, "offset": part, "count": count - part}
-    meta = {
-        "lodLevels": len(counts),
-        "environment": None,
-        "filenames": [f"{level}_0/meta.json" for level in range(len(counts))],
-        "tree": {"bound": {}, "children": [{"lods": first}, {"lods": second}]},
-    }
-    (folder / "lod-meta.json").write_text(json.dumps(meta | changes))
-    return folder
-
-
-def rewrite(folder: Path, change) -> Path:
-    """Lets `change` alter the lod-meta.json in place."""
-    file = folder / "lod-meta.json"
-    meta = json.loads(file.read_text())
-    change(meta)
-    file.write_text(json.dumps(meta))
-    return folder
+from tests.support.splats.sog_scenes import (
+    COUNTS,
+    random_sog,
+    rewrite,
+    write_folder,
+    write_streamed,
+    write_zip,
+)
 
 
 @pytest.fixture

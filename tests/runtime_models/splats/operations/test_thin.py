@@ -19,7 +19,7 @@ from shapeshift.runtime_models.splats.operations.prune_by_importance import (
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from tests.support.models import make_random_model
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 WEIGHTS = {
     "any": lambda n: np.random.default_rng(n).random(n),

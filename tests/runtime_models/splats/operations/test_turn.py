@@ -23,7 +23,7 @@ from shapeshift.runtime_models.splats.operations.rotate_splats import (
 )
 from shapeshift.runtime_models.splats.plain_splats import AXES, Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.support.ply_files import some_splats
+from tests.support.splats.ply_files import some_splats
 
 QUARTERS = [
     np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),

@@ -14,7 +14,7 @@ from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.support.ply_files import names_of, random_rows, sh_of, some_splats, write_rows
+from tests.support.splats.ply_files import names_of, random_rows, sh_of, some_splats, write_rows
 
 
 def check_rows(raw, rows, coefficients):

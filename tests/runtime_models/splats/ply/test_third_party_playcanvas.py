@@ -16,7 +16,7 @@ from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.write_compressed_ply import write_compressed_ply
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.runtime_models.splats.test_round_trips import compare, rows
+from tests.support.splats.round_trips import compare, rows
 
 ALIKE = 50.0  # dB
 
@@ -153,7 +153,7 @@ def test_splat_transform_s_glb_and_spz_are_the_scene_of_their_ply(leg, tmp_path,
 def test_our_glb_holds_splat_transform_s_numbers(leg, tmp_path):
     """It writes .glb and reads none: so ours is held beside its own, attribute by attribute."""
     from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
-    from tests.runtime_models.splats.test_gltf import attributes_in
+    from tests.support.splats.gltf_files import attributes_in
 
     path = tmp_path / "a.ply"
     write_ply(degree(leg, 3), path)

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.ply_file import read_header, read_table
 from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from tests.support.ply_files import names_of, random_rows, some_splats, write_rows
+from tests.support.splats.ply_files import names_of, random_rows, some_splats, write_rows
 
 
 def ulps(a: np.ndarray, b: np.ndarray) -> np.ndarray:

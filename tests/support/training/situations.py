@@ -1,0 +1,74 @@
+"""A training step held still: scene, view and target whose gradients are checked."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from shapeshift.rasterizer.reference import finite_differences
+from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.drawing import camera_of
+from shapeshift.training.heads.networks import HeadLayout, initial_weights
+from shapeshift.training.heads.optimizer import Adam
+from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.reference import decode_reference, step_loss_reference
+from shapeshift.training.step import Step
+
+LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
+OTHERS = {
+    "2 layers": replace(LAYOUT, layers=2),
+    "3 layers": replace(LAYOUT, layers=3, hidden=6),
+    "shape fixed": replace(LAYOUT, fixed=("offset", "scale", "rotation")),
+    "colour alike from everywhere": replace(LAYOUT, view_dependent=False),
+    "all at once": replace(LAYOUT, layers=2, fixed=("opacity", "color"), view_dependent=False),
+    "no frames": replace(LAYOUT, own=("color",)),
+    "no base colours": replace(LAYOUT, own=("frame",)),
+}
+VOXEL = 0.5
+SIZE = (21, 18)  # neither a multiple of a tile nor of a vector
+BACKGROUND = (0.2, 0.5, 0.9)
+SHARES = (0.2, 0.05, 0.03)  # D-SSIM, lambda_alpha, lambda_S
+
+
+def situation(seed: int, layout: HeadLayout = LAYOUT):
+    """(parameters, control, view, rgba): a few large splats, some absent, all heads active."""
+    rng = np.random.default_rng(seed)
+    parameters = {
+        "weights": (2 * initial_weights(layout, rng)).astype(np.float32),
+        "anchors": rng.uniform(-0.6, 0.6, (5, 3)).astype(np.float32),
+        "features": rng.normal(size=(5, 8)).astype(np.float32),
+    }
+    own = {"frames": rng.normal(0, 0.5, (5, 7)), "colors": rng.normal(size=(5, 3))}
+    parameters |= {n: own[n].astype(np.float32) for n in layout.per_anchor[2:]}
+    control = rng.random(4).astype(np.float32)
+    eye = look_at(np.array([0.5, 0.7, 3.0]), np.zeros(3))
+    view = View(eye, perspective(np.deg2rad(40), SIZE), 0.05, 100.0, SIZE)
+    rgba = rng.integers(0, 256, (SIZE[1], SIZE[0], 4)).astype(np.uint8)
+    rgba[..., 3] = 255
+    return parameters, control, view, rgba
+
+
+def compare_gradients(device, layout: HeadLayout, seed: int) -> None:
+    """What the kernels give beside finite differences of the float64 reference."""
+    parameters, control, view, rgba = situation(seed, layout)
+    rates = {name: np.ones(1) for name in parameters}
+    adam = Adam(device, parameters, rates)
+    step = Step(device, layout, VOXEL, adam)
+    loss = ImageLoss(device, SIZE)
+    target = loss.target(device.upload(rgba), BACKGROUND)
+    drawing = step.draw(view, control, BACKGROUND)
+    grads = step.gradients(drawing, loss, target, *SHARES)
+    photo, camera = rgba[..., :3] / 255, camera_of(view)
+
+    def loss_with(name: str, values: np.ndarray) -> float:
+        changed = {**parameters, name: values}
+        splats = decode_reference(layout, changed, control, view.world_from_eye.position, VOXEL)
+        return step_loss_reference(splats, camera, photo, BACKGROUND, SHARES)
+
+    for name, found in grads.items():
+        values = parameters[name].astype(np.float64)
+        wanted = finite_differences(lambda v, name=name: loss_with(name, v), values)
+        if name == "weights":  # what no head sees is frozen; the reference does not know it at all
+            wanted = layout.pack(layout.unpack(wanted))
+        difference = np.abs(device.download(found) - wanted).max() / np.abs(wanted).max()
+        # float32 all the way, sums of some hundred terms: a few units in the seventh digit each
+        assert difference < 1e-5, (name, difference)
