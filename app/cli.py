@@ -38,6 +38,10 @@ COMMANDS = {
         "make a scene file's colliders once, into files that travel with it",
     ),
     "vr": ("headset.headset", "a scene in a headset: walk into it and touch it"),
+    "poses": (
+        "commands.poses",
+        "photos without poses, or a video, to a capture for train",
+    ),
     "train": ("training.train", "posed photos of several modalities to a scene"),
     "fit": (
         "training.fit",

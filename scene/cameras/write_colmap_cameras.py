@@ -49,7 +49,8 @@ def tables_of(cameras: CameraList) -> tuple[dict[int, Lens], list[Posed]]:
 
 def camera_bytes(lenses: dict[int, Lens]) -> bytes:
     rows = [
-        CAMERA.pack(number, LENS_NUMBERS[lens.model], *lens.size) + struct.pack("<4d", *lens.params)
+        CAMERA.pack(number, LENS_NUMBERS[lens.model], *lens.size)
+        + struct.pack(f"<{len(lens.params)}d", *lens.params)
         for number, lens in lenses.items()
     ]
     return COUNT.pack(len(rows)) + b"".join(rows)

@@ -1,0 +1,245 @@
+"""A process of its own for structure from motion: `python -P colmap_run.py find|write JOB.json`.
+
+pycolmap is C++ that logs to standard error, holds the interpreter for minutes and ends the process
+on what it does not like: none of this may happen to the program.  It ends when its standard input
+does, as that of a program that was killed.  Progress goes to standard output, a JSON object a line.
+The database keeps features and matches, so that a second run of the same job goes on.
+
+Reads: JOB.json (Job in find_poses.py); `write` also best/ and best.npz of `find`.
+Writes: `find` the model with most photos into best/ and its arrays into best.npz; `write` the
+model, turned and scaled, into sparse/.
+"""
+
+import json
+import os
+import sqlite3
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+
+ABSENT = 3  # the exit code where pycolmap is not installed or does not load
+MOST_ERROR_PX = 8.0  # a mean reprojection error beyond this is no model
+# What is tried where fewer than ENOUGH of the photos find their place: the least angle between the
+# two photos that a model begins with, the inliers that a photo needs, whether matches are guided
+# by the geometry found so far, and which mapper.  COLMAP's own first; each is dearer than the last.
+LADDER = (
+    {"said": "as usual", "angle": 16.0, "inliers": 30, "guided": False, "mapper": "incremental"},
+    {"said": "smaller angles", "angle": 8.0, "inliers": 20, "guided": False,
+     "mapper": "incremental"},
+    {"said": "few points", "angle": 4.0, "inliers": 15, "guided": False, "mapper": "incremental"},
+    {"said": "guided matches", "angle": 4.0, "inliers": 15, "guided": True,
+     "mapper": "incremental"},
+    {"said": "all photos at once", "angle": 4.0, "inliers": 15, "guided": True,
+     "mapper": "global"},
+)  # fmt: skip
+ENOUGH = 0.9  # of the photos
+POLL_S = 0.5
+
+
+def tell(**what: object) -> None:
+    print(json.dumps(what), flush=True)
+
+
+class Watch:
+    """Tells how many rows of the database a pass has written, for as long as it runs."""
+
+    def __init__(self, database: Path, table: str, total: int, stage: str) -> None:
+        self.query = f"select count(*) from {table}"
+        self.database, self.total, self.stage = database, total, stage
+        self.over = threading.Event()
+        self.thread = threading.Thread(target=self.look, daemon=True)
+
+    def __enter__(self) -> None:
+        self.thread.start()
+
+    def __exit__(self, *_: object) -> None:
+        self.over.set()
+        self.thread.join()
+
+    def look(self) -> None:
+        while not self.over.wait(POLL_S):
+            try:
+                with sqlite3.connect(f"{self.database.as_uri()}?mode=ro", uri=True) as base:
+                    done = base.execute(self.query).fetchone()[0]
+            except sqlite3.Error:  # not there yet, or being written
+                continue
+            tell(stage=self.stage, done=done, of=self.total)
+
+
+def find(job: dict) -> None:
+    import pycolmap
+
+    work = Path(job["work"])
+    database = work / "database.db"
+    pycolmap.set_random_seed(0)
+    count = sum(len(group) for group in job["groups"])
+    with Watch(database, "keypoints", count, "features"):
+        extract(pycolmap, database, job)
+    guided, best = None, None
+    for rung in LADDER:
+        if guided is not rung["guided"]:
+            guided = rung["guided"]
+            with Watch(database, "two_view_geometries", job["pairs"], "matches"):
+                match(pycolmap, database, job, guided)
+        models = solve(pycolmap, database, job, rung, count)
+        found = max((rank(model) for model in models), default=(0, 0))
+        others = sorted((model.num_reg_images() for model in models), reverse=True)[1:]
+        tell(attempt=rung["said"], registered=found[0], of=count, others=others)
+        if best is None or found > rank(best):
+            best = max(models, key=rank, default=best)
+        if found[0] >= ENOUGH * count:
+            break
+    if best is None:
+        tell(registered=0)
+        return
+    (work / "best").mkdir(exist_ok=True)
+    best.write(str(work / "best"))
+    keep_arrays(best, work / "best.npz", job["measured"], job["ends"])
+    tell(registered=best.num_reg_images())
+
+
+def rank(model: object) -> tuple[int, int]:
+    """Photos, then points; a model whose points lie far beside their places counts for nothing."""
+    if not model.compute_mean_reprojection_error() <= MOST_ERROR_PX:
+        return 0, 0
+    return model.num_reg_images(), model.num_points3D()
+
+
+def extract(pycolmap: object, database: Path, job: dict) -> None:
+    """Features of all photos; photos of a group share a camera, also with those done before."""
+    options = pycolmap.FeatureExtractionOptions()
+    options.max_image_size, options.num_threads = job["side"], job["threads"]
+    options.use_gpu, options.sift.max_num_features = False, job["features"]
+    for group in job["groups"]:
+        reader = pycolmap.ImageReaderOptions()
+        reader.camera_model = job["lens"]
+        if job["masks"]:
+            reader.mask_path = job["masks"]
+        reader.existing_camera_id = camera_of(database, group)
+        pycolmap.extract_features(
+            database, job["photos"], image_names=group, camera_mode=pycolmap.CameraMode.SINGLE,
+            reader_options=reader, extraction_options=options, device=pycolmap.Device.cpu,
+        )  # fmt: skip
+
+
+def camera_of(database: Path, names: list[str]) -> int:
+    """The camera that photos of a group have in the database, from a run before; -1: none."""
+    if not database.is_file():
+        return -1
+    with sqlite3.connect(database) as base:
+        cameras = dict(base.execute("select name, camera_id from images"))
+    return next((cameras[name] for name in names if name in cameras), -1)
+
+
+def match(pycolmap: object, database: Path, job: dict, guided: bool) -> None:
+    if guided:  # pairs that are known are left as they are, so these go
+        with sqlite3.connect(database) as base:
+            base.execute("delete from matches")
+            base.execute("delete from two_view_geometries")
+    options = pycolmap.FeatureMatchingOptions()
+    options.num_threads, options.use_gpu, options.guided_matching = job["threads"], False, guided
+    if job["neighbours"]:
+        pairs = pycolmap.SequentialPairingOptions()
+        pairs.overlap, pairs.quadratic_overlap = job["neighbours"], True
+        pairs.loop_detection = False
+        pycolmap.match_sequential(
+            database, matching_options=options, pairing_options=pairs, device=pycolmap.Device.cpu
+        )
+    else:
+        pycolmap.match_exhaustive(database, matching_options=options, device=pycolmap.Device.cpu)
+
+
+def solve(pycolmap: object, database: Path, job: dict, rung: dict, count: int) -> list:
+    """The models that one attempt finds, on the features and matches of the database."""
+    folder = Path(job["work"]) / "models"
+    folder.mkdir(exist_ok=True)
+    if rung["mapper"] == "global":
+        plan = pycolmap.GlobalPipelineOptions()
+        plan.num_threads, plan.random_seed = job["threads"], 0
+        return list(pycolmap.global_mapping(database, job["photos"], folder, plan).values())
+    plan = pycolmap.IncrementalPipelineOptions()
+    plan.num_threads, plan.random_seed = job["threads"], 0
+    plan.ba_global_max_num_iterations, plan.min_model_size = 30, 3
+    plan.mapper.init_min_tri_angle = rung["angle"]
+    plan.mapper.abs_pose_min_num_inliers = rung["inliers"]
+    done = [0]
+
+    def placed() -> None:
+        done[0] += 1
+        tell(stage=f"poses, {rung['said']}", done=min(done[0] + 1, count), of=count)
+
+    models = pycolmap.incremental_mapping(
+        database, job["photos"], folder, options=plan, next_image_callback=placed
+    )
+    return list(models.values())
+
+
+def keep_arrays(model: object, path: Path, measured: str, ends: list) -> None:
+    """What the program wants to know of a model, without pycolmap's objects.
+
+    names; world_from_camera (N, 4, 4) OpenCV axes; points (N,) that a photo sees; depth (N,) median
+    of those; xyz (P, 3); error_px; and of the photo `measured` at (M, 2) px and away (M,) along
+    the view, and rays (2, 3) through the pixels `ends`, 1 long along the view.
+    """
+    images = sorted((i for i in model.images.values() if i.has_pose), key=lambda i: i.name)
+    poses, seen, depths = [], [], []
+    at, away, rays = np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3))
+    for image in images:
+        matrix = np.eye(4)
+        matrix[:3] = image.cam_from_world().inverse().matrix()
+        points = [p for p in image.points2D if p.has_point3D()]
+        xyz = np.array([model.points3D[p.point3D_id].xyz for p in points]).reshape(-1, 3)
+        depth = (xyz - matrix[:3, 3]) @ matrix[:3, 2]
+        poses.append(matrix)
+        seen.append(len(points))
+        depths.append(np.median(depth) if len(depth) else np.nan)
+        if image.name == measured:
+            at, away = np.array([p.xy for p in points]).reshape(-1, 2), depth
+            flat = image.camera.cam_from_img(np.array(ends, float))
+            rays = np.hstack([flat, np.ones((len(ends), 1))])
+    xyz = np.array([p.xyz for p in model.points3D.values()]).reshape(-1, 3)
+    np.savez(
+        path, names=[i.name for i in images], world_from_camera=poses, points=seen, depth=depths,
+        xyz=xyz, error_px=model.compute_mean_reprojection_error(), at=at, away=away,
+        rays=rays,
+    )  # fmt: skip
+
+
+def write(job: dict) -> None:
+    """The best model in the world frame of job["similarity"], (3, 4), as COLMAP writes it."""
+    import pycolmap
+
+    work = Path(job["work"])
+    model = pycolmap.Reconstruction(str(work / "best"))
+    model.transform(pycolmap.Sim3d(np.array(job["similarity"])))
+    target = work / "sparse"
+    target.mkdir(exist_ok=True)
+    model.write(str(target))
+    if job["straight"]:
+        options = pycolmap.UndistortCameraOptions()
+        pycolmap.undistort_images(
+            str(work / "straight"), str(target), job["photos"], undistort_options=options
+        )
+
+
+def end_with_parent() -> None:
+    """Waits until the other end of standard input is gone."""
+    os.read(sys.stdin.fileno(), 1)
+    os._exit(1)
+
+
+def main(what: str, path: str) -> None:
+    try:
+        import pycolmap  # noqa: F401
+    except ImportError as why:
+        sys.stderr.write(str(why))
+        sys.exit(ABSENT)
+    job = json.loads(Path(path).read_text())
+    {"find": find, "write": write}[what](job)
+
+
+if __name__ == "__main__":
+    threading.Thread(target=end_with_parent, daemon=True).start()
+    main(*sys.argv[1:])

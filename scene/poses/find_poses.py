@@ -1,0 +1,230 @@
+"""Photos without poses -> a COLMAP folder that `train` reads: images/, sparse/0, poses.json.
+
+Structure from motion by pycolmap (Schoenberger and Frahm 2016; "all photos at once" is GLOMAP, Pan
+et al. 2024), then the frame: upright, and in metres where a length is known.
+"""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.photo import open_image
+from shapeshift.scene.captures.read_colmap import find_mask
+from shapeshift.scene.json.json_values import shortened
+from shapeshift.scene.poses.child import Progress, run_child
+from shapeshift.scene.poses.photo_list import PhotoFile, PhotoList
+from shapeshift.scene.poses.upright import COLMAP_UP, find_up, length_between, similarity
+from shapeshift.scene.poses.write_posed import write_posed
+
+WORK = "poses.work"  # below the folder that is written, as long as the search is not done
+MOST_FOR_ALL_PAIRS = 120  # photos; beyond that neighbours by name are matched alone
+NEIGHBOURS = 10
+FEW_POINTS = 60  # that a photo sees: its pose hangs on little
+
+
+@dataclass(frozen=True)
+class Length:
+    """A known length: between what two pixels of a photo show."""
+
+    metres: float
+    photo: str  # a name of the list
+    ends: tuple[tuple[float, float], tuple[float, float]]  # px, (0, 0) the upper left corner
+
+
+@dataclass(frozen=True)
+class PoseSettings:
+    masks: Path | None = None  # folder; black: no features there
+    neighbours: int | None = (
+        None  # photos by name that each is matched with; 0: all; None: by count
+    )
+    side: int = 1600  # longest side, pixels, on which features are looked for
+    features: int = 8192  # of a photo, at most
+    lens: str = "SIMPLE_RADIAL"  # COLMAP's camera model
+    length: Length | None = None
+    straight: bool = False  # write undistorted photos of pinhole cameras
+    threads: int = 0  # 0: one a core
+
+    def __post_init__(self) -> None:
+        if self.straight and self.masks is not None:
+            raise ValueError("masks lie on the photos as they are; undistort without masks")
+        if not (self.side >= 100 and self.features >= 100 and self.threads >= 0):
+            raise ValueError("side and features are at least 100, threads at least 0")
+        if self.neighbours is not None and not self.neighbours >= 0:
+            raise ValueError("neighbours is at least 0")
+        if self.length is not None and not 0 < self.length.metres < np.inf:
+            raise ValueError("the known length must be above 0 metres")
+
+
+@dataclass(frozen=True)
+class PoseReport:
+    """What was found; poses.json holds the same."""
+
+    photos: int
+    placed: int
+    left_out: list[str]
+    few_points: dict[str, int]  # photos with a pose that hangs on few points, and how many
+    points: int
+    error_px: float  # mean reprojection error
+    attempts: list[dict]
+    scale: str  # where metres come from
+    up: str  # where upright comes from
+    paired: int = 0  # photos of a second camera that got the poses of those they were taken with
+
+
+def find_poses(
+    photos: PhotoList, out: Path, settings: PoseSettings, progress: Progress
+) -> PoseReport:
+    """Writes the capture into `out`, which has at most an unfinished search in it.
+
+    Raises BadFile where no poses are found.  Interrupted, it keeps features and matches in
+    out/poses.work, and the same call goes on from there.
+    """
+    make_folders(out.parent, out.name)
+    work = make_folders(out, WORK)
+    masks = copy_masks(photos, settings.masks, work) if settings.masks else None
+    job = describe(photos, work, settings, masks)
+    told = run_child("find", start_job(work, job), work / "log.txt", progress)
+    if not told or told[-1]["registered"] < 2:
+        raise BadFile(
+            f"{photos.root}: no two of its {len(photos.photos)} photos could be placed beside each "
+            "other; photos must overlap by more than half, be sharp, and show something with "
+            "texture."
+        )
+    with np.load(work / "best.npz") as file:
+        best = {name: file[name] for name in file.files}
+    turn, up, scale = frame_of(best, photos, settings.length)
+    write_job = work / "write.json"
+    write_whole(write_job, json.dumps(job | {"similarity": turn.tolist()}).encode())
+    run_child("write", write_job, work / "log.txt", progress)
+    placed = {str(name) for name in best["names"]}
+    report = PoseReport(
+        photos=len(photos.photos),
+        placed=len(placed),
+        left_out=sorted(p.name for p in photos.photos if p.name not in placed),
+        few_points={str(n): int(c) for n, c in zip(best["names"], best["points"], strict=True)
+                    if c < FEW_POINTS},
+        points=len(best["xyz"]),
+        error_px=round(float(best["error_px"]), 3),
+        attempts=[line for line in told if "attempt" in line],
+        scale=scale,
+        up=up,
+        paired=sum(name in placed for name in photos.paired.values()),
+    )  # fmt: skip
+    write_posed(photos, placed, out, work, settings.straight, report)
+    return report
+
+
+def describe(photos: PhotoList, work: Path, settings: PoseSettings, masks: Path | None) -> dict:
+    """The job as colmap_run.py reads it."""
+    count = len(photos.photos)
+    near = settings.neighbours
+    if near is None:
+        near = 0 if count <= MOST_FOR_ALL_PAIRS else NEIGHBOURS
+    return {
+        "photos": str(photos.root.absolute()), "work": str(work.absolute()),
+        "groups": photos.groups, "masks": str(masks.absolute()) if masks else "",
+        "neighbours": near, "pairs": count_pairs(count, near), "side": settings.side,
+        "features": settings.features, "lens": settings.lens, "straight": settings.straight,
+        "threads": settings.threads or os.cpu_count() or 1,
+        "measured": settings.length.photo if settings.length else "",
+        "ends": settings.length.ends if settings.length else [],
+    }  # fmt: skip
+
+
+def count_pairs(photos: int, near: int) -> int:
+    """How many pairs are matched, for the progress: quadratic neighbours are 1, 2, 4, ... away."""
+    if not near:
+        return photos * (photos - 1) // 2
+    steps = set(range(1, near + 1)) | {1 << i for i in range(near)}
+    return sum(max(photos - step, 0) for step in steps)
+
+
+def start_job(work: Path, job: dict) -> Path:
+    """The file of the job.  Raises BadFile where another one is unfinished in the folder."""
+    path = work / "job.json"
+    text = json.dumps(job, indent=1).encode()
+    if path.is_file() and path.read_bytes() != text:
+        raise BadFile(
+            f"{work} has an unfinished search with other photos or options; give those again, or "
+            "--overwrite to begin anew."
+        )
+    write_whole(path, text)
+    return path
+
+
+def copy_masks(photos: PhotoList, masks: Path, work: Path) -> Path:
+    """Masks under the names that COLMAP looks for, NAME.jpg.png.  Raises BadFile."""
+    if not masks.is_dir():
+        raise BadFile(f"{masks}: no folder of masks; name one with a PNG for each photo.")
+    found = 0
+    for photo in photos.photos:
+        source = mask_of(masks, photo)
+        if source is None:
+            continue
+        with open_image(source) as image:
+            if image.size != photo.size:
+                raise BadFile(
+                    f"{shortened(source)} has {image.size[0]}x{image.size[1]} pixels, its photo "
+                    f"{photo.size[0]}x{photo.size[1]}; a mask is as large as its photo."
+                )
+            seen = image.convert("L").getextrema()[1]
+        if not seen:
+            raise BadFile(f"{shortened(source)} is all black; white marks what counts.")
+        target = make_folders(work, Path("masks") / Path(photo.name).parent)
+        write_whole(target / f"{Path(photo.name).name}.png", source.read_bytes())
+        found += 1
+    if not found:
+        raise BadFile(
+            f"{masks}: no mask has a photo's name; a mask of a.jpg is called a.jpg.png or a.png."
+        )
+    return work / "masks"
+
+
+def mask_of(masks: Path, photo: PhotoFile) -> Path | None:
+    return find_mask(masks.parent, photo.name) if masks.name == "masks" else next(
+        (p for p in (masks / f"{photo.name}.png", (masks / photo.name).with_suffix(".png"))
+         if p.is_file()), None)  # fmt: skip
+
+
+def frame_of(
+    best: dict[str, np.ndarray], photos: PhotoList, length: Length | None
+) -> tuple[np.ndarray, str, str]:
+    """(3, 4) to the capture's world, and where its up and its metres come from."""
+    orientation = {photo.name: photo.orientation for photo in photos.photos}
+    poses = best["world_from_camera"]
+    up = find_up(poses, [orientation[str(name)] for name in best["names"]])
+    said = "as most photos were held" if up is not None else "not known: the photos do not agree"
+    up = COLMAP_UP if up is None else up
+    centre = np.median(best["xyz"], axis=0)
+    if length is None:
+        scale = 1 / float(np.nanmedian(best["depth"]))
+        words = "arbitrary: what the photos show is 1 m away in the median; say a length (--metres)"
+        return similarity(up, scale, centre), said, words
+    measured = model_length(best, photos, length)
+    words = f"{length.metres:g} m in {length.photo}"
+    return similarity(up, length.metres / measured, centre), said, words
+
+
+def model_length(best: dict[str, np.ndarray], photos: PhotoList, length: Length) -> float:
+    """The known length in the model's own units.  Raises BadFile where that cannot be told."""
+    sizes = {photo.name: photo.size for photo in photos.photos}
+    if length.photo not in sizes:
+        raise BadFile(f"--metres names the photo {length.photo}, which is none of those given.")
+    if length.photo not in set(map(str, best["names"])):
+        raise BadFile(f"--metres names {length.photo}, which got no pose; name another photo.")
+    width, height = sizes[length.photo]
+    ends = np.array(length.ends, float)
+    if not ((ends >= 0) & (ends <= (width, height))).all():
+        raise BadFile(f"--metres: {length.photo} has {width}x{height} pixels; name two in it.")
+    found = length_between(ends, best["at"], best["away"], best["rays"], max(width, height))
+    if not 0 < found < np.inf:
+        raise BadFile(
+            f"--metres: nothing is known near those pixels of {length.photo}, or they are one "
+            "place; name two with texture around them."
+        )
+    return found

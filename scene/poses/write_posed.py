@@ -1,0 +1,93 @@
+"""The finished search -> a capture: photos, masks, the model, and what was found, in that order.
+
+The model comes last: a folder without one is no capture yet, so a killed writer leaves none that
+looks whole.
+"""
+
+import json
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
+from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
+from shapeshift.scene.captures.colmap_tables import COUNT, Lens, Posed, read_tables
+from shapeshift.scene.poses.photo_list import PhotoList
+
+if TYPE_CHECKING:
+    from shapeshift.scene.poses.find_poses import PoseReport
+
+REPORT = "poses.json"
+PAIRED_LENS = "SIMPLE_PINHOLE"
+TABLES = ("cameras.bin", "images.bin", "points3D.bin")
+
+
+def write_posed(
+    photos: PhotoList,
+    placed: set[str],
+    out: Path,
+    work: Path,
+    straight: bool,
+    report: "PoseReport",
+) -> None:
+    """Copies what has a pose into out/images and out/masks, then writes out/sparse/0.
+
+    straight: photos and model are those that pycolmap has undistorted.  Removes the work folder.
+    """
+    source = work / "straight" / "images" if straight else photos.root
+    for name in sorted(placed):
+        copy_into(source / name, out, Path("images") / name)
+    for thermal, visible in photos.paired.items():
+        if visible in placed:
+            copy_into(photos.root / thermal.name, out, Path("images") / thermal.name)
+    if (work / "masks").is_dir():
+        for name in sorted(placed):
+            mask = work / "masks" / f"{name}.png"
+            if mask.is_file():
+                copy_into(mask, out, Path("masks") / f"{name}.png")
+    model = work / "straight" / "sparse" if straight else work / "sparse"
+    tables = {name: (model / name).read_bytes() for name in TABLES}
+    tables |= with_pairs(photos, model, tables)
+    write_whole(out / REPORT, json.dumps(asdict(report), indent=1).encode())
+    target = make_folders(out, "sparse/0")
+    for name, data in sorted(tables.items(), reverse=True):  # readers look for images.bin
+        write_whole(target / name, data)
+    shutil.rmtree(work)
+
+
+def copy_into(source: Path, out: Path, name: Path) -> None:
+    write_whole(make_folders(out, name.parent) / name.name, source.read_bytes())
+
+
+def with_pairs(photos: PhotoList, model: Path, tables: dict[str, bytes]) -> dict[str, bytes]:
+    """The tables with a row for each photo of a second camera: the pose of the first, and a pinhole
+    of the same field of view from top to bottom, which `train --calibrate` makes right."""
+    if not photos.paired:
+        return {}
+    lenses, posed = read_tables(model, ".bin")
+    by_name = {image.name: image for image in posed}
+    next_lens, next_image = max(lenses) + 1, max(image.number for image in posed) + 1
+    new_lenses: dict[Lens, int] = {}
+    rows: list[Posed] = []
+    for thermal, visible in photos.paired.items():
+        if visible not in by_name:
+            continue
+        first = by_name[visible]
+        lens = lenses[first.lens]
+        width, height = thermal.size
+        focal = lens.focal[1] * height / lens.size[1]
+        like = Lens(PAIRED_LENS, thermal.size, (focal, width / 2, height / 2))
+        number = new_lenses.setdefault(like, next_lens + len(new_lenses))
+        rows.append(Posed(next_image + len(rows), thermal.name, first.wxyz, first.place, number))
+    cameras = camera_bytes({number: lens for lens, number in new_lenses.items()})
+    return {
+        "cameras.bin": joined(tables["cameras.bin"], cameras),
+        "images.bin": joined(tables["images.bin"], image_bytes(rows)),
+    }
+
+
+def joined(table: bytes, more: bytes) -> bytes:
+    """Two of COLMAP's tables as one: a count, then the rows."""
+    count = COUNT.unpack_from(table)[0] + COUNT.unpack_from(more)[0]
+    return COUNT.pack(count) + table[COUNT.size :] + more[COUNT.size :]
