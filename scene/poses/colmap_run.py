@@ -36,10 +36,12 @@ LADDER = (
 )  # fmt: skip
 ENOUGH = 0.9  # of the photos
 POLL_S = 0.5
+BLOCK = 8  # photos by photos whose matches are written at once: progress, and what a kill loses
 
 
 def tell(**what: object) -> None:
-    print(json.dumps(what), flush=True)
+    sys.stdout.write(json.dumps(what) + "\n")
+    sys.stdout.flush()
 
 
 class Watch:
@@ -148,7 +150,11 @@ def match(pycolmap: object, database: Path, job: dict, guided: bool) -> None:
             database, matching_options=options, pairing_options=pairs, device=pycolmap.Device.cpu
         )
     else:
-        pycolmap.match_exhaustive(database, matching_options=options, device=pycolmap.Device.cpu)
+        every = pycolmap.ExhaustivePairingOptions()
+        every.block_size = BLOCK
+        pycolmap.match_exhaustive(
+            database, matching_options=options, pairing_options=every, device=pycolmap.Device.cpu
+        )
 
 
 def solve(pycolmap: object, database: Path, job: dict, rung: dict, count: int) -> list:
