@@ -28,6 +28,7 @@ _NAMES_OF = {
     "api.render": ("Renderer",),
     "api.write": ("Exported", "export"),
     "api.learn": ("TrainedScene", "evaluate", "train"),
+    "api.photos": ("poses",),
     "api.measure": ("bench", "chart", "compare"),
     "api.play": ("Step", "cameras", "simulate"),
     "app.paths": ("DEMO", "TOUCH"),

@@ -6,6 +6,7 @@ from shapeshift.api.load import load as load
 from shapeshift.api.measure import bench as bench
 from shapeshift.api.measure import chart as chart
 from shapeshift.api.measure import compare as compare
+from shapeshift.api.photos import poses as poses
 from shapeshift.api.picture import Picture as Picture
 from shapeshift.api.play import Step as Step
 from shapeshift.api.play import cameras as cameras

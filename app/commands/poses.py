@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, POSITIONAL
 from shapeshift.app.paths import full
+from shapeshift.app.program import program
 from shapeshift.app.terminal import say, tell, tell_json
 
 if TYPE_CHECKING:
-    from shapeshift.scene.poses.find_poses import Length, PoseReport
+    from shapeshift.scene.poses.find_poses import Length, PoseSettings
+    from shapeshift.scene.poses.pose_report import PoseReport
 
 FRAMES = "frames"  # of a video, below --out, as long as the search is not done
 OURS = {"images", "masks", "sparse", "poses.json", "poses.work", FRAMES}
@@ -89,7 +91,7 @@ def run(options: Options) -> int:
     return 0
 
 
-def settings_of(options: Options):
+def settings_of(options: Options) -> "PoseSettings":
     """Raises UsageError."""
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.poses.find_poses import NEIGHBOURS, PoseSettings
@@ -186,7 +188,7 @@ def sentences(report: "PoseReport", options: Options) -> list[str]:
     said.append(f"Up: {report.up}.  Scale: {report.scale}.")
     if report.paired:
         said.append("The thermal camera's place is a guess: train with --calibrate.")
-    said.append(f"next: python3 launch.py train {full(options.out)} --out scene.shift")
+    said.append(f"next: {program()} train {full(options.out)} --out scene.shift")
     return said
 
 

@@ -46,14 +46,9 @@ def has_poses(folder: Path) -> bool:
 
 
 def how_to_pose(photos: Path) -> str:
-    """What to do with a folder of photos: name the one above it, or make a model of them there."""
+    """What to do with a folder of photos: name the one above it, or find their poses."""
     above = photos.absolute().parent
     if has_poses(above):
         return f"the poses lie in the folder above, name that: {above}"
-    inside = photos / "images"
-    folder, images = (photos, inside) if inside.is_dir() else (photos, photos)
-    if photos.name == "images":  # photos of a capture lie in its folder images
-        folder = above
-    words = ["colmap", "automatic_reconstructor", "--workspace_path", str(folder)]
-    command = shlex.join([*words, "--image_path", str(images)])
-    return f"run structure from motion first, for example `{command}`, and name {folder} then"
+    command = shlex.join(["python3", "launch.py", "poses", str(photos), "--out", "CAPTURE"])
+    return f"find them first, `{command}`, and name that folder then"

@@ -18,6 +18,7 @@ from shapeshift.scene.captures.read_colmap import find_mask
 from shapeshift.scene.json.json_values import shortened
 from shapeshift.scene.poses.child import Progress, run_child
 from shapeshift.scene.poses.photo_list import PhotoFile, PhotoList
+from shapeshift.scene.poses.pose_report import PoseReport
 from shapeshift.scene.poses.upright import COLMAP_UP, find_up, length_between, similarity
 from shapeshift.scene.poses.write_posed import write_posed
 
@@ -58,22 +59,6 @@ class PoseSettings:
             raise ValueError("neighbours is at least 0")
         if self.length is not None and not 0 < self.length.metres < np.inf:
             raise ValueError("the known length must be above 0 metres")
-
-
-@dataclass(frozen=True)
-class PoseReport:
-    """What was found; poses.json holds the same."""
-
-    photos: int
-    placed: int
-    left_out: list[str]
-    few_points: dict[str, int]  # photos with a pose that hangs on few points, and how many
-    points: int
-    error_px: float  # mean reprojection error
-    attempts: list[dict]
-    scale: str  # where metres come from
-    up: str  # where upright comes from
-    paired: int = 0  # photos of a second camera that got the poses of those they were taken with
 
 
 def find_poses(

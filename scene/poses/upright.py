@@ -8,6 +8,7 @@ import numpy as np
 
 CLEAR_UP = 0.2  # mean length of the photos' up vectors under which they say nothing
 CLEAR_PLANE = 0.5  # of the second singular value that the third may have: rows lie in a plane
+LEAST_TURN = 0.1  # of the first singular value in the second: photos look in different directions
 MOST_TILT = np.cos(np.radians(45))  # between the normal of that plane and the mean up vector
 NEAREST = 8  # points around a pixel that say how far what it shows is
 NEAR_PX = 0.05  # of the photo's longest side: no point nearer than that, and nobody knows
@@ -32,10 +33,11 @@ def find_up(world_from_camera: np.ndarray, orientations: list[int]) -> np.ndarra
     if not np.linalg.norm(mean) > CLEAR_UP:
         return None
     mean /= np.linalg.norm(mean)
-    _, size, axes = np.linalg.svd(across_w, full_matrices=False) if len(turns) > 2 else (0, [0], 0)
-    if len(size) == 3 and size[2] <= CLEAR_PLANE * size[1]:
+    if len(turns) > 2:
+        _, size, axes = np.linalg.svd(across_w, full_matrices=False)
         normal = axes[2] * np.sign(axes[2] @ mean)
-        if normal @ mean >= MOST_TILT:
+        turned = size[1] >= LEAST_TURN * size[0]
+        if turned and size[2] <= CLEAR_PLANE * size[1] and normal @ mean >= MOST_TILT:
             return normal
     return mean
 

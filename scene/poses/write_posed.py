@@ -8,15 +8,12 @@ import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
 from shapeshift.scene.captures.colmap_tables import COUNT, Lens, Posed, read_tables
 from shapeshift.scene.poses.photo_list import PhotoList
-
-if TYPE_CHECKING:
-    from shapeshift.scene.poses.find_poses import PoseReport
+from shapeshift.scene.poses.pose_report import PoseReport
 
 REPORT = "poses.json"
 PAIRED_LENS = "SIMPLE_PINHOLE"
@@ -29,7 +26,7 @@ def write_posed(
     out: Path,
     work: Path,
     straight: bool,
-    report: "PoseReport",
+    report: PoseReport,
 ) -> None:
     """Copies what has a pose into out/images and out/masks, then writes out/sparse/0.
 

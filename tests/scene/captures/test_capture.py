@@ -218,7 +218,9 @@ def test_tankard_has_masks_and_fern_has_points():
 
 
 def test_unposed_bananas_are_told_what_to_do():
-    with pytest.raises(BadFile, match="photos without poses; run structure from motion first"):
+    with pytest.raises(
+        BadFile, match=r"photos without poses; find them first, `python3 launch\.py poses"
+    ):
         read_capture(real("banana16_unposed"))
 
 
@@ -229,30 +231,15 @@ def photo_folder(folder: Path, *names: str) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(
-    ("files", "named", "workspace", "images"),
-    [
-        (("images/a.jpg",), ".", ".", "images"),
-        (("images/a.jpg",), "images", ".", "images"),  # the photos' own folder
-        (("a.jpg",), ".", ".", "."),
-        (("heat/a.jpg", "photo/b.jpg"), ".", ".", "."),  # modalities
-        (("holiday/a.jpg",), "holiday", "holiday", "holiday"),
-    ],
-)
-def test_the_advice_for_photos_without_poses_works(tmp_path, files, named, workspace, images):
-    """What it names exists, and what COLMAP makes there is found by what is to be named next."""
+@pytest.mark.parametrize("files", [("images/a.jpg",), ("a.jpg",), ("heat/a.jpg", "photo/b.jpg")])
+def test_the_advice_for_photos_without_poses_is_a_command(tmp_path, files):
+    """What it names is there; `poses` is tried in tests/app/commands/test_poses.py."""
     root = photo_folder(tmp_path / "my capture", *files)
     with pytest.raises(BadFile) as refusal:
-        read_capture(root / named)
+        read_capture(root)
     words = shlex.split(re.search("`(.*)`", str(refusal.value))[1])
-    assert words[:2] == ["colmap", "automatic_reconstructor"]
-    told = dict(zip(words[2::2], words[3::2], strict=True))
-    where = Path(told["--workspace_path"])
-    assert where.samefile(root / workspace)
-    assert Path(told["--image_path"]).samefile(root / images)
-    assert str(refusal.value).endswith(f"and name {where} then.")
-    # The reader looks for photos in images/, else in the folder itself.
-    assert Path(told["--image_path"]) in (where / "images", where)
+    assert words[:3] == ["python3", "launch.py", "poses"] and words[4:] == ["--out", "CAPTURE"]
+    assert Path(words[3]).samefile(root)
 
 
 def test_photos_beside_their_poses_are_told_where_these_are(tmp_path):
