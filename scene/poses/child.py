@@ -1,9 +1,13 @@
 """Runs colmap_run.py in a process of its own and passes on what it tells."""
 
 import json
+import queue
+import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import IO
 
@@ -11,6 +15,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.poses.colmap_run import ABSENT
 
 Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
+POLL_S = 0.5
 
 
 def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]:
@@ -26,14 +31,14 @@ def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors
         )
         try:
-            told = list(read_lines(child.stdout, progress))
+            told = listen(child, log.parent / "database.db", progress)
             code = child.wait()
         finally:
-            if child.poll() is None:
-                child.kill()
+            child.kill()
             child.wait()
-            child.stdin.close()
-            child.stdout.close()
+            for stream in (child.stdin, child.stdout):
+                if stream is not None:
+                    stream.close()
     if code == ABSENT:
         raise BadFile("pycolmap, which finds poses, is not installed; install the requirements.")
     if code:
@@ -44,18 +49,53 @@ def run_child(what: str, job: Path, log: Path, progress: Progress) -> list[dict]
     return told
 
 
-def read_lines(lines: IO[bytes] | None, progress: Progress) -> list[dict]:
-    """The JSON objects that are no progress; other libraries' words are left out."""
-    kept = []
-    for line in lines or ():
+def listen(child: subprocess.Popen, database: Path, progress: Progress) -> list[dict]:
+    """The JSON objects that are no progress, until the process ends its output."""
+    lines: queue.Queue[dict | None] = queue.Queue()
+    threading.Thread(target=read_lines, args=(child.stdout, lines), daemon=True).start()
+    kept: list[dict] = []
+    watched: dict = {}
+    while True:
         try:
-            said = json.loads(line)
-        except ValueError:
+            said = lines.get(timeout=POLL_S)
+        except queue.Empty:
+            if watched:
+                done = rows_of(database, watched["watch"])
+                progress(watched["stage"], done, watched["of"])
             continue
-        if not isinstance(said, dict):
-            continue
-        if "stage" in said:
+        if said is None:
+            return kept
+        watched = said if "watch" in said else {}
+        if "done" in said:
             progress(said["stage"], said["done"], said["of"])
-        else:
+        elif not watched:
             kept.append(said)
-    return kept
+
+
+def read_lines(stream: IO[bytes], lines: "queue.Queue[dict | None]") -> None:
+    """Puts each JSON object of the stream into the queue, None at its end; other words are left."""
+    for said in objects_of(stream):
+        lines.put(said)
+    lines.put(None)
+
+
+def objects_of(stream: IO[bytes]) -> Iterator[dict]:
+    try:
+        for line in stream:
+            try:
+                said = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(said, dict):
+                yield said
+    except ValueError:  # closed while it was read: the program is being interrupted
+        return
+
+
+def rows_of(database: Path, table: str) -> int:
+    """How many rows a table has; 0 where it is not there yet, or being written."""
+    try:
+        with closing(sqlite3.connect(f"{database.as_uri()}?mode=ro", uri=True)) as base:
+            return base.execute(f"select count(*) from {table}").fetchone()[0]
+    except sqlite3.Error:
+        return 0

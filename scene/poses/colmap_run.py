@@ -2,8 +2,10 @@
 
 pycolmap is C++ that logs to standard error, holds the interpreter for minutes and ends the process
 on what it does not like: none of this may happen to the program.  It ends when its standard input
-does, as that of a program that was killed.  Progress goes to standard output, a JSON object a line.
-The database keeps features and matches, so that a second run of the same job goes on.
+does, as that of a program that was killed.  Progress goes to standard output, a JSON object a line:
+how far it is, or which table of the database to watch.  The program counts its rows, as a second
+SQLite in this process would let go of the locks of pycolmap's.  The database keeps features and
+matches, so that a second run of the same job goes on.
 
 Reads: JOB.json (Job in find_poses.py); `write` also best/ and best.npz of `find`.
 Writes: `find` the model with most photos into best/ and its arrays into best.npz; `write` the
@@ -12,7 +14,6 @@ model, turned and scaled, into sparse/.
 
 import json
 import os
-import sqlite3
 import sys
 import threading
 from pathlib import Path
@@ -35,39 +36,12 @@ LADDER = (
      "mapper": "global"},
 )  # fmt: skip
 ENOUGH = 0.9  # of the photos
-POLL_S = 0.5
 BLOCK = 8  # photos by photos whose matches are written at once: progress, and what a kill loses
 
 
 def tell(**what: object) -> None:
     sys.stdout.write(json.dumps(what) + "\n")
     sys.stdout.flush()
-
-
-class Watch:
-    """Tells how many rows of the database a pass has written, for as long as it runs."""
-
-    def __init__(self, database: Path, table: str, total: int, stage: str) -> None:
-        self.query = f"select count(*) from {table}"
-        self.database, self.total, self.stage = database, total, stage
-        self.over = threading.Event()
-        self.thread = threading.Thread(target=self.look, daemon=True)
-
-    def __enter__(self) -> None:
-        self.thread.start()
-
-    def __exit__(self, *_: object) -> None:
-        self.over.set()
-        self.thread.join()
-
-    def look(self) -> None:
-        while not self.over.wait(POLL_S):
-            try:
-                with sqlite3.connect(f"{self.database.as_uri()}?mode=ro", uri=True) as base:
-                    done = base.execute(self.query).fetchone()[0]
-            except sqlite3.Error:  # not there yet, or being written
-                continue
-            tell(stage=self.stage, done=done, of=self.total)
 
 
 def find(job: dict) -> None:
@@ -77,14 +51,14 @@ def find(job: dict) -> None:
     database = work / "database.db"
     pycolmap.set_random_seed(0)
     count = sum(len(group) for group in job["groups"])
-    with Watch(database, "keypoints", count, "features"):
-        extract(pycolmap, database, job)
+    tell(watch="keypoints", stage="features", of=count)
+    extract(pycolmap, database, job)
     guided, best = None, None
     for rung in LADDER:
         if guided is not rung["guided"]:
             guided = rung["guided"]
-            with Watch(database, "two_view_geometries", job["pairs"], "matches"):
-                match(pycolmap, database, job, guided)
+            tell(watch="two_view_geometries", stage="matches", of=job["pairs"])
+            match(pycolmap, database, job, guided)
         models = solve(pycolmap, database, job, rung, count)
         found = max((rank(model) for model in models), default=(0, 0))
         others = sorted((model.num_reg_images() for model in models), reverse=True)[1:]
@@ -119,27 +93,27 @@ def extract(pycolmap: object, database: Path, job: dict) -> None:
         reader.camera_model = job["lens"]
         if job["masks"]:
             reader.mask_path = job["masks"]
-        reader.existing_camera_id = camera_of(database, group)
+        reader.existing_camera_id = camera_of(pycolmap, database, group)
         pycolmap.extract_features(
             database, job["photos"], image_names=group, camera_mode=pycolmap.CameraMode.SINGLE,
             reader_options=reader, extraction_options=options, device=pycolmap.Device.cpu,
         )  # fmt: skip
 
 
-def camera_of(database: Path, names: list[str]) -> int:
+def camera_of(pycolmap: object, database: Path, names: list[str]) -> int:
     """The camera that photos of a group have in the database, from a run before; -1: none."""
     if not database.is_file():
         return -1
-    with sqlite3.connect(database) as base:
-        cameras = dict(base.execute("select name, camera_id from images"))
+    with pycolmap.Database.open(str(database)) as base:
+        cameras = {image.name: image.camera_id for image in base.read_all_images()}
     return next((cameras[name] for name in names if name in cameras), -1)
 
 
 def match(pycolmap: object, database: Path, job: dict, guided: bool) -> None:
     if guided:  # pairs that are known are left as they are, so these go
-        with sqlite3.connect(database) as base:
-            base.execute("delete from matches")
-            base.execute("delete from two_view_geometries")
+        with pycolmap.Database.open(str(database)) as base:
+            base.clear_matches()
+            base.clear_two_view_geometries()
     options = pycolmap.FeatureMatchingOptions()
     options.num_threads, options.use_gpu, options.guided_matching = job["threads"], False, guided
     if job["neighbours"]:
