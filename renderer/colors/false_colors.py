@@ -58,9 +58,12 @@ class Shade:
 
     def same(self, other: "Shade") -> bool:
         """Whether two ask for the same colours."""
-        if (self.rest is None) != (other.rest is None) or len(self.heats) != len(other.heats):
+        if len(self.heats) != len(other.heats):
             return False
-        if self.rest is not None and not same_controls(self.rest, other.rest):
+        if self.rest is None or other.rest is None:
+            if self.rest is not other.rest:
+                return False
+        elif not same_controls(self.rest, other.rest):
             return False
         return all(a.same(b) for a, b in zip(self.heats, other.heats, strict=True))
 
@@ -91,6 +94,11 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
         return FalseColors(PICTURE, names.pop(), tuple(plain))
     way = (NO_HEAT, BESIDE)[len(names)] if len(names) < 2 else SPLATS
     return FalseColors(way, names.pop() if len(names) == 1 else "", tuple(shades))
+
+
+def has_heat(model: Model) -> bool:
+    """Whether a frame of the model between two stops can hold heat that palettes colour."""
+    return any(stop.kind == "thermal" and stop.palette for stop in model.blend.stops)
 
 
 def shade_of(model: Model, control: Controls) -> Shade:
