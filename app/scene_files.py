@@ -48,8 +48,8 @@ def tell_findings(models: dict[str, "Model"]) -> None:
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:
     """What `launch.py info` prints of a scene file."""
+    from shapeshift.runtime_models.files.json_fields import control_row
     from shapeshift.scene.document.scene_file import FORMAT
-    from shapeshift.scene.json.json_fields import control_row
 
     return {
         "format": FORMAT,

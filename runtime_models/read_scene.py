@@ -143,20 +143,21 @@ def is_package(path: Path) -> bool:
 
 def describe(model: Model, path: str | Path) -> dict:
     """What `launch.py info --json` prints; `path` is where the model was read from."""
-    anchored = isinstance(model, AnchorModel)
-    plain = isinstance(model, SplatLayers)
-    facts = {
-        "format": format_name(model) if anchored else model.provenance.get("format", "splats"),
-        "anchors": 0 if plain else len(model.anchors),
+    file_format = model.provenance.get("format", "splats")
+    facts: dict[str, object] = {
+        "format": format_name(model) if isinstance(model, AnchorModel) else file_format,
+        "anchors": 0 if isinstance(model, SplatLayers) else len(model.anchors),
         "splats": model.splat_count,
-        "sh_degree": round(model.sh.shape[1] ** 0.5) - 1 if plain else None,
+        "sh_degree": (
+            round(model.sh.shape[1] ** 0.5) - 1 if isinstance(model, SplatLayers) else None
+        ),
         "stops": [{"name": s.name, "x": s.x, "kind": s.kind} for s in model.stops],
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
-    if plain:
+    if isinstance(model, SplatLayers):
         if "sh_degree" in model.provenance:  # bands that are zero in every splat were left out
             facts["sh_degree_in_file"] = model.provenance["sh_degree"]
-        drawn = {"antialiased": True} if model.antialiased else {}
+        drawn: dict[str, object] = {"antialiased": True} if model.antialiased else {}
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))

@@ -159,7 +159,7 @@ class StopBlend:
         row = self.weights(control)
         present = np.flatnonzero(row)
         if len(present) == 2:
-            a, b = present
+            a, b = map(int, present)
             share = _part_of(self.curve(a, b), row[b])
             return float(self.stops[a].x + (self.stops[b].x - self.stops[a].x) * share)
         return float(row @ [stop.x for stop in self.stops])
@@ -179,8 +179,8 @@ class StopBlend:
     def _mixed(self, start: np.ndarray, end: np.ndarray, part: float | np.ndarray) -> np.ndarray:
         """Weights (S,) or (A, S) between weights."""
         part = np.asarray(part, np.float64)[..., None]  # () -> (1,), (A,) -> (A, 1)
-        pairs = [(a, b) for a in np.flatnonzero(start.reshape(-1, len(end)).any(axis=0))
-                 for b in np.flatnonzero(end)]  # fmt: skip
+        before = np.flatnonzero(start.reshape(-1, len(end)).any(axis=0)).tolist()
+        pairs = [(a, b) for a in before for b in np.flatnonzero(end).tolist()]
         share = sum(start[..., [a]] * end[b] * _along(self.curve(a, b), part) for a, b in pairs)
         mixed = start + (end - start) * np.clip(share, 0, 1)
         present = (start > 0) | (end > 0)
@@ -214,7 +214,7 @@ NO_STOPS = StopBlend(())
 
 def _part_of(curve: np.ndarray, share: float | np.ndarray) -> np.ndarray:
     """How far along its way a curve has mixed in so much."""
-    return np.interp(share, curve, np.linspace(0, 1, len(curve)))
+    return np.asarray(np.interp(share, curve, np.linspace(0, 1, len(curve))))
 
 
 def encode_control(encoding: ControlEncoding, blend: StopBlend, control: Controls) -> np.ndarray:

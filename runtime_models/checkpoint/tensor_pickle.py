@@ -6,6 +6,7 @@ of them describe tensors, every other one is refused.
 
 import pickletools
 from dataclasses import dataclass, field
+from typing import Any
 
 from shapeshift.runtime_models.model import BadFile
 
@@ -89,7 +90,7 @@ def index_of(data: bytes, file: str) -> Index:
         for count, (opcode, given, _) in enumerate(pickletools.genops(data)):
             if count >= MOST_OPCODES:
                 raise BadFile(f"{file}: its index has more than {MOST_OPCODES:,} steps; too many.")
-            machine.take(opcode.name, given)
+            machine.run(opcode.name, given)
     except BadFile:
         raise
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError):
@@ -113,11 +114,11 @@ def _name_parts(tree: object, found: Index, file: str) -> None:
         if isinstance(node, Record):
             found.modules[name] = node.kind
             node = node.fields
-        inside = ()
+        inside: list[tuple[object, object]] = []
         if isinstance(node, dict):
-            inside = node.items()
+            inside = list(node.items())
         elif isinstance(node, list | tuple):
-            inside = dict(enumerate(node)).items()
+            inside = list(enumerate(node))
         if len(inside) + nodes + len(todo) > MOST_NODES:
             raise BadFile(f"{file}: its tensors are nested or named beyond reason; save it again.")
         below = [(f"{name}.{key}" if name else str(key), part) for key, part in inside]
@@ -133,7 +134,7 @@ class _Machine:
         self.memo: dict[int, object] = {}
         self.result: object = None
 
-    def take(self, name: str, given: object) -> None:
+    def run(self, name: str, given: Any) -> None:
         """One opcode.  Raises BadFile by name for one that tensors do not need."""
         stack, memo = self.stack, self.memo
         if name in CONSTANTS:
@@ -247,11 +248,12 @@ class _Machine:
 
 
 def _tensor(storage: object, offset: object, size: object, stride: object) -> Tensor:
-    whole = [offset, *size, *stride]
-    if not (isinstance(storage, Storage) and type(size) is type(stride) is tuple):
+    if not (isinstance(storage, Storage) and isinstance(size, tuple) and isinstance(stride, tuple)):
         raise ValueError("no tensor")
+    whole = [offset, *size, *stride]
     if not all(type(number) is int and number >= 0 for number in whole) or len(size) != len(stride):
         raise ValueError("no tensor")
+    assert isinstance(offset, int)  # as has just been seen
     return Tensor(storage, offset, size, stride)
 
 

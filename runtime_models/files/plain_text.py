@@ -86,3 +86,9 @@ def cut(text: str, most: int) -> str:
         return text
     end = most // 3
     return f"{text[: most - end - 1]}\u2026{text[-end:]}"
+
+
+def path_end(path: object) -> str:
+    """The end of a path for a message: its last LONGEST_NAME letters."""
+    text = str(path)
+    return text if len(text) <= LONGEST_NAME else f"...{text[-LONGEST_NAME:]}"

@@ -28,14 +28,14 @@ def odd_rows(raw: RawSplats) -> np.ndarray:
 
 def ranges(raw: RawSplats) -> tuple[tuple[float, float], tuple[float, float]]:
     """(least, largest) of usual scales and opacities, both themselves usual."""
-    largest = np.finfo(np.float32).max
+    largest = float(np.finfo(np.float32).max)
     scales = (-largest, LARGEST_LOG) if raw.log_scales else (0.0, largest)
     return scales, ((-largest, largest) if raw.logits else (0.0, 1.0))
 
 
 def is_odd(raw: RawSplats, rows: slice) -> bool:
     """Whether any of these rows may be odd."""
-    largest = np.finfo(np.float32).max
+    largest = float(np.finfo(np.float32).max)
     everything = (-largest, largest)
     scales, opacities = ranges(raw)
     wxyz = raw.wxyz[rows]
@@ -53,7 +53,7 @@ def is_odd(raw: RawSplats, rows: slice) -> bool:
 def odd_in(raw: RawSplats, rows: slice) -> np.ndarray:
     """(n,) bool: the rows themselves."""
     scales, opacities = ranges(raw)
-    largest = np.finfo(np.float32).max  # float64 positions may lie beyond
+    largest = float(np.finfo(np.float32).max)  # float64 positions may lie beyond
     usual = within(raw.means[rows], (-largest, largest)).all(1) & np.isfinite(raw.sh[rows]).all(
         (1, 2)
     )

@@ -41,7 +41,8 @@ def compact(model: AnchorModel, alive: np.ndarray | None = None) -> tuple[Anchor
     alive = shown(model) if alive is None else alive.copy()
     if not alive.any():
         alive[0, 0] = True
-    anchors, slots = alive.any(axis=1), alive.any(axis=0)
+    anchors: np.ndarray = np.asarray(alive.any(axis=1))
+    slots: np.ndarray = np.asarray(alive.any(axis=0))
     smaller = replace(
         model.with_anchors(anchors),
         networks={n: without_slots(model.networks[n], slots, SIZE_PER_SPLAT[n]) for n in HEADS},

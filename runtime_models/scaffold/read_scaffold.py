@@ -24,6 +24,7 @@ from shapeshift.runtime_models.scaffold.scaffold_networks import (
     read_networks,
     turn_networks,
 )
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.operations.recentre import place_of
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, Reading
@@ -91,7 +92,7 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
         (Stop("RGB", 0.0),),
         octree,
         provenance_of(file, networks, octree, settings),
-        tuple(map(float, rotation @ origin)),
+        three(rotation @ origin),
         (*networks.findings, *findings, *far),
     )
     memory.charge(SHOWN * model.splat_count, f"{model.splat_count:,} splats")
@@ -104,7 +105,7 @@ def provenance_of(
     file: Path, networks: Networks, octree: Octree | None, settings: dict[str, str]
 ) -> dict:
     """Where it comes from, and what else the run says that a viewer can use."""
-    found = {
+    found: dict[str, object] = {
         "format": "Scaffold-GS" if octree is None else "Octree-GS",
         "files": [file.name, *networks.files],
     }

@@ -145,13 +145,15 @@ def mlp_of(
         if not (match := LAYER.fullmatch(label)):
             raise BadFile(f"{name} holds {label[:60]!r}, which no plain network has.")
         layers.setdefault(int(match[1]), {})[match[2]] = tensor
-    weights, biases = [], []
+    weights: list[np.ndarray] = []
+    biases: list[np.ndarray] = []
     for number, layer in sorted(layers.items()):
         weight, bias = layer.get("weight"), layer.get("bias")
-        fits = weight is not None and bias is not None and weight.ndim == 2 and weight.size
-        fits = fits and bias.shape == weight.shape[:1]
-        if not fits or (weights and weight.shape[1] != len(weights[-1])):
-            raise BadFile(f"{name}: layer {number} does not fit the one before; save it again.")
+        refusal = f"{name}: layer {number} does not fit the one before; save it again."
+        if weight is None or bias is None or weight.ndim != 2 or not weight.size:
+            raise BadFile(refusal)
+        if bias.shape != weight.shape[:1] or (weights and weight.shape[1] != len(weights[-1])):
+            raise BadFile(refusal)
         memory.charge(3 * 4 * weight.size, f"layer {number} of {name}")
         with np.errstate(over="ignore"):
             weights.append(weight.astype(np.float32))

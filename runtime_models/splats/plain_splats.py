@@ -1,6 +1,6 @@
 """One file of plain splats: how it is wished, as it is written, and as the program takes it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import Account, Memory, unlimited
 from shapeshift.runtime_models.model import Finding
 
+ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")  # of RawSplats and PlainSplats
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
 COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
 
@@ -76,6 +77,11 @@ class RawSplats:
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) other columns, as filed
     findings: tuple[Finding, ...] = ()  # what the reader itself saw
     memory: Account = field(default_factory=unlimited)  # that its arrays are charged to
+
+    def with_arrays(self, arrays: Sequence[np.ndarray], **more: Any) -> "RawSplats":
+        """The same with other arrays, in the order of ARRAYS."""
+        changes: dict[str, Any] = dict(zip(ARRAYS, arrays, strict=True))
+        return replace(self, **changes, **more)
 
     @property
     def bytes_a_splat(self) -> int:

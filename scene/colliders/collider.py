@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
-from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import BadFile, Model, ScaffoldModel
+from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.colliders.collider_cache import content_key, find_kept, keep
 from shapeshift.scene.colliders.collider_pieces import Pieces, hull_faces, read_pieces
 from shapeshift.scene.colliders.collider_points import fill_splats
@@ -78,17 +79,17 @@ def collider_of_splats(
 
 
 def collider_of_model(
-    model: Model, x: float, making: Making | None = None, eye: np.ndarray | None = None
+    model: Model, x: Control, making: Making | None = None, eye: np.ndarray | None = None
 ) -> Collider:
     """The collider of a model as it is at control value x.  Raises BadFile.
 
     eye (3,) metres, in the object's frame: where a model is seen from whose shape depends on it;
     in front of it if not given.
     """
-    if follows_eye(model) and eye is None:
+    if isinstance(model, ScaffoldModel) and eye is None:
         low, high = np.percentile(model.anchors, (1, 99), axis=0)
         eye = (low + high) / 2 + np.array([0, 0, 2 * (high - low).max()])
-    columns = Evaluator(model).geometry(x, eye=None if eye is None else np.float32(eye))
+    columns = Evaluator(model).geometry(x, eye=None if eye is None else np.asarray(eye, np.float32))
     return collider_of_splats(*columns, making)
 
 

@@ -32,8 +32,9 @@ def content_key(settings: str, *arrays: np.ndarray | bytes) -> str:
     for array in arrays:
         if isinstance(array, np.ndarray):
             digest.update(f"{array.shape}{array.dtype.str}".encode())
-            array = np.ascontiguousarray(array).data
-        digest.update(array)
+            digest.update(np.ascontiguousarray(array).data)
+        else:
+            digest.update(array)
     return digest.hexdigest()
 
 

@@ -41,6 +41,7 @@ def one_collider(file: SceneFile, item: SceneItem, model: Model, making: Making)
     try:
         if item.collider == HULLS:
             return collider_of_model(model, item.x, making)
+        assert item.collider is not None, "asked of items that have one"
         return collider_of_mesh(file.path(item.collider), making)
     except BadFile as error:
         raise BadFile(f"object '{item.name}': 'collider': {error}") from None

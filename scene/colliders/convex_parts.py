@@ -75,26 +75,26 @@ def joined(pieces: list[np.ndarray], skin: Skin) -> list[np.ndarray]:
 
     What is noisy comes in more pieces than its shape needs.
     """
-    pieces = dict(enumerate(pieces))
-    volumes = {name: hull_volume(piece) for name, piece in pieces.items()}
+    parts = dict(enumerate(pieces))
+    volumes = {name: hull_volume(piece) for name, piece in parts.items()}
 
     def cost(i: int, j: int) -> float:
         """Metres that the common hull stands out; Inf where it is much larger than both."""
-        both = np.concatenate([pieces[i], pieces[j]])
+        both = np.concatenate([parts[i], parts[j]])
         if not hull_volume(both) <= JOIN * (volumes[i] + volumes[j]):
             return np.inf
         return skin.reach(both)
 
-    costs = {(i, j): cost(i, j) for i in pieces for j in range(i)}
+    costs = {(i, j): cost(i, j) for i in parts for j in range(i)}
     while costs:
         (i, j), least = min(costs.items(), key=lambda pair: (pair[1], pair[0]))
         if not least <= skin.slack:
             break
-        pieces[j] = np.concatenate([pieces.pop(i), pieces[j]])
-        volumes[j] = hull_volume(pieces[j])
+        parts[j] = np.concatenate([parts.pop(i), parts[j]])
+        volumes[j] = hull_volume(parts[j])
         costs = {pair: far for pair, far in costs.items() if i not in pair}
         costs |= {(a, b): cost(a, b) for a, b in costs if j in (a, b)}
-    return list(pieces.values())
+    return list(parts.values())
 
 
 def face_normals(mesh: TriangleMesh) -> np.ndarray:
@@ -134,7 +134,8 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         given, wanted = Path(folder, "mesh.npz"), Path(folder, "hulls.npz")
         centre = mesh.vertices.mean(0, dtype=np.float64)
         size = float(np.ptp(mesh.vertices, axis=0).max()) or 1.0
-        np.savez(
+        save: Callable[..., None] = np.savez  # numpy takes its keywords for one flag
+        save(
             given, vertices=(mesh.vertices - centre) / size, faces=mesh.faces, **SEARCH,
             threshold=CONCAVITY, max_convex_hull=most, max_ch_vertex=MOST_VERTICES,
         )  # fmt: skip
@@ -154,6 +155,7 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         finally:  # also when told() or Ctrl-C ends the wait
             child.kill()
             child.wait()
+            assert child.stdin is not None, "a pipe"
             child.stdin.close()
         if child.returncode == ABSENT:
             why = said.read_text(errors="replace")

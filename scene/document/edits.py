@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
 from shapeshift.scene.pose import Pose
@@ -47,7 +48,7 @@ def add(file: SceneFile, item: SceneItem) -> SceneFile:
 def duplicate(file: SceneFile, name: str, by: tuple[float, float, float]) -> SceneFile:
     """With a copy right behind the object, moved by metres; the background's is an object."""
     item = wanted(file, name)
-    position = tuple(a + b for a, b in zip(item.position, by, strict=True))
+    position = three(a + b for a, b in zip(item.position, by, strict=True))
     file = add(file, replace(item, position=position))
     if item.name == BACKGROUND:
         return file
@@ -120,7 +121,8 @@ def ground(file: SceneFile, floor_y: float | None) -> SceneFile:
 
 def look_from(file: SceneFile, eye: np.ndarray, target: np.ndarray, fov_y: float) -> SceneFile:
     """With the first look from eye (3,) to target (3,).  ValueError for one straight up or down."""
-    view = FirstView(*(tuple(round(float(n), DECIMALS) for n in p) for p in (eye, target)), fov_y)
+    first, second = (three(round(float(n), DECIMALS) for n in place) for place in (eye, target))
+    view = FirstView(first, second, fov_y)
     if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
         raise ValueError("The first look goes not straight up or down; tilt it a little.")
     return file if view == file.view else replace(file, view=view)

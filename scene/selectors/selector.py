@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import four, three
 from shapeshift.runtime_models.stop_weights import Control, check_control
 from shapeshift.scene.pose import UNIT_SLACK, Pose
 
@@ -125,10 +126,10 @@ class Lens(_Placed):
         if self.half_angle is not None:
             acute = 0 < self.half_angle < math.pi / 2
             _wanted(self, "half_angle", acute, "radians between 0 and pi/2")
-            return
-        _floats(self, "tangents", 4)
-        left, right, down, up = self.tangents
-        _wanted(self, "tangents", left < right and down < up, "left < right and down < up")
+        if self.tangents is not None:
+            _floats(self, "tangents", 4)
+            left, right, down, up = self.tangents
+            _wanted(self, "tangents", left < right and down < up, "left < right and down < up")
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         axes = Pose(np.zeros(3), np.array(self.wxyz)).matrix()[:3, :3]
@@ -143,6 +144,7 @@ class Lens(_Placed):
                 (up - high_y * depth) / math.hypot(1, high_y),
             )
             return np.max(sides, axis=0)  # from the farthest plane: its edges are sharp
+        assert self.half_angle is not None, "a cone where it is no pyramid"
         radius = np.hypot(across, up)
         cos, sin = math.cos(self.half_angle), math.sin(self.half_angle)
         apex_is_nearest = depth * cos + radius * sin < 0
@@ -191,7 +193,7 @@ class Painted:
             return False
         return self.weight is other.weight or np.array_equal(self.weight, other.weight)
 
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]  # compared by its array: not for sets or keys
 
 
 Selector = Box | Sphere | HalfSpace | Lens | Painted
@@ -204,13 +206,18 @@ def carried(selector: Selector, world_from_before: Pose) -> Selector:
     moves = world_from_before.matrix()
     if isinstance(selector, HalfSpace):
         point = moves[:3, :3] @ selector.point + moves[:3, 3]
-        return replace(selector, point=point, normal=moves[:3, :3] @ selector.normal)
-    at = "position" if isinstance(selector, Lens) else "centre"
-    wxyz = getattr(selector, "wxyz", UPRIGHT)
-    before = Pose(np.array(getattr(selector, at)), np.array(wxyz))
+        return replace(selector, point=three(point), normal=three(moves[:3, :3] @ selector.normal))
+    assert not isinstance(selector, Painted), "painted regions are fixed to their object"
+    centre = selector.position if isinstance(selector, Lens) else selector.centre
+    wxyz = UPRIGHT if isinstance(selector, Sphere) else selector.wxyz
+    before = Pose(np.array(centre), np.array(wxyz))
     now = Pose.from_matrix(moves @ before.matrix())
-    turned = {"wxyz": now.wxyz} if hasattr(selector, "wxyz") else {}
-    return replace(selector, **{at: now.position}, **turned)
+    position, turned = three(now.position), four(now.wxyz)
+    if isinstance(selector, Lens):
+        return replace(selector, position=position, wxyz=turned)
+    if isinstance(selector, Box):
+        return replace(selector, centre=position, wxyz=turned)
+    return replace(selector, centre=position)
 
 
 def _name(selector: object) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world import physics_rules
@@ -235,7 +236,7 @@ class Physics:
         length = math.hypot(*along) if along.shape == (3,) else 0.0
         if not 0 < length < math.inf:
             raise ValueError(f"a ray has the direction {direction}; 3 numbers, not 0, are wanted.")
-        ray = Ray(tuple(map(float, start)), tuple(map(float, along / length)))
+        ray = Ray(three(start), three(along / length))
         hit = self._queries().cast_ray(ray, MOST_REACH, True)
         return (self._ids[hit[0]], hit[1]) if hit else None
 
@@ -246,7 +247,7 @@ class Physics:
         at = checked_point(point, "the place of a hand")
         reach = checked_number(within, "a hand's reach in metres", 0, MOST_REACH)
         found = self._queries().project_point(
-            tuple(map(float, at)), True, QueryFilter.only_dynamic(), reach + LEAST_EXTENT
+            three(at), True, QueryFilter.only_dynamic(), reach + LEAST_EXTENT
         )
         if found is None:
             return None

@@ -173,8 +173,10 @@ class Motion:
         if self.ends_by(time_s):
             return self.end
         part = EASES[self.ease][0](max(time_s - self.began_s, 0.0) / self.seconds)
+        start, end = self.start, self.end
         if self.over and self.blend.through_numbers:
-            value = self.start + (self.end + 1 - self.start) * part
+            assert not isinstance(start, StopWeights) and not isinstance(end, StopWeights)
+            value = start + (end + 1 - start) * part  # as Machine.goes_over has seen to
             return min(max(value - (value > 1), 0.0), 1.0)
         return self.blend.between(self.start, 1.0 if self.over else self.end, part)
 
@@ -219,7 +221,7 @@ def advance(
     standing: Standing,
     time_s: float,
     events: Sequence[Event] = (),
-    place: Sequence[float] | None = None,
+    place: np.ndarray | Sequence[float] | None = None,
 ) -> tuple[Standing, tuple[Fired, ...]]:
     """The standing at a time, after what happened since the last one, in the order it happened.
 
@@ -250,7 +252,7 @@ def _moved(standing: Standing, time_s: float) -> Standing:
     return replace(standing, x=motion.x(time_s), motion=None if ended else motion)
 
 
-def _inside(machine: Machine, place: Sequence[float]) -> tuple[bool, ...]:
+def _inside(machine: Machine, place: np.ndarray | Sequence[float]) -> tuple[bool, ...]:
     point = np.array(place, np.float64).reshape(1, 3)  # metres
     if not np.isfinite(point).all():
         raise ValueError(f"an object is at {place}; three finite numbers are wanted.")
@@ -276,7 +278,8 @@ def _answer(
         if reaction.on != kind or (reaction.after and standing.state not in reaction.after):
             continue
         least = reaction.least_impulse_n_s
-        if kind == "collision" and not (event.impulse_n_s >= least and _rises(event, least)):
+        hard = event is not None and event.impulse_n_s >= least and _rises(event, least)
+        if kind == "collision" and not hard:
             continue
         goal = machine.goal(reaction, standing.state)
         x, name = (goal.x, goal.name) if isinstance(goal, State) else (goal, "")

@@ -1,19 +1,16 @@
 """One object of a world: what the file says of it, where it stands now, and how it is drawn."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.scene.colliders.collider import Collider
 from shapeshift.scene.document.scene_file import BACKGROUND, SceneItem, machine_of, object_of
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.world.reactions import Machine, Standing, start
 from shapeshift.scene.world.read_script import between
-
-if TYPE_CHECKING:
-    from shapeshift.scene.colliders.collider import Collider
 
 LEADS, FOLLOWS = 6, 18  # steps in which a thing that is taken, or let go, changes its lead
 
@@ -29,8 +26,14 @@ class Thing:
     pose: Pose
     before: Pose  # at the step before, for pictures between two steps
     drawn: SceneObject  # as it was drawn last
-    collider: "Collider | None" = None
+    collider: Collider | None = None
     lead: float = 0.0  # of a step: drawn so much ahead of others, 1 in a hand, that it cannot lag
+
+    @property
+    def body_id(self) -> int:
+        """The body, of an object that has one."""
+        assert self.body is not None, f"'{self.item.name}' has a body"
+        return self.body
 
     @property
     def moves(self) -> bool:
@@ -77,8 +80,10 @@ def drawn_thing(thing: Thing, part: float | None) -> Thing:
 
     The same thing, and the same SceneObject in it, where that is what was drawn last.
     """
-    still = part is None or thing.before is thing.pose
-    pose = thing.pose if still else between(thing.before, thing.pose, part + thing.lead)
+    if part is None or thing.before is thing.pose:
+        pose = thing.pose
+    else:
+        pose = between(thing.before, thing.pose, part + thing.lead)
     drawn, x = thing.drawn, thing.standing.x
     if drawn.x == x and same_pose(drawn.world_from_object, pose):
         return thing
@@ -87,7 +92,7 @@ def drawn_thing(thing: Thing, part: float | None) -> Thing:
 
 def middle_of(thing: Thing) -> np.ndarray:
     """(3,) metres, world: of the box around what can be touched of it."""
-    assert thing.collider is not None  # nobody asks for the middle of what cannot be touched
+    assert thing.collider is not None, "asked of what can be touched"
     corners = np.concatenate(thing.collider.hulls)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]

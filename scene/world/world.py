@@ -8,13 +8,14 @@ clock and draws nothing: the same calls in the same order give the same records 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.model import Finding, Model
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled
-from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.grab import jumped
@@ -22,6 +23,9 @@ from shapeshift.scene.world.reactions import Event, advance, steer
 from shapeshift.scene.world.read_script import between
 from shapeshift.scene.world.record import DECIMALS, Record, event_row, rounded
 from shapeshift.scene.world.rigid_object import Thing, after_step, drawn_thing, new_thing, same_pose
+
+if TYPE_CHECKING:
+    from shapeshift.scene.world.physics import Physics
 
 FLOOR_NAME = "floor"
 REACH_M = 0.05  # from a hand to what it grabs
@@ -63,7 +67,7 @@ class World:
         file: SceneFile,
         models: Mapping[str, Model],
         colliders: Mapping,
-        physics=None,
+        physics: "Physics | None" = None,
         hz: int = 90,
     ) -> None:
         from shapeshift.scene.world.physics import Physics
@@ -77,7 +81,7 @@ class World:
         self.holds: dict[str, int] = {}  # hand -> grab of the physics
         self.impulses: dict[tuple[int, int], float] = {}  # N s of each pair in the step before
         self.steps = 0
-        self._told: dict[tuple, tuple] = {}  # (what, name) -> as it was told last
+        self._told: dict[tuple, object] = {}  # (what, name) -> as it was told last
         self._stirred: set[str] = set()  # came, were placed or controlled since the last step
         self._events: dict[str, list[Event]] = {}  # of hands and rays since the last step
         self._hands_told: list[dict] = []
@@ -180,7 +184,7 @@ class World:
             self._hands_told.append({"hand": hand, "did": "miss"})
             return None
         pose = self.hands[hand]
-        self.holds[hand] = self.physics.grab(self.things[name].body, pose, point)
+        self.holds[hand] = self.physics.grab(self.things[name].body_id, pose, point)
         self._hands_before[hand] = pose
         self._hands_told.append({"hand": hand, "did": "grab", "object": name})
         self._events.setdefault(name, []).append(Event("grab"))
@@ -214,17 +218,19 @@ class World:
         for hand in [hand for hand in self.holds if self.held(hand) == held]:
             self.hands[hand] = jumped(self.hands[hand], moved)
             self._hands_before[hand] = jumped(self._hands_before[hand], moved)
-        pose = self.physics.pose(self.things[held].body)
+        pose = self.physics.pose(self.things[held].body_id)
         self.things[held] = replace(self.things[held], pose=pose, before=pose)
 
     def held(self, name: str) -> str | None:
         """What a hand holds."""
-        return self.names.get(self.physics.held(self.holds[name])) if name in self.holds else None
+        body = self.physics.held(self.holds[name]) if name in self.holds else None
+        return None if body is None else self.names.get(body)
 
     def nearest(self, point: np.ndarray, within: float) -> tuple[str, float] | None:
         """The object that a hand at a point (3,) would take, and how far that is in metres."""
-        found = self.physics.nearest(point, within)
-        name = self.names.get(found[0]) if found else None
+        if (found := self.physics.nearest(point, within)) is None:
+            return None
+        name = self.names.get(found[0])
         return (name, found[1]) if name is not None and self.things[name].moves else None
 
     # ---- rays
@@ -264,7 +270,7 @@ class World:
         return all(
             thing.standing.motion is None
             and same_pose(thing.before, thing.pose)
-            and (not thing.moves or self.physics.sleeps(thing.body))
+            and (not thing.moves or self.physics.sleeps(thing.body_id))
             for thing in self.things.values()
         )
 
@@ -280,7 +286,7 @@ class World:
         self._collide(contacts, record, events)
         held = {self.held(hand) for hand in self.holds}
         for name in self.things:
-            self._react(name, record, events.get(name, ()), name in held)
+            self._react(name, record, events.get(name, []), name in held)
         self._stirred.clear()
         return record
 
@@ -331,7 +337,7 @@ class World:
     def _react(self, name: str, record: Record, events: list[Event], held: bool) -> None:
         """The object's new pose and x; what has changed is told."""
         thing = self.things[name]
-        pose = self.physics.pose(thing.body) if thing.moves else thing.pose
+        pose = self.physics.pose(thing.body_id) if thing.moves else thing.pose
         still = same_pose(pose, thing.pose)
         if still and not events and thing.waits and name not in self._stirred:
             return

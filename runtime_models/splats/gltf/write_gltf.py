@@ -37,11 +37,13 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
     """
     splats = turn(splats, HALF_TURN_Y)
     arrays = attributes_of(splats)
-    views, accessors, place = [], [], 0
+    views: list[dict[str, int]] = []
+    accessors: list[dict[str, object]] = []
+    place = 0
     for name, array in arrays.items():
         size = array.size * (1 if array.dtype == np.uint8 else 4)
         views.append({"buffer": 0, "byteOffset": place, "byteLength": size})
-        accessor = {
+        accessor: dict[str, object] = {
             "bufferView": len(accessors),
             "componentType": BYTE if array.dtype == np.uint8 else FLOAT,
             "count": len(array),
@@ -67,7 +69,7 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
             }
         },
     }
-    node = {"mesh": 0}
+    node: dict[str, object] = {"mesh": 0}
     if any(splats.origin):
         node["translation"] = list(splats.origin)
     asset = {

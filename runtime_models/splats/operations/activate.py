@@ -8,10 +8,9 @@ from shapeshift.runtime_models.files.blocks import block_of, each_block
 from shapeshift.runtime_models.lint.invalid_rows import is_odd, odd_in
 from shapeshift.runtime_models.rotation import normalize
 from shapeshift.runtime_models.splats.operations.rotate_splats import turner
-from shapeshift.runtime_models.splats.plain_splats import RawSplats
+from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats
 
 ODD = 140  # bytes of an odd splat's numbers in float64, beside two copies as they are filed
-ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")
 
 
 def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawSplats]:
@@ -51,7 +50,7 @@ def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawS
         np.concatenate(parts) for parts in zip(*(arrays for _, arrays in found), strict=True)
     ]
     rows = np.concatenate([odd for odd, _ in found])
-    return rows, replace(filed, **dict(zip(ARRAYS, columns, strict=True)), labels=None, extra={})
+    return rows, filed.with_arrays(columns, labels=None, extra={})
 
 
 def sigmoid(logits: np.ndarray) -> None:

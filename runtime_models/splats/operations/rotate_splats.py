@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import basis
 from shapeshift.runtime_models.files.blocks import BLOCK, each_block
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.plain_splats import AXES, PlainSplats
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
@@ -41,7 +42,7 @@ def turn(splats: PlainSplats, rotation: np.ndarray) -> PlainSplats:
     means, wxyz, sh = splats.means.copy(), splats.wxyz.copy(), splats.sh.copy()
     turn_rows = turner(rotation, sh.shape[1])
     each_block(len(means), lambda rows, _: turn_rows(means[rows], wxyz[rows], sh[rows]))
-    origin = tuple(map(float, rotation @ np.array(splats.origin)))
+    origin = three(rotation @ np.array(splats.origin))
     return replace(splats, means=means, wxyz=wxyz, sh=sh, origin=origin)
 
 
@@ -82,8 +83,8 @@ def half_turner(signs: np.ndarray, count: int) -> Callable[..., None]:
 
     def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
         if means.flags.c_contiguous and 3 * len(means) <= len(tiled):
-            flat = means.reshape(-1)  # one long loop, not one of three for each
-            flat *= tiled[: flat.size]
+            numbers = means.reshape(-1)  # one long loop, not one of three for each
+            numbers *= tiled[: numbers.size]
         else:
             means *= tiled[:3]
         wxyz[:] = wxyz.take(order, axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.files.whole_file import write_whole
+from shapeshift.runtime_models.shapes import column_names
 from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, turner
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
@@ -69,7 +70,7 @@ def properties(row: np.dtype) -> list[str]:
     """The header's lines of a record."""
     names = {"place": list("xyz"), "normal": list(NORMAL), "opacity": ["opacity"]}
     lines = []
-    for group in row.names:
+    for group in column_names(row):
         kind = row[group].base
         count = row[group].itemsize // kind.itemsize
         if group.startswith("extra "):

@@ -55,7 +55,7 @@ class Spz:
     def __init__(self, header: SpzHeader, source: "Inflate | Raw | Zstd", extensions: bytes | None):
         self.header, self._source, self._extensions, self._taken = header, source, extensions, 0
 
-    def take(self, size: int) -> bytes:
+    def take(self, size: int) -> bytes | bytearray:
         """Exactly `size` bytes.  Raises BadFile."""
         part = self._source.take(size)
         self._taken += len(part)
@@ -69,7 +69,7 @@ class Spz:
 
     def extensions(self) -> dict[int, bytes]:
         """{type: content}; to be asked when all streams have been taken."""
-        data = self._extensions
+        data: bytes | bytearray | None = self._extensions
         if data is None:  # after the streams
             data = self._source.take(MOST_EXTENSION_BYTES)
         return read_extensions(data) if self.header.flags & EXTENSIONS else {}
@@ -159,7 +159,7 @@ class Inflate:
         """`size` bytes, fewer at the end.  Raises BadFile."""
         parts, left = [], size
         while left and not self._zlib.eof:
-            given = self._zlib.unconsumed_tail
+            given: bytes | memoryview = self._zlib.unconsumed_tail
             if not given:
                 given = self._data[self._at : self._at + PIECE]
                 self._at += len(given)
@@ -247,14 +247,15 @@ class Zstd:
         self._memory.charge(self._window, "unpacking it")
 
 
-def read_extensions(data: bytes) -> dict[int, bytes]:
+def read_extensions(data: bytes | bytearray) -> dict[int, bytes]:
     """{type: content} of records back to back, as far as they are whole."""
-    found, at = {}, 0
+    found: dict[int, bytes] = {}
+    at = 0
     while at + EXTENSION.size <= len(data):
         kind, size = EXTENSION.unpack_from(data, at)
         at += EXTENSION.size
         if size > len(data) - at:
             break
-        found[kind] = data[at : at + size]
+        found[kind] = bytes(data[at : at + size])
         at += size
     return found
