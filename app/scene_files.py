@@ -33,7 +33,7 @@ def open_scene_file(
             raise UsageError(f"--{name} is for one model; in {path.name} each object has its own.")
     file = read_scene_file(path)
     with progress_after(PATIENCE_S) as told:
-        models = read_models(file, replace(options.reading(), told=told))
+        models = read_models(file, replace(options.reading(), progress=told))
     if tell:
         tell_findings(models)
     return file, models, scene_of(file, models)

@@ -28,8 +28,8 @@ from shapeshift.renderer.colors.false_colors import (
 )
 from shapeshift.renderer.colors.palette import (
     apply_palette,
-    lay_heat,
     over_background,
+    overlay_heat,
     palette_colors,
 )
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
@@ -103,7 +103,7 @@ class Renderer:
                     decoded.key = key
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
-        self.drawing.place(poses)
+        self.drawing.set_poses(poses)
         self._scene = scene
 
     def _decode_geometry(self, i: int, decoded: DecodedObject, x: Controls) -> None:
@@ -182,7 +182,7 @@ class Renderer:
         drawn = culled.pop("drawn")
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
-        stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
+        stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
         stats.sorts, stats.order_age = sorts, self.drawing.order_age
         stats.color_sets = len(full) if own else 1
         if self._debug:
@@ -240,7 +240,7 @@ class Renderer:
                 self._geometry_runs += 1
             else:
                 wanted = self._wanted_anchors(i, thing, decoded, colored, stale, views)
-                if not colored.take(key, wanted, stale):
+                if not colored.mark_colored(key, wanted, stale):
                     continue  # all that is seen has its colours
             at_once = self._false_colors.way == SPLATS
             self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
@@ -301,7 +301,7 @@ class Renderer:
         """
         if not self.drawing.draws_heat:
             return self.drawing.image(i)
-        return lay_heat(self.drawing.image(i), self.drawing.heat(i), self._false_colors.palette)
+        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), self._false_colors.palette)
 
     def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
@@ -311,7 +311,7 @@ class Renderer:
             return bilinear(self._debug[i][0], self._sizes[i])
         palette, rgba = self._false_colors.palette, bilinear(self.drawing.image(i), self._sizes[i])
         if self.drawing.draws_heat:
-            rgba = lay_heat(rgba, bilinear(self.drawing.heat(i), self._sizes[i]), palette)
+            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), self._sizes[i]), palette)
         elif self._false_colors.way == PICTURE:
             rgba = apply_palette(rgba, palette)
         return over_background(rgba, self.settings.background, out)

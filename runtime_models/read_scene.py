@@ -30,7 +30,10 @@ from shapeshift.runtime_models.splats.layers.read_layer_list import (
 from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
 from shapeshift.runtime_models.splats.lcc.read_lcc import is_lcc, read_lcc
 from shapeshift.runtime_models.splats.lcc.read_lcc2 import is_lcc2, read_lcc2
-from shapeshift.runtime_models.splats.operations.prune_by_importance import left_whole, thin
+from shapeshift.runtime_models.splats.operations.prune_by_importance import (
+    left_whole,
+    prune_by_importance,
+)
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.read_output_folder import (
     in_run,
@@ -72,7 +75,7 @@ def read_model(path: str | Path, reading: Reading | None = None) -> Model:
         return model
     memory = reading.within(Path(path)).account
     with memory.lend(THINNING * model.splat_count, f"thinning {model.splat_count:,} splats"):
-        return thin(model, reading.most_splats)
+        return prune_by_importance(model, reading.most_splats)
 
 
 def read_whole(path: Path, reading: Reading) -> Model:

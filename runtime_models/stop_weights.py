@@ -32,7 +32,7 @@ class StopWeights:
         sound = all(0 <= weight <= 1 for _, weight in self.parts) and len(set(names)) == len(names)
         if not (sound and abs(total - 1) <= SUM_SLACK):
             raise ValueError(
-                f"the weights {told_control(self)} are no blend; stops, each once, with weights "
+                f"the weights {control_text(self)} are no blend; stops, each once, with weights "
                 "from 0 to 1 that add up to 1 are wanted."
             )
         kept = tuple((name, float(weight)) for name, weight in self.parts if weight > 0)
@@ -82,7 +82,7 @@ class StopBlend:
         return tuple(stop.name for stop in self.stops)
 
     @property
-    def through_numbers(self) -> bool:
+    def encodes_every_x(self) -> bool:
         """Whether a way between two numbers leads through all numbers between them."""
         return self.direct or len(self.stops) < 2
 
@@ -152,7 +152,7 @@ class StopBlend:
             return way
         return StopWeights(tuple(zip(self.names, (way / way.sum()).tolist(), strict=True)))
 
-    def place(self, control: Control) -> float:
+    def slider_x(self, control: Control) -> float:
         """x of the slider's knob: of a blend, the mean of its stops' places, at even pace."""
         if not isinstance(control, StopWeights):
             return control
@@ -170,7 +170,7 @@ class StopBlend:
             return False
         if is_each(start) and start.ndim == 2:
             return False
-        if self.through_numbers:
+        if self.encodes_every_x:
             return True
         xs = sorted(stop.x for stop in self.stops)
         low, high = min(np.min(start), end), max(np.max(start), end)
@@ -237,7 +237,7 @@ def encode_control(encoding: ControlEncoding, blend: StopBlend, control: Control
 
 def _is_outside(blend: StopBlend, x: np.ndarray) -> np.ndarray:
     """Whether numbers lie between no two stops that are to be blended; as many."""
-    if blend.through_numbers:
+    if blend.encodes_every_x:
         return np.ones(x.shape, bool)
     xs = [stop.x for stop in blend.stops]
     return ~((x >= min(xs)) & (x <= max(xs)))
@@ -276,7 +276,7 @@ def check_control(control: Control, whose: str) -> None:
         raise ValueError(f"{whose} has x = {control}; from 0 to 1 is wanted.")
 
 
-def told_control(control: Control) -> str:
+def control_text(control: Control) -> str:
     """A control as `parse_control` reads it."""
     if isinstance(control, StopWeights):
         return ",".join(f"{name}:{weight:.6g}" for name, weight in control.parts)

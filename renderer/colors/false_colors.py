@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shapeshift.renderer.colors.palette import LUMINANCE, through_palette
+from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.runtime_models.evaluate import colors_follow_control
 from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, StopWeights, same_controls
@@ -166,7 +166,7 @@ def mixed_colors(shade: Shade, count: int, color_at: ColorAt) -> np.ndarray:
     heat, colors = np.zeros((count, 2)), np.zeros((count, 3))
     for part in shade.heats:
         weights = _of_splats(part.weights, count)
-        false = through_palette(color_at(part.control) @ LUMINANCE, part.palette)
+        false = palette_values(color_at(part.control) @ LUMINANCE, part.palette)
         colors += np.where(weights[:, None] > 0, weights[:, None] * false, 0)
         heat[:, 1] += weights
     return _kept(shade, heat, color_at) + colors

@@ -48,7 +48,7 @@ class Decoder:
         }  # fmt: skip
         for i, on_gpu in enumerate(self._models):
             if isinstance(on_gpu, Layers):
-                on_gpu.place(arena, i)
+                on_gpu.upload(arena, i)
 
     def geometry(
         self,

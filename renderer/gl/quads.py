@@ -103,11 +103,11 @@ class QuadsDrawing(Drawing):
     def wait_decoded(self) -> None:
         """Nothing: GL keeps the order of the passes itself."""
 
-    def place(self, world_from_objects: list[np.ndarray]) -> None:
+    def set_poses(self, world_from_objects: list[np.ndarray]) -> None:
         poses = np.reshape(world_from_objects, (-1, 4, 4))
         if not np.array_equal(poses, self._arena.world_from_object, equal_nan=True):
             self._changed = True
-            self._arena.place(poses)
+            self._arena.set_poses(poses)
 
     def draw(
         self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0

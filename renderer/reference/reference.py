@@ -18,7 +18,7 @@ from shapeshift.renderer.colors.false_colors import (
     mixed_colors,
     split_colors,
 )
-from shapeshift.renderer.colors.palette import lay_heat
+from shapeshift.renderer.colors.palette import overlay_heat
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import Model, is_antialiased
@@ -73,11 +73,13 @@ def reference_image(
     )
     key = np.linalg.norm(place - middle, axis=1) if settings.order == "distance" else depth
     order = np.argsort(key, kind="stable")
-    ellipses = (column[order] for column in (mean_px, covariance, opacity, color))
-    image = blended(*ellipses, view.size, settings.min_alpha)
+    image = blended(
+        mean_px[order], covariance[order], opacity[order], color[order], view.size,
+        settings.min_alpha,
+    )  # fmt: skip
     if colors.way != BESIDE:
         return image
-    return lay_heat(image[..., [0, 1, 2, 5]], image[..., 3:5], colors.palette)
+    return overlay_heat(image[..., [0, 1, 2, 5]], image[..., 3:5], colors.palette)
 
 
 def shaded_objects(
@@ -144,7 +146,8 @@ def gate_object(
         for a in (splats.means, splats.scales, splats.wxyz, splats.opacity)
     )
     color = shaded_color(thing.model, splats.color, eye_object, shading)
-    scales = np.where(np.isfinite(wxyz).all(axis=1)[:, None], scales, np.nan)  # turned nowhere
+    turned = np.isfinite(wxyz).all(axis=1, keepdims=True)  # (N, 1)
+    scales = np.where(turned, scales, np.nan)
     if not thing.visible:
         means = np.full_like(means, np.nan)
     with np.errstate(all="ignore"):  # splats that are not finite, or beside or behind the eye
@@ -155,7 +158,9 @@ def gate_object(
         in_camera = camera_from_object[:3, :3] @ axes
         bare = screen_covariance(mean, in_camera, (fx, fy), (-most_x, most_x, -most_y, most_y))
         covariance = bare + settings.low_pass * np.eye(2)
-        seen = opacity * kept_light(bare, covariance) if is_antialiased(thing.model) else opacity
+        seen = (
+            opacity * mip_compensation(bare, covariance) if is_antialiased(thing.model) else opacity
+        )
         # The arena keeps covariances as float32: what is infinite there is so here.
         overflow: np.ndarray = np.asarray(
             np.square(axes).sum(axis=2).max(axis=1) > np.finfo(np.float32).max
@@ -183,7 +188,7 @@ def shaded_color(
     return np.asarray(decoded, np.float64)
 
 
-def kept_light(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def mip_compensation(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """(N,) sqrt(det / det with the low pass): how much fainter an antialiased splat becomes."""
     kept = np.sqrt(np.maximum(np.linalg.det(bare), 0) / np.linalg.det(covariance))
     return np.fmin(kept, 1)  # 1 where the quotient is no number

@@ -57,7 +57,7 @@ def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3, or the coloured points that an .npz holds.  Raises BadFile."""
     reading = reading.within(path)
     memory = reading.account
-    reading.tell(f"reading {path.name}", 0.0)
+    reading.report(f"reading {path.name}", 0.0)
     arrays = arrays_of(path, memory)
     lacking = [name for name in GEOMETRY if name not in arrays]
     if set(lacking) == {"scales", "quats", "opacities"}:

@@ -196,7 +196,7 @@ class _Machine:
             raise IndexError("too few for a tuple")
         self.stack[len(self.stack) - count :] = [tuple(items)]
 
-    def _put_items(self, items: list) -> None:
+    def _set_items(self, items: list) -> None:
         target = self.stack[-1]
         if type(target) is not dict or len(items) % 2:
             raise TypeError("items go into a dictionary, in pairs")
@@ -272,8 +272,8 @@ STEPS = {
     "LIST": lambda m: m.stack.append(m._since_mark()),
     "APPEND": lambda m: m._append([m.stack.pop()]),
     "APPENDS": lambda m: m._append(m._since_mark()),
-    "SETITEM": lambda m: m._put_items([m.stack.pop(-2), m.stack.pop()]),
-    "SETITEMS": lambda m: m._put_items(m._since_mark()),
+    "SETITEM": lambda m: m._set_items([m.stack.pop(-2), m.stack.pop()]),
+    "SETITEMS": lambda m: m._set_items(m._since_mark()),
     "POP": lambda m: m.stack.pop(),
     "BINPERSID": _Machine._persistent,
     "STACK_GLOBAL": _Machine._stack_global,

@@ -61,7 +61,7 @@ def read_onnx(
     chain = _Chain(name, constants, given[0], memory)
     with np.errstate(over="ignore", invalid="ignore"):  # finish() refuses what is not finite
         for node in graph.node:
-            chain.take(node)
+            chain.add(node)
     return chain.finish(graph.output[0].name, inputs)
 
 
@@ -142,7 +142,7 @@ class _Chain:
         self.head, self.gain = "none", 1.0
         self.clip: tuple[float, float] | None = None
 
-    def take(self, node) -> None:
+    def add(self, node) -> None:
         """The next node of the file.  Raises BadFile, naming it, where it does not belong."""
         if not node.output:
             raise BadFile(f"{self.name}: a node {node.op_type!r} gives nothing; export it again.")

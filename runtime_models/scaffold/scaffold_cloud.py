@@ -82,7 +82,7 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
         fill(cloud, rows, table)
 
     def tell(part: float) -> None:
-        reading.tell(f"reading {path.name}", part)
+        reading.report(f"reading {path.name}", part)
 
     each_block(count, work, tell, opened)
     return cloud

@@ -25,7 +25,7 @@ class Reading:
     strict: bool = False  # refuse what would be repaired
     allow_huge: bool = False  # open files that would lay thousands of splats over every pixel
     most_splats: int = 0  # no more than these, the ones that show most; 0 = all
-    told: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
+    progress: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
     memory_gb: float = 0.0  # that files may take while they are read; 0 = as memory.py has it
     memory: Memory | Account | None = None  # what they have taken; None: nothing is open yet
 
@@ -49,9 +49,9 @@ class Reading:
         assert isinstance(self.memory, Account), "readers are given a reading of their file"
         return self.memory
 
-    def tell(self, what: str, part: float) -> None:
-        if self.told:
-            self.told(what, part)
+    def report(self, what: str, part: float) -> None:
+        if self.progress:
+            self.progress(what, part)
 
 
 @dataclass

@@ -11,7 +11,7 @@ from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import joined, moved, widened
 from shapeshift.runtime_models.splats.operations.recentre import FINE
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.usd.read_usd import refuse_without
 
@@ -56,7 +56,7 @@ def writer_of(path: Path) -> Writer:
     raise BadFile(f"{path} has no ending that can be written; known are {endings}.")
 
 
-def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
+def describe_losses(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
     """What the splats have and the format has no place for, beside what its codes round."""
     findings = []
     if splats.antialiased and not writer.antialiased:
@@ -76,14 +76,14 @@ def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def cut(splats: PlainSplats, sh_degree: int) -> PlainSplats:
+def truncate_harmonics(splats: PlainSplats, sh_degree: int) -> PlainSplats:
     """Without harmonics above a degree: the best of that degree, as they are orthogonal."""
     return replace(splats, sh=splats.sh[:, : COEFFICIENTS[sh_degree]])
 
 
 def placed(splats: PlainSplats, rotation: np.ndarray, position: np.ndarray) -> PlainSplats:
     """The splats after a rotation (3, 3) about zero and a shift (3,) in metres, exactly."""
-    turned = turn(splats, rotation)
+    turned = rotate_splats(splats, rotation)
     origin = three(np.add(turned.origin, position))
     return replace(turned, origin=origin)
 

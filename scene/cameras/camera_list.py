@@ -107,11 +107,13 @@ def pinhole_view(
 ) -> View:
     """The view of a camera with OpenCV axes (4, 4), pixels.  Raises BadFile."""
     if not all(is_number(f) and f > 0 for f in focal):
-        raise BadFile(f"{where} has focal lengths {_told(focal)}; both must be above 0.")
+        raise BadFile(f"{where} has focal lengths {_numbers_text(focal)}; both must be above 0.")
     if not all(is_number(n) and n >= 1 for n in size):
-        raise BadFile(f"{where} has the size {_told(size)}; pixels from 1 up are wanted.")
+        raise BadFile(f"{where} has the size {_numbers_text(size)}; pixels from 1 up are wanted.")
     if not all(map(is_number, centre)):
-        raise BadFile(f"{where} has its principal point at {_told(centre)}; pixels are wanted.")
+        raise BadFile(
+            f"{where} has its principal point at {_numbers_text(centre)}; pixels are wanted."
+        )
     pixels = (int(size[0]), int(size[1]))
     try:
         return View.from_pinhole(world_from_camera, focal, centre, pixels, NEAR, FAR)
@@ -179,5 +181,5 @@ def moved(views: Sequence[View], by: Sequence[float]) -> list[View]:
     ]
 
 
-def _told(values: Sequence) -> str:
+def _numbers_text(values: Sequence) -> str:
     return ", ".join(f"{v:.6g}" if is_number(v) else str(v)[:20] for v in values)

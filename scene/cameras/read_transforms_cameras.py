@@ -69,7 +69,7 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
         tuple(views[i] for i in kept),
         tuple(names[i] for i in kept),
         "transforms",
-        told(notes, where),
+        note_sentences(notes, where),
     )
 
 
@@ -134,7 +134,7 @@ def size_of(fields: Fields, folder: Path, notes: Notes) -> tuple[float, float]:
     return BLENDER_SIZE
 
 
-def told(notes: Notes, where: str) -> tuple[str, ...]:
+def note_sentences(notes: Notes, where: str) -> tuple[str, ...]:
     out = list(notes.without_lens)
     if notes.bent:
         out.append(f"{where}: the lenses' distortion is left out; the views are those of pinholes.")

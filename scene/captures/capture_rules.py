@@ -39,7 +39,7 @@ class CaptureWorld:
     ) -> "CaptureWorld":
         """`up` if the file gives one, else as the photos (N, 4, 4; OpenCV axes) tell."""
         up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
-        turn = turn_upright(up, where)
+        turn = upright_rotation(up, where)
         return CaptureWorld(turn, three(np.asarray(up, np.float64) + 0.0))  # + 0.0: never -0.0
 
     def turned(self, matrix: np.ndarray) -> np.ndarray:
@@ -121,7 +121,7 @@ def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarra
     return np.sign(mean[axis]) * np.eye(3)[axis]
 
 
-def turn_upright(up: object, where: str) -> np.ndarray:
+def upright_rotation(up: object, where: str) -> np.ndarray:
     """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
     try:
         up = np.asarray(up, np.float64)

@@ -24,11 +24,11 @@ SLACK = 0.025  # of the object's longest side that a hull may stand out of it
 JOIN = 1.08  # times the volume of two pieces that their common hull may have
 SPIKES = 3.0  # times SLACK that it may stand out in a few places: stray splats leave spikes
 SKIN_SAMPLES, HULL_SAMPLES = 20_000, 600
-Told = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
 
 def cut_into_hulls(
-    mesh: TriangleMesh, most: int, told: Told, limit_s: float = LIMIT_S
+    mesh: TriangleMesh, most: int, progress: Progress, limit_s: float = LIMIT_S
 ) -> tuple[tuple[np.ndarray, ...], bool]:
     """At most `most` hulls (V, 3) float32 that cover a closed mesh; whether CoACD did its part.
 
@@ -39,7 +39,7 @@ def cut_into_hulls(
     whole = [part.vertices for part in parts]
     if len(parts) <= most and all(skin.reach(points) <= skin.slack for points in whole):
         return solid_hulls(whole, mesh, most), True
-    pieces = run_coacd(mesh, most, told, limit_s)
+    pieces = run_coacd(mesh, most, progress, limit_s)
     hulls = solid_hulls(joined(pieces, skin), mesh, most)
     return (hulls, True) if hulls else (solid_hulls(whole, mesh, most), False)
 
@@ -125,7 +125,9 @@ def hull_volume(points: np.ndarray) -> float:
         return 0.0
 
 
-def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list[np.ndarray]:
+def run_coacd(
+    mesh: TriangleMesh, most: int, progress: Progress, limit_s: float
+) -> list[np.ndarray]:
     """The vertices of CoACD's pieces; none where it fails or takes longer.
 
     Raises BadFile where it is not installed.
@@ -150,9 +152,9 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
             begun = time.monotonic()
             while child.poll() is None and time.monotonic() - begun < limit_s:
                 passed = (time.monotonic() - begun) / limit_s
-                told("cutting it into convex pieces", passed)
+                progress("cutting it into convex pieces", passed)
                 time.sleep(0.05)
-        finally:  # also when told() or Ctrl-C ends the wait
+        finally:  # also when progress() or Ctrl-C ends the wait
             child.kill()
             child.wait()
             assert child.stdin is not None, "a pipe"
@@ -164,7 +166,7 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
                 f"({why}); install it with: python -m pip install -r requirements.txt."
             )
         if child.returncode != 0 or not wanted.is_file():
-            told("CoACD found no pieces: each separate part becomes one", 1.0)
+            progress("CoACD found no pieces: each separate part becomes one", 1.0)
             return []
         with np.load(wanted) as file:
             return [file[name] * size + centre for name in file.files]

@@ -20,7 +20,7 @@ from shapeshift.scene.document.scene_file import (
 )
 from shapeshift.scene.pose import UNIT_SLACK
 from shapeshift.scene.selectors.selector import Box, Selector, Sphere
-from shapeshift.scene.selectors.selector_rows import made, read_selector_row
+from shapeshift.scene.selectors.selector_rows import build, read_selector_row
 from shapeshift.scene.world.reactions import KINDS, Reaction, State, TwoAxes
 
 MOST_OBJECTS = 1000
@@ -139,7 +139,7 @@ def read_view(row: Fields | None) -> FirstView | None:
 def read_state(row: Fields) -> State:
     values = {"name": row.line("name"), "x": row.control("x")}
     row.refuse_unknown_keys()
-    return made(State, values, row.where)
+    return build(State, values, row.where)
 
 
 def read_two_axes(row: Fields | None) -> TwoAxes | None:
@@ -169,7 +169,7 @@ def read_reaction(row: Fields) -> Reaction:
         "region": read_region(region) if region else None,
     }
     row.refuse_unknown_keys()
-    return made(Reaction, values, row.where)
+    return build(Reaction, values, row.where)
 
 
 def read_names(row: Fields, key: str) -> tuple[str, ...]:

@@ -31,8 +31,8 @@ class _Placed:
 
     def __post_init__(self) -> None:
         check_control(self.x, _name(self))
-        _wanted(self, "border", 0 <= self.border < math.inf, "metres, 0 or more")
-        _wanted(self, "space", self.space in SPACES, " or ".join(SPACES))
+        _check(self, "border", 0 <= self.border < math.inf, "metres, 0 or more")
+        _check(self, "space", self.space in SPACES, " or ".join(SPACES))
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         """(N,) metres from the surface, negative inside, of places (N, 3) in its space."""
@@ -60,7 +60,7 @@ class Box(_Placed):
         super().__post_init__()
         _floats(self, "centre", 3)
         _floats(self, "half", 3)
-        _wanted(self, "half", min(self.half) >= 0, "metres, 0 or more")
+        _check(self, "half", min(self.half) >= 0, "metres, 0 or more")
         _unit(self, "wxyz", 4)
 
     def distance(self, places: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ class Sphere(_Placed):
     def __post_init__(self) -> None:
         super().__post_init__()
         _floats(self, "centre", 3)
-        _wanted(self, "radius", 0 <= self.radius < math.inf, "metres, 0 or more")
+        _check(self, "radius", 0 <= self.radius < math.inf, "metres, 0 or more")
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         return np.linalg.norm(places - self.centre, axis=1) - self.radius
@@ -96,7 +96,7 @@ class HalfSpace(_Placed):
         _floats(self, "point", 3)
         _floats(self, "normal", 3)
         length = math.hypot(*self.normal)
-        _wanted(self, "normal", 0 < length < math.inf, "a direction, not zero")
+        _check(self, "normal", 0 < length < math.inf, "a direction, not zero")
         if abs(length - 1) > 1e-12:  # a unit normal stays to the bit, so that files keep it
             object.__setattr__(self, "normal", tuple(n / length for n in self.normal))
 
@@ -125,11 +125,11 @@ class Lens(_Placed):
             raise ValueError("Lens wants either half_angle or tangents.")
         if self.half_angle is not None:
             acute = 0 < self.half_angle < math.pi / 2
-            _wanted(self, "half_angle", acute, "radians between 0 and pi/2")
+            _check(self, "half_angle", acute, "radians between 0 and pi/2")
         if self.tangents is not None:
             _floats(self, "tangents", 4)
             left, right, down, up = self.tangents
-            _wanted(self, "tangents", left < right and down < up, "left < right and down < up")
+            _check(self, "tangents", left < right and down < up, "left < right and down < up")
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         axes = Pose(np.zeros(3), np.array(self.wxyz)).matrix()[:3, :3]
@@ -224,7 +224,7 @@ def _name(selector: object) -> str:
     return type(selector).__name__
 
 
-def _wanted(selector: object, field: str, fits: bool, wanted: str) -> None:
+def _check(selector: object, field: str, fits: bool, wanted: str) -> None:
     if not fits:
         found = getattr(selector, field)
         raise ValueError(f"{_name(selector)} has {field} = {found}; {wanted} is wanted.")
@@ -235,10 +235,10 @@ def _floats(selector: object, field: str, count: int) -> None:
     row = tuple(float(n) for n in getattr(selector, field))
     object.__setattr__(selector, field, row)
     fits = len(row) == count and all(map(math.isfinite, row))
-    _wanted(selector, field, fits, f"{count} finite numbers")
+    _check(selector, field, fits, f"{count} finite numbers")
 
 
 def _unit(selector: object, field: str, count: int) -> None:
     _floats(selector, field, count)
     length = math.hypot(*getattr(selector, field))
-    _wanted(selector, field, abs(length - 1) <= UNIT_SLACK, "a unit quaternion")
+    _check(selector, field, abs(length - 1) <= UNIT_SLACK, "a unit quaternion")

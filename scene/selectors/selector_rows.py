@@ -47,14 +47,14 @@ def read_selector_row(row: Fields) -> Selector:
             values[field.name] = row.number(field.name, default, "a finite number")
     row.refuse_unknown_keys()
     make: Callable[..., Selector] = kind
-    return made(make, values, row.where)
+    return build(make, values, row.where)
 
 
 def as_list(value: object) -> list:
     return value if isinstance(value, list) else [None]
 
 
-def made(kind: Callable[..., Made], values: dict, where: str) -> Made:
+def build(kind: Callable[..., Made], values: dict, where: str) -> Made:
     """An instance whose own refusal is the file's."""
     try:
         return kind(**values)

@@ -56,7 +56,7 @@ def motor_joint(frame_hand: Any, frame_body: Any, mass_kg: float) -> Any:
     return joint.build()
 
 
-def take_hold(
+def attach_hand(
     world: Any, number: int, body_handle: Any, hand_pose: Pose, point: np.ndarray
 ) -> Hold:
     """Puts a kinematic hand into the world and ties a body to it at a point (3,) of the world."""
@@ -99,7 +99,7 @@ def jumped(pose: Pose, moved: np.ndarray) -> Pose:
     return Pose.from_matrix(moved @ pose.matrix())
 
 
-def lead_hands(world: Any, starts: list[tuple[Hold, Any]], part: float) -> None:
+def move_hands(world: Any, starts: list[tuple[Hold, Any]], part: float) -> None:
     """Puts every hand a part 0..1 of the way from where it was at the start of a step."""
     for hold, start in starts:
         now = start.lerp_slerp(isometry(hold.target), part)

@@ -44,7 +44,7 @@ def along(view: View, place: tuple[float, float], size: Size) -> np.ndarray:
     return view.world_from_eye.matrix()[:3, :3] @ np.array([x, y, -1.0])
 
 
-def take(view: View, size: Size, point: np.ndarray) -> MouseHand:
+def hand_at(view: View, size: Size, point: np.ndarray) -> MouseHand:
     """A hand at a point (3,) of the world before the eye."""
     x, y, z = (view.eye_from_world() @ np.append(point, 1.0))[:3]
     left, right, low, high = view.tangents

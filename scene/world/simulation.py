@@ -37,7 +37,7 @@ class Simulation:
         self.world.grab(act.hand, act.reach_m)
 
     def control(self, act: Act) -> None:
-        thing = self.world.thing(act.item)
+        thing = self.world.object_named(act.item)
         x: Control | None = act.x
         if x is None:
             axes, balance, power = thing.item.two_axes, act.balance, act.power

@@ -210,7 +210,7 @@ def read_level(lcc: Lcc, number: int, reading: Reading) -> RawSplats:
         decode(table, words, lcc.coding, raw, rows)
         first = rows.stop
         if done % 64 == 0:
-            reading.tell(f"reading {lcc.file.name}", first / count)
+            reading.report(f"reading {lcc.file.name}", first / count)
     return raw
 
 

@@ -58,8 +58,8 @@ def read_lcc2(path: Path, reading: Reading) -> SplatLayers:
     files = list(lcc.levels[number]) + ([lcc.environment] if lcc.environment else [])
     parts = []
     for i, each in enumerate(files):
-        reading.tell(f"reading level {number} of {file.name}", i / len(files))
-        parts.append(read_chunk(each, replace(reading, told=None)))
+        reading.report(f"reading level {number} of {file.name}", i / len(files))
+        parts.append(read_chunk(each, replace(reading, progress=None)))
     names = [file.name, *(each.relative_to(file.parent).as_posix() for each in files)]
     return level_as_layers(parts, number, lcc.counts, file, reading, names)
 

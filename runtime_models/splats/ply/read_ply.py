@@ -223,4 +223,4 @@ def parse(text: bytes, name: str) -> np.ndarray:
 
 
 def teller(path: Path, reading: Reading) -> Callable[[float], None]:
-    return lambda part: reading.tell(f"reading {path.name}", part)
+    return lambda part: reading.report(f"reading {path.name}", part)

@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.runtime_models.shapes import column_names
-from shapeshift.runtime_models.splats.operations.knn_distance import spacing
+from shapeshift.runtime_models.splats.operations.knn_distance import knn_distance
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
 from shapeshift.runtime_models.splats.ply.read_ply import (
@@ -76,9 +76,9 @@ def splats_of_points(
         places = places.astype(np.float64)
     count, memory = len(places), reading.account
     memory.charge(count * SHOWN, f"{count:,} points")
-    reading.tell(f"measuring {file}", 0.5)
+    reading.report(f"measuring {file}", 0.5)
     with memory.lend(count * MEASURED, f"measuring {count:,} points"):
-        size = (SIGMA * spacing(places)).astype(np.float32)
+        size = (SIGMA * knn_distance(places)).astype(np.float32)
     done = f"shown as {count:,} points, each as wide as the way to its neighbours"
     return RawSplats(
         means=places,

@@ -51,12 +51,12 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
     what = f"{sog.count:,} splats"
     memory.charge(GEOMETRY * sog.count, what)
     with memory.lend(DECODING * sog.count, what):
-        reading.tell(f"reading {path.name}", 0.0)
+        reading.report(f"reading {path.name}", 0.0)
         means = read_means(sog)
-        reading.tell(f"reading {path.name}", 0.3)
+        reading.report(f"reading {path.name}", 0.3)
         scales = decode(sog, "scales", sog.pixels("scales")[:, :3])
         wxyz = read_quaternions(sog)
-        reading.tell(f"reading {path.name}", 0.5)
+        reading.report(f"reading {path.name}", 0.5)
         sh, opacity = read_colors(sog)
     memory.release(sog.files.held)
     return RawSplats(
@@ -191,7 +191,9 @@ def read_quaternions(sog: Sog) -> np.ndarray:
     each_block(sog.count, fill)
     if unknown.any():
         wxyz[unknown] = 1, 0, 0, 0
-        sog.findings.append(odd("quaternions are of no known code", unknown, "not turned", sog))
+        sog.findings.append(
+            finding_of_pixels("quaternions are of no known code", unknown, "not turned", sog)
+        )
     return wxyz
 
 
@@ -214,7 +216,9 @@ def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
         each_block(sog.count, lambda rows, _: look_up(palette, labels[rows], sh[rows, 1:]))
         if beyond.any():
             sh[beyond, 1:] = 0
-            found = odd("splats name harmonics that are not there", beyond, "one colour", sog)
+            found = finding_of_pixels(
+                "splats name harmonics that are not there", beyond, "one colour", sog
+            )
             sog.findings.append(found)
     return sh, opacity
 
@@ -247,7 +251,7 @@ def read_palette(sog: Sog) -> np.ndarray:
         return decode(sog, "shN", codes)
 
 
-def odd(what: str, rows: np.ndarray, done: str, sog: Sog) -> Finding:
+def finding_of_pixels(what: str, rows: np.ndarray, done: str, sog: Sog) -> Finding:
     """A finding about the rows (N,) bool."""
     numbers = np.flatnonzero(rows)
     few = tuple(int(number) for number in numbers[:10])

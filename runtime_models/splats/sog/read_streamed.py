@@ -11,7 +11,7 @@ from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, Memory
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import check_mode, join_layers
-from shapeshift.runtime_models.splats.operations.prune_by_importance import thin
+from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
 from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.sog_files import (
@@ -85,7 +85,7 @@ def levels(path: Path, reading: Reading) -> Iterator[SplatLayers]:
     streamed = read_tree(path, reading.within(folder_of(path)).account)
     origin = None
     for number in steps(streamed.counts, reading.most_splats):
-        level = thin(read_level(streamed, number, reading), reading.most_splats)
+        level = prune_by_importance(read_level(streamed, number, reading), reading.most_splats)
         if origin is None:
             origin = level.origin
         shift = np.subtract(level.origin, origin)
@@ -170,9 +170,9 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
         if run.count:
             runs_of_file.setdefault(run.file, []).append(run)
     parts, used = [], [streamed.folder / TREE]
-    within = replace(reading, told=None)
+    within = replace(reading, progress=None)
     for i, (file, runs) in enumerate(sorted(runs_of_file.items())):
-        reading.tell(f"reading level {number} of {streamed.folder.name}", i / len(runs_of_file))
+        reading.report(f"reading level {number} of {streamed.folder.name}", i / len(runs_of_file))
         parts.append(picked(read_raw_sog(streamed.files[file], within), runs))
         used += files_of_sog(streamed.files[file], reading)
     if streamed.environment is not None:
@@ -186,11 +186,11 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
     return replace(
         layers,
         provenance=layers.provenance | shown,
-        findings=(*layers.findings, *told_of(streamed, number)),
+        findings=(*layers.findings, *level_findings(streamed, number)),
     )
 
 
-def told_of(streamed: Streamed, number: int) -> tuple[Finding, ...]:
+def level_findings(streamed: Streamed, number: int) -> tuple[Finding, ...]:
     """A word on which level it is, where it is not the finest."""
     finest = finest_within(streamed.counts, 0)
     if number == finest:

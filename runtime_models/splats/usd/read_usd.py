@@ -62,7 +62,7 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
     refuse_without(path)
     reading = reading.within(path)
     memory = reading.account
-    reading.tell(f"reading {path.name}", 0.0)
+    reading.report(f"reading {path.name}", 0.0)
     with tempfile.TemporaryDirectory(prefix="shapeshift-", ignore_cleanup_errors=True) as folder:
         made = Path(folder, "splats.npz")
         run(path, made, memory)
