@@ -15,9 +15,9 @@ from shapeshift.app.document import Document
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
+from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.cameras.framing import distances_from, orbit_path
-from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.metrics import psnr
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene

@@ -85,7 +85,7 @@ def open_model(
             f"{path} is a scene file of objects; one model is wanted here: name the file of one."
         )
     with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
-        model = read_model(path, replace(options.reading(), told=tell))
+        model = read_model(path, replace(options.reading(), progress=tell))
     for finding in model.findings:
         say(sentence(finding))
     return model

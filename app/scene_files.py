@@ -33,7 +33,7 @@ def open_scene_file(
             raise UsageError(f"--{name} is for one model; in {path.name} each object has its own.")
     file = read_scene_file(path)
     with progress_after(PATIENCE_S) as told:
-        models = read_models(file, replace(options.reading(), told=told))
+        models = read_models(file, replace(options.reading(), progress=told))
     if tell:
         tell_findings(models)
     return file, models, scene_of(file, models)
@@ -48,8 +48,8 @@ def tell_findings(models: dict[str, "Model"]) -> None:
 
 def describe_scene(file: "SceneFile", models: dict[str, "Model"], path: Path) -> dict:
     """What `launch.py info` prints of a scene file."""
+    from shapeshift.runtime_models.files.json_fields import control_row
     from shapeshift.scene.document.scene_file import FORMAT
-    from shapeshift.scene.json.json_fields import control_row
 
     return {
         "format": FORMAT,

@@ -54,3 +54,19 @@ def blend_heat(
             device.program(KERNEL)["blend_heat"], count, GROUP,
             count, rows.start, int(into_color), heat, color,
         )  # fmt: skip
+
+
+def compile_heat(device: Device, splats: int) -> None:
+    """Compiles the kernels above for so many splats, and writes nothing.
+
+    A driver may compile when a kernel is launched first (PoCL does, one binary up to 65,535 items
+    and another one beyond): 200 ms that are better spent while a scene opens than in a frame.
+    """
+    kernels = device.program(KERNEL)
+    nothing = device.empty((1, 4))
+    weights = device.constants(np.zeros(1, np.float32))
+    device.launch(
+        kernels["add_heat"], splats, GROUP, 0, 0, 1, 1, None, weights, nothing, nothing
+    )  # fmt: skip
+    device.launch(kernels["blend_heat"], splats, GROUP, 0, 0, 0, nothing, nothing)
+    device.queue.finish()

@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
-from shapeshift.rasterizer.project import RECORD, Projected
+from shapeshift.rasterizer.project import RECORD, TILE, Projected
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -109,6 +109,21 @@ def rasterize_with_heat(
     if views:
         draw_views(device, inputs, size, views[0][1].grid, float(min_transmittance))
     return [device.view(image) for image in images], [device.view(image) for image in hot]
+
+
+def compile_with_heat(
+    device: Device, form: str | None = None, min_transmittance: float = MIN_TRANSMITTANCE
+) -> None:
+    """Compiles what rasterize_with_heat launches for heat, with one empty tile.
+
+    On a GPU the kernel is built for one value of min_transmittance.
+    """
+    starts = device.constants(np.zeros(2, np.int32))
+    record, image = device.empty((1, RECORD)), device.empty((TILE, TILE, 4))
+    inputs = [(starts, starts, record, image, record, device.empty((TILE, TILE, 2)))]
+    draw_views = {"cpu": _draw_cpu, "gpu": _draw_gpu}[form or device.kind]
+    draw_views(device, inputs, (TILE, TILE), (1, 1), float(min_transmittance))
+    device.queue.finish()
 
 
 def _draw_cpu(

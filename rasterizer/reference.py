@@ -1,4 +1,7 @@
-"""The slow twin: projection and blending in plain numpy float64, and finite differences."""
+"""The one oracle of drawing: projection and blending in plain numpy float64; finite differences.
+
+renderer/reference puts the scene, its gates and its palettes around it.
+"""
 
 from collections.abc import Callable
 
@@ -6,7 +9,7 @@ import numpy as np
 
 from shapeshift.rasterizer.project import LEAST_ALPHA, LOW_PASS, Camera
 
-MAX_ALPHA = 0.99
+MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
 Splats = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -21,20 +24,68 @@ def rotations(wxyz: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
+def screen_covariance(
+    means: np.ndarray,
+    axes: np.ndarray,
+    focal: tuple[float, float],
+    limits: tuple[float, float, float, float],
+) -> np.ndarray:
+    """(N, 2, 2) px^2 of ellipsoids by the linearised projection: J W Sigma W^T J^T (EWA; 3DGS).
+
+    means (N, 3) metres in the camera, z forward; axes (N, 3, 3): columns one sigma long, in the
+    camera; focal: fx, fy in pixels; limits: least and most x/z, least and most y/z that J sees.
+    """
+    (fx, fy), (left, right, top, bottom), z = focal, limits, means[:, 2]
+    jacobian = np.zeros((len(z), 2, 3))  # pixels per metre
+    jacobian[:, 0, 0], jacobian[:, 1, 1] = fx / z, fy / z
+    jacobian[:, 0, 2] = -fx * np.clip(means[:, 0] / z, left, right) / z
+    jacobian[:, 1, 2] = -fy * np.clip(means[:, 1] / z, top, bottom) / z
+    half = jacobian @ axes
+    return half @ half.transpose(0, 2, 1)
+
+
+def blend(
+    mean_px: np.ndarray,
+    conics: np.ndarray,
+    power_thresholds: np.ndarray,
+    extents: np.ndarray,
+    opacity: np.ndarray,
+    color: np.ndarray,
+    size: tuple[int, int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Image (H, W, C) over nothing and transmittance (H, W) of colours (N, C), near to far.
+
+    conics (N, 3): A, B, C of r = A dx^2 + 2 B dx dy + C dy^2; alpha = min(0.99, opacity
+    exp(-r / 2)), none where r is above the power threshold (N,), which is within extents (N, 2) px
+    of the mean (N, 2).  Splat by splat, without early stop (3DGS; paper eq. 2).
+    """
+    width, height = size
+    image, transmittance = np.zeros((height, width, color.shape[1])), np.ones((height, width))
+    first = np.clip(np.floor(mean_px - extents - 0.5), 0, size).astype(int)
+    after = np.clip(np.ceil(mean_px + extents + 0.5), 0, size).astype(int)
+    for i in np.flatnonzero(np.all(after > first, axis=1)):
+        (x0, y0), (x1, y1), (a, b, c) = first[i], after[i], conics[i]
+        dx = np.arange(x0, x1) + 0.5 - mean_px[i, 0]
+        dy = (np.arange(y0, y1) + 0.5 - mean_px[i, 1])[:, None]
+        r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
+        alpha = np.minimum(MAX_ALPHA, opacity[i] * np.exp(-r / 2))
+        weight = np.where(r <= power_thresholds[i], alpha, 0) * transmittance[y0:y1, x0:x1]
+        image[y0:y1, x0:x1] += weight[..., None] * color[i]
+        transmittance[y0:y1, x0:x1] -= weight
+    return image, transmittance
+
+
 def project_reference(
     means, scales, wxyz, opacity, color, camera: Camera, low_pass: float = LOW_PASS
 ) -> tuple[np.ndarray, np.ndarray]:
     """Records (N, 12) and depths (N,) float64 of finite splats, laid out as `project` lays them."""
     camera_from_world = np.asarray(camera.camera_from_world, np.float64)
     p = means @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
-    z = np.where(p[:, 2] > camera.near, p[:, 2], 1.0)  # the others are culled below
-    left, right, top, bottom = camera.limits()
-    tan_x, tan_y = np.clip(p[:, 0] / z, left, right), np.clip(p[:, 1] / z, top, bottom)
-    jacobian = np.zeros((len(z), 2, 3))
-    jacobian[:, 0, 0], jacobian[:, 0, 2] = camera.fx / z, -camera.fx * tan_x / z
-    jacobian[:, 1, 1], jacobian[:, 1, 2] = camera.fy / z, -camera.fy * tan_y / z
-    root = jacobian @ camera_from_world[:3, :3] @ (rotations(wxyz) * scales[:, None, :])
-    covariance = root @ root.transpose(0, 2, 1) + low_pass * np.eye(2)  # (N, 2, 2) px^2
+    in_front = p.copy()
+    in_front[:, 2] = z = np.where(p[:, 2] > camera.near, p[:, 2], 1.0)  # the others are culled
+    axes = camera_from_world[:3, :3] @ (rotations(wxyz) * scales[:, None, :])
+    bare = screen_covariance(in_front, axes, (camera.fx, camera.fy), camera.limits())
+    covariance = bare + low_pass * np.eye(2)  # (N, 2, 2) px^2
     conic = np.linalg.inv(covariance)
     power_threshold = 2 * np.log(np.maximum(opacity, LEAST_ALPHA) / LEAST_ALPHA)
     extent = np.sqrt(power_threshold[:, None] * np.diagonal(covariance, axis1=1, axis2=2))
@@ -54,24 +105,13 @@ def rasterize_reference(
     record: np.ndarray, depth: np.ndarray, size: tuple[int, int], background=(0.0, 0.0, 0.0)
 ) -> tuple[np.ndarray, np.ndarray]:
     """Image (3, H, W) and transmittance (H, W), splat by splat, near to far, without early stop."""
-    width, height = size
-    x, y = np.arange(width) + 0.5, np.arange(height)[:, None] + 0.5
-    image, transmittance = np.zeros((3, height, width)), np.ones((height, width))
-    for i in np.argsort(depth, kind="stable"):
-        mean_x, mean_y, a, b, c, opacity, *rgb, extent_x, extent_y, power_threshold = record[i]
-        if not extent_x > 0:
-            continue
-        columns = slice(*np.clip(np.floor([mean_x - extent_x, mean_x + extent_x + 2]), 0, width)
-                        .astype(int))  # fmt: skip
-        rows = slice(*np.clip(np.floor([mean_y - extent_y, mean_y + extent_y + 2]), 0, height)
-                     .astype(int))  # fmt: skip
-        dx, dy = x[columns] - mean_x, y[rows] - mean_y
-        r = a * dx * dx + 2 * b * dx * dy + c * dy * dy
-        alpha = np.where(r <= power_threshold, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0)
-        weight = alpha * transmittance[rows, columns]
-        image[:, rows, columns] += np.multiply.outer(rgb, weight)
-        transmittance[rows, columns] -= weight
-    return image + transmittance * np.asarray(background)[:, None, None], transmittance
+    order = np.argsort(depth, kind="stable")
+    drawn = record[order[record[order, 9] > 0]]  # of the others the extents are -1
+    image, transmittance = blend(
+        drawn[:, :2], drawn[:, 2:5], drawn[:, 11], drawn[:, 9:11], drawn[:, 5], drawn[:, 6:9], size
+    )
+    over = image + transmittance[..., None] * np.asarray(background)
+    return over.transpose(2, 0, 1), transmittance
 
 
 def render_reference(splats: Splats, camera: Camera, background=(0.0, 0.0, 0.0)) -> tuple:

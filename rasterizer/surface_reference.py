@@ -8,15 +8,19 @@ from shapeshift.rasterizer.reference import MAX_ALPHA, Splats, project_reference
 REACH = 6.0  # sigmas along the view within which a splat's depth is held
 
 
-def midpoint_depth(mean, covariance, rays, near: float) -> np.ndarray:
-    """(P,) metres: where rays (P, 3) with z = 1 are halfway through an ellipsoid, by its inverse.
+def midpoint(
+    mean: np.ndarray, axes: np.ndarray, rays: np.ndarray, near: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Metres (...,) where rays (..., 3), z = 1, are halfway through an ellipsoid, by its inverse;
+    and (3,) the inverse times the mean: what the surface there faces away from.
 
-    mean (3,), covariance (3, 3): in the camera, z forward.
+    mean (3,), axes (3, 3), columns one sigma long: in the camera, z forward.
     """
-    inverse = np.linalg.inv(covariance)
-    depth = (rays @ inverse @ mean) / np.einsum("pi,ij,pj->p", rays, inverse, rays)
-    reach = REACH * np.sqrt(covariance[2, 2])
-    return np.clip(depth, max(mean[2] - reach, near), mean[2] + reach)
+    inverse = axes / np.square(axes).sum(axis=0)  # columns: directions over sigmas
+    inverse = inverse @ inverse.T
+    depth = (rays @ inverse @ mean) / np.einsum("...i,ij,...j->...", rays, inverse, rays)
+    reach = REACH * np.linalg.norm(axes[2])
+    return np.clip(depth, max(mean[2] - reach, near), mean[2] + reach), inverse @ mean
 
 
 def render_depth_reference(
@@ -43,7 +47,7 @@ def render_depth_reference(
         alpha = np.where(r <= power_threshold, np.minimum(MAX_ALPHA, opacity * np.exp(-r / 2)), 0)
         weight = alpha * transmittance
         drawn = weight > 0
-        held = midpoint_depth(places[i], axes[i] @ axes[i].T, rays[drawn], camera.near)
+        held, _ = midpoint(places[i], axes[i], rays[drawn], camera.near)
         metres[drawn] += weight[drawn] * held
         image += np.multiply.outer(rgb, weight)
         transmittance = transmittance - weight

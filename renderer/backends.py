@@ -2,7 +2,9 @@
 
 import moderngl
 
+from shapeshift.renderer.drawing import Drawing
 from shapeshift.renderer.gl.context import is_software
+from shapeshift.renderer.gl.gpu import Gpu
 
 CHOICES = {"drawing": ("quads", "tiles"), "mlps": ("gl", "onnxruntime"), "sort": ("gl", "numpy")}
 
@@ -31,3 +33,15 @@ def choose_backends(
         by_default[0] if mlps == "auto" else mlps,
         by_default[1] if sort == "auto" else sort,
     )
+
+
+def open_drawing(drawing: str, gpu: Gpu | None, mlps: str, sort: str) -> Drawing:
+    """The drawing that choose_backends has named; gpu None: tiles."""
+    if drawing == "tiles" or gpu is None:
+        # Needs OpenCL, which quads do without.
+        from shapeshift.renderer.tiles.tiles import TilesDrawing
+
+        return TilesDrawing()
+    from shapeshift.renderer.gl.quads import QuadsDrawing
+
+    return QuadsDrawing(gpu, mlps, sort)

@@ -72,9 +72,9 @@ COUNTS = {
 COUNTS_SIZE = MOST_VIEWS * COUNTS_STRIDE + 4
 
 
-def defines() -> dict[str, int | float]:
+def defines() -> dict[str, object]:
     """What every shader is compiled with."""
-    numbers = {
+    numbers: dict[str, object] = {
         "WORKGROUP": WORKGROUP, "DECODE_WORKGROUP": DECODE_WORKGROUP, "SORT_BLOCKS": SORT_BLOCKS,
         "RADIX": RADIX, "CULLED_KEY": f"{CULLED_KEY:#x}u", "MAX_ALPHA": MAX_ALPHA,
         "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK, "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",

@@ -27,10 +27,10 @@ MOST_STOPS = 6  # of more, only neighbours get a pace: 15 ways, or one a stop
 DECIMALS = 4  # of a weight
 EVEN_ENOUGH = 2.5  # largest step of x by 1/100 over an even one: more is a jump
 
-Told = Callable[[str, float], None]  # what is done, and how much of it, 0..1
+Progress = Callable[[str, float], None]  # what is done, and how much of it, 0..1
 
 
-def measure_pace(model: Model, told: Told | None = None) -> tuple[Pace, ...]:
+def measure_pace(model: Model, progress: Progress | None = None) -> tuple[Pace, ...]:
     """The pace of every pair of stops (of many stops: of neighbours), where its way can be seen.
 
     About 1.5 seconds of a core a pair: MOST small pictures from VIEWS places.
@@ -44,8 +44,8 @@ def measure_pace(model: Model, told: Told | None = None) -> tuple[Pace, ...]:
     with Renderer(None, sort="numpy") as renderer:
         views = views_of(plain)
         for number, (a, b) in enumerate(pairs):
-            if told is not None:
-                told(f"pace from {a.name} to {b.name}", number / len(pairs))
+            if progress is not None:
+                progress(f"pace from {a.name} to {b.name}", number / len(pairs))
 
             def picture(share: float, a: str = a.name, b: str = b.name) -> np.ndarray:
                 blend = StopWeights(((a, 1 - share), (b, share)))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.backends import choose_backends
+from shapeshift.renderer.backends import choose_backends, open_drawing
 from shapeshift.renderer.colors.color_cache import (
     ColorCache,
     centre_of,
@@ -28,8 +28,8 @@ from shapeshift.renderer.colors.false_colors import (
 )
 from shapeshift.renderer.colors.palette import (
     apply_palette,
-    lay_heat,
     over_background,
+    overlay_heat,
     palette_colors,
 )
 from shapeshift.renderer.debug.debug import debug_image, opaque, prepare_debug
@@ -41,7 +41,7 @@ from shapeshift.renderer.settings import TARGETS, FrameStats, RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.renderer.timing import PassTimer
 from shapeshift.runtime_models.evaluate import follows_eye, shape_follows_control
-from shapeshift.runtime_models.model import SplatLayers
+from shapeshift.runtime_models.model import ScaffoldModel, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, same_controls
 from shapeshift.scene.control import control_key, control_of
 from shapeshift.scene.metrics import psnr
@@ -75,16 +75,8 @@ class Renderer:
         self._target = target
         self._ctx = ctx
         self._gpu = Gpu(ctx) if ctx is not None else None
-        self._resolve = Resolve(self._gpu) if ctx is not None else None
-        if drawing == "tiles":
-            # Needs OpenCL, which quads do without.
-            from shapeshift.renderer.tiles.tiles import TilesDrawing
-
-            self.drawing = TilesDrawing()
-        else:
-            from shapeshift.renderer.gl.quads import QuadsDrawing
-
-            self.drawing = QuadsDrawing(self._gpu, mlps, sort)
+        self._resolve = Resolve(self._gpu) if self._gpu is not None else None
+        self.drawing = open_drawing(drawing, self._gpu, mlps, sort)
         self._timer = PassTimer(ctx)
         self._scene = Scene(())
         self._decoded: list[DecodedObject] = []
@@ -111,7 +103,7 @@ class Renderer:
                     decoded.key = key
             self._choose_false_colors(scene)
         poses = [o.world_from_object.matrix() if o.visible else HIDDEN for o in scene.objects]
-        self.drawing.place(poses)
+        self.drawing.set_poses(poses)
         self._scene = scene
 
     def _decode_geometry(self, i: int, decoded: DecodedObject, x: Controls) -> None:
@@ -119,9 +111,8 @@ class Renderer:
         if decoded.key is not None and same_controls(x, decoded.x):
             return  # a selector changed where nothing is
         shaped = decoded.key is not None and not shape_follows_control(decoded.model)
-        if not (
-            shaped or follows_eye(decoded.model)
-        ):  # else with the colours, once the eye is known
+        # What follows the eye is decoded with the colours, once the eye is known.
+        if not (shaped or follows_eye(decoded.model)):
             self.drawing.decode_geometry(i, x)
             self._geometry_runs += 1
         decoded.x = x
@@ -191,7 +182,7 @@ class Renderer:
         drawn = culled.pop("drawn")
         runs = (self._geometry_runs, self._color_runs)
         self._geometry_runs = self._color_runs = 0
-        stats = FrameStats(self._timer.take(), self._scene.splat_count, drawn, culled, *runs)
+        stats = FrameStats(self._timer.collect(), self._scene.splat_count, drawn, culled, *runs)
         stats.sorts, stats.order_age = sorts, self.drawing.order_age
         stats.color_sets = len(full) if own else 1
         if self._debug:
@@ -210,7 +201,7 @@ class Renderer:
             return wish == "each"
         for decoded in self._decoded:
             decoded.look = decoded.look or Look.of(decoded.model)
-        looks = [decoded.look for decoded in self._decoded]
+        looks = [decoded.look for decoded in self._decoded if decoded.look is not None]
         return not shared_is_enough(self._scene, looks, views)
 
     def _decode_colors(self, views: list[View], own: bool = False) -> None:
@@ -249,7 +240,7 @@ class Renderer:
                 self._geometry_runs += 1
             else:
                 wanted = self._wanted_anchors(i, thing, decoded, colored, stale, views)
-                if not colored.take(key, wanted, stale):
+                if not colored.mark_colored(key, wanted, stale):
                     continue  # all that is seen has its colours
             at_once = self._false_colors.way == SPLATS
             self.drawing.decode_color(i, decoded.shade, eye, wanted, at_once)
@@ -282,7 +273,7 @@ class Renderer:
             colored.reach = reach_of(*parts)
         pose = thing.world_from_object.matrix()
         seen = visible_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
-        return seen if stale else seen & ~colored.anchors
+        return seen if stale or colored.anchors is None else seen & ~colored.anchors
 
     def _wanted_of_follower(
         self, thing: SceneObject, colored: ColorCache, stale: bool, views: list[View]
@@ -292,13 +283,15 @@ class Renderer:
         Where its splats can be is known beforehand, so only what views see needs to be decoded;
         for one eye as a whole, so what comes into view has the rest decoded, too.
         """
+        model = thing.model
+        assert isinstance(model, ScaffoldModel), "the one kind that follows the eye"
         if not self.settings.skip_unseen:
             return stale or colored.anchors is not None, None
-        if colored.reach_key != self.settings.min_alpha:
-            colored.reach = reach_of_scaffold(thing.model, self.settings.min_alpha)
+        if colored.reach is None or colored.reach_key != self.settings.min_alpha:
+            colored.reach = reach_of_scaffold(model, self.settings.min_alpha)
             colored.reach_key = self.settings.min_alpha
         pose = thing.world_from_object.matrix()
-        seen = visible_anchors(thing.model.anchors, colored.reach, pose, views, self.settings)
+        seen = visible_anchors(model.anchors, colored.reach, pose, views, self.settings)
         new = colored.anchors is not None and (seen & ~colored.anchors).any()
         return stale or bool(new), None if seen.all() else seen
 
@@ -308,7 +301,7 @@ class Renderer:
         """
         if not self.drawing.draws_heat:
             return self.drawing.image(i)
-        return lay_heat(self.drawing.image(i), self.drawing.heat(i), self._false_colors.palette)
+        return overlay_heat(self.drawing.image(i), self.drawing.heat(i), self._false_colors.palette)
 
     def resolved(self, i: int = 0, out: np.ndarray | None = None) -> np.ndarray:
         """(H, W, 3) float32 display sRGB of view i: palette applied, over settings.background,
@@ -318,7 +311,7 @@ class Renderer:
             return bilinear(self._debug[i][0], self._sizes[i])
         palette, rgba = self._false_colors.palette, bilinear(self.drawing.image(i), self._sizes[i])
         if self.drawing.draws_heat:
-            rgba = lay_heat(rgba, bilinear(self.drawing.heat(i), self._sizes[i]), palette)
+            rgba = overlay_heat(rgba, bilinear(self.drawing.heat(i), self._sizes[i]), palette)
         elif self._false_colors.way == PICTURE:
             rgba = apply_palette(rgba, palette)
         return over_background(rgba, self.settings.background, out)
@@ -397,4 +390,5 @@ class Renderer:
 
 def scaled(view: View, part: float) -> View:
     """The view in `part` times its pixels a side, at least one."""
-    return view if part == 1 else view.resized(tuple(max(1, round(part * n)) for n in view.size))
+    width, height = (max(1, round(part * side)) for side in view.size)
+    return view if part == 1 else view.resized((width, height))

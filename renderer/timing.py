@@ -40,7 +40,7 @@ class PassTimer:
             self._software.finish()
         self._add(name, (time.perf_counter() - start) * 1e3)
 
-    def take(self) -> dict[str, float]:
+    def collect(self) -> dict[str, float]:
         """Milliseconds of every pass since the last call, in the order in which passes ran."""
         for name, query in self._asked:
             self._add(name, query.elapsed * 1e-6)

@@ -94,7 +94,7 @@ def as_plain(
     absent: int,
 ) -> PlainSplats:
     """The rows that are there, with what the model knows about them."""
-    findings = ()
+    findings: tuple[Finding, ...] = ()
     if absent:
         findings = (Finding(f"{absent:,} splats are absent at this x", absent, "left out"),)
     means, scales, wxyz, opacity = geometry
@@ -156,6 +156,10 @@ def recolored(sh: np.ndarray, recolor: Recolor) -> np.ndarray:
         color = np.maximum(values @ sh[rows] + np.float32(0.5), 0)  # (n, D, 3), as shade does
         every = np.repeat(rows, len(directions))
         flat = color.reshape(-1, 3)
-        shown = recolor(lambda control, flat=flat: flat, every).reshape(color.shape)
+
+        def color_at(control: Controls, flat: np.ndarray = flat) -> np.ndarray:
+            return flat
+
+        shown = recolor(color_at, every).reshape(color.shape)
         out[rows] = parts.T @ (shown - np.float32(0.5))
     return out

@@ -8,6 +8,7 @@ from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.model import (
     HEADS,
     SIZE_PER_SPLAT,
+    AnchorFrames,
     AnchorModel,
     Mlp,
     Model,
@@ -93,7 +94,7 @@ class Evaluator:
             self._scaffold = ScaffoldEvaluator(model, keep)
         elif isinstance(model, AnchorModel):
             if model.frames is not None:
-                self._frames = FrameColumns(model)
+                self._frames = FrameColumns(model.frames, model.splats_per_anchor)
             kind = FoldedNetwork if fold else WholeNetwork
             for name, mlp in model.networks.items():
                 self._networks[name] = kind(name, mlp, model, threads)
@@ -161,6 +162,7 @@ class Evaluator:
         eye: as of geometry.
         """
         if self._scaffold is not None:
+            assert eye is not None, "a model that follows the eye is asked for one eye"
             return self._scaffold.color_along(eye, direction)
         return self._color(x, slice(None), direction)
 
@@ -183,14 +185,14 @@ class Evaluator:
 
         With `keep`, one that does not see x is what it was.
         """
-        if name in self._lasting:
+        if self._kept is not None and name in self._lasting:
             return self._kept[name]
         values = self._run(name, x)
         if self._frames is not None:
             values = self._frames.apply(name, values)
         if name == "offset":
             values += self._centres
-        if self._kept is not None and "control" not in self.model.networks[name].inputs:
+        if self._kept is not None and "control" not in self._anchored.networks[name].inputs:
             self._lasting.add(name)
             self._kept[name] = values
         return values
@@ -207,10 +209,11 @@ class Evaluator:
 
         rows: of the anchors; x and direction are already of these rows alone.
         """
-        network, features = self._network(name, not is_each(x)), self.model.features[rows]
+        every = self._anchored.features
+        network, features = self._network(name, not is_each(x)), every[rows]
         out = self._room(name) if out is None else out
         psi = self._encoded(x)
-        base = network.feature_part(self.model.features)
+        base = network.feature_part(every)
         base = None if base is None else base[rows]
         for start in range(0, len(features), BATCH):
             part = slice(start, start + BATCH)
@@ -225,13 +228,13 @@ class Evaluator:
         if one_control or isinstance(self._networks[name], WholeNetwork):
             return self._networks[name]
         if name not in self._whole:
-            mlp = self.model.networks[name]
-            self._whole[name] = WholeNetwork(name, mlp, self.model, self._threads)
+            mlp = self._anchored.networks[name]
+            self._whole[name] = WholeNetwork(name, mlp, self._anchored, self._threads)
         return self._whole[name]
 
     def _room(self, name: str) -> np.ndarray:
         """(A, k * size) for what a network gives; the same again with `keep`."""
-        model = self.model
+        model = self._anchored
         shape = (len(model.features), model.splats_per_anchor * SIZE_PER_SPLAT[name])
         if self._kept is None:
             return np.empty(shape, np.float32)
@@ -239,20 +242,25 @@ class Evaluator:
             self._kept[name] = np.empty(shape, np.float32)
         return self._kept[name]
 
+    @property
+    def _anchored(self) -> AnchorModel:
+        """The model, where it is one of anchors and five networks."""
+        assert isinstance(self.model, AnchorModel)
+        return self.model
+
     def _encoded(self, x: Controls) -> np.ndarray:
         """Psi(x): (1, d) of one value, (A, d) of one an anchor."""
         if not is_each(x):
-            return self.model.psi(x)
+            return self._anchored.psi(x)
         if self._own is None or not np.array_equal(self._own[0], x):  # five networks ask for it
-            self._own = np.array(x), self.model.psi(x)
+            self._own = np.array(x), self._anchored.psi(x)
         return self._own[1]
 
 
 class FrameColumns:
     """What anchors' frames make of the outputs of the networks of the shape."""
 
-    def __init__(self, model: AnchorModel) -> None:
-        frames, k = model.frames, model.splats_per_anchor
+    def __init__(self, frames: AnchorFrames, k: int) -> None:
         self._axes = rotation_matrices(frames.wxyz) * frames.scales[:, None]  # (A, 3, 3)
         self._scales = np.tile(frames.scales, k)  # (A, k * 3)
         self._wxyz = np.repeat(frames.wxyz, k, axis=0)  # (A * k, 4)
@@ -285,8 +293,11 @@ class WholeNetwork:
     def feature_part(self, features: np.ndarray) -> None:
         """Nothing is kept."""
 
-    def run(self, parts: dict[str, np.ndarray], base: None) -> np.ndarray:
-        """(n, k * size) of features (n, F), directions (n, 3) and Psi, (1, d) or (n, d)."""
+    def run(self, parts: dict[str, np.ndarray], base: np.ndarray | None) -> np.ndarray:
+        """(n, k * size) of features (n, F), directions (n, 3) and Psi, (1, d) or (n, d).
+
+        base: None, as feature_part gives it.
+        """
         count = len(parts["feature"])
         columns = [np.broadcast_to(parts[p], (count, parts[p].shape[1])) for p in self._inputs]
         return self._session.run(["output"], {"input": np.concatenate(columns, axis=1)})[0]

@@ -30,7 +30,10 @@ from shapeshift.runtime_models.splats.layers.read_layer_list import (
 from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
 from shapeshift.runtime_models.splats.lcc.read_lcc import is_lcc, read_lcc
 from shapeshift.runtime_models.splats.lcc.read_lcc2 import is_lcc2, read_lcc2
-from shapeshift.runtime_models.splats.operations.prune_by_importance import left_whole, thin
+from shapeshift.runtime_models.splats.operations.prune_by_importance import (
+    left_whole,
+    prune_by_importance,
+)
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.read_output_folder import (
     in_run,
@@ -72,7 +75,7 @@ def read_model(path: str | Path, reading: Reading | None = None) -> Model:
         return model
     memory = reading.within(Path(path)).account
     with memory.lend(THINNING * model.splat_count, f"thinning {model.splat_count:,} splats"):
-        return thin(model, reading.most_splats)
+        return prune_by_importance(model, reading.most_splats)
 
 
 def read_whole(path: Path, reading: Reading) -> Model:
@@ -143,20 +146,21 @@ def is_package(path: Path) -> bool:
 
 def describe(model: Model, path: str | Path) -> dict:
     """What `launch.py info --json` prints; `path` is where the model was read from."""
-    anchored = isinstance(model, AnchorModel)
-    plain = isinstance(model, SplatLayers)
-    facts = {
-        "format": format_name(model) if anchored else model.provenance.get("format", "splats"),
-        "anchors": 0 if plain else len(model.anchors),
+    file_format = model.provenance.get("format", "splats")
+    facts: dict[str, object] = {
+        "format": format_name(model) if isinstance(model, AnchorModel) else file_format,
+        "anchors": 0 if isinstance(model, SplatLayers) else len(model.anchors),
         "splats": model.splat_count,
-        "sh_degree": round(model.sh.shape[1] ** 0.5) - 1 if plain else None,
+        "sh_degree": (
+            round(model.sh.shape[1] ** 0.5) - 1 if isinstance(model, SplatLayers) else None
+        ),
         "stops": [{"name": s.name, "x": s.x, "kind": s.kind} for s in model.stops],
         "bytes": sum(file.stat().st_size for file in files_of(model, Path(path))),
     }
-    if plain:
+    if isinstance(model, SplatLayers):
         if "sh_degree" in model.provenance:  # bands that are zero in every splat were left out
             facts["sh_degree_in_file"] = model.provenance["sh_degree"]
-        drawn = {"antialiased": True} if model.antialiased else {}
+        drawn: dict[str, object] = {"antialiased": True} if model.antialiased else {}
         if "level" in model.provenance:  # of a streamed scene; 0 is the finest
             drawn["level"] = model.provenance["level"]
             drawn["levels"] = dict(enumerate(model.provenance["level_splats"]))

@@ -1,5 +1,7 @@
 """Array contracts, checked where data enters: `check(means=(means, "N 3"))`."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import each_block
@@ -32,6 +34,29 @@ def check(**arrays: tuple[np.ndarray, str]) -> dict[str, int]:
             first = np.argwhere(~finite)[0].tolist()
             raise ValueError(f"{name} has {(~finite).sum()} NaN or Inf, first at {first}")
     return sizes
+
+
+def three(values: Iterable[float]) -> tuple[float, float, float]:
+    """Three numbers of an array or list as a tuple of floats."""
+    first, second, third = map(float, values)
+    return first, second, third
+
+
+def four(values: Iterable[float]) -> tuple[float, float, float, float]:
+    """Four numbers of an array or list as a tuple of floats."""
+    first, second, third, fourth = map(float, values)
+    return first, second, third, fourth
+
+
+def column_names(row: np.dtype) -> tuple[str, ...]:
+    """The names of a record's fields; () of a plain number."""
+    return row.names or ()
+
+
+def column_offset(row: np.dtype, name: str) -> int:
+    """Bytes of a record before one of its fields."""
+    assert row.fields is not None, "a record has fields"
+    return row.fields[name][1]
 
 
 def all_finite(array: np.ndarray) -> bool:

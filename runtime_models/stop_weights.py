@@ -32,7 +32,7 @@ class StopWeights:
         sound = all(0 <= weight <= 1 for _, weight in self.parts) and len(set(names)) == len(names)
         if not (sound and abs(total - 1) <= SUM_SLACK):
             raise ValueError(
-                f"the weights {told_control(self)} are no blend; stops, each once, with weights "
+                f"the weights {control_text(self)} are no blend; stops, each once, with weights "
                 "from 0 to 1 that add up to 1 are wanted."
             )
         kept = tuple((name, float(weight)) for name, weight in self.parts if weight > 0)
@@ -82,7 +82,7 @@ class StopBlend:
         return tuple(stop.name for stop in self.stops)
 
     @property
-    def through_numbers(self) -> bool:
+    def encodes_every_x(self) -> bool:
         """Whether a way between two numbers leads through all numbers between them."""
         return self.direct or len(self.stops) < 2
 
@@ -152,14 +152,14 @@ class StopBlend:
             return way
         return StopWeights(tuple(zip(self.names, (way / way.sum()).tolist(), strict=True)))
 
-    def place(self, control: Control) -> float:
+    def slider_x(self, control: Control) -> float:
         """x of the slider's knob: of a blend, the mean of its stops' places, at even pace."""
         if not isinstance(control, StopWeights):
             return control
         row = self.weights(control)
         present = np.flatnonzero(row)
         if len(present) == 2:
-            a, b = present
+            a, b = map(int, present)
             share = _part_of(self.curve(a, b), row[b])
             return float(self.stops[a].x + (self.stops[b].x - self.stops[a].x) * share)
         return float(row @ [stop.x for stop in self.stops])
@@ -170,7 +170,7 @@ class StopBlend:
             return False
         if is_each(start) and start.ndim == 2:
             return False
-        if self.through_numbers:
+        if self.encodes_every_x:
             return True
         xs = sorted(stop.x for stop in self.stops)
         low, high = min(np.min(start), end), max(np.max(start), end)
@@ -179,8 +179,8 @@ class StopBlend:
     def _mixed(self, start: np.ndarray, end: np.ndarray, part: float | np.ndarray) -> np.ndarray:
         """Weights (S,) or (A, S) between weights."""
         part = np.asarray(part, np.float64)[..., None]  # () -> (1,), (A,) -> (A, 1)
-        pairs = [(a, b) for a in np.flatnonzero(start.reshape(-1, len(end)).any(axis=0))
-                 for b in np.flatnonzero(end)]  # fmt: skip
+        before = np.flatnonzero(start.reshape(-1, len(end)).any(axis=0)).tolist()
+        pairs = [(a, b) for a in before for b in np.flatnonzero(end).tolist()]
         share = sum(start[..., [a]] * end[b] * _along(self.curve(a, b), part) for a, b in pairs)
         mixed = start + (end - start) * np.clip(share, 0, 1)
         present = (start > 0) | (end > 0)
@@ -214,7 +214,7 @@ NO_STOPS = StopBlend(())
 
 def _part_of(curve: np.ndarray, share: float | np.ndarray) -> np.ndarray:
     """How far along its way a curve has mixed in so much."""
-    return np.interp(share, curve, np.linspace(0, 1, len(curve)))
+    return np.asarray(np.interp(share, curve, np.linspace(0, 1, len(curve))))
 
 
 def encode_control(encoding: ControlEncoding, blend: StopBlend, control: Controls) -> np.ndarray:
@@ -237,7 +237,7 @@ def encode_control(encoding: ControlEncoding, blend: StopBlend, control: Control
 
 def _is_outside(blend: StopBlend, x: np.ndarray) -> np.ndarray:
     """Whether numbers lie between no two stops that are to be blended; as many."""
-    if blend.through_numbers:
+    if blend.encodes_every_x:
         return np.ones(x.shape, bool)
     xs = [stop.x for stop in blend.stops]
     return ~((x >= min(xs)) & (x <= max(xs)))
@@ -276,7 +276,7 @@ def check_control(control: Control, whose: str) -> None:
         raise ValueError(f"{whose} has x = {control}; from 0 to 1 is wanted.")
 
 
-def told_control(control: Control) -> str:
+def control_text(control: Control) -> str:
     """A control as `parse_control` reads it."""
     if isinstance(control, StopWeights):
         return ",".join(f"{name}:{weight:.6g}" for name, weight in control.parts)

@@ -1,16 +1,17 @@
 """What every reader of captures does with the file of a photo: its size, its lens, its view."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
 from shapeshift.scene.captures.colmap_tables import Lens
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.undistort import is_straight, pinhole_of
-from shapeshift.scene.json.json_values import shortened
 from shapeshift.scene.pose import View
 
 
@@ -20,7 +21,7 @@ def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
         size = image.size
     if claimed is not None and claimed != size:
         raise BadFile(
-            f"{shortened(path)}: the image has {size[0]}x{size[1]} pixels, the capture says "
+            f"{path_end(path)}: the image has {size[0]}x{size[1]} pixels, the capture says "
             f"{claimed[0]}x{claimed[1]}; resize the images or scale the intrinsics with them"
         )
     return size
@@ -67,7 +68,7 @@ def doubts_of(
     missing: list[str],
     photos: list[Photo],
     rescaled: list[str],
-    no_depth: list[str] = (),
+    no_depth: Sequence[str] = (),
 ) -> tuple[str, ...]:
     """What a person should know of a capture's files, a sentence each.
 
@@ -78,21 +79,21 @@ def doubts_of(
     if missing:
         said.append(
             f"{len(missing)} of {named} photos that the capture names are not there, for example "
-            f"{shortened(missing[0])}; they are left out."
+            f"{path_end(missing[0])}; they are left out."
         )
     if rescaled:
         said.append(
             f"{len(rescaled)} photos have another size than the capture says, for example "
-            f"{shortened(rescaled[0])}; the intrinsics are scaled with them."
+            f"{path_end(rescaled[0])}; the intrinsics are scaled with them."
         )
     if no_depth:
         said.append(
             f"{len(no_depth)} depth photos are not there, for example of "
-            f"{shortened(no_depth[0])}; those photos are used without."
+            f"{path_end(no_depth[0])}; those photos are used without."
         )
     bent = [photo for photo in photos if photo.lens is not None]
     if bent:
-        models = ", ".join(sorted({photo.lens.model for photo in bent}))
+        models = ", ".join(sorted({photo.lens.model for photo in bent if photo.lens is not None}))
         said.append(f"{len(bent)} photos are undistorted as they are read ({models}).")
     return tuple(said)
 
@@ -101,6 +102,6 @@ def refuse_all_missing(missing: list[str], named: int, where: str) -> None:
     """Raises BadFile where none of the photos is there."""
     if len(missing) == named:
         raise BadFile(
-            f"{where}: none of its {named} photos is there, for example {shortened(missing[0])}; "
+            f"{where}: none of its {named} photos is there, for example {path_end(missing[0])}; "
             "put them beside it"
         )

@@ -149,7 +149,7 @@ class Sweep:
     def play(self, control: Control) -> Control:
         """Starts there; returns where: the beginning when a single round was at its end."""
         self.playing = self.period > 0
-        at_end = self.playing and self.blend.place(control) >= self.xs[-1]
+        at_end = self.playing and self.blend.slider_x(control) >= self.xs[-1]
         if at_end and self.mode == "once":
             self.seconds = 0.0
             return self.xs[0]
@@ -176,7 +176,7 @@ class Sweep:
     @property
     def x(self) -> float:
         """Where the slider's knob is."""
-        return self.blend.place(self.control)
+        return self.blend.slider_x(self.control)
 
     def resume_at(self, control: Control) -> None:
         """Continues from there, on the next leg that passes it, if possible in the same direction.
@@ -185,7 +185,7 @@ class Sweep:
         """
         if not self.period > 0 or self._shows(self.control, control):
             return
-        x, way = self.blend.place(control), self.way
+        x, way = self.blend.slider_x(control), self.way
         x = min(max(x, self.xs[0]), self.xs[-1])
         now, count = self._place()[0], len(way) - 1
         upwards = way[now + 1] > way[now]
@@ -206,7 +206,7 @@ class Sweep:
     def _shows(self, one: Control, other: Control) -> bool:
         """Whether two controls look the same."""
         apart = self.blend.weights(one) - self.blend.weights(other)
-        return abs(self.blend.place(one) - self.blend.place(other)) < 1e-6 and (
+        return abs(self.blend.slider_x(one) - self.blend.slider_x(other)) < 1e-6 and (
             bool((np.abs(apart) < 1e-5).all())
         )
 

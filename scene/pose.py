@@ -160,7 +160,8 @@ class View:
         the bottom is cut off.
         """
         left, right, down, up = self.tangents
-        (width, height), size = self.size, tuple(max(side // factor, 1) for side in self.size)
+        (width, height) = self.size
+        size = (max(width // factor, 1), max(height // factor, 1))
         across, below = (min(side, factor) * new for side, new in zip(self.size, size, strict=True))
         if across < width:
             right = left + (right - left) * across / width

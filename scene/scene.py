@@ -26,7 +26,7 @@ class SceneObject:
     @property
     def slider_x(self) -> float:
         """Where the knob of its slider is."""
-        return self.model.blend.place(self.x)
+        return self.model.blend.slider_x(self.x)
 
     def __post_init__(self) -> None:
         """Refuses a place or an x that is none: ValueError with a sentence."""
@@ -34,8 +34,9 @@ class SceneObject:
         length = math.hypot(*pose.wxyz)
         if not (all(map(math.isfinite, pose.position)) and abs(length - 1) <= UNIT_SLACK):
             raise ValueError(
-                f"object '{self.name}' stands at {_told(pose.position)} with a quaternion "
-                f"{_told(pose.wxyz)}; finite metres and a quaternion of length 1 are wanted."
+                f"object '{self.name}' stands at {_numbers_text(pose.position)} with a quaternion "
+                f"{_numbers_text(pose.wxyz)}; finite metres and a quaternion of length 1 "
+                "are wanted."
             )
         for control in (self.x, *(selector.x for selector in self.selectors)):
             check_control(control, f"object '{self.name}'")
@@ -43,7 +44,7 @@ class SceneObject:
                 self.model.blend.weights(control)  # knows every stop
 
 
-def _told(numbers: np.ndarray) -> str:
+def _numbers_text(numbers: np.ndarray) -> str:
     return "(" + ", ".join(f"{number:.6g}" for number in numbers) + ")"
 
 

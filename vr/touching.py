@@ -159,7 +159,7 @@ def offered(world, side: str, hand: Hand, palm: Pose | None, standing: Standing)
         return None
     aim = standing.pose(hand.aim)
     hit = world.aim(aim.position, -aim.matrix()[:3, 2])
-    if hit is None or hit.object not in world.things or not answers(world, hit.object):
+    if hit is None or hit.object not in world.objects or not answers(world, hit.object):
         return None
     return Offer(side, hit.object, "ray")
 
@@ -177,13 +177,13 @@ def beam(world, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam:
     length = BEAM_M if hit is None else hit.distance_m / standing.scale  # metres of the room
     start = hand.aim.position
     end = start - hand.aim.matrix()[:3, 2] * min(length, BEAM_M)
-    meets = hit.object if hit is not None and hit.object in world.things else None
+    meets = hit.object if hit is not None and hit.object in world.objects else None
     return Beam(side, start, end, meets, acts)
 
 
 def answers(world, name: str | None) -> bool:
     """Whether an object has something to do when a ray hits it."""
-    return name is not None and any(r.on == "ray" for r in world.things[name].machine.reactions)
+    return name is not None and any(r.on == "ray" for r in world.objects[name].machine.reactions)
 
 
 def at_rest(frame: Frame, touching: Touching) -> Frame:

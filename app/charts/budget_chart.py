@@ -14,11 +14,13 @@ from shapeshift.app.document import Document
 from shapeshift.app.terminal import say
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
+from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import make_folders
 
 if TYPE_CHECKING:
     from shapeshift.app.charts.chart_measure import ChartRow, Pricing
 
+LARGEST_CHART = 1 << 20  # bytes of a stored chart
 FORMAT = 3  # of the stored file, and of what the measure means: others are measured again
 
 
@@ -141,11 +143,11 @@ def store_rows(path: Path, rows: Sequence[BudgetRow]) -> None:
 def read_rows(path: Path) -> list[BudgetRow] | None:
     """What store_rows wrote; None where there is nothing or nothing that can be used."""
     try:
-        found = json.loads(path.read_bytes())
+        found = saved_object(path, LARGEST_CHART)
         if found["format"] != FORMAT:
             return None
         rows = [_row(each) for each in found["rows"]]
-    except (OSError, ValueError, RecursionError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError):
         return None  # never written, half a file, another program's, or one of long ago
     return rows if any(row.name == "exact" for row in rows) else None
 

@@ -157,11 +157,9 @@ def check_result_path(path: Path) -> None:
 
 
 def is_result(path: Path) -> bool:
-    try:
-        found = json.loads(path.read_bytes()) if path.stat().st_size < LARGEST_RESULT else None
-    except (ValueError, RecursionError):
-        return False
-    return isinstance(found, dict) and "frame_ms" in found
+    from shapeshift.runtime_models.files.json_fields import saved_object
+
+    return "frame_ms" in saved_object(path, LARGEST_RESULT)
 
 
 def write_json(path: Path, result: dict) -> None:

@@ -92,7 +92,7 @@ def make_one(file: "SceneFile", item, model) -> "Collider":
     from shapeshift.scene.colliders.collider_files import one_collider
 
     with progress_after(PATIENCE_S) as told:
-        return one_collider(file, item, model, Making(told=told))
+        return one_collider(file, item, model, Making(progress=told))
 
 
 def write_one(collider: "Collider", path: Path) -> str:

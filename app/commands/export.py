@@ -240,13 +240,13 @@ def with_x(text: str) -> str:
 
 def told_x(parts: list) -> str:
     """x of what was written, with the stop's name where it is one."""
-    from shapeshift.runtime_models.stop_weights import told_control
+    from shapeshift.runtime_models.stop_weights import control_text
 
     thing = parts[0].thing
     if len({part.thing.x for part in parts}) > 1:
         return f"{len(parts)} objects, each at its own x"
     name = next((stop.name for stop in thing.model.stops if stop.x == thing.x), "")
-    return f"x = {told_control(thing.x)}" + (f" ({name})" if name else "")
+    return f"x = {control_text(thing.x)}" + (f" ({name})" if name else "")
 
 
 def export_package(options: Options, opened: list) -> int:

@@ -17,7 +17,13 @@ from shapeshift.runtime_models.package.package_files import MANIFEST
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.sog.read_streamed import TREE
 from shapeshift.runtime_models.splats.sog.sog_files import META
-from shapeshift.runtime_models.splats.write_plain import cut, merged, placed, told_lost, writer_of
+from shapeshift.runtime_models.splats.write_plain import (
+    describe_losses,
+    merged,
+    placed,
+    truncate_harmonics,
+    writer_of,
+)
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.control import control_of, covered
@@ -59,7 +65,7 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
         told(f"baking {part.thing.name}", number / (len(parts) + 1))
         baked.append(bake_part(part, look))
     told(f"writing {path.name}", len(parts) / (len(parts) + 1))
-    splats = cut(merged(baked), look.sh_degree)
+    splats = truncate_harmonics(merged(baked), look.sh_degree)
     x, y, z = np.add(splats.origin, look.origin).tolist()
     splats = replace(splats, origin=(x, y, z))
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -67,7 +73,7 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
         writer.write(splats, path)
     except ValueError as error:  # the format cannot hold them
         raise UsageError(f"{writer.name}: {error}") from None
-    lost = [replace(finding, file=path.name) for finding in told_lost(splats, writer)]
+    lost = [replace(finding, file=path.name) for finding in describe_losses(splats, writer)]
     return replace(splats, findings=(*splats.findings, *lost))
 
 

@@ -50,7 +50,7 @@ def examine(options: Options) -> dict:
     from shapeshift.runtime_models.read_scene import describe, read_model
 
     with progress_after(PATIENCE_S) as told:
-        model = read_model(options.scene, replace(options.reading(), told=told))
+        model = read_model(options.scene, replace(options.reading(), progress=told))
         moves = uneven(model, options.scene.name)
     facts = describe(model, options.scene)
     splats = splats_of(model)

@@ -101,7 +101,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
     from shapeshift.scene.world.world import World
 
     with progress_after(PATIENCE_S) as shown:
-        models = read_models(file, Reading(told=shown))
+        models = read_models(file, Reading(progress=shown))
         file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown)
     world = World(file, models, colliders, hz=HZ)
@@ -133,7 +133,7 @@ def tell(simulation, steps: int, path: Path, options: Options):
     world = simulation.world
     with open_lines(path) as out:
         head = {"scene": options.scene.name, "hz": world.hz, "steps": steps}
-        out.write(line({**head, "objects": list(world.things)}))
+        out.write(line({**head, "objects": list(world.objects)}))
         yield 0
         for number in range(1, steps + 1):
             record = simulation.step()

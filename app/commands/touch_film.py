@@ -55,7 +55,7 @@ def film(renderer: Renderer, ctx, size: tuple[int, int], path: Path) -> dict:
         "physics_ms": percentiles(physics[WARM_UP:]),
         "frames": len(frames) - WARM_UP,
         "steps_a_frame": STEPS,
-        "objects": len(world.things),
+        "objects": len(world.objects),
         "splats": stats.splats,
         "reactions": changes,
     }

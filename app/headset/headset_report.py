@@ -13,8 +13,8 @@ from shapeshift.app.drawing import save_png
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.files.whole_file import open_lines, write_whole
-from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.record import Record
 from shapeshift.vr.frame import SIDES, Frame, Hand

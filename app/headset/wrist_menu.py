@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.scene.document.scene_file import named_stops
-from shapeshift.scene.world.follow import put_back
+from shapeshift.scene.world.follow import reset_objects
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.stance import resized
@@ -73,8 +73,8 @@ def facts_of(state: XrState, note: str = "") -> Facts:
 def sliders_of(world: World) -> tuple[Slider, ...]:
     """Of the objects that are seen and have somewhere to go, in the scene's order."""
     return tuple(
-        Slider(name, stops, thing.drawn.model.blend.place(thing.standing.x))
-        for name, thing in world.things.items()
+        Slider(name, stops, thing.drawn.model.blend.slider_x(thing.reaction_state.x))
+        for name, thing in world.objects.items()
         if thing.drawn.visible and len(stops := named_stops(thing.item, thing.drawn.model)) > 1
     )
 
@@ -92,7 +92,7 @@ def grant(wish: Wish, state: XrState, actions: MenuActions, frame: Frame) -> Non
         case Recentre():
             actions.recentre(frame)
         case PutBack():
-            put_back(state.world)
+            reset_objects(state.world)
         case SetFloor(shown):
             state.floor_shown = shown
         case Exit():

@@ -165,7 +165,7 @@ class XrApp:
         """Around what hands would take, or their rays act on, that do not point at the panel."""
         lines: list[Capsule] = []
         for offer in self.state.user.touched.offers:
-            thing = self.state.world.things[offer.object]
+            thing = self.state.world.objects[offer.object]
             hull = self._outlines.hull(thing.collider)
             if hull is None or offer.side in self.menu.carried.panel.hovers:
                 continue

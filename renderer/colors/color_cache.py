@@ -49,7 +49,7 @@ class ColorCache:
         before, now = (np.linalg.norm(np.array(eye) - self.centre) for eye in (self.key[1], key[1]))
         return nearer and not abs(math.log(now / before)) <= math.radians(degrees)
 
-    def take(self, key: tuple, wanted: np.ndarray | None, stale: bool) -> bool:
+    def mark_colored(self, key: tuple, wanted: np.ndarray | None, stale: bool) -> bool:
         """Notes that the wanted anchors get their colours; False: none of them needs any."""
         if stale:
             self.key, self.anchors = key, wanted

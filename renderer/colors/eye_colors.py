@@ -7,7 +7,7 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.color_slope import color_slope
 from shapeshift.runtime_models.evaluate import follows_eye
-from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.model import Model, ScaffoldModel, SplatLayers
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
@@ -30,7 +30,7 @@ class Look:
     def of(model: Model) -> "Look":
         places = model.means[model.opacity > 0] if isinstance(model, SplatLayers) else model.anchors
         step = max(-(-len(places) // SAMPLE), 1)
-        slope = math.inf if follows_eye(model) else color_slope(model)
+        slope = math.inf if isinstance(model, ScaffoldModel) else color_slope(model)
         return Look(np.array(places[::step], np.float64), slope)
 
     def shared_db(self, eyes: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shapeshift.renderer.colors.palette import LUMINANCE, through_palette
+from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.runtime_models.evaluate import colors_follow_control
 from shapeshift.runtime_models.model import Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls, StopWeights, same_controls
@@ -58,9 +58,12 @@ class Shade:
 
     def same(self, other: "Shade") -> bool:
         """Whether two ask for the same colours."""
-        if (self.rest is None) != (other.rest is None) or len(self.heats) != len(other.heats):
+        if len(self.heats) != len(other.heats):
             return False
-        if self.rest is not None and not same_controls(self.rest, other.rest):
+        if self.rest is None or other.rest is None:
+            if self.rest is not other.rest:
+                return False
+        elif not same_controls(self.rest, other.rest):
             return False
         return all(a.same(b) for a, b in zip(self.heats, other.heats, strict=True))
 
@@ -91,6 +94,11 @@ def false_colors(scene: Scene, controls: list[Controls]) -> FalseColors:
         return FalseColors(PICTURE, names.pop(), tuple(plain))
     way = (NO_HEAT, BESIDE)[len(names)] if len(names) < 2 else SPLATS
     return FalseColors(way, names.pop() if len(names) == 1 else "", tuple(shades))
+
+
+def has_heat(model: Model) -> bool:
+    """Whether a frame of the model between two stops can hold heat that palettes colour."""
+    return any(stop.kind == "thermal" and stop.palette for stop in model.blend.stops)
 
 
 def shade_of(model: Model, control: Controls) -> Shade:
@@ -158,7 +166,7 @@ def mixed_colors(shade: Shade, count: int, color_at: ColorAt) -> np.ndarray:
     heat, colors = np.zeros((count, 2)), np.zeros((count, 3))
     for part in shade.heats:
         weights = _of_splats(part.weights, count)
-        false = through_palette(color_at(part.control) @ LUMINANCE, part.palette)
+        false = palette_values(color_at(part.control) @ LUMINANCE, part.palette)
         colors += np.where(weights[:, None] > 0, weights[:, None] * false, 0)
         heat[:, 1] += weights
     return _kept(shade, heat, color_at) + colors

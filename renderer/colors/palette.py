@@ -87,17 +87,17 @@ def apply_palette(rgba: np.ndarray, name: str) -> np.ndarray:
     The palette colours what is there, not the background: colour is divided by alpha first.
     """
     alpha = rgba[..., 3]
-    false = through_palette((rgba[..., :3] @ LUMINANCE) / np.maximum(alpha, 1e-6), name)
+    false = palette_values((rgba[..., :3] @ LUMINANCE) / np.maximum(alpha, 1e-6), name)
     shown = [false * alpha[..., None], alpha[..., None]]
     return np.concatenate(shown, axis=-1).astype(rgba.dtype)
 
 
-def lay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
+def overlay_heat(rgba: np.ndarray, heat: np.ndarray, name: str) -> np.ndarray:
     """Premultiplied (H, W, 4) and the heat beside it, (H, W, 2) value and weight, both times alpha:
     with the palette's colour of the value, as much as the weight; as (H, W, 4).
     """
     value, weight = heat[..., 0], heat[..., 1]
-    false = through_palette(value / np.maximum(weight, 1e-6), name)
+    false = palette_values(value / np.maximum(weight, 1e-6), name)
     out = rgba.copy()
     out[..., :3] += false * weight[..., None]
     return out
@@ -121,7 +121,7 @@ def over_background(
     return out
 
 
-def through_palette(values: np.ndarray, name: str) -> np.ndarray:
+def palette_values(values: np.ndarray, name: str) -> np.ndarray:
     """(..., 3) display sRGB of values (...), held to 0..1; NaN stays."""
     place = np.clip(values, 0, 1) * (STEPS - 1)
     return np.stack(
@@ -133,7 +133,7 @@ def _gray() -> np.ndarray:
     return np.repeat(np.linspace(0, 1, STEPS)[:, None], 3, axis=1)
 
 
-def _through(points: tuple) -> np.ndarray:
+def _palette_table(points: tuple) -> np.ndarray:
     """(256, 3) through control points by monotone cubics: no overshoot, no visible corner."""
     place = np.array([p for p, _ in points])
     color = np.array([c for _, c in points])
@@ -184,7 +184,7 @@ def _srgb_from_oklab(oklab: np.ndarray) -> np.ndarray:
 
 PALETTES = {
     "gray": _gray,
-    "ironbow": lambda: _through(IRONBOW),
-    "turbo": lambda: _through(TURBO),
+    "ironbow": lambda: _palette_table(IRONBOW),
+    "turbo": lambda: _palette_table(TURBO),
     "perceptual": _perceptual,
 }

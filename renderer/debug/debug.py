@@ -15,6 +15,7 @@ from shapeshift.renderer.debug.debug_map import birdseye
 from shapeshift.renderer.debug.points import dim, dot_size, paint_points
 from shapeshift.renderer.settings import CULL_REASONS, DEBUG_VIEWS, FrameStats, RenderSettings
 from shapeshift.runtime_models.model import Model, is_antialiased
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
@@ -168,7 +169,7 @@ def debug_legend(
         texts = [f"{s * s * largest:,.0f} splats" for s in steps]
         texts[-1] += " (largest)"
         colors = ramp(HEAT, steps)
-    return [(text, tuple(map(float, c))) for text, c in zip(texts, colors, strict=True)]
+    return [(text, three(c)) for text, c in zip(texts, colors, strict=True)]
 
 
 def ramp(table: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -203,12 +204,14 @@ def object_counts(scene: Scene) -> dict[str, float]:
 
 def object_parts(scene: Scene) -> list[list[tuple[int | None, int]]]:
     """For each object (label, splats) of its commonest labels; one (None, all) without labels."""
-    parts = []
+    parts: list[list[tuple[int | None, int]]] = []
     for thing in scene.objects:
         labels, ranks = label_ranks(thing.model)
         counts = np.bincount(np.ravel(ranks), minlength=len(labels)).tolist()
-        alone = [(None, thing.model.splat_count)]
-        parts.append(alone if not labels else list(zip(labels, counts, strict=True)))
+        if labels:
+            parts.append(list(zip(labels, counts, strict=True)))
+        else:
+            parts.append([(None, thing.model.splat_count)])
     return parts
 
 

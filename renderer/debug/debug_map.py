@@ -53,7 +53,7 @@ def heading(view: View) -> np.ndarray:
         level = np.array([up[0], 0, up[2]])
     level /= max(np.linalg.norm(level), 1e-9)
     map_from_world = np.eye(4)
-    map_from_world[:3, :3] = [[-level[2], 0, level[0]], [0, 1, 0], -level]
+    map_from_world[:3, :3] = [[-level[2], 0, level[0]], [0, 1, 0], (-level).tolist()]
     return map_from_world
 
 

@@ -9,7 +9,7 @@ The life of the passes, in the order of the calls:
     decoder = Decoder(gpu, arena, models, "gl" or "onnxruntime")
     decoder.geometry(i, x)                           # when the control value of object i changed
     decoder.color(i, x, eye_object)                  # then, and when the eye moved
-    arena.place(world_from_objects)                  # (4, 4) each, NaN hides; any time
+    arena.set_poses(world_from_objects)                  # (4, 4) each, NaN hides; any time
     projector.project(arena, views, settings, sort_from_world)    # one or two views at once
     # with colours an eye: arena.color_set(v, len(views)) and decoder.color for each eye before
     sorter.sort(arena, settings.key_bits)
@@ -128,7 +128,7 @@ class Arena:
             self.records.release()
             self.records = self.gpu.reserve(size, "records of two views")
 
-    def place(self, world_from_objects: list[np.ndarray] | np.ndarray) -> None:
+    def set_poses(self, world_from_objects: list[np.ndarray] | np.ndarray) -> None:
         """Poses (4, 4) of all objects; one full of NaN hides its object."""
         self.world_from_object[:] = np.reshape(world_from_objects, (-1, 4, 4))
 

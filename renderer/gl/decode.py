@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shapeshift.renderer.colors.false_colors import Shade
+from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.heat import Heater
 from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.gl.buffers import Arena
@@ -10,8 +10,8 @@ from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.layers import Layers
 from shapeshift.renderer.gl.networks import Networks
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
-from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
-from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
 from shapeshift.runtime_models.stop_weights import Controls
 
 MLPS = ("gl", "onnxruntime")
@@ -29,14 +29,15 @@ class Decoder:
         if mlps not in MLPS:
             raise ValueError(f"there are no networks by {mlps!r}; choose {' or '.join(MLPS)}.")
         self._gpu, self._arena = gpu, arena
-        self._heater: Heater | None = None
+        # Its programs compile now, not in the first frame between a thermal stop and another.
+        self._heater = Heater(gpu) if any(map(has_heat, models)) else None
         made: dict[int, Layers | Networks | Evaluator] = {}
         for model in models:
             if id(model) in made:
                 continue
             if isinstance(model, SplatLayers):
                 made[id(model)] = Layers(gpu, model)
-            elif mlps == "gl" and not follows_eye(model):
+            elif mlps == "gl" and isinstance(model, AnchorModel):
                 made[id(model)] = Networks(gpu, model)
             else:
                 made[id(model)] = Evaluator(model, keep=True)
@@ -47,7 +48,7 @@ class Decoder:
         }  # fmt: skip
         for i, on_gpu in enumerate(self._models):
             if isinstance(on_gpu, Layers):
-                on_gpu.place(arena, i)
+                on_gpu.upload(arena, i)
 
     def geometry(
         self,
@@ -81,19 +82,19 @@ class Decoder:
         seen: (A,) bool; the rest may keep what it has (compute passes colour all at once).
         at_once: the heat becomes colours of its palettes here.
         """
-        if shade.heats and self._heater is None:
-            self._heater = Heater(self._gpu)
+        heater = self._heater
         for number, heat in enumerate(shade.heats):
             self.color(i, heat.control, eye, seen, number + 1)
             palette = palette_colors(heat.palette) if at_once else None
-            self._heater.add(self._arena, i, heat.weights, palette, number == 0)
+            assert heater is not None, "a model with such a stop has made it"
+            heater.add(self._arena, i, heat.weights, palette, number == 0)
         layers = isinstance(self._models[i], Layers)
         if shade.rest is not None and not (shade.heats and layers):
             self.color(i, shade.rest, eye, seen)
         if i in self._colors:
             self._colors[i].forget_after(self._arena.set, len(shade.heats))
-        if shade.heats:
-            self._heater.blend(self._arena, i, at_once)
+        if heater is not None and shade.heats:
+            heater.blend(self._arena, i, at_once)
         else:
             self._arena.clear_heat(i)
 

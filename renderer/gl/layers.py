@@ -34,7 +34,7 @@ class Layers:
             buffer = gpu.upload(rows.reshape(len(rows), -1).T, "spherical harmonics")
             self._parts.append((first, len(rows), buffer))
 
-    def place(self, arena: Arena, i: int) -> None:
+    def upload(self, arena: Arena, i: int) -> None:
         """Means and covariances of object i, which never change."""
         model = self._model
         arena.write_geometry(i, model.means, model.scales, model.wxyz, model.opacity)

@@ -147,6 +147,7 @@ class Networks:
     def _heads_for(self, x: Controls) -> dict[str, "_Head"]:
         """The networks, ready for one control or for one an anchor."""
         if not is_each(x):
+            assert not isinstance(x, np.ndarray), "one control for all"
             for head in self._heads.values():
                 head.set_control(self._model, x)
             return self._heads

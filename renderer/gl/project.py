@@ -128,7 +128,7 @@ def limits(settings: RenderSettings) -> dict[str, object]:
     for i, limit in enumerate((largest, farthest, settings.min_pixels)):
         if settings.fade > 0 and 0 < limit < layout.HUGE:
             ends[i], slopes[i] = limit, min(1 / (settings.fade * limit), layout.HUGE)
-    numbers = {
+    numbers: dict[str, object] = {
         "min_alpha": settings.min_alpha, "low_pass": settings.low_pass, "max_pixels": largest,
         "max_distance": farthest, "min_pixels": min(settings.min_pixels, layout.HUGE),
     }  # fmt: skip

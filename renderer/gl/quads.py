@@ -1,6 +1,6 @@
 """Draws with GL: compute passes and quads, made for a GPU; software GL runs the same.
 
-Same life as renderer/tiles/tiles.py: allocate, decode what changed, place, draw.
+What its methods mean: renderer/drawing.py.
 """
 
 from collections.abc import Iterator
@@ -12,7 +12,8 @@ from itertools import pairwise
 import moderngl
 import numpy as np
 
-from shapeshift.renderer.colors.false_colors import Shade
+from shapeshift.renderer.colors.false_colors import Shade, has_heat
+from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.context import is_software
 from shapeshift.renderer.gl.decode import Decoder
@@ -34,10 +35,8 @@ from shapeshift.runtime_models.model import Model, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.pose import View
 
-SAMPLE = 4096  # splats, for a median
 
-
-class QuadsDrawing:
+class QuadsDrawing(Drawing):
     """The arena of all objects in GL buffers, and the passes that draw it."""
 
     def __init__(self, gpu: Gpu, mlps: str, sort: str) -> None:
@@ -66,7 +65,6 @@ class QuadsDrawing:
         return self._gpu.allocations
 
     def allocate(self, models: list[Model]) -> None:
-        """Room for these objects; what was decoded before is gone."""
         self._release_arena()
         self._changed = True
         self._models, self._most = models, None
@@ -74,6 +72,8 @@ class QuadsDrawing:
         self._arena = Arena(self._gpu, counts, antialiased)
         self._decoder = Decoder(self._gpu, self._arena, models, self._mlps)
         self._allocated = [self._arena, self._decoder]
+        if any(map(has_heat, models)):
+            self._splatter.program_for(heat=True)  # compiled now, not in the first frame with heat
         on_cpu = self._mlps == "gl" and any(follows_eye(model) for model in models)
         self.backends["mlps"] = f"{self._mlps}, Scaffold-GS onnxruntime" if on_cpu else self._mlps
 
@@ -84,18 +84,10 @@ class QuadsDrawing:
         eye_object: np.ndarray | None = None,
         seen: np.ndarray | None = None,
     ) -> None:
-        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
-
-        eye_object: (3,) in the object's frame, for a model that follows it; seen: (A,) bool, the
-        anchors of such a model that are there, None: all.
-        """
         self._changed = True
         self._decoder.geometry(i, x, eye_object, seen)
 
     def color_set(self, which: int, count: int) -> None:
-        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
-        or one a view.
-        """
         self._arena.color_set(which, count)
 
     def decode_color(
@@ -106,27 +98,20 @@ class QuadsDrawing:
         seen: np.ndarray | None = None,
         at_once: bool = False,
     ) -> None:
-        """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
-
-        seen: (A,) bool, one an anchor: the rest may keep what it has.  at_once: the heat becomes
-        colours of its palettes here.
-        """
         self._decoder.shade(i, shade, eye_object, seen, at_once)
 
     def wait_decoded(self) -> None:
         """Nothing: GL keeps the order of the passes itself."""
 
-    def place(self, world_from_objects: list[np.ndarray]) -> None:
-        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+    def set_poses(self, world_from_objects: list[np.ndarray]) -> None:
         poses = np.reshape(world_from_objects, (-1, 4, 4))
         if not np.array_equal(poses, self._arena.world_from_object, equal_nan=True):
             self._changed = True
-            self._arena.place(poses)
+            self._arena.set_poses(poses)
 
     def draw(
         self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
     ) -> None:
-        """Draws every view; view i is then image(first + i)."""
         arena = self._arena
         target, unit = choose_target(self._gpu, settings.target, self._brightest())
         self._splatter.target, self._splatter.unit = target, unit
@@ -159,16 +144,14 @@ class QuadsDrawing:
 
     def _splat(self, group: list[View], i: int, settings: RenderSettings) -> None:
         """Draws views that were projected together, from image i on; two at once where it pays."""
-        arena, disparity = self._arena, None
+        arena, pair, disparity = self._arena, self.stereo_pair, None
         alike = len(group) == 2 and group[0].size == group[1].size and arena.count
-        paired = self.stereo_pair is not None and alike and not self.draws_heat
-        if paired and settings.low_pass >= LEAST_LOW_PASS:
-            disparity = self.stereo_pair.disparity(arena, group[0].size[0])
-        if disparity is not None:
+        if pair is not None and alike and not self.draws_heat:
+            if settings.low_pass >= LEAST_LOW_PASS:
+                disparity = pair.disparity(arena, group[0].size[0])
+        if pair is not None and disparity is not None:
             pictures = [self._splatter.target_of(i + row, group[row].size) for row in range(2)]
-            self.stereo_pair.draw(
-                arena, pictures, disparity, settings.min_alpha, self._splatter.unit
-            )
+            pair.draw(arena, pictures, disparity, settings.min_alpha, self._splatter.unit)
             return
         for row, view in enumerate(group):
             heat = None
@@ -178,7 +161,6 @@ class QuadsDrawing:
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
-        """Whatever the body does to the order, afterwards it is the one that was in use before."""
         arena, sort_policy = self._arena, copy(self._sort_policy)
         now = (self.sorts, self.order_age, self._changed)
         kept = [(buffer, buffer.read()) for buffer in (arena.order, arena.command)]
@@ -195,14 +177,9 @@ class QuadsDrawing:
         mean_opacity, owner, _ = (
             a[:: -(-self._arena.count // SAMPLE)] for a in self.splat_points()
         )
-        rows = (eye_from_world @ self._arena.world_from_object)[owner, :3]  # (n, 3, 4)
-        places = (rows[..., :3] @ mean_opacity[:, :3, None])[..., 0] + rows[..., 3]
-        distance = np.linalg.norm(places[mean_opacity[:, 3] > 0], axis=1)
-        distance = distance[np.isfinite(distance)]
-        return float(np.median(distance)) if distance.size else 0.0
+        return median_distance(eye_from_world @ self._arena.world_from_object, mean_opacity, owner)
 
     def counts(self) -> dict[str, int]:
-        """{drawn, *CULL_REASONS} of the view drawn last."""
         return self._projector.counts(self._arena, self._last)
 
     def _brightest(self) -> float:
@@ -212,27 +189,21 @@ class QuadsDrawing:
         return self._most
 
     def presentable(self, i: int) -> moderngl.Texture:
-        """The image of view i on the GPU, row 0 at the bottom; its colours count in unit_of(i)."""
         return self._splatter.texture(i)
 
     def unit_of(self, i: int) -> float:
-        """The display value that 1 in presentable(i) stands for."""
         return self._splatter.unit_of(i)
 
     def image(self, i: int) -> np.ndarray:
-        """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._splatter.image(i)
 
     def heat(self, i: int) -> np.ndarray:
-        """(H, W, 2) float32, row 0 on top, of the same view: value and weight, both times alpha."""
         return self._splatter.image(i, of=1)[..., :2]
 
     def presentable_heat(self, i: int) -> moderngl.Texture:
-        """What resolve takes beside it, of a frame with heat."""
         return self._splatter.texture(i, of=1)
 
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
         arena = self._arena
         owner = np.repeat(np.arange(len(arena.starts) - 1), np.diff(arena.starts))
         rows = [np.frombuffer(b.read(), np.float32) for b in (arena.mean_opacity, arena.covariance)]
@@ -240,7 +211,6 @@ class QuadsDrawing:
         return rows[0][: 4 * n].reshape(n, 4), owner, rows[1][: 8 * n].reshape(n, 8)
 
     def write_colors(self, color: np.ndarray) -> None:
-        """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
         sets = len(self._arena.colors)
         for which in reversed(range(sets)):
             self._arena.color_set(which, sets)
@@ -248,7 +218,6 @@ class QuadsDrawing:
                 self._arena.write_color(i, color[start:end])
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
-        """(H, W): how many splats each pixel of a view just drawn blends, for a debug view."""
         return count_overdraw(self._gpu, self._projector, self._arena, view, settings)
 
     def surface(self, view: View, settings: RenderSettings) -> Surface:

@@ -39,7 +39,10 @@ class Resolve:
         """
         from_array = isinstance(source, np.ndarray)
         images = [source] if heat is None or palette is None else [source, heat]
-        textures = [self._upload(each, i) if from_array else each for i, each in enumerate(images)]
+        textures: list[moderngl.Texture] = [
+            self._upload(each, i) if isinstance(each, np.ndarray) else each
+            for i, each in enumerate(images)
+        ]
         same_size = textures[0].size == tuple(framebuffer.viewport[2:])
         for texture in textures:
             texture.filter = (moderngl.NEAREST,) * 2 if same_size else (moderngl.LINEAR,) * 2

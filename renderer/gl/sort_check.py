@@ -1,14 +1,12 @@
 """Whether this driver's GL sort is right, asked once at the start; numpy sorts where it is not."""
 
-import logging
-from functools import cache
-
 import numpy as np
 
 from shapeshift.renderer import layout
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.sort import KEY_BITS, Sorter, quantize, stable_order
+from shapeshift.renderer.gl.target import warn_once
 
 BLOCK = layout.WORKGROUP
 GROUP = layout.WORKGROUP * layout.SORT_BLOCKS
@@ -29,7 +27,7 @@ def checked_sorter(gpu: Gpu, backend: str) -> tuple[Sorter, str]:
     if not wrong:
         return sorter, backend
     sorter.release()
-    _tell_once(
+    warn_once(
         f"the GL sort of this driver ({gpu.ctx.info['GL_RENDERER']}) puts {wrong} in a wrong "
         "order; numpy sorts instead, which reads the keys back in every frame."
     )
@@ -86,8 +84,3 @@ def _in_order(arena: Arena, keys: np.ndarray, bits: int) -> bool:
     close = np.abs(steps - quantize(keys)).max(initial=0) <= 1
     culled = np.array_equal(steps == 65535, keys == layout.CULLED_KEY)
     return bool(close and culled and np.array_equal(order, stable_order(steps, 16)))
-
-
-@cache
-def _tell_once(sentence: str) -> None:
-    logging.getLogger("renderer").warning(sentence)

@@ -19,14 +19,18 @@ class Splatter:
         # Both may change from frame to frame.  unit: the display value that 1 in the picture means.
         self.target, self.unit = target, unit
         self._gpu = gpu
-        self._programs = {False: self._made(False)}  # with heat or without
+        self._programs: dict[bool, tuple[moderngl.Program, moderngl.VertexArray]] = {}
+        self.program_for(heat=False)
         self._targets: dict[int, moderngl.Framebuffer] = {}
         self._units: dict[int, float] = {}  # of the images
 
-    def _made(self, heat: bool) -> tuple[moderngl.Program, moderngl.VertexArray]:
-        program = self._gpu.program("splat.vert", "splat.frag", HEAT=int(heat))
-        # No attributes and no indices: the shader pulls what it draws from the arena.
-        return program, self._gpu.ctx.vertex_array(program, [])
+    def program_for(self, heat: bool) -> tuple[moderngl.Program, moderngl.VertexArray]:
+        """What draws pictures with heat beside them, or without; compiled at the first call."""
+        if heat not in self._programs:
+            program = self._gpu.program("splat.vert", "splat.frag", HEAT=int(heat))
+            # No attributes and no indices: the shader pulls what it draws from the arena.
+            self._programs[heat] = program, self._gpu.ctx.vertex_array(program, [])
+        return self._programs[heat]
 
     def draw(
         self,
@@ -52,10 +56,8 @@ class Splatter:
         self, arena: Arena, size: tuple[int, int], min_alpha: float, first: int,
         heat: moderngl.Buffer | None,
     ) -> None:  # fmt: skip
-        ctx, key = self._gpu.ctx, heat is not None
-        if key not in self._programs:
-            self._programs[key] = self._made(key)
-        program, triangles = self._programs[key]
+        ctx = self._gpu.ctx
+        program, triangles = self.program_for(heat is not None)
         if heat is not None:
             bind(heat=heat)
         ctx.enable_only(moderngl.BLEND)

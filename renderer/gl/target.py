@@ -40,7 +40,7 @@ def choose_target(gpu: Gpu, wish: str, most: float) -> tuple[str, float]:
     if wish not in ("auto", "rgba16"):
         return wish, 1.0
     if not draws_into(gpu, "rgba16"):
-        tell_once(
+        warn_once(
             f"this driver ({gpu.ctx.info['GL_RENDERER']}) does not draw into GL_RGBA16, which GL "
             "4.3 asks for; half floats are blended instead: many faint layers get too dark."
         )
@@ -66,5 +66,5 @@ def draws_into(gpu: Gpu, name: str) -> bool:
 
 
 @cache
-def tell_once(sentence: str) -> None:
+def warn_once(sentence: str) -> None:
     logging.getLogger("renderer").warning(sentence)

@@ -1,9 +1,13 @@
-"""The passes of a frame in numpy float64, slow and plain: the oracle of every drawing back end."""
+"""A scene's frame in numpy float64, slow and plain: the oracle of every drawing back end.
+
+Projection and blending are rasterizer/reference.py's; here are the scene, its gates, its colours.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from shapeshift.rasterizer.reference import blend, screen_covariance
 from shapeshift.renderer import layout
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
@@ -14,7 +18,7 @@ from shapeshift.renderer.colors.false_colors import (
     mixed_colors,
     split_colors,
 )
-from shapeshift.renderer.colors.palette import lay_heat
+from shapeshift.renderer.colors.palette import overlay_heat
 from shapeshift.renderer.settings import CULL_REASONS, RenderSettings
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import Model, is_antialiased
@@ -24,7 +28,6 @@ from shapeshift.scene.control import control_of
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene, SceneObject
 
-MAX_ALPHA = 0.99  # 3DGS: one splat never hides everything behind it
 JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection counts as flat;
 #                        an off-centre view has that of the centred picture that it is a part of
 
@@ -64,16 +67,19 @@ def reference_image(
     objects, colors = shaded_objects(scene, view, settings, eye)
     if not objects:
         return np.zeros((view.size[1], view.size[0], 4))
-    depth, place, *ellipses = (
+    depth, place, mean_px, covariance, opacity, color = (
         np.concatenate([getattr(o, name)[o.reason == 0] for o in objects])
         for name in ("depth", "place", "mean_px", "covariance", "opacity", "color")
     )
     key = np.linalg.norm(place - middle, axis=1) if settings.order == "distance" else depth
     order = np.argsort(key, kind="stable")
-    image = blend(*(column[order] for column in ellipses), view.size, settings.min_alpha)
+    image = blended(
+        mean_px[order], covariance[order], opacity[order], color[order], view.size,
+        settings.min_alpha,
+    )  # fmt: skip
     if colors.way != BESIDE:
         return image
-    return lay_heat(image[..., [0, 1, 2, 5]], image[..., 3:5], colors.palette)
+    return overlay_heat(image[..., [0, 1, 2, 5]], image[..., 3:5], colors.palette)
 
 
 def shaded_objects(
@@ -140,7 +146,8 @@ def gate_object(
         for a in (splats.means, splats.scales, splats.wxyz, splats.opacity)
     )
     color = shaded_color(thing.model, splats.color, eye_object, shading)
-    scales = np.where(np.isfinite(wxyz).all(axis=1)[:, None], scales, np.nan)  # turned nowhere
+    turned = np.isfinite(wxyz).all(axis=1, keepdims=True)  # (N, 1)
+    scales = np.where(turned, scales, np.nan)
     if not thing.visible:
         means = np.full_like(means, np.nan)
     with np.errstate(all="ignore"):  # splats that are not finite, or beside or behind the eye
@@ -148,27 +155,20 @@ def gate_object(
         depth = mean[:, 2]
         axes = rotation_matrices(normalize(wxyz)) * scales[:, None, :]  # (N, 3, 3) metres
         most_x, most_y = (t * JACOBIAN_MARGIN for t in view.widest_tangents())
-        x = np.clip(mean[:, 0] / depth, -most_x, most_x)
-        y = np.clip(mean[:, 1] / depth, -most_y, most_y)
-        zero = np.zeros_like(depth)
-        jacobian = np.stack(
-            [
-                np.stack([fx / depth, zero, -fx * x / depth], axis=1),
-                np.stack([zero, fy / depth, -fy * y / depth], axis=1),
-            ],
-            axis=1,
-        )  # (N, 2, 3) pixels per metre
-        half = jacobian @ camera_from_object[:3, :3] @ axes
-        bare = half @ half.transpose(0, 2, 1)
+        in_camera = camera_from_object[:3, :3] @ axes
+        bare = screen_covariance(mean, in_camera, (fx, fy), (-most_x, most_x, -most_y, most_y))
         covariance = bare + settings.low_pass * np.eye(2)
-        seen = opacity * kept_light(bare, covariance) if is_antialiased(thing.model) else opacity
+        seen = (
+            opacity * mip_compensation(bare, covariance) if is_antialiased(thing.model) else opacity
+        )
         # The arena keeps covariances as float32: what is infinite there is so here.
-        overflow = np.square(axes).sum(axis=2).max(axis=1) > np.finfo(np.float32).max
+        overflow: np.ndarray = np.asarray(
+            np.square(axes).sum(axis=2).max(axis=1) > np.finfo(np.float32).max
+        )
         covariance[overflow] = np.inf
         mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
         reason, faded = gate(mean, mean_px, covariance, opacity, seen, color, view, settings)
         place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
-        in_camera = camera_from_object[:3, :3] @ axes
     return Projected(reason, depth, place, mean_px, covariance, faded, color, mean, in_camera)
 
 
@@ -188,7 +188,7 @@ def shaded_color(
     return np.asarray(decoded, np.float64)
 
 
-def kept_light(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def mip_compensation(bare: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """(N,) sqrt(det / det with the low pass): how much fainter an antialiased splat becomes."""
     kept = np.sqrt(np.maximum(np.linalg.det(bare), 0) / np.linalg.det(covariance))
     return np.fmin(kept, 1)  # 1 where the quotient is no number
@@ -256,7 +256,7 @@ def largest_axis_px(covariance: np.ndarray) -> np.ndarray:
     return np.sqrt((a + c) / 2 + np.hypot((a - c) / 2, b))
 
 
-def blend(
+def blended(
     mean_px: np.ndarray,
     covariance: np.ndarray,
     opacity: np.ndarray,
@@ -264,26 +264,9 @@ def blend(
     size: tuple[int, int],
     min_alpha: float,
 ) -> np.ndarray:
-    """(H, W, C + 1) of colours (N, C): near to far, alpha = min(0.99, opacity exp(-r / 2)),
-    dropped below min_alpha.
-    """
-    width, height = size
-    image, transmittance = np.zeros((height, width, color.shape[1])), np.ones((height, width))
-    inverse = np.linalg.inv(covariance)
-    radius = np.sqrt(np.maximum(2 * np.log(np.maximum(opacity, min_alpha) / min_alpha), 0))
-    extent = radius[:, None] * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))  # pixels
-    first = np.clip(np.floor(mean_px - extent - 0.5), 0, size).astype(int)
-    after = np.clip(np.ceil(mean_px + extent + 0.5), 0, size).astype(int)
-    for i in np.flatnonzero(np.all(after > first, axis=1)):
-        (x0, y0), (x1, y1) = first[i], after[i]
-        dx = np.arange(x0, x1) + 0.5 - mean_px[i, 0]
-        dy = (np.arange(y0, y1) + 0.5 - mean_px[i, 1])[:, None]
-        (a, b), (_, c) = inverse[i]
-        alpha = np.minimum(
-            MAX_ALPHA, opacity[i] * np.exp(-0.5 * (a * dx * dx + 2 * b * dx * dy + c * dy * dy))
-        )
-        alpha[~(alpha >= min_alpha)] = 0
-        weight = alpha * transmittance[y0:y1, x0:x1]
-        image[y0:y1, x0:x1] += weight[..., None] * color[i]
-        transmittance[y0:y1, x0:x1] -= weight
+    """(H, W, C + 1) of colours (N, C), near to far, and coverage; alpha below min_alpha is none."""
+    conics = np.linalg.inv(covariance)[:, (0, 0, 1), (0, 1, 1)]
+    thresholds = 2 * np.log(np.maximum(opacity, min_alpha) / min_alpha)
+    extents = np.sqrt(thresholds[:, None] * np.diagonal(covariance, axis1=1, axis2=2))  # pixels
+    image, transmittance = blend(mean_px, conics, thresholds, extents, opacity, color, size)
     return np.concatenate([image, 1 - transmittance[..., None]], axis=2)

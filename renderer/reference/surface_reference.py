@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from shapeshift.renderer.reference.reference import MAX_ALPHA, Projected, gate_object
+from shapeshift.rasterizer.reference import MAX_ALPHA
+from shapeshift.rasterizer.surface_reference import midpoint
+from shapeshift.renderer.reference.reference import Projected, gate_object
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
-
-REACH = 6.0  # sigmas along the view within which depth is held
 
 
 def reference_surface(scene: Scene, view: View, settings: RenderSettings | None = None) -> Surface:
@@ -29,24 +29,12 @@ def reference_surface(scene: Scene, view: View, settings: RenderSettings | None 
         r = np.einsum("hwi,ij,hwj->hw", d, np.linalg.inv(splats.covariance[i]), d)
         alpha = np.minimum(MAX_ALPHA, splats.opacity[i] * np.exp(-r / 2))
         weight = np.where(alpha >= settings.min_alpha, alpha, 0) * transmittance
-        depth, facing = midpoint(splats.mean[i], splats.axes[i], rays, view.near)
+        depth, away = midpoint(splats.mean[i], splats.axes[i], rays, view.near)
+        facing = away * [-1, 1, 1]  # from the camera's axes to the eye's, towards it
         metres += weight * depth
-        normal += weight[..., None] * facing
+        normal += weight[..., None] * (facing / np.linalg.norm(facing))
         transmittance -= weight
     return Surface(metres, normal, 1 - transmittance)
-
-
-def midpoint(
-    mean: np.ndarray, axes: np.ndarray, rays: np.ndarray, near: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Metres (H, W) where rays (H, W, 3), z = 1, are halfway through; the normal, eye axes."""
-    inverse = axes / np.square(axes).sum(axis=0)  # columns: directions over sigmas
-    inverse = inverse @ inverse.T
-    depth = (rays @ inverse @ mean) / np.einsum("hwi,ij,hwj->hw", rays, inverse, rays)
-    reach = REACH * np.linalg.norm(axes[2])
-    facing = inverse @ mean * [-1, 1, 1]
-    held = np.clip(depth, max(mean[2] - reach, near), mean[2] + reach)
-    return held, facing / np.linalg.norm(facing)
 
 
 def _drawn(found: list[Projected]) -> Projected:

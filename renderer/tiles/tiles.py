@@ -1,29 +1,31 @@
 """Draws with rasterizer/ where there is no GPU: OpenCL tiles, 5 to 8 times faster than software GL.
 
-Same life as renderer/gl/quads.py: allocate, decode what changed, place, draw.  No GL here.
+What its methods mean: renderer/drawing.py.  No GL here.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles, sort_order
 from shapeshift.rasterizer.device import Device, open_device
-from shapeshift.rasterizer.heat import add_heat, blend_heat
+from shapeshift.rasterizer.heat import add_heat, blend_heat, compile_heat
 from shapeshift.rasterizer.overdraw import count_overdraw
 from shapeshift.rasterizer.pack import pack, pack_color, pack_opacity
 from shapeshift.rasterizer.project import CULL_REASONS, Camera, Projected
 from shapeshift.rasterizer.project_arena import Limits, SortFrames, project_arena
 from shapeshift.rasterizer.quantize_keys import quantize_keys
-from shapeshift.rasterizer.raster import rasterize_with_heat
+from shapeshift.rasterizer.raster import compile_with_heat, rasterize_with_heat
 from shapeshift.rasterizer.resolve import resolve
 from shapeshift.rasterizer.shade_sh import shade_sh, upload_sh
 from shapeshift.rasterizer.surface import rasterize_depth, surface_arena
-from shapeshift.renderer.colors.false_colors import Shade
+from shapeshift.renderer.colors.false_colors import Shade, has_heat
 from shapeshift.renderer.colors.palette import palette_colors
+from shapeshift.renderer.drawing import SAMPLE, Drawing, median_distance
 from shapeshift.renderer.limits import check_tiles
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.sort_policy import SortPolicy
@@ -35,7 +37,8 @@ from shapeshift.runtime_models.model import Model, SplatLayers, is_antialiased
 from shapeshift.runtime_models.stop_weights import Controls
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View
 
-SAMPLE = 4096  # splats, for a median
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 
 @dataclass
@@ -45,15 +48,15 @@ class _Slot:
     start: int
     count: int
     evaluator: Evaluator
-    sh: object | None  # device array of coefficients; None: the colour comes from a network
+    sh: "Array | None"  # of coefficients; None: the colour comes from a network
     colors: ColorMemory
     placed: bool = False  # layers: the control value changes nothing but their opacity
 
 
-class TilesDrawing:
+class TilesDrawing(Drawing):
     """The arena of all objects on an OpenCL device, and the passes that draw it."""
 
-    decodes_on_gpu = False  # says which clock times the decoding: GL's or the wall's
+    decodes_on_gpu = False
 
     def __init__(self, device: Device | None = None) -> None:
         self.device = device or open_device()
@@ -76,7 +79,6 @@ class TilesDrawing:
         self._heat_images: dict[int, np.ndarray] = {}
 
     def allocate(self, models: list[Model]) -> None:
-        """Room for these objects; what was decoded before is gone."""
         check_tiles(self.device, models)
         counts = [model.splat_count for model in models]
         starts = np.concatenate([[0], np.cumsum(counts, dtype=int)])
@@ -100,6 +102,10 @@ class TilesDrawing:
             _Slot(int(start), n, evaluators[id(m)], sh.get(id(m)), ColorMemory(evaluators[id(m)]))
             for start, n, m in zip(starts, counts, models, strict=False)
         ]
+        if with_heat := {m.splat_count for m in models if m.splat_count and has_heat(m)}:
+            for count in {min(with_heat), max(with_heat)}:
+                compile_heat(device, count)
+            compile_with_heat(device, min_transmittance=RenderSettings().min_transmittance)
 
     def decode_geometry(
         self,
@@ -108,11 +114,6 @@ class TilesDrawing:
         eye_object: np.ndarray | None = None,
         seen: np.ndarray | None = None,
     ) -> None:
-        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
-
-        eye_object: (3,) in the object's frame, for a model that follows it; seen: (A,) bool, the
-        anchors of such a model that are there, None: all.
-        """
         slot = self._slots[i]
         self._changed = True
         splats = slot.evaluator.geometry(x, unit=False, eye=eye_object, seen=seen)
@@ -123,9 +124,6 @@ class TilesDrawing:
         slot.placed = slot.sh is not None
 
     def color_set(self, which: int, count: int) -> None:
-        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
-        or one a view.
-        """
         self._colors = self._colors[:count]
         while len(self._colors) < count:
             self._colors.append(self.device.zeros((self.splats, 4)))
@@ -140,11 +138,6 @@ class TilesDrawing:
         seen: np.ndarray | None = None,
         at_once: bool = False,
     ) -> None:
-        """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
-
-        seen: (A,) bool, one an anchor (a splat of layers): the rest may keep what it has.
-        at_once: the heat becomes colours of its palettes here.
-        """
         slot = self._slots[i]
         rows = slice(slot.start, slot.start + slot.count)
         if self._heats[self._set] is None and shade.heats:
@@ -178,8 +171,7 @@ class TilesDrawing:
         """Returns when what was decoded is there: once for all objects, not after each."""
         self.device.queue.finish()
 
-    def place(self, world_from_objects: list[np.ndarray]) -> None:
-        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+    def set_poses(self, world_from_objects: list[np.ndarray]) -> None:
         poses = np.reshape(world_from_objects, (-1, 4, 4))
         if not np.array_equal(poses, self._world_from_objects, equal_nan=True):
             self._world_from_objects, self._changed = poses, True
@@ -187,7 +179,6 @@ class TilesDrawing:
     def draw(
         self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
     ) -> None:
-        """Draws every view; view i is then image(first + i)."""
         if not self.splats:
             for i, view in enumerate(views):
                 self._images[first + i] = np.zeros((view.size[1], view.size[0], 4), np.float32)
@@ -276,7 +267,6 @@ class TilesDrawing:
 
     @contextmanager
     def order_set_aside(self) -> Iterator[None]:
-        """Whatever the body does to the order, afterwards it is the one that was in use before."""
         names = ("_orders", "sorts", "order_age", "_changed")
         kept, sort_policy = [getattr(self, name) for name in names], copy(self._sort_policy)
         try:
@@ -290,15 +280,10 @@ class TilesDrawing:
         """Metres from an eye to the median splat, from a sample of those that are there."""
         step = -(-self.splats // SAMPLE)
         mean_opacity = self.device.view(self._mean_opacity)[::step]
-        poses = eye_from_world @ self._world_from_objects  # (O, 4, 4)
-        rows = poses[self.device.view(self._object_index)[::step], :3]  # (n, 3, 4)
-        places = (rows[..., :3] @ mean_opacity[:, :3, None])[..., 0] + rows[..., 3]
-        distance = np.linalg.norm(places[mean_opacity[:, 3] > 0], axis=1)
-        distance = distance[np.isfinite(distance)]
-        return float(np.median(distance)) if distance.size else 0.0
+        owner = self.device.view(self._object_index)[::step]
+        return median_distance(eye_from_world @ self._world_from_objects, mean_opacity, owner)
 
     def counts(self) -> dict[str, int]:
-        """{drawn, opacity, distance, ...} of the view drawn last: gates in their order."""
         if not self.splats:
             return dict.fromkeys(("drawn", *CULL_REASONS), 0)
         culled = self._projected[-1].culled(self.device)
@@ -313,31 +298,23 @@ class TilesDrawing:
         return 1.0
 
     def presentable_heat(self, i: int) -> np.ndarray:
-        """What resolve takes beside it, of a frame with heat."""
         return self._heat_images[i]
 
     def presentable_rgba8(
         self, i: int, background: tuple[float, float, float], palette: np.ndarray | None = None
     ) -> np.ndarray:
-        """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom.
-
-        palette: of the heat, where the frame has any, else of the picture.
-        """
         heat = self._heat_images[i] if self.draws_heat else None
         return resolve(self.device, self._images[i], background, palette, heat)
 
     def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
-        arrays = (self._mean_opacity, self._object_index, self._covariance)
-        return tuple(self.device.download(array) for array in arrays)
+        read = self.device.download
+        return read(self._mean_opacity), read(self._object_index), read(self._covariance)
 
     def write_colors(self, color: np.ndarray) -> None:
-        """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
         for each in self._colors:
             pack_color(self.device, np.reshape(color, (self.splats, 3)), 0, each)
 
     def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
-        """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
         if not self.splats:
             return np.zeros(view.size[::-1], np.int32)
         return count_overdraw(self.device, self._projected[i], view.size)
@@ -362,11 +339,9 @@ class TilesDrawing:
         return Surface(metres, np.ascontiguousarray(np.moveaxis(normal, 0, 2)), 1 - transmittance)
 
     def image(self, i: int) -> np.ndarray:
-        """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
         return self._images[i]
 
     def heat(self, i: int) -> np.ndarray:
-        """(H, W, 2) float32, row 0 on top, of the same view: value and weight, both times alpha."""
         return self._heat_images[i]
 
     def close(self) -> None:

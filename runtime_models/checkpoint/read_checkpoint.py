@@ -57,9 +57,8 @@ def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
     """Splats of SH degree 0 to 3, or the coloured points that an .npz holds.  Raises BadFile."""
     reading = reading.within(path)
     memory = reading.account
-    reading.tell(f"reading {path.name}", 0.0)
+    reading.report(f"reading {path.name}", 0.0)
     arrays = arrays_of(path, memory)
-    arrays = {role: array for role, array in arrays.items() if array is not None}
     lacking = [name for name in GEOMETRY if name not in arrays]
     if set(lacking) == {"scales", "quats", "opacities"}:
         points = splats_of_points(arrays["means"], shades(arrays, path), path.name, reading)
@@ -90,12 +89,13 @@ def read_raw_checkpoint(path: Path, reading: Reading) -> RawSplats:
     return raw
 
 
-def arrays_of(path: Path, memory: Account) -> dict[str, np.ndarray | None]:
+def arrays_of(path: Path, memory: Account) -> dict[str, np.ndarray]:
     """role -> array, as stored.  Raises BadFile where there are two sets of splats, or none."""
     if all(name.endswith(".npy") for name in member_names(path)):
         with opened_zip(path, path.name, memory) as archive:
             names = {n[:-4]: ROLES[n[:-4]] for n in archive.namelist() if n[:-4] in ROLES}
-            return {role: read_array(archive, n, path.name, memory) for n, role in names.items()}
+            read = {role: read_array(archive, n, path.name, memory) for n, role in names.items()}
+            return {role: array for role, array in read.items() if array is not None}
     found: dict[str, dict[str, np.ndarray]] = {}
     tensors = read_tensors(path, memory, lambda name: name.rpartition(".")[2] in ROLES)
     for name, tensor in tensors.items():
@@ -137,22 +137,23 @@ def colors_of(
         # nerfstudio without harmonics keeps logits of colours
         by_logits = more == 0 and rest is not None
 
-        def fill(sh: np.ndarray) -> None:
+        def fill_harmonics(sh: np.ndarray) -> None:
             sh[:, 0] = (sigmoid(first) - 0.5) / C0 if by_logits else first
-            if kept:
+            if kept and rest is not None:
                 sh[:, 1:] = rest[:, :kept]
 
-        return 1 + kept, fill, ()
+        return 1 + kept, fill_harmonics, ()
     if colors is None:
         raise BadFile(f"{path.name} has splats without colours; {WANTED}.")
-    colors = shaped(colors, (count, 3), "colors", path)
     what = "colours of which a network makes others, for each photo"
     found = Finding(what, 0, "shown without it", file=path.name, repaired=False)
 
-    def fill(sh: np.ndarray) -> None:
-        sh[:, 0] = (sigmoid(colors) - 0.5) / C0
+    logits = shaped(colors, (count, 3), "colors", path)
 
-    return 1, fill, (found,)
+    def fill_colors(sh: np.ndarray) -> None:
+        sh[:, 0] = (sigmoid(logits) - 0.5) / C0
+
+    return 1, fill_colors, (found,)
 
 
 def sigmoid(logits: np.ndarray) -> np.ndarray:

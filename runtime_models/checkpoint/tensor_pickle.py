@@ -6,6 +6,7 @@ of them describe tensors, every other one is refused.
 
 import pickletools
 from dataclasses import dataclass, field
+from typing import Any
 
 from shapeshift.runtime_models.model import BadFile
 
@@ -89,7 +90,7 @@ def index_of(data: bytes, file: str) -> Index:
         for count, (opcode, given, _) in enumerate(pickletools.genops(data)):
             if count >= MOST_OPCODES:
                 raise BadFile(f"{file}: its index has more than {MOST_OPCODES:,} steps; too many.")
-            machine.take(opcode.name, given)
+            machine.run(opcode.name, given)
     except BadFile:
         raise
     except (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError):
@@ -113,11 +114,11 @@ def _name_parts(tree: object, found: Index, file: str) -> None:
         if isinstance(node, Record):
             found.modules[name] = node.kind
             node = node.fields
-        inside = ()
+        inside: list[tuple[object, object]] = []
         if isinstance(node, dict):
-            inside = node.items()
+            inside = list(node.items())
         elif isinstance(node, list | tuple):
-            inside = dict(enumerate(node)).items()
+            inside = list(enumerate(node))
         if len(inside) + nodes + len(todo) > MOST_NODES:
             raise BadFile(f"{file}: its tensors are nested or named beyond reason; save it again.")
         below = [(f"{name}.{key}" if name else str(key), part) for key, part in inside]
@@ -133,7 +134,7 @@ class _Machine:
         self.memo: dict[int, object] = {}
         self.result: object = None
 
-    def take(self, name: str, given: object) -> None:
+    def run(self, name: str, given: Any) -> None:
         """One opcode.  Raises BadFile by name for one that tensors do not need."""
         stack, memo = self.stack, self.memo
         if name in CONSTANTS:
@@ -195,7 +196,7 @@ class _Machine:
             raise IndexError("too few for a tuple")
         self.stack[len(self.stack) - count :] = [tuple(items)]
 
-    def _put_items(self, items: list) -> None:
+    def _set_items(self, items: list) -> None:
         target = self.stack[-1]
         if type(target) is not dict or len(items) % 2:
             raise TypeError("items go into a dictionary, in pairs")
@@ -247,11 +248,12 @@ class _Machine:
 
 
 def _tensor(storage: object, offset: object, size: object, stride: object) -> Tensor:
-    whole = [offset, *size, *stride]
-    if not (isinstance(storage, Storage) and type(size) is type(stride) is tuple):
+    if not (isinstance(storage, Storage) and isinstance(size, tuple) and isinstance(stride, tuple)):
         raise ValueError("no tensor")
+    whole = [offset, *size, *stride]
     if not all(type(number) is int and number >= 0 for number in whole) or len(size) != len(stride):
         raise ValueError("no tensor")
+    assert isinstance(offset, int)  # as has just been seen
     return Tensor(storage, offset, size, stride)
 
 
@@ -270,8 +272,8 @@ STEPS = {
     "LIST": lambda m: m.stack.append(m._since_mark()),
     "APPEND": lambda m: m._append([m.stack.pop()]),
     "APPENDS": lambda m: m._append(m._since_mark()),
-    "SETITEM": lambda m: m._put_items([m.stack.pop(-2), m.stack.pop()]),
-    "SETITEMS": lambda m: m._put_items(m._since_mark()),
+    "SETITEM": lambda m: m._set_items([m.stack.pop(-2), m.stack.pop()]),
+    "SETITEMS": lambda m: m._set_items(m._since_mark()),
     "POP": lambda m: m.stack.pop(),
     "BINPERSID": _Machine._persistent,
     "STACK_GLOBAL": _Machine._stack_global,

@@ -30,12 +30,12 @@ class ColorMemory:
         if follows_eye(self._evaluator.model):  # colours of the shapes decoded just now
             return self._evaluator.color(control, eye, seen)
         last = self._parts.get(part)
-        same = last is not None and last.is_of(control, eye)
-        if same and last.covers(seen):
-            return last.colors
+        same = last if last is not None and last.is_of(control, eye) else None
+        if same is not None and same.covers(seen):
+            return same.colors
         colors = self._evaluator.color(control, eye, seen, None if last is None else last.colors)
-        if same and seen is not None:  # others came into view
-            seen = seen | last.seen
+        if same is not None and same.seen is not None and seen is not None:  # others came into view
+            seen = seen | same.seen
         self._parts[part] = _Decoded(control, np.array(eye), seen, colors)
         return colors
 

@@ -44,6 +44,7 @@ def _of_harmonics(layers: SplatLayers) -> float:
 def _of_networks(evaluator: Evaluator, x: float) -> float:
     """By differences between directions that are STEP apart."""
     rng = np.random.default_rng(0)
+    assert isinstance(evaluator.model, AnchorModel)
     count = len(evaluator.model.anchors)
     direction = unit(rng.normal(size=(count, 3)))
     aside = unit(np.cross(direction, rng.normal(size=(count, 3))))

@@ -59,12 +59,17 @@ class Account:
         return self
 
     @property
+    def explained(self) -> int:
+        """Bytes that the sizes of its files explain."""
+        return int(self.a_byte * self.size)
+
+    @property
     def left(self) -> int:
         """Bytes that may still be taken."""
         free = self.whole.most - self.whole.taken
         if self.whole.asked:
             return free
-        explained = max(self.a_byte * self.size - self.taken, 0)
+        explained = max(self.explained - self.taken, 0)
         return min(free, explained + FREE - self.whole.beyond)
 
     def widen(self, size: int) -> None:
@@ -75,7 +80,7 @@ class Account:
         """Takes `count` bytes for good.  Raises BadFile; `what` is for its message."""
         whole = self.whole
         with whole.lock:
-            explained = self.a_byte * self.size
+            explained = self.explained
             beyond = max(self.taken + count - explained, 0) - max(self.taken - explained, 0)
             if not (whole.asked or whole.beyond + beyond <= FREE):
                 of_its_own = f"its {self.size:,} bytes may take {amount(explained + FREE)}"
@@ -90,7 +95,7 @@ class Account:
     def release(self, count: int) -> None:
         """Gives back what was charged."""
         with self.whole.lock:
-            explained = self.a_byte * self.size
+            explained = self.explained
             self.whole.beyond -= max(self.taken - explained, 0)
             self.taken -= count
             self.whole.taken -= count
@@ -198,5 +203,6 @@ def windows_memory() -> int:
                     *((name, ctypes.c_ulonglong) for name in "abcdefg")]  # fmt: skip
 
     status = Status(length=ctypes.sizeof(Status))
-    told = ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
-    return status.a if told and status.a else UNKNOWN
+    windows = getattr(ctypes, "windll")  # noqa: B009  only there
+    known = windows.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
+    return status.a if known and status.a else UNKNOWN

@@ -5,6 +5,9 @@ import math
 import tokenize
 import warnings
 import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import IO
 
 import numpy as np
 
@@ -56,3 +59,9 @@ def read_array(
         )
     numbers = np.frombuffer(data, kind, offset=file.tell())
     return numbers.reshape(shape, order="F" if by_columns else "C")
+
+
+def write_arrays(target: str | Path | IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
+    """Arrays by their names as a compressed .npz."""
+    save: Callable[..., None] = np.savez_compressed  # numpy takes its keywords for one flag
+    save(target, **arrays)

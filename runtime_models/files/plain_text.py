@@ -76,13 +76,19 @@ def escaped(found: re.Match) -> str:
 def shortened_line(text: str, most: int) -> str:
     """With long words and then the whole cut in their middle."""
     if len(text) > LONGEST_WORD:
-        text = LONG_WORD.sub(lambda word: cut(word[0], LONGEST_WORD), text)
-    return cut(text, most)
+        text = LONG_WORD.sub(lambda word: shorten_middle(word[0], LONGEST_WORD), text)
+    return shorten_middle(text, most)
 
 
-def cut(text: str, most: int) -> str:
+def shorten_middle(text: str, most: int) -> str:
     """At most so many letters: the beginning, an ellipsis, the end."""
     if len(text) <= most:
         return text
     end = most // 3
     return f"{text[: most - end - 1]}\u2026{text[-end:]}"
+
+
+def path_end(path: object) -> str:
+    """The end of a path for a message: its last LONGEST_NAME letters."""
+    text = str(path)
+    return text if len(text) <= LONGEST_NAME else f"...{text[-LONGEST_NAME:]}"

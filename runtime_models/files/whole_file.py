@@ -27,7 +27,7 @@ LOCKS = os.name != "nt"  # Windows refuses to delete a file that is open instead
 _swept: set[Path] = set()  # folders that this process has looked through
 
 
-def write_whole(path: Path, data: bytes | Iterable[bytes]) -> None:
+def write_whole(path: Path, data: bytes | Iterable[bytes | memoryview]) -> None:
     """The bytes, which may come in parts, in place of `path`."""
     with whole_file(path) as file:
         file.writelines([data] if isinstance(data, bytes | bytearray | memoryview) else data)

@@ -9,7 +9,7 @@ LARGEST_LOG = 80.0  # exp of it is a finite float32
 SQUARES = (1e-30, 1e30)  # a quaternion's length squared: far from the ends of float32
 
 
-def odd_rows(raw: RawSplats) -> np.ndarray:
+def invalid_rows(raw: RawSplats) -> np.ndarray:
     """(K,) rising rows with a number that is not usual as it is filed.
 
     NaN or Inf anywhere, a quaternion of next to no or of boundless length, a scale or opacity that
@@ -19,8 +19,8 @@ def odd_rows(raw: RawSplats) -> np.ndarray:
     found: list[np.ndarray] = []
 
     def look(rows: slice, _: None) -> None:
-        if is_odd(raw, rows):
-            found.append(rows.start + np.flatnonzero(odd_in(raw, rows)))
+        if any_invalid(raw, rows):
+            found.append(rows.start + np.flatnonzero(invalid_in(raw, rows)))
 
     each_block(len(raw.means), look)
     return np.sort(np.concatenate(found)) if found else np.empty(0, np.intp)
@@ -28,14 +28,14 @@ def odd_rows(raw: RawSplats) -> np.ndarray:
 
 def ranges(raw: RawSplats) -> tuple[tuple[float, float], tuple[float, float]]:
     """(least, largest) of usual scales and opacities, both themselves usual."""
-    largest = np.finfo(np.float32).max
+    largest = float(np.finfo(np.float32).max)
     scales = (-largest, LARGEST_LOG) if raw.log_scales else (0.0, largest)
     return scales, ((-largest, largest) if raw.logits else (0.0, 1.0))
 
 
-def is_odd(raw: RawSplats, rows: slice) -> bool:
+def any_invalid(raw: RawSplats, rows: slice) -> bool:
     """Whether any of these rows may be odd."""
-    largest = np.finfo(np.float32).max
+    largest = float(np.finfo(np.float32).max)
     everything = (-largest, largest)
     scales, opacities = ranges(raw)
     wxyz = raw.wxyz[rows]
@@ -50,10 +50,10 @@ def is_odd(raw: RawSplats, rows: slice) -> bool:
     return not all(low <= part.min() and part.max() <= high for part, (low, high) in parts)
 
 
-def odd_in(raw: RawSplats, rows: slice) -> np.ndarray:
+def invalid_in(raw: RawSplats, rows: slice) -> np.ndarray:
     """(n,) bool: the rows themselves."""
     scales, opacities = ranges(raw)
-    largest = np.finfo(np.float32).max  # float64 positions may lie beyond
+    largest = float(np.finfo(np.float32).max)  # float64 positions may lie beyond
     usual = within(raw.means[rows], (-largest, largest)).all(1) & np.isfinite(raw.sh[rows]).all(
         (1, 2)
     )

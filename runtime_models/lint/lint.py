@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from shapeshift.runtime_models.lint.lint_rows import mend_rows
+from shapeshift.runtime_models.lint.lint_rows import repair_rows
 from shapeshift.runtime_models.lint.lint_whole import (
     read_coding,
     refuse_boundless,
@@ -10,8 +10,8 @@ from shapeshift.runtime_models.lint.lint_whole import (
     sample_of,
 )
 from shapeshift.runtime_models.model import BadFile, Finding
-from shapeshift.runtime_models.splats.operations.activate import ODD, to_own_units
-from shapeshift.runtime_models.splats.operations.recentre import about, place_of
+from shapeshift.runtime_models.splats.operations.activate import ODD, activate
+from shapeshift.runtime_models.splats.operations.recentre import origin_of, recentred
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, RawSplats, Reading
 
@@ -26,10 +26,10 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     count, ours = len(raw.means), ours_from_file(reading.up or raw.up, reading.flip, raw.front)
     memory = raw.memory
     findings = [*raw.findings, *read_coding(raw)]
-    odd, filed = to_own_units(raw, ours)
+    odd, filed = activate(raw, ours)
     dropping = 12 * raw.sh.shape[1] * count if len(odd) else 0  # one array at a time
     with memory.lend(dropping, f"the check of {count:,} splats"):
-        findings += mend_rows(raw, odd, filed)
+        findings += repair_rows(raw, odd, filed)
     memory.release(len(odd) * (ODD + 2 * raw.bytes_a_splat))
     if not len(raw.means):
         raise BadFile(f"{raw.file}: not one of {count:,} splats can be drawn{because(findings)}.")
@@ -37,14 +37,14 @@ def judge(raw: RawSplats, reading: Reading) -> PlainSplats:
     refuse_boundless(raw.file, sample)
     if not reading.allow_huge:
         refuse_filling(raw.file, sample)
-    origin, found = place_of(sample, raw.means.dtype, raw.file)
+    origin, found = origin_of(sample, raw.means.dtype, raw.file)
     if any(origin):
         memory.charge(36 * len(raw.means), f"moving {len(raw.means):,} splats")
     findings += found
     if reading.strict:
         refuse_repairs(raw.file, findings)
     return PlainSplats(
-        about(raw.means, origin),
+        recentred(raw.means, origin),
         raw.scales,
         raw.wxyz,
         raw.opacity,

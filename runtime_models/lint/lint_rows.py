@@ -13,7 +13,7 @@ OPAQUE, UNSEEN, FLAT = KEPT = ("kept, opaque", "kept, invisible", "kept, flat") 
 
 
 @dataclass(frozen=True)
-class Odd:
+class InvalidRows:
     """The rows of a file that need a second look, as they are in the file, in float64."""
 
     rows: np.ndarray  # (K,) rising
@@ -25,7 +25,7 @@ class Odd:
     sh: np.ndarray  # (K, M, 3)
 
 
-def mend_rows(raw: RawSplats, rows: np.ndarray, filed: RawSplats) -> list[Finding]:
+def repair_rows(raw: RawSplats, rows: np.ndarray, filed: RawSplats) -> list[Finding]:
     """Drops and mends rows of `raw`, which is in our units already; what was found.
 
     rows: (K,) the odd ones, and `filed`: these alone, as the file has them (own_units.py).
@@ -35,17 +35,21 @@ def mend_rows(raw: RawSplats, rows: np.ndarray, filed: RawSplats) -> list[Findin
     for what, rule in DROPS.items():
         hit = rule(odd) & ~broken
         broken |= hit
-        found += told(what, rows[hit], DROPPED, raw)
+        found += row_findings(what, rows[hit], DROPPED, raw)
     kept = ~broken
     found += hide_sizeless(raw, rows[broken])
     if filed.log_scales:
         flat = (odd.scales == -np.inf).any(1) & ~(odd.sigma == 0).all(1)
-        found += told("a scale of -Inf along an axis", rows[kept & flat], FLAT, raw)
+        found += row_findings("a scale of -Inf along an axis", rows[kept & flat], FLAT, raw)
     else:
         found += unsign_scales(raw, odd, kept)
     if filed.logits:
-        found += told("an opacity of +Inf", rows[kept & (odd.opacity == np.inf)], OPAQUE, raw)
-        found += told("an opacity of -Inf", rows[kept & (odd.opacity == -np.inf)], UNSEEN, raw)
+        found += row_findings(
+            "an opacity of +Inf", rows[kept & (odd.opacity == np.inf)], OPAQUE, raw
+        )
+        found += row_findings(
+            "an opacity of -Inf", rows[kept & (odd.opacity == -np.inf)], UNSEEN, raw
+        )
     else:
         found += bound_opacity(raw, odd, kept)
     if broken.any():
@@ -53,11 +57,11 @@ def mend_rows(raw: RawSplats, rows: np.ndarray, filed: RawSplats) -> list[Findin
     return found
 
 
-def look_at(rows: np.ndarray, filed: RawSplats) -> Odd:
+def look_at(rows: np.ndarray, filed: RawSplats) -> InvalidRows:
     with np.errstate(over="ignore", invalid="ignore"):  # NaN that signals, too
         scales = filed.scales.astype(np.float64)
         sigma = np.exp(scales).astype(np.float32) if filed.log_scales else filed.scales
-        return Odd(
+        return InvalidRows(
             rows, filed.means.astype(np.float64), scales, sigma.astype(np.float64),
             filed.wxyz.astype(np.float64), filed.opacity.astype(np.float64), filed.sh,
         )  # fmt: skip
@@ -77,11 +81,11 @@ def finite_as_float32(array: np.ndarray) -> np.ndarray:
     return np.abs(array) <= np.finfo(np.float32).max  # NaN fails
 
 
-def unsign_scales(raw: RawSplats, odd: Odd, kept: np.ndarray) -> list[Finding]:
+def unsign_scales(raw: RawSplats, odd: InvalidRows, kept: np.ndarray) -> list[Finding]:
     """A splat mirrored along its own axis is the same splat: the sign of a sigma means nothing."""
     hit = odd.rows[kept & (odd.sigma < 0).any(1)]
     raw.scales[hit] = np.abs(raw.scales[hit])
-    return told("a negative scale", hit, "read without their sign", raw)
+    return row_findings("a negative scale", hit, "read without their sign", raw)
 
 
 def hide_sizeless(raw: RawSplats, broken: np.ndarray) -> list[Finding]:
@@ -90,16 +94,16 @@ def hide_sizeless(raw: RawSplats, broken: np.ndarray) -> list[Finding]:
     gone = np.flatnonzero((first == 0) & (second == 0) & (third == 0))
     gone = np.setdiff1d(gone, broken, assume_unique=True)
     raw.opacity[gone] = 0
-    return told("no size", gone, UNSEEN, raw)
+    return row_findings("no size", gone, UNSEEN, raw)
 
 
-def bound_opacity(raw: RawSplats, odd: Odd, kept: np.ndarray) -> list[Finding]:
+def bound_opacity(raw: RawSplats, odd: InvalidRows, kept: np.ndarray) -> list[Finding]:
     hit = odd.rows[kept & ~((odd.opacity >= 0) & (odd.opacity <= 1))]
     raw.opacity[hit] = np.clip(raw.opacity[hit], 0, 1)
-    return told("an opacity outside 0..1", hit, "cut there", raw)
+    return row_findings("an opacity outside 0..1", hit, "cut there", raw)
 
 
-def told(what: str, rows: np.ndarray, done: str, raw: RawSplats) -> list[Finding]:
+def row_findings(what: str, rows: np.ndarray, done: str, raw: RawSplats) -> list[Finding]:
     """One finding of these rows, none where there are none."""
     if not len(rows):
         return []

@@ -48,7 +48,8 @@ def read_coding(raw: RawSplats) -> list[Finding]:
     logarithm of a metre), as logarithms they would fill the scene, as metres they do not.  A file
     in millimetres has no scale below 0 either, but fills nothing.
     """
-    few, found = slice(0, SAMPLE), []
+    few = slice(0, SAMPLE)
+    found: list[Finding] = []
     doubt_opacity = raw.logits and not outside(raw.opacity[few], 0, 1)
     doubt_scales = raw.log_scales and not outside(raw.scales[few], 0, np.inf)
     if not (doubt_opacity or doubt_scales):  # nearly every file

@@ -22,7 +22,7 @@ class Removed:
     splats: int
 
 
-def shown(model: AnchorModel, xs: list[float] | None = None) -> np.ndarray:
+def visible_slots(model: AnchorModel, xs: list[float] | None = None) -> np.ndarray:
     """(A, k) bool: splats that are not absent at some control value, by default at some stop."""
     evaluator = Evaluator(model)
     out = np.zeros((len(model.anchors), model.splats_per_anchor), bool)
@@ -31,17 +31,18 @@ def shown(model: AnchorModel, xs: list[float] | None = None) -> np.ndarray:
     return out
 
 
-def compact(model: AnchorModel, alive: np.ndarray | None = None) -> tuple[AnchorModel, Removed]:
+def drop_unused(model: AnchorModel, alive: np.ndarray | None = None) -> tuple[AnchorModel, Removed]:
     """The model without anchors and slots that have no living splat, and without silent units.
 
     alive: (A, k) bool, by default what some stop shows: every picture at a stop stays as it was.
     Of an anchor that stays, all slots stay that some other anchor needs, since networks give the
     splats of an anchor together.  A model that shows nothing keeps one anchor and one slot.
     """
-    alive = shown(model) if alive is None else alive.copy()
+    alive = visible_slots(model) if alive is None else alive.copy()
     if not alive.any():
         alive[0, 0] = True
-    anchors, slots = alive.any(axis=1), alive.any(axis=0)
+    anchors: np.ndarray = np.asarray(alive.any(axis=1))
+    slots: np.ndarray = np.asarray(alive.any(axis=0))
     smaller = replace(
         model.with_anchors(anchors),
         networks={n: without_slots(model.networks[n], slots, SIZE_PER_SPLAT[n]) for n in HEADS},

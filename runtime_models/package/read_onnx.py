@@ -61,7 +61,7 @@ def read_onnx(
     chain = _Chain(name, constants, given[0], memory)
     with np.errstate(over="ignore", invalid="ignore"):  # finish() refuses what is not finite
         for node in graph.node:
-            chain.take(node)
+            chain.add(node)
     return chain.finish(graph.output[0].name, inputs)
 
 
@@ -139,9 +139,10 @@ class _Chain:
         self.before = ""  # the kind of that node
         self.weights: list[np.ndarray] = []  # (out, in) each
         self.biases: list[np.ndarray] = []  # (out,) each
-        self.head, self.clip, self.gain = "none", None, 1.0
+        self.head, self.gain = "none", 1.0
+        self.clip: tuple[float, float] | None = None
 
-    def take(self, node) -> None:
+    def add(self, node) -> None:
         """The next node of the file.  Raises BadFile, naming it, where it does not belong."""
         if not node.output:
             raise BadFile(f"{self.name}: a node {node.op_type!r} gives nothing; export it again.")
@@ -173,14 +174,17 @@ class _Chain:
         elif kind == "Add":
             self.biases[-1] = self.biases[-1] + self._row(self._other(node, label), label)
         elif kind == "Clip":
-            self.clip = tuple(
+            low, high = (
                 self._scalar(self._constant(node, i, label), label)
                 if i < len(node.input) and node.input[i]
                 else float(attributes.get(word, default))  # attributes before opset 11
                 for i, word, default in ((1, "min", -LARGEST), (2, "max", LARGEST))
             )
-            if not self.clip[0] < self.clip[1]:
-                raise BadFile(f"{label} clips to {self.clip}, expected a lower and a higher bound.")
+            if not low < high:
+                raise BadFile(
+                    f"{label} clips to {(low, high)}, expected a lower and a higher bound."
+                )
+            self.clip = low, high
         elif kind == "Mul":
             self.gain = self._scalar(self._other(node, label), label)
         elif kind in HEADS:

@@ -85,9 +85,10 @@ def read_anchors(
         if len(tables[0]) != len(tables[-1]):
             raise BadFile(f"{where}: {len(tables[0])} positions but {len(tables[-1])} {name}.")
     memory.release(sum(array.nbytes for array in arrays.values()))
+    positions, features, *frames = tables
     if not with_frames:
-        return *tables, None
-    positions, features, log_scales, wxyz = tables
+        return positions, features, None
+    log_scales, wxyz = frames
     if not np.abs(log_scales).max() <= LARGEST_LOG:
         raise BadFile(
             f"{where}: frame_log_scales reach {np.abs(log_scales).max():.3g}, expected natural "

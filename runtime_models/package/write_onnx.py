@@ -16,9 +16,10 @@ def write_onnx(mlp: Mlp, name: str, first_bias: str = "stored") -> bytes:
     graph, (1, hidden) for all rows or (N, hidden).  "input and rows": and a third, "rows"
     (N, hidden), is added to the first layer, too.
     """
-    from onnx import TensorProto, checker, helper, numpy_helper
+    from onnx import NodeProto, TensorProto, checker, helper, numpy_helper
 
-    constants, nodes = [], []
+    constants: list[TensorProto] = []
+    nodes: list[NodeProto] = []
 
     def constant(label: str, value: np.ndarray | float) -> str:
         constants.append(numpy_helper.from_array(np.asarray(value, np.float32, order="C"), label))

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.plain_text import json_text
 from shapeshift.runtime_models.files.whole_file import whole_folder, write_whole
 from shapeshift.runtime_models.model import HEADS, AnchorModel, BadFile, Stop
@@ -55,7 +56,7 @@ def package_files(model: AnchorModel, features: str) -> dict[str, bytes]:
         log_scales = np.log(model.frames.scales)
         tables |= encode_features(log_scales, features, "frame_log_scales")
         tables |= encode_features(model.frames.wxyz, features, "frame_rotations")
-    np.savez_compressed(arrays, positions=model.anchors, **tables)
+    write_arrays(arrays, {"positions": model.anchors, **tables})
     manifest = json_text(describe_model(model)).encode()
     files = {MANIFEST: manifest, ANCHORS: arrays.getvalue()}
     for name in HEADS:
@@ -91,7 +92,9 @@ def describe_model(model: AnchorModel) -> dict:
 
 def describe_between(model: AnchorModel) -> dict:
     """What older readers pass over; left out where it is as usual."""
-    rows = {} if model.between_stops == "blend" else {"between_stops": model.between_stops}
+    rows: dict[str, object] = {}
+    if model.between_stops != "blend":
+        rows["between_stops"] = model.between_stops
     if model.pace:
         rows["pace"] = [
             {"from": pace.start, "to": pace.end, "blend": list(pace.blend)} for pace in model.pace
@@ -100,7 +103,7 @@ def describe_between(model: AnchorModel) -> dict:
 
 
 def describe_stop(stop: Stop) -> dict:
-    row = {"name": stop.name, "x": stop.x, "kind": stop.kind}
+    row: dict[str, object] = {"name": stop.name, "x": stop.x, "kind": stop.kind}
     if stop.palette:
         row["palette"] = stop.palette
     if stop.value_range is not None:

@@ -115,15 +115,16 @@ class ScaffoldEvaluator:
         if model.octree is not None:
             drawn, part = drawn_anchors(model.octree, eye)
         drawn = drawn if seen is None else drawn & seen
-        features = None if self._bank is None else np.zeros_like(model.features)
+        bank = self._bank
+        features = None if bank is None else np.zeros_like(model.features)
         opacity = np.full((count, k), -1, np.float32)
         view = np.empty((count, 4), np.float32)
         look = Look(tuple(eye), view, features, opacity, drawn.copy(), seen)
 
         def decode(rows: Rows) -> None:
             look.view[rows] = views_of(model.anchors[rows], eye)
-            if look.features is not None:
-                weights = softmax(self._bank.run(rows, look.inputs(rows)))  # (n, 3)
+            if bank is not None and look.features is not None:
+                weights = softmax(bank.run(rows, look.inputs(rows)))  # (n, 3)
                 look.features[rows] = mixed(model.features[rows], weights)
             found = self._heads["opacity"].run(rows, look.inputs(rows))
             opacity[rows] = found if part is None else found * part[rows, None]

@@ -22,9 +22,10 @@ from shapeshift.runtime_models.scaffold.scaffold_networks import (
     Networks,
     Shape,
     read_networks,
-    turn_networks,
+    rotate_networks,
 )
-from shapeshift.runtime_models.splats.operations.recentre import place_of
+from shapeshift.runtime_models.shapes import three
+from shapeshift.runtime_models.splats.operations.recentre import origin_of
 from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file
 from shapeshift.runtime_models.splats.plain_splats import COLMAP_UP, Reading
 
@@ -74,24 +75,24 @@ def read_scaffold(path: Path, reading: Reading) -> ScaffoldModel:
     networks = read_networks(file.parent, shape, memory)
     anchors, features_of, offsets, scales, _ = cloud.kept()
     sample = sample_of(anchors, scales, np.ones(len(anchors)))
-    place, far = place_of(sample, anchors.dtype, file.name)
+    place, far = origin_of(sample, anchors.dtype, file.name)
     origin = np.array(place)
     anchors -= origin.astype(np.float32)
     if octree is not None:
         octree.places[:] -= origin.astype(np.float32)
     rotation = ours_from_file(reading.up or COLMAP_UP, reading.flip)
     for places in (anchors, offsets, *([] if octree is None else [octree.places])):
-        turn_places(places, rotation)
+        rotate_places(places, rotation)
     model = ScaffoldModel(
         anchors,
         features_of,
         offsets,
         scales,
-        turn_networks(networks.mlps, rotation, features),
+        rotate_networks(networks.mlps, rotation, features),
         (Stop("RGB", 0.0),),
         octree,
         provenance_of(file, networks, octree, settings),
-        tuple(map(float, rotation @ origin)),
+        three(rotation @ origin),
         (*networks.findings, *findings, *far),
     )
     memory.charge(SHOWN * model.splat_count, f"{model.splat_count:,} splats")
@@ -104,7 +105,7 @@ def provenance_of(
     file: Path, networks: Networks, octree: Octree | None, settings: dict[str, str]
 ) -> dict:
     """Where it comes from, and what else the run says that a viewer can use."""
-    found = {
+    found: dict[str, object] = {
         "format": "Scaffold-GS" if octree is None else "Octree-GS",
         "files": [file.name, *networks.files],
     }
@@ -115,7 +116,7 @@ def provenance_of(
     return found
 
 
-def turn_places(places: np.ndarray, rotation: np.ndarray) -> None:
+def rotate_places(places: np.ndarray, rotation: np.ndarray) -> None:
     """(n, ..., 3) turned by a rotation (3, 3), in place and block by block."""
     for start in range(0, len(places), BLOCK):
         block = places[start : start + BLOCK]

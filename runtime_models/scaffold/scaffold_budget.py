@@ -27,7 +27,7 @@ def within_budget(model: ScaffoldModel, most_splats: int) -> ScaffoldModel:
     keep, rows = max(most_splats // model.splats_per_anchor, 1), np.arange(len(model.anchors))
     if model.octree is not None:
         levels, counts = np.unique(model.octree.level, return_counts=True)
-        whole = np.count_nonzero(np.cumsum(counts) <= keep)
+        whole = int(np.count_nonzero(np.cumsum(counts) <= keep))
         rows = np.flatnonzero(model.octree.level <= levels[max(whole - 1, 0)])
     if len(rows) > keep:
         rows = rows[largest(shown_of(pick(model, rows)), keep)]

@@ -8,13 +8,14 @@ extra_level and, in the first two rows of info, the coarsest cell's size and the
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import RawIOBase
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK, each_block
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import column_names, column_offset
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.ply_file import PlyHeader, read_header
 from shapeshift.runtime_models.splats.ply.read_ply import read_fully
@@ -54,8 +55,8 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
     if header.encoding == "ascii":
         raise BadFile(f"{path.name} is an ASCII PLY; export it as a binary one.")
     vertex.require((*PLACE, *SCALES), path.name)
-    k, width = count_columns(vertex.layout.names, path.name)
-    count, row = vertex.count, vertex.row
+    k, width = count_columns(column_names(vertex.layout), path.name)
+    count, row = vertex.count, vertex.layout
     floats = 3 + width + 3 * k + 3 + 3  # of an anchor
     reading.within(path).account.charge(2 * 4 * count * floats, f"{count:,} anchors")
     cloud = Cloud(
@@ -64,24 +65,24 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
         np.empty((count, width), np.float32),
         np.empty((count, k, 3), np.float32),
         np.empty((count, 3), np.float32),
-        np.zeros((count if "level" in row.names else 0, 3), np.float32),
+        np.zeros((count if "level" in column_names(row) else 0, 3), np.float32),
         np.empty(count, bool),
     )
 
     @contextmanager
-    def opened() -> Iterator[tuple[BinaryIO, np.ndarray]]:
+    def opened() -> Iterator[tuple[RawIOBase, np.ndarray]]:
         with path.open("rb", buffering=0) as file:
             yield file, np.empty(BLOCK, row)
 
-    def work(rows: slice, own: tuple[BinaryIO, np.ndarray]) -> None:
+    def work(rows: slice, own: tuple[RawIOBase, np.ndarray]) -> None:
         file, table = own[0], own[1][: rows.stop - rows.start]
         file.seek(begins + rows.start * row.itemsize)
-        if read_fully(file, memoryview(table.view(np.uint8))) < table.nbytes:
+        if read_fully(file, table.view(np.uint8).data) < table.nbytes:
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         fill(cloud, rows, table)
 
     def tell(part: float) -> None:
-        reading.tell(f"reading {path.name}", part)
+        reading.report(f"reading {path.name}", part)
 
     each_block(count, work, tell, opened)
     return cloud
@@ -103,7 +104,7 @@ def count_columns(names: tuple[str, ...], file: str) -> tuple[int, int]:
 def fill(cloud: Cloud, rows: slice, table: np.ndarray) -> None:
     """Puts records of the file into some rows, offsets and scales in metres."""
     k, width = cloud.offsets.shape[1], cloud.features.shape[1]
-    names = table.dtype.names
+    names = column_names(table.dtype)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is judged below
         cloud.anchors[rows] = gather(table, PLACE)
         cloud.features[rows] = gather(table, [f"f_anchor_feat_{i}" for i in range(width)])
@@ -123,8 +124,8 @@ def fill(cloud: Cloud, rows: slice, table: np.ndarray) -> None:
 def gather(table: np.ndarray, names: list[str] | tuple[str, ...]) -> np.ndarray:
     """(n, len(names)) float32 of some columns."""
     kinds = table.dtype
-    if all(kinds[name] == np.dtype("<f4") for name in kinds.names):
-        places = [kinds.fields[name][1] // 4 for name in names]
+    if all(kinds[name] == np.dtype("<f4") for name in column_names(kinds)):
+        places = [column_offset(kinds, name) // 4 for name in names]
         return np.take(table.view("<f4").reshape(len(table), -1), places, axis=1)
     out = np.empty((len(table), len(names)), np.float32)
     for i, name in enumerate(names):

@@ -17,7 +17,7 @@ from shapeshift.runtime_models.files.memory import Account, unlimited
 from shapeshift.runtime_models.model import SCAFFOLD_HEADS, BadFile, Finding, Mlp
 from shapeshift.runtime_models.package.package_files import LARGEST_NETWORK
 from shapeshift.runtime_models.package.read_onnx import read_onnx
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn_quaternions
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_quaternions
 
 UNITED = "checkpoints.pth"
 APPEARANCE = "embedding_appearance"
@@ -145,13 +145,15 @@ def mlp_of(
         if not (match := LAYER.fullmatch(label)):
             raise BadFile(f"{name} holds {label[:60]!r}, which no plain network has.")
         layers.setdefault(int(match[1]), {})[match[2]] = tensor
-    weights, biases = [], []
+    weights: list[np.ndarray] = []
+    biases: list[np.ndarray] = []
     for number, layer in sorted(layers.items()):
         weight, bias = layer.get("weight"), layer.get("bias")
-        fits = weight is not None and bias is not None and weight.ndim == 2 and weight.size
-        fits = fits and bias.shape == weight.shape[:1]
-        if not fits or (weights and weight.shape[1] != len(weights[-1])):
-            raise BadFile(f"{name}: layer {number} does not fit the one before; save it again.")
+        refusal = f"{name}: layer {number} does not fit the one before; save it again."
+        if weight is None or bias is None or weight.ndim != 2 or not weight.size:
+            raise BadFile(refusal)
+        if bias.shape != weight.shape[:1] or (weights and weight.shape[1] != len(weights[-1])):
+            raise BadFile(refusal)
         memory.charge(3 * 4 * weight.size, f"layer {number} of {name}")
         with np.errstate(over="ignore"):
             weights.append(weight.astype(np.float32))
@@ -236,7 +238,7 @@ def fold_inputs(mlp: Mlp, last: np.ndarray) -> Mlp:
     )
 
 
-def turn_networks(mlps: dict[str, Mlp], rotation: np.ndarray, features: int) -> dict[str, Mlp]:
+def rotate_networks(mlps: dict[str, Mlp], rotation: np.ndarray, features: int) -> dict[str, Mlp]:
     """The networks for directions and rotations of a world that was turned by (3, 3).
 
     Both are linear there: W d_file = (W R^T) d_turned, and q * (W h + b) = (q * W) h + q * b.
@@ -250,7 +252,9 @@ def turn_networks(mlps: dict[str, Mlp], rotation: np.ndarray, features: int) -> 
             for arrays in (weights, biases):
                 rows = arrays[-1].reshape(-1, 7, arrays[-1].size // len(arrays[-1])).copy()
                 columns = np.moveaxis(rows[:, 3:], 1, 2)  # (k, hidden or 1, wxyz)
-                columns = turn_quaternions(columns.reshape(-1, 4), rotation).reshape(columns.shape)
+                columns = rotate_quaternions(columns.reshape(-1, 4), rotation).reshape(
+                    columns.shape
+                )
                 rows[:, 3:] = np.moveaxis(columns, 2, 1)
                 arrays[-1] = rows.reshape(arrays[-1].shape)
         turned[role] = replace(mlp, weights=tuple(weights), biases=tuple(biases))

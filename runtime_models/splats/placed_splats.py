@@ -6,7 +6,10 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.rotation import normalize, rotation_matrices
-from shapeshift.runtime_models.splats.operations.rotate_splats import quaternion_of, turn_harmonics
+from shapeshift.runtime_models.splats.operations.rotate_splats import (
+    quaternion_of,
+    rotate_harmonics,
+)
 from shapeshift.runtime_models.splats.plain_splats import RawSplats
 
 EVEN = 1e-5  # how much the scales of a node may differ and still be one
@@ -36,7 +39,7 @@ def after(raw: RawSplats, world_from_mesh: np.ndarray) -> RawSplats:
     turn = left @ right  # the nearest rotation; a reflection where the matrix mirrors
     raw = replace(raw, means=raw.means @ linear.T + offset)
     if not np.allclose(turn, np.eye(3), atol=1e-7):
-        harmonics = turn_harmonics(turn, raw.sh.shape[1])
+        harmonics = rotate_harmonics(turn, raw.sh.shape[1])
         sh = np.einsum("ij,njc->nic", harmonics, raw.sh, optimize=True)
         raw = replace(raw, sh=sh)
     if sizes[0] - sizes[2] <= EVEN * sizes[0] and np.linalg.det(turn) > 0:

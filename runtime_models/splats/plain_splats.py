@@ -1,6 +1,6 @@
 """One file of plain splats: how it is wished, as it is written, and as the program takes it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from shapeshift.runtime_models.files.memory import Account, Memory, unlimited
 from shapeshift.runtime_models.model import Finding
 
+ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")  # of RawSplats and PlainSplats
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
 COLMAP_UP = "-Y"  # x right, y down, z forward: as 3DGS writes its files
 
@@ -24,7 +25,7 @@ class Reading:
     strict: bool = False  # refuse what would be repaired
     allow_huge: bool = False  # open files that would lay thousands of splats over every pixel
     most_splats: int = 0  # no more than these, the ones that show most; 0 = all
-    told: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
+    progress: Callable[[str, float], None] | None = None  # (what is being done, part done 0..1)
     memory_gb: float = 0.0  # that files may take while they are read; 0 = as memory.py has it
     memory: Memory | Account | None = None  # what they have taken; None: nothing is open yet
 
@@ -48,9 +49,9 @@ class Reading:
         assert isinstance(self.memory, Account), "readers are given a reading of their file"
         return self.memory
 
-    def tell(self, what: str, part: float) -> None:
-        if self.told:
-            self.told(what, part)
+    def report(self, what: str, part: float) -> None:
+        if self.progress:
+            self.progress(what, part)
 
 
 @dataclass
@@ -76,6 +77,11 @@ class RawSplats:
     extra: dict[str, np.ndarray] = field(default_factory=dict)  # (N,) other columns, as filed
     findings: tuple[Finding, ...] = ()  # what the reader itself saw
     memory: Account = field(default_factory=unlimited)  # that its arrays are charged to
+
+    def with_arrays(self, arrays: Sequence[np.ndarray], **more: Any) -> "RawSplats":
+        """The same with other arrays, in the order of ARRAYS."""
+        changes: dict[str, Any] = dict(zip(ARRAYS, arrays, strict=True))
+        return replace(self, **changes, **more)
 
     @property
     def bytes_a_splat(self) -> int:

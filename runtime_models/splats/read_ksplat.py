@@ -82,7 +82,7 @@ def read_raw_ksplat(path: Path, reading: Reading) -> RawSplats:
         with memory.lend(decoded, f"{section.count:,} splats"):
             fill(raw, rows, data, header, section)
         first += section.count
-        reading.tell(f"reading {path.name}", first / header.count)
+        reading.report(f"reading {path.name}", first / header.count)
     memory.release(len(data))
     return raw
 

@@ -71,12 +71,8 @@ def read_classifier(path: Path, memory: Account | None = None) -> tuple[np.ndarr
 
     tensors = read_tensors(path, memory)
     weight, bias = tensors.get("weight"), tensors.get("bias")
-    shapes = [None if t is None else t.shape for t in (weight, bias)]
-    if None in shapes or weight.ndim != 4 or weight.shape[2:] != (1, 1):
-        fits = False
-    else:
-        fits = weight.shape[0] > 0 and weight.shape[1] > 0 and bias.shape == weight.shape[:1]
-    if not fits:
+    if weight is None or bias is None or not fits_convolution(weight, bias):
+        shapes = [None if t is None else t.shape for t in (weight, bias)]
         raise BadFile(
             f"{path.name} holds weights of shapes {shapes}, expected a 1x1 convolution: "
             "(classes, features, 1, 1) and (classes,)."
@@ -86,3 +82,10 @@ def read_classifier(path: Path, memory: Account | None = None) -> tuple[np.ndarr
     if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
         raise BadFile(f"{path.name} holds NaN or Inf; save the classifier again.")
     return weight, bias
+
+
+def fits_convolution(weight: np.ndarray, bias: np.ndarray) -> bool:
+    """Whether they are those of a 1x1 convolution with at least one feature and one class."""
+    if weight.ndim != 4 or weight.shape[2:] != (1, 1):
+        return False
+    return weight.shape[0] > 0 and weight.shape[1] > 0 and bias.shape == weight.shape[:1]

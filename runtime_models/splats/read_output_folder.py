@@ -50,9 +50,11 @@ def thermal_pair(folder: Path) -> tuple[Path, Path] | None:
 
     Two clouds of a ThermalGaussian run, two files, or two folders with a run or one file each.
     """
-    clouds = [newest_of(folder.glob(f"point_cloud_{name}/iteration_*/{CLOUD}")) for name in PAIR]
-    if None not in clouds:
-        return tuple(clouds)
+    color, thermal = (
+        newest_of(folder.glob(f"point_cloud_{name}/iteration_*/{CLOUD}")) for name in PAIR
+    )
+    if color is not None and thermal is not None:
+        return color, thermal
     names = [ending for form in formats() for ending in form.endings]
     endings = tuple(name for name in names if name.startswith("."))
     files = {file.name: file for file in splat_files(folder, endings)}
@@ -61,10 +63,10 @@ def thermal_pair(folder: Path) -> tuple[Path, Path] | None:
         inner = []
     folders = {sub.name: file for sub in inner if (file := only_cloud(sub, endings)) is not None}
     for named in (files, folders):
-        thermal = [name for name in named if is_thermal_name(name)]
-        if len(named) == 2 and len(thermal) == 1:
-            color = next(name for name in named if name != thermal[0])
-            return named[color], named[thermal[0]]
+        hot = [name for name in named if is_thermal_name(name)]
+        if len(named) == 2 and len(hot) == 1:
+            other = next(name for name in named if name != hot[0])
+            return named[other], named[hot[0]]
     return None
 
 

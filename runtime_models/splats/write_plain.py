@@ -8,9 +8,10 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import COEFFICIENTS
 from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import joined, moved, widened
 from shapeshift.runtime_models.splats.operations.recentre import FINE
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.usd.read_usd import refuse_without
 
@@ -55,7 +56,7 @@ def writer_of(path: Path) -> Writer:
     raise BadFile(f"{path} has no ending that can be written; known are {endings}.")
 
 
-def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
+def describe_losses(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
     """What the splats have and the format has no place for, beside what its codes round."""
     findings = []
     if splats.antialiased and not writer.antialiased:
@@ -75,15 +76,15 @@ def told_lost(splats: PlainSplats, writer: Writer) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def cut(splats: PlainSplats, sh_degree: int) -> PlainSplats:
+def truncate_harmonics(splats: PlainSplats, sh_degree: int) -> PlainSplats:
     """Without harmonics above a degree: the best of that degree, as they are orthogonal."""
     return replace(splats, sh=splats.sh[:, : COEFFICIENTS[sh_degree]])
 
 
 def placed(splats: PlainSplats, rotation: np.ndarray, position: np.ndarray) -> PlainSplats:
     """The splats after a rotation (3, 3) about zero and a shift (3,) in metres, exactly."""
-    turned = turn(splats, rotation)
-    origin = tuple(float(a + b) for a, b in zip(turned.origin, position, strict=True))
+    turned = rotate_splats(splats, rotation)
+    origin = three(np.add(turned.origin, position))
     return replace(turned, origin=origin)
 
 
@@ -97,9 +98,11 @@ def merged(parts: list[PlainSplats]) -> PlainSplats:
     columns = sorted({name for part in parts for name in part.extra})
     labels = [part.labels for part in parts]
     return PlainSplats(
-        joined([moved(p.means, s) for p, s in zip(parts, shifts, strict=True)], counts),
-        *(joined([getattr(p, n) for p in parts], counts) for n in ("scales", "wxyz", "opacity")),
-        joined([widened(part.sh, width) for part in parts], counts),
+        means=joined([moved(p.means, s) for p, s in zip(parts, shifts, strict=True)], counts),
+        scales=joined([part.scales for part in parts], counts),
+        wxyz=joined([part.wxyz for part in parts], counts),
+        opacity=joined([part.opacity for part in parts], counts),
+        sh=joined([widened(part.sh, width) for part in parts], counts),
         origin=origin,
         antialiased=any(part.antialiased for part in parts),
         labels=joined(labels, counts) if any(x is not None for x in labels) else None,

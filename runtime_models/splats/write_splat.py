@@ -6,7 +6,7 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.files.whole_file import write_whole
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.read_splat import ROW
 
@@ -17,7 +17,7 @@ def write_splat(splats: PlainSplats, path: str | Path) -> None:
     Viewers show such files while they load, so that the order is what is seen first.
     """
     first = np.argsort(-splats.opacity * splats.scales.prod(axis=1, dtype=np.float64), stable=True)
-    back = turn_half(splats)
+    back = rotate_half_turn(splats)
     table = np.empty(len(first), ROW)
     table["mean"] = back.means[first] + np.array(back.origin)
     table["scale"] = back.scales[first]

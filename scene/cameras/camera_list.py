@@ -1,19 +1,16 @@
 """A list of views with names, as every file of cameras gives it, and what its readers share."""
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.memory import read_json_file
+from shapeshift.runtime_models.files.json_fields import Fields, is_number, rows_of, shown
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.splats.operations.rotate_splats import UPSIDE_DOWN, ours_from_file
 from shapeshift.scene.cameras.framing import FOV_Y
 from shapeshift.scene.captures.capture_rules import rigid
-from shapeshift.scene.json.json_values import is_number
 from shapeshift.scene.pose import OPENCV_FROM_EYE, Pose, View
 
 SIZE = (640, 360)  # pixels, where neither the file nor its reader says
@@ -45,29 +42,17 @@ class CameraList:
     fps: float = 0.0  # of a path that is to be played; 0 = separate views
 
 
-def read_json(path: Path) -> object:
-    """What a JSON file holds.  Raises BadFile."""
-    if not path.is_file():  # reading a pipe would wait for ever
-        raise BadFile(f"{path} is no file; --camera wants a file of cameras.")
-    if path.stat().st_size > MOST_BYTES:
-        raise BadFile(f"{path} has {path.stat().st_size:,} bytes; no file of cameras is so large.")
-    data = read_json_file(path)
-    try:
-        return json.loads(data)
-    except (ValueError, RecursionError):
-        raise BadFile(f"{path} is not JSON, and no other form of cameras either.") from None
-
-
-def read_rows(data: object, name: str, where: str) -> list[dict]:
-    """The list of objects `name` of a file; BadFile unless it is one and not empty."""
-    rows = data
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise BadFile(f"{where}: {name} must be a list of objects, one a camera.")
+def read_rows(rows: object, name: str, where: str) -> list[Fields]:
+    """The list of objects `name` of a file, one a camera; BadFile unless it is one, not empty."""
+    if not isinstance(rows, list):
+        raise BadFile(
+            f"{where}: {name} is {shown(rows)}; a list of objects, one a camera, is wanted."
+        )
     if not rows:
-        raise BadFile(f"{where} holds no camera.")
+        raise BadFile(f"{where} holds no camera; add one.")
     if len(rows) > MOST_VIEWS:
         raise BadFile(f"{where} holds {len(rows):,} cameras; at most {MOST_VIEWS:,} are read.")
-    return rows
+    return list(rows_of(rows, f"{where}, camera", 0))
 
 
 def numbers(value: object, shape: tuple[int, ...], what: str) -> np.ndarray:
@@ -122,11 +107,13 @@ def pinhole_view(
 ) -> View:
     """The view of a camera with OpenCV axes (4, 4), pixels.  Raises BadFile."""
     if not all(is_number(f) and f > 0 for f in focal):
-        raise BadFile(f"{where} has focal lengths {_told(focal)}; both must be above 0.")
+        raise BadFile(f"{where} has focal lengths {_numbers_text(focal)}; both must be above 0.")
     if not all(is_number(n) and n >= 1 for n in size):
-        raise BadFile(f"{where} has the size {_told(size)}; pixels from 1 up are wanted.")
+        raise BadFile(f"{where} has the size {_numbers_text(size)}; pixels from 1 up are wanted.")
     if not all(map(is_number, centre)):
-        raise BadFile(f"{where} has its principal point at {_told(centre)}; pixels are wanted.")
+        raise BadFile(
+            f"{where} has its principal point at {_numbers_text(centre)}; pixels are wanted."
+        )
     pixels = (int(size[0]), int(size[1]))
     try:
         return View.from_pinhole(world_from_camera, focal, centre, pixels, NEAR, FAR)
@@ -183,16 +170,16 @@ def first_of_each(views: list[View]) -> list[int]:
 
 def moved(views: Sequence[View], by: Sequence[float]) -> list[View]:
     """The views with (3,) metres added to their places: a scene's -origin, for one re-centred."""
-    by = np.asarray(by, np.float64)
-    if not by.any():
+    shift = np.asarray(by, np.float64)
+    if not shift.any():
         return list(views)
     return [
         replace(
-            v, world_from_eye=replace(v.world_from_eye, position=v.world_from_eye.position + by)
+            v, world_from_eye=replace(v.world_from_eye, position=v.world_from_eye.position + shift)
         )
         for v in views
     ]
 
 
-def _told(values: Sequence) -> str:
+def _numbers_text(values: Sequence) -> str:
     return ", ".join(f"{v:.6g}" if is_number(v) else str(v)[:20] for v in values)

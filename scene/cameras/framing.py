@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shapeshift.runtime_models.model import Model, SplatLayers
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.scene.scene import Scene
 
@@ -214,7 +215,7 @@ def default_background(
         return otherwise
     if not all(isinstance(c, int | float) and 0 <= c <= 1 for c in found):
         return otherwise
-    return tuple(map(float, found))
+    return three(found)
 
 
 def point_under(

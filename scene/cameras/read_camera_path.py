@@ -1,10 +1,10 @@
 """nerfstudio's camera_path.json: its frames if it has them, else a path through its keyframes."""
 
-import json
 import math
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields, is_number, parse_json
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import (
     MOST_VIEWS,
@@ -12,7 +12,6 @@ from shapeshift.scene.cameras.camera_list import (
     CameraReading,
     assumed_fov,
     eye_view,
-    is_number,
     numbers,
     ours_from_world,
     pose_matrix,
@@ -22,6 +21,7 @@ from shapeshift.scene.cameras.camera_path import along, poses_between
 from shapeshift.scene.pose import MOST_SIDE, Pose, View, perspective
 
 MARKS = ("camera_path", "keyframes")
+DEGREES = "degrees between 0 and 180"
 FPS, SECONDS_A_KEY = 24.0, 2.0  # of a path through keyframes that does not say
 FLAT = ("equirectangular", "omnidirectional", "vr180")  # camera types without one field of view
 
@@ -35,7 +35,9 @@ def read_camera_path(data: dict, reading: CameraReading, where: str) -> CameraLi
     kind = str(data.get("camera_type", "perspective")).lower()
     if any(word in kind for word in FLAT):
         raise BadFile(f"{where} is a path of {kind[:40]} pictures; perspective ones can be drawn.")
-    notes = (f"{where}: {kind} cameras are drawn in perspective.",) if "fisheye" in kind else ()
+    notes: tuple[str, ...] = ()
+    if "fisheye" in kind:
+        notes = (f"{where}: {kind} cameras are drawn in perspective.",)
     size = reading.size or render_size(data, where)
     frames = data.get("camera_path") or []
     fps = data.get("fps", FPS)
@@ -71,22 +73,24 @@ def view_of(pose: Pose, fov_y: float, size: tuple[int, int], where: str) -> View
 
 
 def read_keys(
-    rows: list[dict], name: str, data: dict, reading: CameraReading, where: str
+    rows: list[Fields], name: str, data: dict, reading: CameraReading, where: str
 ) -> tuple[list[Pose], list[float], tuple[str, ...]]:
     """Pose in our world and field of view in radians of each row; notes."""
     turn = ours_from_world(reading)
-    poses, fovs, notes = [], [], ()
-    for i, row in enumerate(rows):
-        here = f"{where}, {name} {i}"
-        value = row.get(name, row.get("matrix"))
-        poses.append(Pose.from_matrix(turn @ read_matrix(value, here)))
-        degrees = row.get("fov", data.get("default_fov"))
-        if degrees is None:
+    poses: list[Pose] = []
+    fovs: list[float] = []
+    notes: tuple[str, ...] = ()
+    default = {"fov": data["default_fov"]} if "default_fov" in data else {}
+    for row in rows:
+        value = row.data.get(name, row.data.get("matrix"))
+        poses.append(Pose.from_matrix(turn @ read_matrix(value, row.where)))
+        row = Fields({**default, **row.data}, row.where)
+        if not row.has("fov"):
             fov_y, notes = assumed_fov(reading, where)
-        elif is_number(degrees) and 0 < degrees < 180:
+        elif 0 < (degrees := row.number("fov", wanted=DEGREES, low=0, high=180)) < 180:
             fov_y = math.radians(degrees)
         else:
-            raise BadFile(f"{here}: 'fov' is {degrees!r:.40}, expected degrees between 0 and 180.")
+            raise row.error("fov", DEGREES)
         fovs.append(fov_y)
     return poses, fovs, notes
 
@@ -98,11 +102,8 @@ def read_matrix(value: object, where: str) -> np.ndarray:
     the row 0 0 0 1 (https://github.com/nerfstudio-project/nerfstudio/issues/3117).
     """
     text = isinstance(value, str)
-    if text:
-        try:
-            value = json.loads(value)
-        except (ValueError, RecursionError):
-            raise BadFile(f"{where}: 'matrix' is a text that is not JSON.") from None
+    if isinstance(value, str):
+        value = parse_json(value, f"{where}: the text of 'matrix'")
     matrix = numbers(value, (4, 4), f"{where}: 'matrix'")
     first = matrix[:3, 3].any() and not matrix[3, :3].any()  # a place in the last column
     last = matrix[3, :3].any() and not matrix[:3, 3].any()  # a place in the last row
@@ -111,10 +112,6 @@ def read_matrix(value: object, where: str) -> np.ndarray:
 
 
 def render_size(data: dict, where: str) -> tuple[int, int]:
-    width, height = data.get("render_width", 1920), data.get("render_height", 1080)
-    if not all(is_number(n) and 1 <= n <= MOST_SIDE for n in (width, height)):
-        raise BadFile(
-            f"{where}: 'render_width' and 'render_height' are {width!r:.20} and {height!r:.20}; "
-            f"1 to {MOST_SIDE} are wanted."
-        )
-    return int(width), int(height)
+    fields, wanted = Fields(data, where), f"1 to {MOST_SIDE} pixels"
+    width = fields.number("render_width", 1920.0, wanted, 1, MOST_SIDE)
+    return int(width), int(fields.number("render_height", 1080.0, wanted, 1, MOST_SIDE))

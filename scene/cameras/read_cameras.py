@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from shapeshift.runtime_models.files.json_fields import read_json
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.cameras.camera_list import CameraList, CameraReading, read_json
+from shapeshift.scene.cameras.camera_list import MOST_BYTES, CameraList, CameraReading
 from shapeshift.scene.cameras.read_camera_path import MARKS as PATH_MARKS
 from shapeshift.scene.cameras.read_camera_path import read_camera_path
 from shapeshift.scene.cameras.read_colmap_cameras import read_colmap_cameras
@@ -43,7 +44,7 @@ def read_camera_list(path: str | Path, reading: CameraReading | None = None) -> 
         return read_folder(path, reading)
     if path.stem in COLMAP_TABLES and path.suffix in (".bin", ".txt"):
         return read_colmap_cameras(path.parent, path.suffix, reading)
-    data = read_json(path)
+    data = read_json(path, most_bytes=MOST_BYTES)
     if isinstance(data, list):
         first = data[0] if data and isinstance(data[0], dict) else {}
         read = read_inria_cameras if INRIA_MARKS <= first.keys() else read_own_cameras
@@ -76,7 +77,7 @@ def read_folder(folder: Path, reading: CameraReading) -> CameraList:
 def is_cameras(path: Path) -> bool:
     """Whether a JSON file is one of cameras, by its keys; whether it is whole is for the reader."""
     try:
-        data = read_json(path)
+        data = read_json(path, most_bytes=MOST_BYTES)
     except (BadFile, OSError):
         return False
     if isinstance(data, list):

@@ -29,7 +29,7 @@ def read_colmap_cameras(folder: Path, ending: str, reading: CameraReading) -> Ca
             image, lenses[image.lens], turn, f"{folder / f'images{ending}'}: {image.name}"
         )
         views.append(view.resized(reading.size) if reading.size else view)
-    notes = ()
+    notes: tuple[str, ...] = ()
     if any(lenses[image.lens].bends for image in posed):
         notes = (f"{folder}: the lenses' distortion is left out; the views are those of pinholes.",)
     kind = "binary" if ending == ".bin" else "text"

@@ -3,19 +3,21 @@
 import math
 from dataclasses import replace
 
+from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import (
     SIZE,
     CameraList,
     CameraReading,
     eye_view,
-    is_number,
     pose_matrix,
     read_name,
     read_rows,
 )
 from shapeshift.scene.pose import MOST_SIDE, View, perspective
 
+MOST_M = 1e30  # of near, far and tangents: any that a float holds well
+FOV_WANTED = "radians between 0 and pi"
 NEAR, FAR = 0.01, 1000.0  # metres, where the file does not say
 
 
@@ -27,44 +29,43 @@ def read_own_cameras(rows: object, reading: CameraReading, where: str) -> Camera
     picture that this is a part of}.
     """
     rows = read_rows(rows, "the file", where)
-    views = [read_row(row, reading, f"{where}, camera {i}") for i, row in enumerate(rows)]
-    names = tuple(read_name(row.get("name")) for row in rows)
+    views = [read_row(row, reading) for row in rows]
+    names = tuple(read_name(row.data.get("name")) for row in rows)
     return CameraList(tuple(views), names, "our own list")
 
 
-def read_row(row: dict, reading: CameraReading, where: str) -> View:
-    if "matrix" not in row:
-        raise BadFile(f"{where}: expected an object with 'matrix' and 'fov_y' or 'tangents'.")
-    matrix = pose_matrix(row["matrix"], f"{where}: 'matrix'")
-    near, far = row.get("near", NEAR), row.get("far", FAR)
-    if not (is_number(near) and is_number(far) and 0 < near < far):
-        raise BadFile(f"{where}: near {near!r:.40} and far {far!r:.40} must be 0 < near < far.")
-    size = reading.size or read_size(row.get("size", SIZE), where)
-    view = eye_view(matrix, read_tangents(row, size, where), size, where, near, far)
-    return replace(view, whole=four_tangents(row, "whole", where)) if "whole" in row else view
+def read_row(row: Fields, reading: CameraReading) -> View:
+    if not row.has("matrix"):
+        raise BadFile(f"{row.where}: expected an object with 'matrix' and 'fov_y' or 'tangents'.")
+    matrix = pose_matrix(row.data["matrix"], f"{row.where}: 'matrix'")
+    near = row.number("near", NEAR, "metres above 0", high=MOST_M)
+    far = row.number("far", FAR, f"metres beyond near, {near:g},", near, MOST_M)
+    if not 0 < near < far:
+        raise BadFile(f"{row.where}: near {near:g} and far {far:g} must be 0 < near < far.")
+    size = reading.size or read_size(row)
+    view = eye_view(matrix, read_tangents(row, size), size, row.where, near, far)
+    return replace(view, whole=four_tangents(row, "whole")) if "whole" in row.data else view
 
 
-def read_size(value: object, where: str) -> tuple[int, int]:
+def read_size(row: Fields) -> tuple[int, int]:
+    value = row.value("size", SIZE)
     good = isinstance(value, list | tuple) and len(value) == 2
     if not (good and all(type(n) is int and 1 <= n <= MOST_SIDE for n in value)):
-        raise BadFile(f"{where}: 'size' is {value!r:.40}, expected [width, height] in pixels.")
+        raise row.error("size", f"[width, height], 1 to {MOST_SIDE} pixels,")
     return value[0], value[1]
 
 
-def four_tangents(row: dict, name: str, where: str) -> tuple[float, float, float, float]:
-    """left, right, down, up."""
-    tangents = row[name]
-    good = isinstance(tangents, list) and len(tangents) == 4 and all(map(is_number, tangents))
-    if not (good and tangents[0] < tangents[1] and tangents[2] < tangents[3]):
-        raise BadFile(f"{where}: '{name}' must be left < right, down < up.")
-    left, right, down, up = map(float, tangents)
+def four_tangents(row: Fields, name: str) -> tuple[float, float, float, float]:
+    left, right, down, up = row.numbers(name, 4, most=MOST_M)
+    if not (left < right and down < up):
+        raise row.error(name, "[left, right, down, up] with left < right, down < up")
     return left, right, down, up
 
 
-def read_tangents(row: dict, size: tuple[int, int], where: str) -> tuple:
-    if "tangents" in row:
-        return four_tangents(row, "tangents", where)
-    fov_y = row.get("fov_y")
-    if not (is_number(fov_y) and 0 < fov_y < math.pi):
-        raise BadFile(f"{where}: 'fov_y' is {fov_y!r:.40}, expected radians between 0 and pi.")
-    return perspective(float(fov_y), size)
+def read_tangents(row: Fields, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    if "tangents" in row.data:
+        return four_tangents(row, "tangents")
+    fov_y = row.number("fov_y", wanted=FOV_WANTED, high=math.pi)
+    if not 0 < fov_y < math.pi:
+        raise row.error("fov_y", FOV_WANTED)
+    return perspective(fov_y, size)

@@ -2,11 +2,13 @@
 
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields, is_number
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.cameras.camera_list import (
     CameraList,
@@ -14,7 +16,6 @@ from shapeshift.scene.cameras.camera_list import (
     assumed_fov,
     first_of_each,
     flipped,
-    is_number,
     opencv_from_eye,
     ours_from_world,
     pinhole_view,
@@ -27,6 +28,8 @@ from shapeshift.scene.captures.read_transforms import ENDINGS, POSES, gather, op
 from shapeshift.scene.pose import View
 
 BLENDER_SIZE = (800, 800)  # of the synthetic NeRF scenes, whose files name no size
+LEAST, MOST = 1e-30, 1e30  # that a float holds well
+RADIANS = "radians between 0 and pi"
 LENS = ("k1", "k2", "k3", "k4", "p1", "p2")
 MARK = "frames"
 
@@ -66,11 +69,11 @@ def read_transforms_cameras(files: list[Path], reading: CameraReading) -> Camera
         tuple(views[i] for i in kept),
         tuple(names[i] for i in kept),
         "transforms",
-        told(notes, where),
+        note_sentences(notes, where),
     )
 
 
-def pose_of(entry: dict, where: str) -> np.ndarray:
+def pose_of(entry: Mapping, where: str) -> np.ndarray:
     """(4, 4) camera to world with OpenCV axes, the file's world."""
     key = next((k for k in POSES if k in entry), None)
     if key is None:
@@ -80,14 +83,17 @@ def pose_of(entry: dict, where: str) -> np.ndarray:
 
 
 def view_of(
-    entry: dict, camera: np.ndarray, folder: Path, reading: CameraReading, notes: Notes, where: str
+    entry: Mapping,
+    camera: np.ndarray,
+    folder: Path,
+    reading: CameraReading,
+    notes: Notes,
+    where: str,
 ) -> View:
-    size = size_of(entry, folder, notes)
-    width, height = size
-    if not all(is_number(n) and n >= 1 for n in size):
-        raise BadFile(f"{where}: 'w' and 'h' are {width!r:.20} and {height!r:.20}, not pixels.")
-    fx = focal_of(entry, "fl_x", "camera_angle_x", width, where)
-    fy = focal_of(entry, "fl_y", "camera_angle_y", height, where)
+    fields = Fields(entry, where)
+    width, height = size = size_of(fields, folder, notes)
+    fx = focal_of(fields, "fl_x", "camera_angle_x", width)
+    fy = focal_of(fields, "fl_y", "camera_angle_y", height)
     if not fx and not fy:
         fov_y, notes.without_lens = assumed_fov(reading, where.split(",")[0])
         fy = height / 2 / math.tan(fov_y / 2)
@@ -98,23 +104,26 @@ def view_of(
     return view.resized(reading.size) if reading.size else view
 
 
-def focal_of(entry: dict, pixels: str, angle: str, side: float, where: str) -> float:
+def focal_of(fields: Fields, pixels: str, angle: str, side: float) -> float:
     """Focal length in pixels, or 0 where neither it nor the angle of view is told."""
-    if pixels in entry:
-        if not (is_number(entry[pixels]) and entry[pixels] > 0):
-            raise BadFile(f"{where}: '{pixels}' is {entry[pixels]!r:.40}; pixels above 0 wanted.")
-        return float(entry[pixels])
-    if angle in entry:
-        if not (is_number(entry[angle]) and 0 < entry[angle] < math.pi):
-            raise BadFile(f"{where}: '{angle}' is {entry[angle]!r:.40}; 0 to pi radians wanted.")
-        return side / 2 / math.tan(entry[angle] / 2)
+    if pixels in fields.data:
+        return fields.number(pixels, wanted="pixels above 0", low=LEAST, high=MOST)
+    if angle in fields.data:
+        radians = fields.number(angle, wanted=RADIANS, low=LEAST, high=math.pi)
+        if not radians < math.pi:
+            raise fields.error(angle, RADIANS)
+        return side / 2 / math.tan(radians / 2)
     return 0.0
 
 
-def size_of(entry: dict, folder: Path, notes: Notes) -> tuple:
+def size_of(fields: Fields, folder: Path, notes: Notes) -> tuple[float, float]:
     """(width, height) as told, else of the photo if it is there, else of Blender's sets."""
+    entry = fields.data
     if "w" in entry and "h" in entry:
-        return entry["w"], entry["h"]
+        return (
+            fields.number("w", wanted="pixels, 1 or more,", low=1, high=MOST),
+            fields.number("h", wanted="pixels, 1 or more,", low=1, high=MOST),
+        )
     file = entry.get("file_path") or entry.get("file")
     if isinstance(file, str) and "\0" not in file:
         for ending in ENDINGS:
@@ -125,7 +134,7 @@ def size_of(entry: dict, folder: Path, notes: Notes) -> tuple:
     return BLENDER_SIZE
 
 
-def told(notes: Notes, where: str) -> tuple[str, ...]:
+def note_sentences(notes: Notes, where: str) -> tuple[str, ...]:
     out = list(notes.without_lens)
     if notes.bent:
         out.append(f"{where}: the lenses' distortion is left out; the views are those of pinholes.")

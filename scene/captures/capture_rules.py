@@ -2,19 +2,21 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields, rows_of, shown
 from shapeshift.runtime_models.model import STOP_KINDS, BadFile, Stop
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.photo import decoded, over_black
-from shapeshift.scene.json.json_values import number_in, numbers_in, shown, text_in
 
 ORTHONORMAL = 1e-3  # largest entry of R^T R - 1 that rounding in a text file may leave
+LARGEST_NUMBER = 1e30  # of a value range: what float32 products hold
 FARTHEST = 1e12  # metres from zero: beyond that no photo was taken
 TEST_EVERY = 8  # the held-out photos of the splatting literature: every 8th, from the first
 # Worlds of COLMAP's axes are turned as 3DGS PLY files are, whatever their photos say: splats
@@ -37,8 +39,8 @@ class CaptureWorld:
     ) -> "CaptureWorld":
         """`up` if the file gives one, else as the photos (N, 4, 4; OpenCV axes) tell."""
         up = up_of_cameras(world_from_cameras, otherwise) if up is None else up
-        turn = turn_upright(up, where)
-        return CaptureWorld(turn, tuple(float(c) + 0.0 for c in up))  # + 0.0: never -0.0
+        turn = upright_rotation(up, where)
+        return CaptureWorld(turn, three(np.asarray(up, np.float64) + 0.0))  # + 0.0: never -0.0
 
     def turned(self, matrix: np.ndarray) -> np.ndarray:
         return self.ours_from_file @ matrix
@@ -119,7 +121,7 @@ def up_of_cameras(world_from_cameras: np.ndarray, otherwise: tuple) -> np.ndarra
     return np.sign(mean[axis]) * np.eye(3)[axis]
 
 
-def turn_upright(up: object, where: str) -> np.ndarray:
+def upright_rotation(up: object, where: str) -> np.ndarray:
     """(4, 4) the shortest turn that brings `up` to +Y; half a turn about x for -Y."""
     try:
         up = np.asarray(up, np.float64)
@@ -154,7 +156,7 @@ def colored_by_palette(stops: tuple[Stop, ...], photos: list[Photo]) -> tuple[St
     def grey(name: str) -> bool:
         photo = next(p for p in photos if p.modality == name)
         image, _ = decoded(photo.path, photo.counts)
-        return image.mode == "L" or bool((np.ptp(over_black(image), axis=2) == 0).all())
+        return image.mode == "L" or bool((np.ptp(np.asarray(over_black(image)), axis=2) == 0).all())
 
     return tuple(
         replace(s, palette="ironbow") if s.kind == "thermal" and grey(s.name) else s for s in stops
@@ -165,40 +167,32 @@ def stops_from(listed: object, where: str) -> list[Stop]:
     """The stops of a list of JSON objects, in its order, every field checked."""
     if not isinstance(listed, list) or not all(isinstance(entry, dict) for entry in listed):
         raise BadFile(f"{where}: 'modalities' must be a list of names or of objects")
-    stops = [stop_from(entry, where) for entry in listed]
+    stops = [stop_from(row, where) for row in rows_of(listed, f"{where}: modality", 1)]
     if len({stop.name for stop in stops}) < len(stops):
         raise BadFile(f"{where}: two modalities have the same name; rename one")
     return stops
 
 
-def stop_from(entry: dict, where: str) -> Stop:
-    name = text_in(entry, "name", f"{where}: a modality")
-    if not name:
-        raise BadFile(f"{where}: a modality has no name; give each one a 'name'")
-    whose = f"{where}: modality {shown(name)}"
-    x, kind = number_in(entry, "x", whose), text_in(entry, "kind", whose, "rgb")
-    if not 0 <= x <= 1:
-        raise BadFile(f"{whose} has x = {x:g}; give a number from 0 to 1")
-    if kind not in STOP_KINDS:
-        raise BadFile(f"{whose} is of kind {shown(kind)}; use {', '.join(STOP_KINDS)}")
-    span = numbers_in(entry, "value_range", 2, whose)
-    if span is not None and not span[0] < span[1]:
-        raise BadFile(f"{whose} needs value_range [low, high], not {list(span)}")
+def stop_from(entry: Fields, where: str) -> Stop:
+    name = entry.text("name")
+    entry.where = f"{where}: modality {shown(name)}"
     return Stop(
-        name, x, kind, text_in(entry, "palette", whose), span, text_in(entry, "unit", whose)
+        name,
+        entry.number("x", wanted="0 to 1", low=0, high=1),
+        entry.line("kind", "rgb", known=STOP_KINDS) if entry.has("kind") else "rgb",
+        entry.text("palette", ""),
+        entry.pair("value_range", most=LARGEST_NUMBER) if entry.has("value_range") else None,
+        entry.text("unit", ""),
     )
 
 
 def counts_from(listed: object, where: str) -> dict[str, tuple[float, float]]:
     """Of the modalities that have 'counts': which numbers of a grey photo stand for 0 and 1."""
-    out = {}
+    out: dict[str, tuple[float, float]] = {}
     for entry in listed if isinstance(listed, list) else ():
         if isinstance(entry, dict) and entry.get("counts") is not None:
-            whose = f"{where}: modality {shown(entry.get('name'))}"
-            low, high = numbers_in(entry, "counts", 2, whose)
-            if not low < high:
-                raise BadFile(f"{whose} needs counts [low, high], not {[low, high]}")
-            out[entry.get("name")] = (low, high)
+            fields = Fields(entry, f"{where}: modality {shown(entry.get('name'))}")
+            out[fields.text("name")] = fields.pair("counts", most=LARGEST_NUMBER)
     return out
 
 
@@ -206,11 +200,14 @@ def with_counts(photos: list[Photo], counts: dict[str, tuple[float, float]]) -> 
     return [replace(photo, counts=counts.get(photo.modality)) for photo in photos]
 
 
-def background_from(entry: dict, where: str) -> tuple[float, ...] | None:
+def background_from(entry: Mapping, where: str) -> tuple[float, float, float] | None:
     """The colour 'background', display sRGB; None where none is stated."""
-    color = numbers_in(entry, "background", 3, where)
-    if color is not None and not all(0 <= c <= 1 for c in color):
-        raise BadFile(f"{where}: 'background' is {list(color)}; give three numbers from 0 to 1")
+    fields = Fields(entry, where)
+    if not fields.has("background"):
+        return None
+    color = three(fields.numbers("background", 3))
+    if not all(0 <= c <= 1 for c in color):
+        raise fields.error("background", "a list of three numbers from 0 to 1")
     return color
 
 
@@ -238,7 +235,7 @@ def plain_background(photos: list[Photo]) -> tuple[float, float, float] | None:
         colors, counts = np.unique(border, axis=0, return_counts=True)
         if counts.max() >= PLAIN_BORDER * len(border):
             color = colors[counts.argmax()].astype(np.float32) / 255
-            found.append(tuple(map(float, color)))
+            found.append(three(color))
     if not found or Counter(found).most_common(1)[0][1] < min(4, len(photos)):
         return None
     return Counter(found).most_common(1)[0][0]

@@ -2,12 +2,15 @@
 
 import math
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields
 from shapeshift.runtime_models.files.memory import Memory
 from shapeshift.runtime_models.files.npy import BAD_HEADER
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.photo import (
@@ -19,7 +22,6 @@ from shapeshift.scene.captures.photo import (
     quiet,
 )
 from shapeshift.scene.captures.undistort import pixels_of, straight_pixels
-from shapeshift.scene.json.json_values import is_number, shortened, shown, text_in
 
 NAMES = ("depth_path", "depth_file_path")  # ours and instant-ngp's; nerfstudio's
 UNITS = ("depth_unit", "integer_depth_scale")  # ours; instant-ngp's
@@ -29,28 +31,31 @@ LOOKED_AT, FEW_POINTS = 3, 30  # photos, points: to tell whether a unit can be r
 OTHER_UNIT = 8  # times: more than this the points of a scene do not lie behind what is seen
 DEPTH = 12  # bytes of memory a number of a .npy
 FARTHEST = 1e6  # metres: beyond that nothing was measured
+METRES = f"metres above 0 and up to {FARTHEST:g}"
 
 
 def depth_of(
-    entry: dict, folder: Path, size: tuple[int, int], where: str
+    entry: Mapping, folder: Path, size: tuple[int, int], where: str
 ) -> tuple[Path | None, float]:
     """The depth photo of a frame, if it names one that is there, and metres a step of it."""
-    unit = next((entry[key] for key in UNITS if entry.get(key) is not None), MILLIMETRES)
-    if not (is_number(unit) and 0 < unit <= FARTHEST):
-        raise BadFile(f"{where}: '{UNITS[0]}' is {shown(unit)}; metres above 0 are wanted")
-    name = next((text for key in NAMES if (text := text_in(entry, key, where))), "")
+    fields = Fields(entry, where)
+    key = next(filter(fields.has, UNITS), None)
+    unit = fields.number(key, wanted=METRES, high=FARTHEST) if key else MILLIMETRES
+    if key and not unit > 0:
+        raise fields.error(key, METRES)
+    name = next((text for key in NAMES if (text := fields.text(key, ""))), "")
     if not name:
-        return None, float(unit)
+        return None, unit
     path = folder / name
     if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
-        return None, float(unit)
+        return None, unit
     width, height = depth_size(path)
     if not abs(width * size[1] / (height * size[0]) - 1) <= ASPECT:
         raise BadFile(
             f"{where}: the depth photo has {width}x{height} pixels, the photo {size[0]}x{size[1]}; "
             "both must show the same field of view"
         )
-    return path, float(unit)
+    return path, unit
 
 
 def depth_size(path: Path) -> tuple[int, int]:
@@ -61,7 +66,7 @@ def depth_size(path: Path) -> tuple[int, int]:
     with open_image(path) as image:
         if image.mode not in GREY_16:
             raise BadFile(
-                f"{shortened(path)}: a depth photo is greyscale of 16 bits, or a .npy; this one is "
+                f"{path_end(path)}: a depth photo is greyscale of 16 bits, or a .npy; this one is "
                 f"{image.mode}"
             )
         return image.size
@@ -73,6 +78,7 @@ def load_depth(photo: Photo, factor: int | None = None) -> np.ndarray:
     factor: as in load_photo, at each of whose pixels it then lies; None: as it is in its file.
     """
     path = photo.depth
+    assert path is not None, "asked of photos that have one"
     if path.suffix.lower() == ".npy":
         values = _array(path)
         values = np.array(values, np.float32) * (
@@ -169,7 +175,7 @@ def _integers(path: Path, most: int) -> np.ndarray:
             with quiet():
                 image.load()
         except BROKEN as error:
-            raise BadFile(f"{shortened(path)}: cut off ({error}); copy it again") from None
+            raise BadFile(f"{path_end(path)}: cut off ({error}); copy it again") from None
         steps = np.array(image, np.float32)
     steps[steps >= 65535] = 0
     return steps
@@ -177,7 +183,7 @@ def _integers(path: Path, most: int) -> np.ndarray:
 
 def _array(path: Path) -> np.ndarray:
     """A view of the (H, W) numbers of a .npy file: nothing is read yet."""
-    where = shortened(path)
+    where = path_end(path)
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except (ValueError, OSError, OverflowError, EOFError, *BAD_HEADER):

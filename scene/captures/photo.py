@@ -67,20 +67,21 @@ def load_photo(photo: Photo, factor: int = 1) -> Pixels:
     if photo.lens is not None:  # what is made of it is beside it in memory
         charge_pixels(photo.path, photo.view.size)
     image, file_size = decoded(photo.path, photo.counts, factor)
-    mask, alpha = None, image.getchannel("A") if image.mode == "RGBA" else None
+    mask_image, has_alpha = None, image.mode == "RGBA"
     if photo.mask is not None:
         image = over_black(image)
-        mask, mask_size = decoded(photo.mask, None, factor, math.prod(file_size))
-        mask = over_black(mask).convert("L")
+        mask_image, mask_size = decoded(photo.mask, None, factor, math.prod(file_size))
+        mask_image = over_black(mask_image).convert("L")
         if mask_size != file_size:
             raise BadFile(
                 f"{photo.mask}: the mask has {mask_size[0]}x{mask_size[1]} pixels, its photo "
                 f"{file_size[0]}x{file_size[1]}; make them the same size"
             )
     image = smaller(image, file_size, photo.lens, factor)
-    if mask is not None:
-        mask = np.asarray(smaller(mask, file_size, photo.lens, factor))
-    elif alpha is not None:
+    mask: np.ndarray | None = None
+    if mask_image is not None:
+        mask = np.asarray(smaller(mask_image, file_size, photo.lens, factor))
+    elif has_alpha:
         mask = np.asarray(image.getchannel("A"))
     gone = None
     if photo.lens is not None:
@@ -111,7 +112,8 @@ def smaller(
         if (across, down) == (1, 1):
             return image if size == image.size else image.crop((0, 0, *size))
         return image.reduce((across, down), (0, 0, size[0] * across, size[1] * down))
-    size = tuple(max(side // factor, 1) for side in pinhole_of(lens).size)
+    width, height = pinhole_of(lens).size
+    size = (max(width // factor, 1), max(height // factor, 1))
     if factor == 1:
         return undistorted(image, lens, size)
     # Twice as many pixels as are wanted, out of about as many: fewer would blur, more cost time.
@@ -196,7 +198,7 @@ def floats(image: Image.Image, mode: str) -> np.ndarray:
     out = np.empty((image.height, image.width, len(mode)), np.float32)
     for start in range(0, image.height, ROWS):
         end = min(start + ROWS, image.height)
-        out[start:end] = image.crop((0, start, image.width, end)).convert(mode)
+        out[start:end] = np.asarray(image.crop((0, start, image.width, end)).convert(mode))
     out /= 255
     return out
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields, shown
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.stop_names import guess_kind
 from shapeshift.scene.cameras.read_colmap_cameras import camera_pose
@@ -23,17 +25,18 @@ from shapeshift.scene.captures.capture_rules import (
 )
 from shapeshift.scene.captures.colmap_points import read_colmap_points
 from shapeshift.scene.captures.colmap_tables import find_model, read_tables
-from shapeshift.scene.captures.read_transforms import read_json
-from shapeshift.scene.json.json_values import shortened, shown, text_in
+from shapeshift.scene.captures.read_transforms import read_capture_json
 
 
 def read_colmap(folder: Path) -> Capture:
     """Sub-folders of images/ are modalities; capture.json may say more (docs/capture.md)."""
-    model, ending = find_model(folder)
+    if (found := find_model(folder)) is None:
+        raise BadFile(f"{folder} holds no COLMAP model; images.bin or images.txt is wanted.")
+    model, ending = found
     lenses, images = read_tables(model, ending)
     posed = sorted(images, key=lambda image: image.name)
     root = folder / "images" if (folder / "images").is_dir() else folder
-    said = read_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
+    said = read_capture_json(folder / "capture.json") if (folder / "capture.json").is_file() else {}
     stops, modality_of = modalities(said, [i.name for i in posed], folder)
     cameras = [camera_pose(image, f"{folder}: {image.name}") for image in posed]
     world = CaptureWorld.of(np.array(cameras), COLMAP_UP, said.get("up", COLMAP_UP), str(folder))
@@ -73,12 +76,12 @@ def modalities(
     stops = stops_from(entries, where)
     of: dict = {}
     for stop, entry in zip(stops, entries, strict=True):
-        prefix = text_in(entry, "folder", where, stop.name).rstrip("/") + "/"
+        prefix = Fields(entry, where).text("folder", stop.name).rstrip("/") + "/"
         mine = [n for n in names if n.startswith(prefix)]
         if not mine:
             raise BadFile(
                 f"{where}: modality {shown(stop.name)} has no images under "
-                f"images/{shortened(prefix)}; add them to the COLMAP model or drop the modality"
+                f"images/{path_end(prefix)}; add them to the COLMAP model or drop the modality"
             )
         of |= dict.fromkeys(mine, stop.name)
     left = sorted(set(names) - set(of))

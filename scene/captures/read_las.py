@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.memory import Memory
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.las_run import (
     REFUSED,
@@ -17,7 +18,6 @@ from shapeshift.scene.captures.las_run import (
     Unreadable,
     las_points,
 )
-from shapeshift.scene.json.json_values import shortened
 
 # mark, where the points begin, how many records lie before them, which format points have
 HEAD = struct.Struct("<4s92xIIB")
@@ -31,7 +31,7 @@ def read_las(path: Path, most: int) -> tuple[np.ndarray, int]:
 
     LAZ is unpacked by a process of its own.  Raises BadFile.
     """
-    where = shortened(path)
+    where = path_end(path)
     if not path.is_file():
         raise BadFile(f"{where}: the file of points is missing; put it there")
     packed = refuse_head(path, where)

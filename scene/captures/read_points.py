@@ -7,19 +7,20 @@ import numpy as np
 
 from shapeshift.runtime_models.files.memory import Account, Memory
 from shapeshift.runtime_models.files.npy import read_array
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.zip_files import opened_zip
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import column_names
 from shapeshift.runtime_models.splats.ply.ply_file import read_header
 from shapeshift.runtime_models.splats.ply.read_points_ply import read_records, shades_of
 from shapeshift.scene.captures.capture_rules import FARTHEST
-from shapeshift.scene.json.json_values import shortened
 
 POINT = 96  # bytes of a point on the way: two copies of its place, its colour
 
 
 def read_points(path: Path) -> tuple[np.ndarray, np.ndarray | None]:
     """(P, 3) float64 positions and (P, 3) float32 colours 0..1 or None, in the file's own world."""
-    where = shortened(path)
+    where = path_end(path)
     if not os.path.isfile(path):  # unlike Path.is_file it takes any text for a name
         raise BadFile(f"{where}: the file of points is missing; put it there or drop its entry")
     read = read_ply if path.suffix.lower() == ".ply" else read_npz
@@ -46,7 +47,7 @@ def read_npz(path: Path, where: str, memory: Account) -> tuple[np.ndarray, np.nd
         names = archive.namelist()
         xyz = read_array(archive, "xyz", where, memory)
         if xyz is None:
-            held = shortened(", ".join(names[:20]))
+            held = path_end(", ".join(names[:20]))
             raise BadFile(f"{where}: lacks the array 'xyz' (P, 3), holds {held or 'nothing'}")
         memory.charge(POINT * len(xyz) if xyz.ndim else 0, "its points")
         return xyz, read_array(archive, "rgb", where, memory)
@@ -56,7 +57,7 @@ def read_ply(path: Path, where: str, memory: Account) -> tuple[np.ndarray, np.nd
     """The vertices of a PLY, binary or ASCII; all that its header promises is there."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    lacking = [axis for axis in "xyz" if axis not in vertex.layout.names]
+    lacking = [axis for axis in "xyz" if axis not in column_names(vertex.layout)]
     if lacking:
         raise BadFile(f"{where}: its vertices have no {lacking[0]}; x, y and z are wanted")
     memory.charge((POINT + vertex.layout.itemsize) * vertex.count, f"{vertex.count:,} points")

@@ -1,21 +1,22 @@
 """transforms.json and cameras.json -> Capture: nerfstudio, Blender, our own form, OpenCV tables."""
 
-import json
 import math
 import os
 from collections import ChainMap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.files.memory import read_json_file
+from shapeshift.runtime_models.files.json_fields import Fields, read_json, shown
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.capture_photos import doubts_of, image_size, posed_photo, refuse_all_missing
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.capture_rules import (
     COLMAP_UP,
+    LARGEST_NUMBER,
     CaptureWorld,
     background_from,
     counts_from,
@@ -29,7 +30,6 @@ from shapeshift.scene.captures.colmap_tables import Lens
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
 from shapeshift.scene.captures.read_points import read_points
-from shapeshift.scene.json.json_values import is_number, shortened, shown, text_in
 from shapeshift.scene.pose import OPENCV_FROM_EYE
 
 ENDINGS = ("", ".png", ".jpg", ".jpeg", ".PNG", ".JPG")
@@ -39,6 +39,7 @@ LENS = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy",
         "k1", "k2", "k3", "k4", "p1", "p2", "w", "h")  # fmt: skip
 # nerfstudio's lists of the photos of a split; what is in none of them is not used.
 LISTS = {"train_filenames": "train", "val_filenames": "test", "test_filenames": "test"}
+MOST_BYTES = 1 << 30  # of JSON
 NO_PINHOLES = ("EQUIRECTANGULAR", "OMNIDIRECTIONAL", "VR180", "ORTHOPHOTO", "FISHEYE624")
 
 
@@ -46,7 +47,7 @@ NO_PINHOLES = ("EQUIRECTANGULAR", "OMNIDIRECTIONAL", "VR180", "ORTHOPHOTO", "FIS
 class Shot:
     """One photo as the file has it: its frame with what the file says for all frames."""
 
-    entry: dict
+    entry: Mapping
     modality: str
     path: Path  # without an ending where there is no such file
     world_from_camera: np.ndarray  # (4, 4) OpenCV axes, the file's world
@@ -89,19 +90,26 @@ def read_transforms(*files: Path) -> Capture:
     if not any("split" in e for e in entries):
         photos = split_every_8th(photos)
     points, colors = None, None
-    name = text_in(data, "points", where)
-    if not name and (name := text_in(data, "ply_file_path", where)):
+    fields = Fields(data, where)
+    name = fields.text("points", "")
+    if not name and (name := fields.text("ply_file_path", "")):
         if not os.path.isfile(folder / name):
-            doubts += (f"The points {shortened(folder / name)} are not there.",)
+            doubts += (f"The points {path_end(folder / name)} are not there.",)
             name = ""
     if name or (folder / "points3d.npz").is_file():
         points, colors = read_points(folder / (name or "points3d.npz"))
     described = any(isinstance(m, dict) for m in data.get("modalities") or ())
-    background, notes = background_from(data, where), data.get("notes")
-    if not isinstance(notes, dict | None):
-        raise BadFile(f"{where}: 'notes' is {shown(notes)}; an object is wanted")
+    background, notes = background_from(data, where), fields.optional_object("notes")
     capture = world.capture(
-        folder, stops, photos, points, colors, background, not described, notes, doubts
+        folder,
+        stops,
+        photos,
+        points,
+        colors,
+        background,
+        not described,
+        dict(notes.data) if notes else None,
+        doubts,
     )
     refuse_other_units(capture, where)
     return capture
@@ -109,9 +117,10 @@ def read_transforms(*files: Path) -> Capture:
 
 def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
     """What the files say for all frames, and every frame with that filled in."""
-    everything, entries = {}, []
+    everything: dict = {}
+    entries: list[Mapping] = []
     for file in files:
-        data = read_json(file)
+        data = read_capture_json(file)
         frames = data.pop("frames", None)
         if not isinstance(frames, list) or not all(isinstance(f, dict) for f in frames):
             raise BadFile(f"{file}: no list 'frames'; this file holds no posed photos")
@@ -126,12 +135,10 @@ def gather(files: tuple[Path, ...]) -> tuple[dict, list[Mapping]]:
 
 def listed(frames: list[dict], data: dict, where: str) -> list[dict]:
     """The frames with the splits of nerfstudio's lists of them; all as they are without such."""
-    splits = {}
+    splits: dict[str, str] = {}
     for key, split in LISTS.items():
-        names = data.get(key) or []
-        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise BadFile(f"{where}: '{key}' is {shown(names)}; a list of 'file_path's is wanted")
-        splits |= dict.fromkeys(names, split)
+        if data.get(key):
+            splits |= dict.fromkeys(Fields(data, where).texts(key), split)
     if not splits:
         return frames
     used = [frame for frame in frames if frame.get("file_path") in splits]
@@ -140,14 +147,11 @@ def listed(frames: list[dict], data: dict, where: str) -> list[dict]:
     return [frame | {"split": splits[frame["file_path"]]} for frame in used]
 
 
-def read_json(file: Path) -> dict:
-    text = read_json_file(file)
-    try:
-        data = json.loads(text.decode("utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise BadFile(f"{file}: not JSON ({error}); write it again") from None
+def read_capture_json(file: Path) -> dict:
+    """The object of a file; a version of our own form that is not known is refused."""
+    data = read_json(file, most_bytes=MOST_BYTES)
     if not isinstance(data, dict):
-        raise BadFile(f"{file}: holds a {type(data).__name__}; an object with 'frames' is wanted")
+        raise BadFile(f"{file} holds {shown(data)}; an object with 'frames' is wanted")
     if data.get("format", "shapeshift-capture") == "shapeshift-capture":
         version = data.get("version", 1)
         if version != 1:
@@ -157,11 +161,11 @@ def read_json(file: Path) -> dict:
     return data
 
 
-def stops_of(data: dict, entries: list[dict], where: str) -> tuple[Stop, ...]:
+def stops_of(data: dict, entries: Sequence[Mapping], where: str) -> tuple[Stop, ...]:
     listed = data.get("modalities")
     if not listed:
         names = [
-            text_in(entry, "modality", f"{where}: frame {i}", "RGB")
+            Fields(entry, f"{where}: frame {i}").text("modality", "RGB")
             for i, entry in enumerate(entries)
         ]
         if "" in names:
@@ -175,14 +179,15 @@ def stops_of(data: dict, entries: list[dict], where: str) -> tuple[Stop, ...]:
 
 
 def shots_of(
-    entry: dict, number: int, data: dict, stops: tuple[Stop, ...], folder: Path, where: str
+    entry: Mapping, number: int, data: dict, stops: tuple[Stop, ...], folder: Path, where: str
 ) -> list[Shot]:
     """The photos of one frame: one, or one a modality where the frame names none of several."""
     where = f"{where}: frame {number}"
-    file = text_in(entry, "file_path", where) or text_in(entry, "file", where)
+    fields = Fields(entry, where)
+    file = fields.text("file_path", "") or fields.text("file", "")
     if not file:
         raise BadFile(f"{where} names no image; give it a 'file_path'")
-    where = f"{where} ({shortened(file)})"
+    where = fields.where = f"{where} ({path_end(file)})"
     key = next((k for k in POSES if k in entry), None)
     if key is None:
         raise BadFile(f"{where} has no pose; run COLMAP first, or give it a 'transform_matrix'")
@@ -191,7 +196,7 @@ def shots_of(
         matrix = matrix @ OPENCV_FROM_EYE
     names = [s.name for s in stops]
     if "modality" in entry or len(names) == 1:
-        modality = text_in(entry, "modality", where, names[0])
+        modality = fields.text("modality", names[0])
         if modality not in names:
             raise BadFile(
                 f"{where} is of modality {shown(modality)}; the file lists {shown(names)}"
@@ -200,7 +205,7 @@ def shots_of(
     return [Shot(entry, n, find_image(folder / n / file), matrix, where, folder / n) for n in names]
 
 
-def opencv_axes(entry: dict) -> bool:
+def opencv_axes(entry: Mapping) -> bool:
     """Whether poses have x right, y down, z forward; without a word on it they are OpenGL's."""
     if "transform_matrix" in entry:
         return "opencv" in str(entry.get("convention", "")).lower()
@@ -217,16 +222,17 @@ def find_image(path: Path) -> Path:
 
 def photo_of(shot: Shot, lens: Lens, world: CaptureWorld, folder: Path) -> Photo:
     entry, where = shot.entry, shot.where
-    split = text_in(entry, "split", where, "train")
+    fields = Fields(entry, where)
+    split = fields.text("split", "train")
     if split not in SPLITS:
         raise BadFile(f"{where} has split {shown(split)}; use train or test")
     matrix = world.turned(shot.world_from_camera)
     photo = posed_photo(shot.path, shot.modality, matrix, lens, where)
-    mask, name = None, text_in(entry, "mask_path", where) or text_in(entry, "mask", where)
+    mask, name = None, fields.text("mask_path", "") or fields.text("mask", "")
     if name:
         mask = folder / name
         if not os.path.isfile(mask):
-            raise BadFile(f"{where}: the mask {shortened(mask)} is missing; put it there")
+            raise BadFile(f"{where}: the mask {path_end(mask)} is missing; put it there")
         image_size(mask, photo.file_size)
     depth, unit = depth_of(entry, shot.folder, photo.file_size, where)
     return replace(photo, mask=mask, split=SPLITS[split], depth=depth, depth_unit=unit)
@@ -235,10 +241,9 @@ def photo_of(shot: Shot, lens: Lens, world: CaptureWorld, folder: Path) -> Photo
 def lens_of(shot: Shot) -> Lens:
     """The lens as the file states it, of the size that it states; else of that of the photo."""
     entry, where = shot.entry, shot.where
+    fields = Fields(entry, where)
     for key in LENS:
-        value = entry.get(key, 0)
-        if not (is_number(value) and abs(value) <= 1e30):
-            raise BadFile(f"{where}: '{key}' is {shown(value)}; a number is wanted")
+        fields.number(key, 0.0, low=-LARGEST_NUMBER, high=LARGEST_NUMBER)
     if "w" in entry and "h" in entry:
         width, height = size = int(entry["w"]), int(entry["h"])
         if not (width >= 1 and height >= 1 and size == (entry["w"], entry["h"])):
@@ -269,7 +274,7 @@ def lens_of(shot: Shot) -> Lens:
     return Lens("FULL_OPENCV", size, (fx, fy, *centre, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0))
 
 
-def focal_of(entry: dict, key: str, side: int, where: str) -> float:
+def focal_of(entry: Mapping, key: str, side: int, where: str) -> float:
     """Pixels of focal length of an angle of view in radians across `side` pixels."""
     if not 0 < entry[key] < math.pi:
         raise BadFile(f"{where}: '{key}' is {entry[key]:g}; radians between 0 and pi are wanted")

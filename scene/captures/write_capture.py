@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.npy import write_arrays
 from shapeshift.runtime_models.files.whole_file import whole_file, write_whole
 from shapeshift.scene.captures.capture import Capture, Photo
 
@@ -91,4 +92,4 @@ def write_points(path: Path, capture: Capture) -> None:
     if capture.point_colors is not None:
         arrays["rgb"] = np.round(np.asarray(capture.point_colors) * 255).astype(np.uint8)
     with whole_file(path) as file:
-        np.savez_compressed(file, **arrays)
+        write_arrays(file, arrays)

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
-from shapeshift.runtime_models.model import BadFile, Model
-from shapeshift.scene.colliders.collider_cache import content_key, find_kept, keep
+from shapeshift.runtime_models.evaluate import Evaluator
+from shapeshift.runtime_models.model import BadFile, Model, ScaffoldModel
+from shapeshift.runtime_models.stop_weights import Control
+from shapeshift.scene.colliders.collider_cache import content_key, read_cached, write_cached
 from shapeshift.scene.colliders.collider_pieces import Pieces, hull_faces, read_pieces
 from shapeshift.scene.colliders.collider_points import fill_splats
 from shapeshift.scene.colliders.collider_wrap import join_meshes, volume, wrap
@@ -28,7 +29,7 @@ THINNEST = 0.01  # of the longest side, of such a box
 FEWEST_SPLATS = 30  # fewer get a box
 MESH_SAMPLES = 400_000  # points on an open mesh that a skin is wrapped around
 MESH_CELLS = 128  # cells along its longest side
-Told = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,11 @@ class Making:
     most_hulls: int = MOST_HULLS
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from the user's cache or written to it
-    told: Told | None = None  # (what is being done, part done 0..1); may raise to end it
+    progress: Progress | None = None  # (what is being done, part done 0..1); may raise to end it
 
-    def tell(self, what: str, part: float) -> None:
-        if self.told:
-            self.told(what, part)
+    def report(self, what: str, part: float) -> None:
+        if self.progress:
+            self.progress(what, part)
 
 
 def collider_of_splats(
@@ -74,21 +75,21 @@ def collider_of_splats(
     """
     making = making or Making()
     columns = (means, scales, wxyz, opacity)
-    return known_or_made(making, columns, lambda: mesh_of_splats(*columns, making))
+    return cached_or_made(making, columns, lambda: mesh_of_splats(*columns, making))
 
 
 def collider_of_model(
-    model: Model, x: float, making: Making | None = None, eye: np.ndarray | None = None
+    model: Model, x: Control, making: Making | None = None, eye: np.ndarray | None = None
 ) -> Collider:
     """The collider of a model as it is at control value x.  Raises BadFile.
 
     eye (3,) metres, in the object's frame: where a model is seen from whose shape depends on it;
     in front of it if not given.
     """
-    if follows_eye(model) and eye is None:
+    if isinstance(model, ScaffoldModel) and eye is None:
         low, high = np.percentile(model.anchors, (1, 99), axis=0)
         eye = (low + high) / 2 + np.array([0, 0, 2 * (high - low).max()])
-    columns = Evaluator(model).geometry(x, eye=None if eye is None else np.float32(eye))
+    columns = Evaluator(model).geometry(x, eye=None if eye is None else np.asarray(eye, np.float32))
     return collider_of_splats(*columns, making)
 
 
@@ -105,7 +106,7 @@ def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:
     given = pieces.skin if pieces else read_mesh(path)
     if making.hollow:  # the physics takes any triangles that stay where they are
         return Collider(around(given), given)
-    return known_or_made(making, (given.vertices, given.faces), lambda: closed_mesh(given, making))
+    return cached_or_made(making, (given.vertices, given.faces), lambda: closed_mesh(given, making))
 
 
 def collider_of_pieces(pieces: Pieces) -> Collider:
@@ -117,7 +118,7 @@ def collider_of_pieces(pieces: Pieces) -> Collider:
     return Collider(hulls, skin)
 
 
-def known_or_made(
+def cached_or_made(
     making: Making, columns: tuple[np.ndarray, ...], make: Callable[[], TriangleMesh]
 ) -> Collider:
     """From a cache if it was made before, else made now and kept."""
@@ -128,16 +129,16 @@ def known_or_made(
         )
     settings = f"{VERSION} {making.faces} {making.most_hulls} {making.hollow}"
     key = content_key(settings, *columns) if making.kept else ""
-    made = find_kept(key) if making.kept else None
+    made = read_cached(key) if making.kept else None
     if made is None:
         mesh = make()
         hulls, finished = around(mesh), True
         if not making.hollow:
-            hulls, finished = cut_into_hulls(mesh, making.most_hulls, making.tell)
+            hulls, finished = cut_into_hulls(mesh, making.most_hulls, making.report)
         made = hulls, mesh
         if making.kept and finished:  # what a slow machine gave up on is tried again
-            keep(key, made)
-    making.tell("making a collider", 1.0)
+            write_cached(key, made)
+    making.report("making a collider", 1.0)
     return Collider(*made)
 
 
@@ -154,7 +155,7 @@ def mesh_of_splats(
     making: Making,
 ) -> TriangleMesh:
     """A watertight mesh around the splats; a box around few.  Raises BadFile around none."""
-    making.tell("looking for what is solid", 0.0)
+    making.report("looking for what is solid", 0.0)
     filling = fill_splats(means, scales, wxyz, opacity)
     if not len(filling.points):
         raise BadFile(
@@ -163,7 +164,7 @@ def mesh_of_splats(
         )
     if filling.splats < FEWEST_SPLATS or not filling.cell_m > 0:
         return box_around(filling.points)
-    skin = wrap(filling.points, filling.cell_m, making.faces, making.tell, making.hollow)
+    skin = wrap(filling.points, filling.cell_m, making.faces, making.report, making.hollow)
     return usable(skin, filling.points)
 
 
@@ -171,7 +172,7 @@ def closed_mesh(given: TriangleMesh, making: Making) -> TriangleMesh:
     """A mesh of about `faces` faces that is watertight, out of any."""
     from shapeshift.scene.colliders.collider_wrap import simplify
 
-    making.tell("closing the mesh", 0.0)
+    making.report("closing the mesh", 0.0)
     if is_watertight(given.faces) and volume(given.vertices, given.faces) > 0:
         return usable(simplify(given, making.faces), given.vertices)
     size = np.ptp(given.vertices.astype(np.float64), axis=0)
@@ -179,7 +180,7 @@ def closed_mesh(given: TriangleMesh, making: Making) -> TriangleMesh:
         return box_around(given.vertices)
     points, _ = sample_faces(given.vertices[given.faces].astype(np.float64), MESH_SAMPLES)
     cell_m = size.max() / MESH_CELLS
-    return usable(wrap(points, cell_m, making.faces, making.tell), given.vertices)
+    return usable(wrap(points, cell_m, making.faces, making.report), given.vertices)
 
 
 def usable(mesh: TriangleMesh, points: np.ndarray) -> TriangleMesh:

@@ -32,12 +32,13 @@ def content_key(settings: str, *arrays: np.ndarray | bytes) -> str:
     for array in arrays:
         if isinstance(array, np.ndarray):
             digest.update(f"{array.shape}{array.dtype.str}".encode())
-            array = np.ascontiguousarray(array).data
-        digest.update(array)
+            digest.update(np.ascontiguousarray(array).data)
+        else:
+            digest.update(array)
     return digest.hexdigest()
 
 
-def find_kept(key: str) -> Made | None:
+def read_cached(key: str) -> Made | None:
     """The collider of a key; None where there is none that can be used."""
     try:
         path = cache_folder(FOLDER) / f"{key}.collider"
@@ -54,7 +55,7 @@ def find_kept(key: str) -> Made | None:
     return made
 
 
-def keep(key: str, made: Made) -> Path | None:
+def write_cached(key: str, made: Made) -> Path | None:
     """Writes it; where it lies, None where nothing can be written."""
     try:
         folder = cache_folder(FOLDER)

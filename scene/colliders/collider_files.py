@@ -7,7 +7,7 @@ from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.scene.colliders.collider import (
     Collider,
     Making,
-    Told,
+    Progress,
     collider_of_mesh,
     collider_of_model,
 )
@@ -17,13 +17,13 @@ BACKGROUND_FACES = 10_000  # it stays where it is: the physics looks only at tho
 
 
 def colliders_of(
-    file: SceneFile, models: Mapping[str, Model], told: Told | None = None
+    file: SceneFile, models: Mapping[str, Model], progress: Progress | None = None
 ) -> dict[str, Collider]:
     """The collider of each object that has one, by its name; kept in the user's cache.
 
     Raises BadFile that names the object.
     """
-    making, made, out = Making(told=told), {}, {}
+    making, made, out = Making(progress=progress), {}, {}
     for item in file.all_items:
         if item.collider is not None:
             x = item.x if item.collider == HULLS else 0
@@ -41,6 +41,7 @@ def one_collider(file: SceneFile, item: SceneItem, model: Model, making: Making)
     try:
         if item.collider == HULLS:
             return collider_of_model(model, item.x, making)
+        assert item.collider is not None, "asked of items that have one"
         return collider_of_mesh(file.path(item.collider), making)
     except BadFile as error:
         raise BadFile(f"object '{item.name}': 'collider': {error}") from None

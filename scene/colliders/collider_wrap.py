@@ -29,26 +29,26 @@ MOST_OVER = 1.1  # times the faces wanted that a simplified mesh may have
 CRUMB = 1e-3  # of the largest part's volume
 UNIT = 0.2  # the size that a mesh is given to be simplified: the package's tolerances have units
 SLOW = (3, 5, 7)  # how slowly edges merge; the package's own 7 harms thin parts and comes last
-Told = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
 
 def wrap(
-    points: np.ndarray, cell_m: float, faces: int, told: Told, hollow: bool = False
+    points: np.ndarray, cell_m: float, faces: int, progress: Progress, hollow: bool = False
 ) -> TriangleMesh:
     """A watertight mesh of about `faces` faces around points (M, 3) metres, M > 0.
 
     hollow: what they enclose stays free, as the inside of a room; else it is solid.
     """
-    told("wrapping the splats", 0.2)
+    progress("wrapping the splats", 0.2)
     low = points.min(0) - (ROOM + 0.5) * cell_m
     solid, points = fill(points, low, cell_m, hollow)
-    told("wrapping the splats", 0.4)
+    progress("wrapping the splats", 0.4)
     field = distance_field(solid, points, low, cell_m, hollow)
-    told("wrapping the splats", 0.6)
+    progress("wrapping the splats", 0.6)
     skin = find_surface(field)
     vertices = (skin.vertices + np.float32(0.5)) * np.float32(cell_m)  # from low: short numbers
     coarse = simplify(TriangleMesh(vertices, skin.faces), faces)
-    told("wrapping the splats", 0.9)
+    progress("wrapping the splats", 0.9)
     tight = draw_in(coarse, field < 0, cell_m)
     return TriangleMesh((tight.vertices + low).astype(np.float32), tight.faces)
 

@@ -24,11 +24,11 @@ SLACK = 0.025  # of the object's longest side that a hull may stand out of it
 JOIN = 1.08  # times the volume of two pieces that their common hull may have
 SPIKES = 3.0  # times SLACK that it may stand out in a few places: stray splats leave spikes
 SKIN_SAMPLES, HULL_SAMPLES = 20_000, 600
-Told = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
 
 def cut_into_hulls(
-    mesh: TriangleMesh, most: int, told: Told, limit_s: float = LIMIT_S
+    mesh: TriangleMesh, most: int, progress: Progress, limit_s: float = LIMIT_S
 ) -> tuple[tuple[np.ndarray, ...], bool]:
     """At most `most` hulls (V, 3) float32 that cover a closed mesh; whether CoACD did its part.
 
@@ -39,7 +39,7 @@ def cut_into_hulls(
     whole = [part.vertices for part in parts]
     if len(parts) <= most and all(skin.reach(points) <= skin.slack for points in whole):
         return solid_hulls(whole, mesh, most), True
-    pieces = run_coacd(mesh, most, told, limit_s)
+    pieces = run_coacd(mesh, most, progress, limit_s)
     hulls = solid_hulls(joined(pieces, skin), mesh, most)
     return (hulls, True) if hulls else (solid_hulls(whole, mesh, most), False)
 
@@ -75,26 +75,26 @@ def joined(pieces: list[np.ndarray], skin: Skin) -> list[np.ndarray]:
 
     What is noisy comes in more pieces than its shape needs.
     """
-    pieces = dict(enumerate(pieces))
-    volumes = {name: hull_volume(piece) for name, piece in pieces.items()}
+    parts = dict(enumerate(pieces))
+    volumes = {name: hull_volume(piece) for name, piece in parts.items()}
 
     def cost(i: int, j: int) -> float:
         """Metres that the common hull stands out; Inf where it is much larger than both."""
-        both = np.concatenate([pieces[i], pieces[j]])
+        both = np.concatenate([parts[i], parts[j]])
         if not hull_volume(both) <= JOIN * (volumes[i] + volumes[j]):
             return np.inf
         return skin.reach(both)
 
-    costs = {(i, j): cost(i, j) for i in pieces for j in range(i)}
+    costs = {(i, j): cost(i, j) for i in parts for j in range(i)}
     while costs:
         (i, j), least = min(costs.items(), key=lambda pair: (pair[1], pair[0]))
         if not least <= skin.slack:
             break
-        pieces[j] = np.concatenate([pieces.pop(i), pieces[j]])
-        volumes[j] = hull_volume(pieces[j])
+        parts[j] = np.concatenate([parts.pop(i), parts[j]])
+        volumes[j] = hull_volume(parts[j])
         costs = {pair: far for pair, far in costs.items() if i not in pair}
         costs |= {(a, b): cost(a, b) for a, b in costs if j in (a, b)}
-    return list(pieces.values())
+    return list(parts.values())
 
 
 def face_normals(mesh: TriangleMesh) -> np.ndarray:
@@ -125,7 +125,9 @@ def hull_volume(points: np.ndarray) -> float:
         return 0.0
 
 
-def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list[np.ndarray]:
+def run_coacd(
+    mesh: TriangleMesh, most: int, progress: Progress, limit_s: float
+) -> list[np.ndarray]:
     """The vertices of CoACD's pieces; none where it fails or takes longer.
 
     Raises BadFile where it is not installed.
@@ -134,7 +136,8 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
         given, wanted = Path(folder, "mesh.npz"), Path(folder, "hulls.npz")
         centre = mesh.vertices.mean(0, dtype=np.float64)
         size = float(np.ptp(mesh.vertices, axis=0).max()) or 1.0
-        np.savez(
+        save: Callable[..., None] = np.savez  # numpy takes its keywords for one flag
+        save(
             given, vertices=(mesh.vertices - centre) / size, faces=mesh.faces, **SEARCH,
             threshold=CONCAVITY, max_convex_hull=most, max_ch_vertex=MOST_VERTICES,
         )  # fmt: skip
@@ -149,11 +152,12 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
             begun = time.monotonic()
             while child.poll() is None and time.monotonic() - begun < limit_s:
                 passed = (time.monotonic() - begun) / limit_s
-                told("cutting it into convex pieces", passed)
+                progress("cutting it into convex pieces", passed)
                 time.sleep(0.05)
-        finally:  # also when told() or Ctrl-C ends the wait
+        finally:  # also when progress() or Ctrl-C ends the wait
             child.kill()
             child.wait()
+            assert child.stdin is not None, "a pipe"
             child.stdin.close()
         if child.returncode == ABSENT:
             why = said.read_text(errors="replace")
@@ -162,7 +166,7 @@ def run_coacd(mesh: TriangleMesh, most: int, told: Told, limit_s: float) -> list
                 f"({why}); install it with: python -m pip install -r requirements.txt."
             )
         if child.returncode != 0 or not wanted.is_file():
-            told("CoACD found no pieces: each separate part becomes one", 1.0)
+            progress("CoACD found no pieces: each separate part becomes one", 1.0)
             return []
         with np.load(wanted) as file:
             return [file[name] * size + centre for name in file.files]

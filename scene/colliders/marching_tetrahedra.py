@@ -34,9 +34,9 @@ def find_surface(field: np.ndarray) -> TriangleMesh:
             for face in faces:  # three edges (low corner, high corner)
                 keys = [(rows + steps[low]) * 8 + (high - low) for low, high in face]
                 triangles.append(np.stack(keys, 1))
-    keys = np.concatenate(triangles) if triangles else np.zeros((0, 3), np.int64)
-    edges, faces = np.unique(keys, return_inverse=True)
-    return TriangleMesh(places(field, edges, steps), faces.reshape(-1, 3).astype(np.int32))
+    every = np.concatenate(triangles) if triangles else np.zeros((0, 3), np.int64)
+    edges, corner_of = np.unique(every, return_inverse=True)
+    return TriangleMesh(places(field, edges, steps), corner_of.reshape(-1, 3).astype(np.int32))
 
 
 def crossing_cells(inside: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def places(field: np.ndarray, edges: np.ndarray, steps: list[int]) -> np.ndarray
 @cache
 def six_tetrahedra() -> list[tuple[tuple[int, ...], dict[int, list]]]:
     """The corners (bits xyz) of each, and for each set of corners inside the faces' edges."""
-    found = []
+    found: list[tuple[tuple[int, ...], dict[int, list]]] = []
     for order in permutations((4, 2, 1)):
         corners = (0, order[0], order[0] + order[1], 7)
         found.append((corners, {case: cut(corners, case) for case in range(1, 15)}))

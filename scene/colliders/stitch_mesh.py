@@ -86,7 +86,8 @@ def split_doubles(
     for number, edge in enumerate(doubles):
         more.append((vertices[ends[edge, 0]] + vertices[ends[edge, 1]]) / 2)
         middle[[half[edge], other[edge]]] = len(vertices) + number
-    kept, added = [], []
+    kept: list = []
+    added: list[np.ndarray] = []
     for face, on_edges in zip(faces, middle.reshape(-1, 3), strict=True):
         if (on_edges < 0).all():
             kept.append(face)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.stop_weights import Control, StopWeights, check_control
 from shapeshift.scene.document.scene_file import BACKGROUND, FAR_M, FirstView, SceneFile, SceneItem
 from shapeshift.scene.pose import Pose
@@ -46,8 +47,8 @@ def add(file: SceneFile, item: SceneItem) -> SceneFile:
 
 def duplicate(file: SceneFile, name: str, by: tuple[float, float, float]) -> SceneFile:
     """With a copy right behind the object, moved by metres; the background's is an object."""
-    item = wanted(file, name)
-    position = tuple(a + b for a, b in zip(item.position, by, strict=True))
+    item = item_named(file, name)
+    position = three(a + b for a, b in zip(item.position, by, strict=True))
     file = add(file, replace(item, position=position))
     if item.name == BACKGROUND:
         return file
@@ -57,7 +58,7 @@ def duplicate(file: SceneFile, name: str, by: tuple[float, float, float]) -> Sce
 
 def remove(file: SceneFile, name: str) -> SceneFile:
     """Without an object or the background."""
-    item = wanted(file, name)
+    item = item_named(file, name)
     if item is file.background:
         return replace(file, background=None)
     return replace(file, items=tuple(other for other in file.items if other is not item))
@@ -67,7 +68,7 @@ def hide(file: SceneFile, name: str, hidden: bool = True) -> SceneFile:
     return change(file, name, visible=not hidden)
 
 
-def place(file: SceneFile, name: str, pose: Pose) -> SceneFile:
+def set_pose(file: SceneFile, name: str, pose: Pose) -> SceneFile:
     """With the object elsewhere.  ValueError for a place that the physics does not reach."""
     position = tuple(round(float(metres), DECIMALS) for metres in pose.position)
     if not all(-FAR_M <= metres <= FAR_M for metres in position):
@@ -85,7 +86,7 @@ def set_x(file: SceneFile, name: str, x: Control) -> SceneFile:
 def rename(file: SceneFile, before: str, after: str) -> SceneFile:
     """With another name.  ValueError, one sentence, for one that the file cannot have."""
     after = " ".join(after.split())
-    if wanted(file, before) is file.background:
+    if item_named(file, before) is file.background:
         raise ValueError(f"The background is always called '{BACKGROUND}'.")
     if not 0 < len(after) <= LONGEST_NAME or not after.isprintable():
         raise ValueError(f"A name has 1 to {LONGEST_NAME} letters on one line.")
@@ -100,7 +101,7 @@ def rename(file: SceneFile, before: str, after: str) -> SceneFile:
 
 def change(file: SceneFile, name: str, /, **values: Any) -> SceneFile:
     """With other values of an object's fields; the same file where nothing is different."""
-    before = wanted(file, name)
+    before = item_named(file, name)
     if all(getattr(before, field) == value for field, value in values.items()):
         return file
     after = replace(before, **values)
@@ -120,13 +121,14 @@ def ground(file: SceneFile, floor_y: float | None) -> SceneFile:
 
 def look_from(file: SceneFile, eye: np.ndarray, target: np.ndarray, fov_y: float) -> SceneFile:
     """With the first look from eye (3,) to target (3,).  ValueError for one straight up or down."""
-    view = FirstView(*(tuple(round(float(n), DECIMALS) for n in p) for p in (eye, target)), fov_y)
+    first, second = (three(round(float(n), DECIMALS) for n in place) for place in (eye, target))
+    view = FirstView(first, second, fov_y)
     if math.dist(view.eye[::2], view.target[::2]) < 1e-6:
         raise ValueError("The first look goes not straight up or down; tilt it a little.")
     return file if view == file.view else replace(file, view=view)
 
 
-def wanted(file: SceneFile, name: str) -> SceneItem:
+def item_named(file: SceneFile, name: str) -> SceneItem:
     """The item of that name; ValueError where there is none."""
     item = find(file, name)
     if item is None:
@@ -226,7 +228,7 @@ class History:
     def redoes(self) -> str:
         return self.steps[self.at + 1].what if self.at + 1 < len(self.steps) else ""
 
-    def take(
+    def record(
         self, file: SceneFile, what: str, together: str = "", regions: tuple | None = None,
         more_bytes: int = 0,
     ) -> "History":  # fmt: skip

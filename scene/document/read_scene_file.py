@@ -3,7 +3,9 @@
 import math
 from pathlib import Path
 
+from shapeshift.runtime_models.files.json_fields import Fields, read_json
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.layers.read_layers import MODES
 from shapeshift.runtime_models.splats.plain_splats import AXES
 from shapeshift.scene.control import EASES
@@ -16,10 +18,9 @@ from shapeshift.scene.document.scene_file import (
     SceneFile,
     SceneItem,
 )
-from shapeshift.scene.json.json_fields import Fields, read_object_file
 from shapeshift.scene.pose import UNIT_SLACK
 from shapeshift.scene.selectors.selector import Box, Selector, Sphere
-from shapeshift.scene.selectors.selector_rows import made, read_selector_row
+from shapeshift.scene.selectors.selector_rows import build, read_selector_row
 from shapeshift.scene.world.reactions import KINDS, Reaction, State, TwoAxes
 
 MOST_OBJECTS = 1000
@@ -31,18 +32,18 @@ GRAVITY, MASS, FRICTION, RESTITUTION = 100.0, 1e6, 10.0, 1.0  # at most: m/s2, k
 def read_scene_file(path: str | Path) -> SceneFile:
     """Raises BadFile, one sentence that names the object and the key."""
     path = Path(path)
-    file = read_object_file(path)
-    asked = file.take("format", FORMAT if path.name.lower().endswith(ENDING) else None)
+    file = Fields(read_json(path, path.name, unique=True), path.name)
+    asked = file.value("format", FORMAT if path.name.lower().endswith(ENDING) else None)
     if asked != FORMAT:
-        raise file.refuse("format", f"'{FORMAT}', which this program reads,")
-    floor_y = file.take("floor_y", None)
+        raise file.error("format", f"'{FORMAT}', which this program reads,")
+    floor_y = file.value("floor_y", None)
     if floor_y is not None:
         floor_y = file.number("floor_y", None, "metres, or null for no floor,", -FAR_M, FAR_M)
     gravity = file.number("gravity_m_s2", 9.81, "0 to 100 m/s2", 0, GRAVITY)
-    background = file.inner(BACKGROUND)
+    background = file.optional_object(BACKGROUND)
     rows = file.rows("objects", MOST_OBJECTS, "object")
-    view = read_view(file.inner("view"))
-    file.done()
+    view = read_view(file.optional_object("view"))
+    file.refuse_unknown_keys()
     items = tuple(read_item(row, path.name) for row in rows)
     names = [item.name for item in items]
     for name in names:
@@ -61,9 +62,9 @@ def read_scene_file(path: str | Path) -> SceneFile:
 
 def read_item(row: Fields, file: str) -> SceneItem:
     """One of "objects"."""
-    name = row.text("name")
+    name = row.line("name")
     if len(name) > LONGEST_NAME:
-        raise row.refuse("name", f"a name of at most {LONGEST_NAME} letters")
+        raise row.error("name", f"a name of at most {LONGEST_NAME} letters")
     row.where = f"{file}: object '{name}'"
     values = read_looks(row) | {
         "static": row.flag("static"),
@@ -71,9 +72,9 @@ def read_item(row: Fields, file: str) -> SceneItem:
         "states": tuple(map(read_state, row.rows("states", MOST_ROWS, "state"))),
         "ring": row.flag("ring"),
         "reactions": tuple(map(read_reaction, row.rows("reactions", MOST_ROWS, "reaction"))),
-        "two_axes": read_two_axes(row.inner("two_axes")),
+        "two_axes": read_two_axes(row.optional_object("two_axes")),
     }
-    row.done()
+    row.refuse_unknown_keys()
     names = [state.name for state in values["states"]]
     if twice := [name for name in names if names.count(name) > 1]:
         raise BadFile(f"{row.where}: 'states': two are called '{twice[0]}'.")
@@ -87,19 +88,19 @@ def read_item(row: Fields, file: str) -> SceneItem:
 def read_background(row: Fields) -> SceneItem:
     """It is touched and never moved, and answers to nothing."""
     values = read_looks(row)
-    row.done()
+    row.refuse_unknown_keys()
     return SceneItem(name=BACKGROUND, static=True, **values)
 
 
 def read_looks(row: Fields) -> dict:
     """What objects and the background have alike."""
-    collider = row.path("collider") if row.take("collider", None) is not None else None
+    collider = row.path("collider") if row.value("collider", None) is not None else None
     return {
         "model": row.path("model"),
-        "mode": row.text("mode", "", MODES),
-        "up": row.text("up", "", AXES),
+        "mode": row.line("mode", "", MODES),
+        "up": row.line("up", "", AXES),
         "flip": row.flag("flip"),
-        **read_pose(row.inner("pose")),
+        **read_pose(row.optional_object("pose")),
         "x": row.control("x", 0.0),
         "visible": row.flag("visible", True),
         "selectors": read_selectors(row),
@@ -119,8 +120,8 @@ def read_pose(row: Fields | None) -> dict:
     position = row.numbers("position", 3, SceneItem.position, FAR_M)
     wxyz = row.numbers("wxyz", 4, SceneItem.wxyz)
     if not abs(math.hypot(*wxyz) - 1) <= UNIT_SLACK:
-        raise row.refuse("wxyz", "a quaternion of length 1")
-    row.done()
+        raise row.error("wxyz", "a quaternion of length 1")
+    row.refuse_unknown_keys()
     return {"position": position, "wxyz": wxyz}
 
 
@@ -129,16 +130,16 @@ def read_view(row: Fields | None) -> FirstView | None:
         return None
     eye, target = row.numbers("eye", 3), row.numbers("target", 3)
     fov_y = row.number("fov_y", 0.8, "radians from 0.01 to 3", 0.01, 3.0)
-    row.done()
+    row.refuse_unknown_keys()
     if math.dist(eye, target) < 1e-6 or math.dist(eye[::2], target[::2]) < 1e-6:
-        raise row.refuse("target", "a place that is not straight above, below or in the eye")
-    return FirstView(eye, target, fov_y)
+        raise row.error("target", "a place that is not straight above, below or in the eye")
+    return FirstView(three(eye), three(target), fov_y)
 
 
 def read_state(row: Fields) -> State:
-    values = {"name": row.text("name"), "x": row.control("x")}
-    row.done()
-    return made(State, values, row.where)
+    values = {"name": row.line("name"), "x": row.control("x")}
+    row.refuse_unknown_keys()
+    return build(State, values, row.where)
 
 
 def read_two_axes(row: Fields | None) -> TwoAxes | None:
@@ -149,34 +150,34 @@ def read_two_axes(row: Fields | None) -> TwoAxes | None:
         name: row.number(name, getattr(plain, name), "0 to 1", 0, 1)
         for name in ("below", "rest", "above")
     }
-    row.done()
+    row.refuse_unknown_keys()
     return TwoAxes(**values)
 
 
 def read_reaction(row: Fields) -> Reaction:
-    to, wanted = row.take("to"), "the name of a state, 'next' or a number from 0 to 1"
-    to = row.text("to", wanted=wanted) if isinstance(to, str) else row.control("to", wanted=wanted)
-    region = row.inner("region")
+    to, wanted = row.value("to"), "the name of a state, 'next' or a number from 0 to 1"
+    to = row.line("to", wanted=wanted) if isinstance(to, str) else row.control("to", wanted=wanted)
+    region = row.optional_object("region")
     values = {
-        "on": row.text("on", known=KINDS),
+        "on": row.line("on", known=KINDS),
         "to": to,
         "after": read_names(row, "from"),
         "least_impulse_n_s": row.number("least_impulse_n_s", 0.0, "N s, 0 or more,", 0),
         "seconds": row.number("seconds", 0.5, "seconds, 0 or more,", 0),
-        "ease": row.text("ease", "smooth", tuple(EASES)),
+        "ease": row.line("ease", "smooth", tuple(EASES)),
         "cooldown_s": row.number("cooldown_s", 0.25, "seconds, 0 or more,", 0),
         "region": read_region(region) if region else None,
     }
-    row.done()
-    return made(Reaction, values, row.where)
+    row.refuse_unknown_keys()
+    return build(Reaction, values, row.where)
 
 
 def read_names(row: Fields, key: str) -> tuple[str, ...]:
     """A name or a list of names."""
-    value = row.take(key, [])
+    value = row.value(key, [])
     names = [value] if isinstance(value, str) else value
     if not (isinstance(names, list) and all(isinstance(n, str) and n for n in names)):
-        raise row.refuse(key, "the name of a state or a list of such")
+        raise row.error(key, "the name of a state or a list of such")
     return tuple(names)
 
 
@@ -185,5 +186,7 @@ def read_region(row: Fields) -> Box | Sphere:
     row.data = {"x": 0, "space": "world", **row.data}
     if row.data["x"] != 0 or row.data["space"] != "world" or "border" in row.data:
         raise BadFile(f"{row.where}: a region has no 'x', 'border' or 'space'; leave them out.")
-    row.text("kind", known=("box", "sphere"))
-    return read_selector_row(row)
+    row.line("kind", known=("box", "sphere"))
+    region = read_selector_row(row)
+    assert isinstance(region, Box | Sphere), "the kinds that are known here"
+    return region

@@ -5,9 +5,9 @@ import os
 from dataclasses import fields
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.document.scene_file import FORMAT, HULLS, SceneFile, SceneItem
-from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.selectors.selector_rows import selector_row
 from shapeshift.scene.world.reactions import Reaction
 

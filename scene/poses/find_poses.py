@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_colmap import find_mask
-from shapeshift.scene.json.json_values import shortened
 from shapeshift.scene.poses.child import Progress, run_child
 from shapeshift.scene.poses.photo_list import PhotoFile, PhotoList
 from shapeshift.scene.poses.pose_report import PoseReport
@@ -154,12 +154,12 @@ def copy_masks(photos: PhotoList, masks: Path, work: Path) -> Path:
         with open_image(source) as image:
             if image.size != photo.size:
                 raise BadFile(
-                    f"{shortened(source)} has {image.size[0]}x{image.size[1]} pixels, its photo "
+                    f"{path_end(source)} has {image.size[0]}x{image.size[1]} pixels, its photo "
                     f"{photo.size[0]}x{photo.size[1]}; a mask is as large as its photo."
                 )
             seen = image.convert("L").getextrema()[1]
         if not seen:
-            raise BadFile(f"{shortened(source)} is all black; white marks what counts.")
+            raise BadFile(f"{path_end(source)} is all black; white marks what counts.")
         target = make_folders(work, Path("masks") / Path(photo.name).parent)
         write_whole(target / f"{Path(photo.name).name}.png", source.read_bytes())
         found += 1

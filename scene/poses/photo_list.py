@@ -4,11 +4,11 @@ from collections import Counter, defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
+from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.stop_names import is_thermal_name
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_capture import PICTURES, has_poses
-from shapeshift.scene.json.json_values import shortened
 
 FEWEST = 3  # photos; two give a pair, and no third that says whether it is right
 ORIENTATION = 0x0112  # of EXIF: which side of the photo was up
@@ -89,7 +89,7 @@ def find_pairs(photos: list[PhotoFile]) -> dict[PhotoFile, str]:
     alone = [photo for photo in thermal if photo not in found]
     if visible and alone:
         raise BadFile(
-            f"{len(alone)} thermal photos, for example {shortened(alone[0].name)}, have no photo "
+            f"{len(alone)} thermal photos, for example {path_end(Path(alone[0].name))}, have no photo "
             "of visible light with the same name; name the two of a pair alike, or leave them out."
         )
     return found

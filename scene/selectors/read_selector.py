@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop, one_line
+from shapeshift.runtime_models.shapes import four, three
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Selector, Sphere
 
@@ -53,7 +54,7 @@ def _made(kind: str, shape: list[tuple], common: dict, eye: Pose | None) -> Sele
         return HalfSpace(point=shape[0], normal=shape[1], **common)
     angle = math.radians(_single(shape[0], "angle"))
     pose = eye or Pose(np.zeros(3), np.array([1.0, 0, 0, 0]))
-    return Lens(position=pose.position, wxyz=pose.wxyz, half_angle=angle, **common)
+    return Lens(position=three(pose.position), wxyz=four(pose.wxyz), half_angle=angle, **common)
 
 
 def _single(numbers: tuple[float, ...], what: str) -> float:

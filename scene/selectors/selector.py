@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import four, three
 from shapeshift.runtime_models.stop_weights import Control, check_control
 from shapeshift.scene.pose import UNIT_SLACK, Pose
 
@@ -30,8 +31,8 @@ class _Placed:
 
     def __post_init__(self) -> None:
         check_control(self.x, _name(self))
-        _wanted(self, "border", 0 <= self.border < math.inf, "metres, 0 or more")
-        _wanted(self, "space", self.space in SPACES, " or ".join(SPACES))
+        _check(self, "border", 0 <= self.border < math.inf, "metres, 0 or more")
+        _check(self, "space", self.space in SPACES, " or ".join(SPACES))
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         """(N,) metres from the surface, negative inside, of places (N, 3) in its space."""
@@ -59,7 +60,7 @@ class Box(_Placed):
         super().__post_init__()
         _floats(self, "centre", 3)
         _floats(self, "half", 3)
-        _wanted(self, "half", min(self.half) >= 0, "metres, 0 or more")
+        _check(self, "half", min(self.half) >= 0, "metres, 0 or more")
         _unit(self, "wxyz", 4)
 
     def distance(self, places: np.ndarray) -> np.ndarray:
@@ -77,7 +78,7 @@ class Sphere(_Placed):
     def __post_init__(self) -> None:
         super().__post_init__()
         _floats(self, "centre", 3)
-        _wanted(self, "radius", 0 <= self.radius < math.inf, "metres, 0 or more")
+        _check(self, "radius", 0 <= self.radius < math.inf, "metres, 0 or more")
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         return np.linalg.norm(places - self.centre, axis=1) - self.radius
@@ -95,7 +96,7 @@ class HalfSpace(_Placed):
         _floats(self, "point", 3)
         _floats(self, "normal", 3)
         length = math.hypot(*self.normal)
-        _wanted(self, "normal", 0 < length < math.inf, "a direction, not zero")
+        _check(self, "normal", 0 < length < math.inf, "a direction, not zero")
         if abs(length - 1) > 1e-12:  # a unit normal stays to the bit, so that files keep it
             object.__setattr__(self, "normal", tuple(n / length for n in self.normal))
 
@@ -124,11 +125,11 @@ class Lens(_Placed):
             raise ValueError("Lens wants either half_angle or tangents.")
         if self.half_angle is not None:
             acute = 0 < self.half_angle < math.pi / 2
-            _wanted(self, "half_angle", acute, "radians between 0 and pi/2")
-            return
-        _floats(self, "tangents", 4)
-        left, right, down, up = self.tangents
-        _wanted(self, "tangents", left < right and down < up, "left < right and down < up")
+            _check(self, "half_angle", acute, "radians between 0 and pi/2")
+        if self.tangents is not None:
+            _floats(self, "tangents", 4)
+            left, right, down, up = self.tangents
+            _check(self, "tangents", left < right and down < up, "left < right and down < up")
 
     def distance(self, places: np.ndarray) -> np.ndarray:
         axes = Pose(np.zeros(3), np.array(self.wxyz)).matrix()[:3, :3]
@@ -143,6 +144,7 @@ class Lens(_Placed):
                 (up - high_y * depth) / math.hypot(1, high_y),
             )
             return np.max(sides, axis=0)  # from the farthest plane: its edges are sharp
+        assert self.half_angle is not None, "a cone where it is no pyramid"
         radius = np.hypot(across, up)
         cos, sin = math.cos(self.half_angle), math.sin(self.half_angle)
         apex_is_nearest = depth * cos + radius * sin < 0
@@ -191,7 +193,7 @@ class Painted:
             return False
         return self.weight is other.weight or np.array_equal(self.weight, other.weight)
 
-    __hash__ = None
+    __hash__ = None  # type: ignore[assignment]  # compared by its array: not for sets or keys
 
 
 Selector = Box | Sphere | HalfSpace | Lens | Painted
@@ -204,20 +206,25 @@ def carried(selector: Selector, world_from_before: Pose) -> Selector:
     moves = world_from_before.matrix()
     if isinstance(selector, HalfSpace):
         point = moves[:3, :3] @ selector.point + moves[:3, 3]
-        return replace(selector, point=point, normal=moves[:3, :3] @ selector.normal)
-    at = "position" if isinstance(selector, Lens) else "centre"
-    wxyz = getattr(selector, "wxyz", UPRIGHT)
-    before = Pose(np.array(getattr(selector, at)), np.array(wxyz))
+        return replace(selector, point=three(point), normal=three(moves[:3, :3] @ selector.normal))
+    assert not isinstance(selector, Painted), "painted regions are fixed to their object"
+    centre = selector.position if isinstance(selector, Lens) else selector.centre
+    wxyz = UPRIGHT if isinstance(selector, Sphere) else selector.wxyz
+    before = Pose(np.array(centre), np.array(wxyz))
     now = Pose.from_matrix(moves @ before.matrix())
-    turned = {"wxyz": now.wxyz} if hasattr(selector, "wxyz") else {}
-    return replace(selector, **{at: now.position}, **turned)
+    position, turned = three(now.position), four(now.wxyz)
+    if isinstance(selector, Lens):
+        return replace(selector, position=position, wxyz=turned)
+    if isinstance(selector, Box):
+        return replace(selector, centre=position, wxyz=turned)
+    return replace(selector, centre=position)
 
 
 def _name(selector: object) -> str:
     return type(selector).__name__
 
 
-def _wanted(selector: object, field: str, fits: bool, wanted: str) -> None:
+def _check(selector: object, field: str, fits: bool, wanted: str) -> None:
     if not fits:
         found = getattr(selector, field)
         raise ValueError(f"{_name(selector)} has {field} = {found}; {wanted} is wanted.")
@@ -228,10 +235,10 @@ def _floats(selector: object, field: str, count: int) -> None:
     row = tuple(float(n) for n in getattr(selector, field))
     object.__setattr__(selector, field, row)
     fits = len(row) == count and all(map(math.isfinite, row))
-    _wanted(selector, field, fits, f"{count} finite numbers")
+    _check(selector, field, fits, f"{count} finite numbers")
 
 
 def _unit(selector: object, field: str, count: int) -> None:
     _floats(selector, field, count)
     length = math.hypot(*getattr(selector, field))
-    _wanted(selector, field, abs(length - 1) <= UNIT_SLACK, "a unit quaternion")
+    _check(selector, field, abs(length - 1) <= UNIT_SLACK, "a unit quaternion")

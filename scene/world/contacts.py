@@ -42,7 +42,7 @@ class Tally:
     def __init__(self, world: Any, ids: dict[Any, int], gravity_m_s2: float) -> None:
         self._world, self._ids, self._gravity = world, ids, gravity_m_s2
         # pair: (sum of its impulses, the largest, where that one was)
-        self._hardest: dict[tuple[int, int], tuple[float, float, np.ndarray]] = {}
+        self._hardest: dict[tuple[int, int], tuple[float, float, np.ndarray | None]] = {}
 
     def gather(self, events: list, before: dict[int, Triple], free: dict[int, tuple]) -> None:
         """Adds one substep.
@@ -71,7 +71,11 @@ class Tally:
 
     def contacts(self) -> list[Contact]:
         """Every pair once, by ids."""
-        return [Contact(*pair, row[0], row[2]) for pair, row in sorted(self._hardest.items())]
+        return [
+            Contact(*pair, total, point)
+            for pair, (total, _, point) in sorted(self._hardest.items(), key=lambda row: row[0])
+            if point is not None
+        ]
 
     def _touch(self, event: Any, seconds: float) -> Touch:
         ids = self._ids[event.collider1], self._ids[event.collider2]

@@ -12,7 +12,7 @@ from shapeshift.scene.document.scene_file import (
     object_of,
 )
 from shapeshift.scene.world.reactions import start
-from shapeshift.scene.world.rigid_object import Thing
+from shapeshift.scene.world.rigid_object import RigidObject
 from shapeshift.scene.world.world import World
 
 BODY = ("model", "mode", "up", "flip", "collider", "static", "mass_kg", "friction", "restitution")
@@ -28,64 +28,64 @@ def follow(world: World, file: SceneFile, models: Mapping[str, Model], colliders
     """
     wanted = {item.name: item for item in file.all_items}
     rename(world, wanted)
-    for name in [name for name in world.things if name not in wanted]:
+    for name in [name for name in world.objects if name not in wanted]:
         world.remove(name)
     for label, item in labelled(file):
-        if item.name not in world.things:
+        if item.name not in world.objects:
             world.add(item, models[item.name], colliders.get(item.name), label)
         else:
             change(world, item, models[item.name], colliders.get(item.name))
-        thing = world.things[item.name]
+        thing = world.objects[item.name]
         if thing.drawn.label != label:
-            world.things[item.name] = replace(thing, drawn=replace(thing.drawn, label=label))
-    world.things = {name: world.things[name] for name in wanted}
+            world.objects[item.name] = replace(thing, drawn=replace(thing.drawn, label=label))
+    world.objects = {name: world.objects[name] for name in wanted}
 
 
 def rename(world: World, wanted: Mapping[str, SceneItem]) -> None:
     """An object that is gone and one that is new, alike but for the name, are the same."""
-    gone = [name for name in world.things if name not in wanted]
-    for item in [item for name, item in wanted.items() if name not in world.things]:
-        same = [n for n in gone if changed(world.things[n].item, item) == {"name"}]
+    gone = [name for name in world.objects if name not in wanted]
+    for item in [item for name, item in wanted.items() if name not in world.objects]:
+        same = [n for n in gone if changed(world.objects[n].item, item) == {"name"}]
         if same:
             gone.remove(same[0])
-            thing = world.things.pop(same[0])
+            thing = world.objects.pop(same[0])
             drawn = replace(thing.drawn, name=item.name)
-            world.things[item.name] = replace(thing, item=item, drawn=drawn)
+            world.objects[item.name] = replace(thing, item=item, drawn=drawn)
             if thing.body is not None:
                 world.names[thing.body] = item.name
 
 
 def change(world: World, item: SceneItem, model: Model, collider) -> None:
     """One object becomes what its item says now."""
-    new = changed(world.things[item.name].item, item)
+    new = changed(world.objects[item.name].item, item)
     if not new:
         return
-    label = world.things[item.name].drawn.label
+    label = world.objects[item.name].drawn.label
     if new & set(BODY):
-        stand_in(world, world.things[item.name], item, model, collider)
+        stand_in(world, world.objects[item.name], item, model, collider)
     if new & {"selectors"}:
-        drawn = object_of(item, world.things[item.name].drawn.model, label)
-        world.things[item.name] = replace(world.things[item.name], drawn=drawn)
+        drawn = object_of(item, world.objects[item.name].drawn.model, label)
+        world.objects[item.name] = replace(world.objects[item.name], drawn=drawn)
     if new & set(ANSWERS):
-        thing = world.things[item.name]
+        thing = world.objects[item.name]
         machine = machine_of(item, model)
-        standing = start(machine, thing.standing.x)
-        world.things[item.name] = replace(thing, machine=machine, standing=standing)
+        reaction_state = start(machine, thing.reaction_state.x)
+        world.objects[item.name] = replace(thing, machine=machine, reaction_state=reaction_state)
     if new & {"position", "wxyz"}:
-        world.place(item.name, item.pose)
+        world.move_object(item.name, item.pose)
     if "x" in new:
         world.control(item.name, item.x)
     if "visible" in new:
         world.show(item.name, item.visible)
-    world.things[item.name] = replace(world.things[item.name], item=item)
+    world.objects[item.name] = replace(world.objects[item.name], item=item)
 
 
-def stand_in(world: World, old: Thing, item: SceneItem, model: Model, collider) -> None:
+def stand_in(world: World, old: RigidObject, item: SceneItem, model: Model, collider) -> None:
     """Another body and model for an object, where it stands now and at its x of now."""
     world.remove(item.name)
     world.add(item, model, collider, old.drawn.label)
-    world.place(item.name, old.pose)
-    world.control(item.name, old.standing.x)
+    world.move_object(item.name, old.pose)
+    world.control(item.name, old.reaction_state.x)
 
 
 def changed(before: SceneItem, after: SceneItem) -> set[str]:
@@ -101,12 +101,12 @@ def changed(before: SceneItem, after: SceneItem) -> set[str]:
     return names
 
 
-def put_back(world: World) -> None:
+def reset_objects(world: World) -> None:
     """Everything where its item says, at rest, at its first x; hands are empty."""
     for hand in list(world.holds):
         world.release(hand)
-    for name, thing in world.things.items():
-        world.place(name, thing.item.pose)
+    for name, thing in world.objects.items():
+        world.move_object(name, thing.item.pose)
         fresh = start(thing.machine, thing.item.x)
-        world.things[name] = replace(world.things[name], standing=fresh)
+        world.objects[name] = replace(world.objects[name], reaction_state=fresh)
     world.impulses = {}

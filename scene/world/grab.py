@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.physics_shapes import isometry, pose_of
 
@@ -55,7 +56,7 @@ def motor_joint(frame_hand: Any, frame_body: Any, mass_kg: float) -> Any:
     return joint.build()
 
 
-def take_hold(
+def attach_hand(
     world: Any, number: int, body_handle: Any, hand_pose: Pose, point: np.ndarray
 ) -> Hold:
     """Puts a kinematic hand into the world and ties a body to it at a point (3,) of the world."""
@@ -64,7 +65,7 @@ def take_hold(
     body = world.rigid_bodies[body_handle]
     at = isometry(hand_pose)
     # Both frames lie at the point and along the body, so that at first nothing pulls.
-    world_from_grip = Isometry3(tuple(map(float, point)), body.position.rotation)
+    world_from_grip = Isometry3(three(point), body.position.rotation)
     hand_from_grip = at.inverse() * world_from_grip
     body_from_grip = body.position.inverse() * world_from_grip
     hand = world.add_body(RigidBody.kinematic_position_based(position=at), [])
@@ -98,7 +99,7 @@ def jumped(pose: Pose, moved: np.ndarray) -> Pose:
     return Pose.from_matrix(moved @ pose.matrix())
 
 
-def lead_hands(world: Any, starts: list[tuple[Hold, Any]], part: float) -> None:
+def move_hands(world: Any, starts: list[tuple[Hold, Any]], part: float) -> None:
     """Puts every hand a part 0..1 of the way from where it was at the start of a step."""
     for hold, start in starts:
         now = start.lerp_slerp(isometry(hold.target), part)
@@ -171,11 +172,13 @@ def hold_from_json(numbers: dict) -> Hold:
     from rapier3d import ImpulseJointHandle, RigidBodyHandle
 
     target, *trail = (Pose(np.array(row[:3]), np.array(row[3:])) for row in numbers["poses"])
+    grip, body_grip = numbers["grips"]
     hold = Hold(
         numbers["body"],
         RigidBodyHandle(*numbers["hand"]),
         ImpulseJointHandle(*numbers["joint"]),
-        *map(np.array, numbers["grips"]),
+        np.array(grip),
+        np.array(body_grip),
         target,
     )
     hold.trail.extend(trail)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import four
 from shapeshift.scene.pose import Pose, View
 
 NOTCH = 1.08  # times as far, one notch of the wheel
@@ -43,7 +44,7 @@ def along(view: View, place: tuple[float, float], size: Size) -> np.ndarray:
     return view.world_from_eye.matrix()[:3, :3] @ np.array([x, y, -1.0])
 
 
-def take(view: View, size: Size, point: np.ndarray) -> MouseHand:
+def hand_at(view: View, size: Size, point: np.ndarray) -> MouseHand:
     """A hand at a point (3,) of the world before the eye."""
     x, y, z = (view.eye_from_world() @ np.append(point, 1.0))[:3]
     left, right, low, high = view.tangents
@@ -63,11 +64,11 @@ def moved(hand: MouseHand, dx: float, dy: float, size: Size) -> MouseHand:
     """Dragged by so many pixels, right and down; not out of the picture, nobody could bring it
     back.
     """
-    place = tuple(
+    x, y = (
         float(np.clip(at + by, min(0, at), max(most, at)))
         for at, by, most in zip(hand.place, (dx, dy), size, strict=True)
     )
-    return replace(hand, place=place)
+    return replace(hand, place=(x, y))
 
 
 def pushed(hand: MouseHand, notches: float, view: View) -> MouseHand:
@@ -91,7 +92,7 @@ def rolled(hand: MouseHand, notches: float, view: View) -> MouseHand:
 
 def with_turn(hand: MouseHand, turn: np.ndarray) -> MouseHand:
     wxyz = multiply(turn, np.array(hand.wxyz))
-    return replace(hand, wxyz=tuple(map(float, wxyz / np.linalg.norm(wxyz))))
+    return replace(hand, wxyz=four(wxyz / np.linalg.norm(wxyz)))
 
 
 def bounded_depth(view: View, depth: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world import physics_rules
@@ -18,12 +19,12 @@ from shapeshift.scene.world.contacts import Contact, Tally, any_near, velocities
 from shapeshift.scene.world.grab import (
     WITH_HAND,
     Hold,
+    attach_hand,
     carry,
     hold_from_json,
     hold_to_json,
     lag,
-    lead_hands,
-    take_hold,
+    move_hands,
     throw,
 )
 from shapeshift.scene.world.physics_shapes import (
@@ -107,7 +108,7 @@ class Physics:
         else:
             engine_shape = hulls_shape(shape)
         return self._insert(
-            self._take_id(), RigidBody.fixed(position=at), engine_shape, None, friction, restitution
+            self._new_id(), RigidBody.fixed(position=at), engine_shape, None, friction, restitution
         )
 
     def add_body(
@@ -128,12 +129,12 @@ class Physics:
         shape = hulls_shape(hulls)
         mass, finding = clamped_mass(mass_kg)
         body = RigidBody.dynamic(position=at, ccd_enabled=True)
-        number = self._insert(self._take_id(), body, shape, mass, friction, restitution)
+        number = self._insert(self._new_id(), body, shape, mass, friction, restitution)
         self._masses[number] = mass
         self.findings += [finding] if finding else []
         return number
 
-    def _take_id(self) -> int:
+    def _new_id(self) -> int:
         self._next_id += 1
         return self._next_id - 1
 
@@ -172,7 +173,7 @@ class Physics:
         """Takes a thing out; hands that held it are empty, and what lay on it falls."""
         handle = self._handle(number)
         for grab in [g for g, hold in self._holds.items() if hold.body == number]:
-            self._let_go(grab)
+            self._remove_hand(grab)
         del self._ids[self._collider(number)], self._handles[number]
         self._world.remove_body(handle)
         self._masses.pop(number, None)
@@ -180,7 +181,7 @@ class Physics:
         self._world.wake_up_all()
         self._queries_stale = True
 
-    def place(self, number: int, pose: Pose) -> None:
+    def set_pose(self, number: int, pose: Pose) -> None:
         """Puts a thing somewhere else, at rest: undo, reset and the gizmo."""
         body = self._world.rigid_bodies[self._handle(number)]
         body.position = isometry(checked_pose(pose, f"thing {number}"))
@@ -235,7 +236,7 @@ class Physics:
         length = math.hypot(*along) if along.shape == (3,) else 0.0
         if not 0 < length < math.inf:
             raise ValueError(f"a ray has the direction {direction}; 3 numbers, not 0, are wanted.")
-        ray = Ray(tuple(map(float, start)), tuple(map(float, along / length)))
+        ray = Ray(three(start), three(along / length))
         hit = self._queries().cast_ray(ray, MOST_REACH, True)
         return (self._ids[hit[0]], hit[1]) if hit else None
 
@@ -245,9 +246,8 @@ class Physics:
 
         at = checked_point(point, "the place of a hand")
         reach = checked_number(within, "a hand's reach in metres", 0, MOST_REACH)
-        found = self._queries().project_point(
-            tuple(map(float, at)), True, QueryFilter.only_dynamic(), reach + LEAST_EXTENT
-        )
+        bodies, far = QueryFilter.only_dynamic(), reach + LEAST_EXTENT
+        found = self._queries().project_point(three(at), True, bodies, far)
         if found is None:
             return None
         p = found[1].point
@@ -293,7 +293,7 @@ class Physics:
         ]
         tally = Tally(self._world, self._ids, -self._world.gravity.y)
         for k in range(substeps):
-            lead_hands(self._world, starts, (k + 1) / substeps)
+            move_hands(self._world, starts, (k + 1) / substeps)
             rules.contact_clustering = not any_near(self._world, at_meshes)
             self._world.step()
             events = self._events.drain_contact_force_events()
@@ -313,7 +313,7 @@ class Physics:
         body = self._body(number)
         hand = checked_pose(hand_pose, "a hand")
         at = checked_point(point, "the point of a grab")
-        hold = take_hold(self._world, number, self._handles[number], hand, at)
+        hold = attach_hand(self._world, number, self._handles[number], hand, at)
         self._holds[self._next_grab] = hold
         body.wake_up(True)
         self._next_grab += 1
@@ -327,7 +327,7 @@ class Physics:
         """Where the hand shall be after the next step; None: it is lost, and drops what it held."""
         hold = self._hold(grab)
         if pose is None:
-            self._let_go(grab)
+            self._remove_hand(grab)
             return
         hold.target = checked_pose(pose, "a hand")
         self._world.rigid_bodies[self._handles[hold.body]].wake_up(True)
@@ -344,11 +344,11 @@ class Physics:
         hold = self._hold(grab)
         body = self._world.rigid_bodies[self._handles[hold.body]]
         with_hand = lag(hold, self._world.rigid_bodies[hold.hand], body) <= WITH_HAND
-        self._let_go(grab)
+        self._remove_hand(grab)
         if with_hand and all(other.body != hold.body for other in self._holds.values()):
             throw(hold, body, self.hz, physics_rules.MOST_SPEED)
 
-    def _let_go(self, grab: int) -> None:
+    def _remove_hand(self, grab: int) -> None:
         hold = self._holds.pop(grab)
         self._world.impulse_joints.remove(hold.joint)
         self._world.remove_body(hold.hand)

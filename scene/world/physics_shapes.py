@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.runtime_models.model import Finding
+from shapeshift.runtime_models.shapes import three
 from shapeshift.scene.colliders.thicken import thickened
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.pose import UNIT_SLACK, Pose
@@ -61,7 +62,7 @@ def isometry(pose: Pose) -> Any:
     """The engine's word for a pose."""
     from rapier3d import Isometry3, Rotation3
 
-    return Isometry3(tuple(map(float, pose.position)), Rotation3(*map(float, pose.wxyz)))
+    return Isometry3(three(pose.position), Rotation3(*map(float, pose.wxyz)))
 
 
 def pose_of(isometry: Any) -> Pose:
@@ -74,7 +75,7 @@ def hulls_shape(hulls: Any) -> Any:
     """The engine's shape of convex pieces, each (V, 3) metres, object frame.  Raises ValueError."""
     from rapier3d import Isometry3, MeshConversionError, SharedShape
 
-    parts = []
+    parts: list[Any] = []  # (Isometry3, SharedShape)
     for i, hull in enumerate(hulls):
         points = np.ascontiguousarray(hull, np.float32)
         if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= FAR).all():

@@ -1,9 +1,9 @@
 """How an object's control answers to what happens to it: declared as data, stepped as a pure
 function.
 
-A Machine is what a scene file declares, a Standing is where one object is in it.  `advance` takes a
-Standing, the time and what happened, and gives the next Standing: no clock, no engine, no state
-beside it, so the same events give the same x for ever.
+A Machine is what a scene file declares, a ReactionState is where one object is in it.  `advance`
+makes the next ReactionState of the one before, the time and what happened: no clock, no engine, no
+state beside it, so the same events give the same x for ever.
 """
 
 import math
@@ -55,17 +55,17 @@ class Reaction:
 
     def __post_init__(self) -> None:
         """Refuses what could never happen or never end: ValueError with a sentence."""
-        _wanted(self, "on", self.on in KINDS, " or ".join(KINDS))
+        _check(self, "on", self.on in KINDS, " or ".join(KINDS))
         fits = bool(self.to) if isinstance(self.to, str | StopWeights) else 0 <= self.to <= 1
-        _wanted(self, "to", fits, "a state, 'next' or a number from 0 to 1")
-        _wanted(self, "ease", self.ease in EASES, " or ".join(EASES))
+        _check(self, "to", fits, "a state, 'next' or a number from 0 to 1")
+        _check(self, "ease", self.ease in EASES, " or ".join(EASES))
         for name in ("seconds", "cooldown_s", "least_impulse_n_s"):
             unit = "N s" if name == "least_impulse_n_s" else "seconds"
-            _wanted(self, name, 0 <= getattr(self, name) < math.inf, f"{unit}, 0 or more")
+            _check(self, name, 0 <= getattr(self, name) < math.inf, f"{unit}, 0 or more")
         of_collision = self.on == "collision" or self.least_impulse_n_s == 0
-        _wanted(self, "least_impulse_n_s", of_collision, "a collision to have it")
+        _check(self, "least_impulse_n_s", of_collision, "a collision to have it")
         fits = (self.region is not None) == (self.on == "enter")
-        _wanted(self, "region", fits, "a box or a sphere for 'enter', and for nothing else,")
+        _check(self, "region", fits, "a box or a sphere for 'enter', and for nothing else,")
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,9 @@ class Machine:
         """Whether the way of a ring leads up past 1, or to 1 instead of 0."""
         if not self.ring or isinstance(end, StopWeights):
             return False
-        if self.blend.through_numbers and not isinstance(start, StopWeights):
+        if self.blend.encodes_every_x and not isinstance(start, StopWeights):
             return end < start
-        return end == 0 < self.blend.place(start)
+        return end == 0 < self.blend.slider_x(start)
 
     def goal(self, reaction: Reaction, state: str) -> State | Control:
         """Where the reaction leads from a state."""
@@ -173,14 +173,16 @@ class Motion:
         if self.ends_by(time_s):
             return self.end
         part = EASES[self.ease][0](max(time_s - self.began_s, 0.0) / self.seconds)
-        if self.over and self.blend.through_numbers:
-            value = self.start + (self.end + 1 - self.start) * part
+        start, end = self.start, self.end
+        if self.over and self.blend.encodes_every_x:
+            assert not isinstance(start, StopWeights) and not isinstance(end, StopWeights)
+            value = start + (end + 1 - start) * part  # as Machine.goes_over has seen to
             return min(max(value - (value > 1), 0.0), 1.0)
         return self.blend.between(self.start, 1.0 if self.over else self.end, part)
 
 
 @dataclass(frozen=True)
-class Standing:
+class ReactionState:
     """Where one object is: its control, the state it is in or on its way to, what it waits for."""
 
     x: Control
@@ -202,55 +204,55 @@ class Fired:
     to_x: Control
 
 
-def start(machine: Machine, x: Control) -> Standing:
+def start(machine: Machine, x: Control) -> ReactionState:
     """An object at x, in the state that is nearest."""
     machine.check(x, "an object")
-    return Standing(x, machine.nearest(x))
+    return ReactionState(x, machine.nearest(x))
 
 
-def steer(machine: Machine, standing: Standing, x: Control) -> Standing:
+def steer(machine: Machine, current: ReactionState, x: Control) -> ReactionState:
     """The same after a hand has put x somewhere: no way goes on, no reaction waits longer."""
     machine.check(x, "an object")
-    return replace(standing, x=x, state=machine.nearest(x), motion=None)
+    return replace(current, x=x, state=machine.nearest(x), motion=None)
 
 
 def advance(
     machine: Machine,
-    standing: Standing,
+    current: ReactionState,
     time_s: float,
     events: Sequence[Event] = (),
-    place: Sequence[float] | None = None,
-) -> tuple[Standing, tuple[Fired, ...]]:
-    """The standing at a time, after what happened since the last one, in the order it happened.
+    place: np.ndarray | Sequence[float] | None = None,
+) -> tuple[ReactionState, tuple[Fired, ...]]:
+    """The state at a time, after what happened since the last one, in the order it happened.
 
     Each event takes the first reaction of its kind that may be taken and leads elsewhere; regions
     that `place` (3,) world metres has come into follow the events.  ValueError for a time before
     the last one and for what is no number.
     """
-    if not standing.time_s <= time_s < math.inf:
-        raise ValueError(f"time {time_s} s follows {standing.time_s} s; it must not go back.")
-    standing = replace(_moved(standing, time_s), time_s=time_s)
-    inside = standing.inside if place is None else _inside(machine, place)
-    entered = _entered(standing.inside, inside)
+    if not current.time_s <= time_s < math.inf:
+        raise ValueError(f"time {time_s} s follows {current.time_s} s; it must not go back.")
+    current = replace(_moved(current, time_s), time_s=time_s)
+    inside = current.inside if place is None else _inside(machine, place)
+    entered = _entered(current.inside, inside)
     fired = []
     for kind, event, rows in [
         *((e.kind, e, range(len(machine.reactions))) for e in events),
         *(("enter", None, [row]) for row in entered),
     ]:
-        standing, taken = _answer(machine, standing, kind, event, rows)
+        current, taken = _answer(machine, current, kind, event, rows)
         fired += taken
-    return replace(standing, inside=inside), tuple(fired)
+    return replace(current, inside=inside), tuple(fired)
 
 
-def _moved(standing: Standing, time_s: float) -> Standing:
-    motion = standing.motion
+def _moved(current: ReactionState, time_s: float) -> ReactionState:
+    motion = current.motion
     if motion is None:
-        return standing
+        return current
     ended = motion.ends_by(time_s)
-    return replace(standing, x=motion.x(time_s), motion=None if ended else motion)
+    return replace(current, x=motion.x(time_s), motion=None if ended else motion)
 
 
-def _inside(machine: Machine, place: Sequence[float]) -> tuple[bool, ...]:
+def _inside(machine: Machine, place: np.ndarray | Sequence[float]) -> tuple[bool, ...]:
     point = np.array(place, np.float64).reshape(1, 3)  # metres
     if not np.isfinite(point).all():
         raise ValueError(f"an object is at {place}; three finite numbers are wanted.")
@@ -266,33 +268,38 @@ def _entered(before: tuple[bool, ...] | None, now: tuple[bool, ...] | None) -> l
 
 
 def _answer(
-    machine: Machine, standing: Standing, kind: str, event: Event | None, rows: Sequence[int]
-) -> tuple[Standing, list[Fired]]:
+    machine: Machine,
+    current: ReactionState,
+    kind: str,
+    event: Event | None,
+    rows: Sequence[int],
+) -> tuple[ReactionState, list[Fired]]:
     column = KINDS.index(kind)
-    if standing.time_s < standing.quiet_until_s[column] - SLACK_S:
-        return standing, []
+    if current.time_s < current.quiet_until_s[column] - SLACK_S:
+        return current, []
     for row in rows:
         reaction = machine.reactions[row]
-        if reaction.on != kind or (reaction.after and standing.state not in reaction.after):
+        if reaction.on != kind or (reaction.after and current.state not in reaction.after):
             continue
         least = reaction.least_impulse_n_s
-        if kind == "collision" and not (event.impulse_n_s >= least and _rises(event, least)):
+        hard = event is not None and event.impulse_n_s >= least and _rises(event, least)
+        if kind == "collision" and not hard:
             continue
-        goal = machine.goal(reaction, standing.state)
+        goal = machine.goal(reaction, current.state)
         x, name = (goal.x, goal.name) if isinstance(goal, State) else (goal, "")
-        heading = standing.motion.end if standing.motion else standing.x
-        if name == standing.state and x == heading:
+        heading = current.motion.end if current.motion else current.x
+        if name == current.state and x == heading:
             continue
-        quiet = list(standing.quiet_until_s)
-        quiet[column] = standing.time_s + reaction.cooldown_s
-        fired = Fired(kind, row, standing.state, name, x)
+        quiet = list(current.quiet_until_s)
+        quiet[column] = current.time_s + reaction.cooldown_s
+        fired = Fired(kind, row, current.state, name, x)
         motion = Motion(
-            standing.x, x, standing.time_s, reaction.seconds, reaction.ease,
-            machine.goes_over(standing.x, x), machine.blend,
+            current.x, x, current.time_s, reaction.seconds, reaction.ease,
+            machine.goes_over(current.x, x), machine.blend,
         )  # fmt: skip
-        standing = replace(standing, state=name, motion=motion, quiet_until_s=tuple(quiet))
-        return _moved(standing, standing.time_s), [fired]
-    return standing, []
+        current = replace(current, state=name, motion=motion, quiet_until_s=tuple(quiet))
+        return _moved(current, current.time_s), [fired]
+    return current, []
 
 
 def _rises(event: Event, least_n_s: float) -> bool:
@@ -320,7 +327,7 @@ class TwoAxes:
         return blend.between(self.rest, side, abs(balance) * power)
 
 
-def _wanted(reaction: Reaction, field: str, fits: bool, wanted: str) -> None:
+def _check(reaction: Reaction, field: str, fits: bool, wanted: str) -> None:
     if not fits:
         found = getattr(reaction, field)
         raise ValueError(f"'{field}' is {found!r:.60}; {wanted} is wanted.")

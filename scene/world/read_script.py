@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import MOST_BYTES, Fields, parse_json
 from shapeshift.runtime_models.files.memory import read_text_file
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.document.scene_file import FAR_M, SceneItem
-from shapeshift.scene.json.json_fields import MOST_BYTES, Fields, read_object
 from shapeshift.scene.pose import UNIT_SLACK, Pose
 from shapeshift.scene.selectors.selector import UPRIGHT
 
@@ -37,7 +38,7 @@ class Act:
     item: str = ""  # of a control
     balance: float | None = None  # of a control: these two, or x
     power: float | None = None
-    x: float | None = None
+    x: Control | None = None
 
 
 def read_script(path: Path, items: Sequence[SceneItem] = ()) -> tuple[Act, ...]:
@@ -56,21 +57,20 @@ def read_script(path: Path, items: Sequence[SceneItem] = ()) -> tuple[Act, ...]:
     hands: set[str] = set()  # that have a place by now
     for number, line in enumerate(lines, 1):
         if line.strip() and not line.lstrip().startswith(b"#"):
-            row = read_object(line, f"{path.name}, line {number}")
+            where = f"{path.name}, line {number}"
+            row = Fields(parse_json(line, where, unique=True), where)
             acts.append(read_act(row, number, acts[-1].t if acts else 0.0, items))
             check_hand(acts[-1], hands, row.where)
     return tuple(acts)
 
 
 def read_act(row: Fields, number: int, before_s: float, items: Sequence[SceneItem]) -> Act:
-    t = row.number("t", None, "seconds, 0 to a day,", 0, LONGEST_S)
-    if t is None:
-        raise BadFile(f"{row.where}: 't' is missing.")
+    t = row.number("t", wanted="seconds, 0 to a day,", low=0, high=LONGEST_S)
     if t < before_s:
         raise BadFile(f"{row.where}: 't' is {t:g} after {before_s:g}; lines go on in time.")
-    do = row.text("do", known=DEEDS)
+    do = row.line("do", known=DEEDS)
     values = READ[do](row, items)
-    row.done()
+    row.refuse_unknown_keys()
     return Act(line=number, t=t, do=do, **values)
 
 
@@ -89,12 +89,12 @@ def read_hand(row: Fields, items: Sequence[SceneItem]) -> dict:
     wxyz = row.numbers("wxyz", 4, UPRIGHT)
     length = math.hypot(*wxyz)
     if not abs(length - 1) <= UNIT_SLACK:
-        raise row.refuse("wxyz", "a quaternion of length 1")
+        raise row.error("wxyz", "a quaternion of length 1")
     return read_which(row, items) | {"pose": Pose(np.array(position), np.array(wxyz) / length)}
 
 
 def read_which(row: Fields, items: Sequence[SceneItem]) -> dict:
-    return {"hand": row.text("hand", HAND)}
+    return {"hand": row.line("hand", HAND)}
 
 
 def read_grab(row: Fields, items: Sequence[SceneItem]) -> dict:
@@ -104,7 +104,7 @@ def read_grab(row: Fields, items: Sequence[SceneItem]) -> dict:
 def read_ray(row: Fields, items: Sequence[SceneItem]) -> dict:
     origin, direction = row.numbers("origin", 3, most=FAR_M), row.numbers("direction", 3)
     if not 1e-6 < math.hypot(*direction) < 1e6:
-        raise row.refuse("direction", "a direction, not zero,")
+        raise row.error("direction", "a direction, not zero,")
     return {"origin": origin, "direction": direction}
 
 
@@ -112,7 +112,7 @@ def read_control(row: Fields, items: Sequence[SceneItem]) -> dict:
     if not items:
         raise BadFile(f"{row.where}: the scene has no object to control.")
     values = {
-        "item": row.text("object", known=tuple(item.name for item in items)),
+        "item": row.line("object", known=tuple(item.name for item in items)),
         "balance": row.number("balance", None, "-1 to 1", -1, 1),
         "power": row.number("power", None, "0 to 1", 0, 1),
         "x": row.control("x", None),
@@ -140,17 +140,18 @@ class HandPath:
     """Where a hand is when: straight and evenly from each line of the script to the next."""
 
     def __init__(self, acts: Sequence[Act], hand: str) -> None:
-        self.lines = [act for act in acts if act.do == "hand" and act.hand == hand]
-        self.times = [act.t for act in self.lines]
+        lines = [act for act in acts if act.do == "hand" and act.hand == hand]
+        self.poses = [act.pose for act in lines if act.pose is not None]
+        self.times = [act.t for act in lines]
 
     def at(self, time_s: float) -> Pose:
         """Before the first line where that says, after the last one where that says."""
         row = bisect_right(self.times, time_s)
-        if row in (0, len(self.lines)):
-            return self.lines[max(row - 1, 0)].pose
-        before, after = self.lines[row - 1], self.lines[row]
-        part = (time_s - before.t) / (after.t - before.t)
-        return between(before.pose, after.pose, part)
+        if row in (0, len(self.poses)):
+            return self.poses[max(row - 1, 0)]
+        before_s, after_s = self.times[row - 1], self.times[row]
+        part = (time_s - before_s) / (after_s - before_s)
+        return between(self.poses[row - 1], self.poses[row], part)
 
 
 def between(first: Pose, last: Pose, part: float) -> Pose:

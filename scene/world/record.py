@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from shapeshift.scene.json.json_fields import control_row
+from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.scene.world.reactions import Fired
 
 DECIMALS = 6  # of what is told: micrometres

@@ -1,36 +1,39 @@
 """One object of a world: what the file says of it, where it stands now, and how it is drawn."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Model
+from shapeshift.scene.colliders.collider import Collider
 from shapeshift.scene.document.scene_file import BACKGROUND, SceneItem, machine_of, object_of
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import SceneObject
-from shapeshift.scene.world.reactions import Machine, Standing, start
+from shapeshift.scene.world.reactions import Machine, ReactionState, start
 from shapeshift.scene.world.read_script import between
-
-if TYPE_CHECKING:
-    from shapeshift.scene.colliders.collider import Collider
 
 LEADS, FOLLOWS = 6, 18  # steps in which a thing that is taken, or let go, changes its lead
 
 
 @dataclass(frozen=True)
-class Thing:
+class RigidObject:
     """An object on its way: where it stands and what its x does."""
 
     item: SceneItem
     body: int | None  # of the physics; None: nothing can touch it
     machine: Machine
-    standing: Standing
+    reaction_state: ReactionState
     pose: Pose
     before: Pose  # at the step before, for pictures between two steps
     drawn: SceneObject  # as it was drawn last
-    collider: "Collider | None" = None
+    collider: Collider | None = None
     lead: float = 0.0  # of a step: drawn so much ahead of others, 1 in a hand, that it cannot lag
+
+    @property
+    def body_id(self) -> int:
+        """The body, of an object that has one."""
+        assert self.body is not None, f"'{self.item.name}' has a body"
+        return self.body
 
     @property
     def moves(self) -> bool:
@@ -40,15 +43,15 @@ class Thing:
     @property
     def waits(self) -> bool:
         """Whether a step in which nothing happens to it leaves it as it is."""
-        return self.standing.motion is None and self.before is self.pose and self.lead == 0
+        return self.reaction_state.motion is None and self.before is self.pose and self.lead == 0
 
 
-def new_thing(item: SceneItem, model: Model, collider, label: int, physics) -> Thing:
+def new_rigid_object(item: SceneItem, model: Model, collider, label: int, physics) -> RigidObject:
     """The object where the file puts it, its body in the physics.  Raises BadFile."""
     drawn, machine = object_of(item, model, label), machine_of(item, model)
     body = add_body(physics, item, collider)
-    pose, standing = item.pose, start(machine, item.x)
-    return Thing(item, body, machine, standing, pose, pose, drawn, collider)
+    pose, reaction_state = item.pose, start(machine, item.x)
+    return RigidObject(item, body, machine, reaction_state, pose, pose, drawn, collider)
 
 
 def add_body(physics, item: SceneItem, collider) -> int | None:
@@ -64,30 +67,38 @@ def add_body(physics, item: SceneItem, collider) -> int | None:
         raise BadFile(f"object '{item.name}': {error}") from None
 
 
-def after_step(thing: Thing, pose: Pose, standing: Standing, held: bool) -> Thing:
+def after_step(
+    thing: RigidObject, pose: Pose, reaction_state: ReactionState, held: bool
+) -> RigidObject:
     """Where it stands now; what is taken gets ahead in LEADS steps, let go it falls back slowly."""
     lead = thing.lead + (1 / LEADS if held else -1 / FOLLOWS)
     return replace(
-        thing, standing=standing, pose=pose, before=thing.pose, lead=min(max(lead, 0.0), 1.0)
+        thing,
+        reaction_state=reaction_state,
+        pose=pose,
+        before=thing.pose,
+        lead=min(max(lead, 0.0), 1.0),
     )
 
 
-def drawn_thing(thing: Thing, part: float | None) -> Thing:
+def drawn_object(thing: RigidObject, part: float | None) -> RigidObject:
     """With what is drawn at a part 0..1 of the way from the step before to this one; None: now.
 
     The same thing, and the same SceneObject in it, where that is what was drawn last.
     """
-    still = part is None or thing.before is thing.pose
-    pose = thing.pose if still else between(thing.before, thing.pose, part + thing.lead)
-    drawn, x = thing.drawn, thing.standing.x
+    if part is None or thing.before is thing.pose:
+        pose = thing.pose
+    else:
+        pose = between(thing.before, thing.pose, part + thing.lead)
+    drawn, x = thing.drawn, thing.reaction_state.x
     if drawn.x == x and same_pose(drawn.world_from_object, pose):
         return thing
     return replace(thing, drawn=replace(drawn, world_from_object=pose, x=x))
 
 
-def middle_of(thing: Thing) -> np.ndarray:
+def middle_of(thing: RigidObject) -> np.ndarray:
     """(3,) metres, world: of the box around what can be touched of it."""
-    assert thing.collider is not None  # nobody asks for the middle of what cannot be touched
+    assert thing.collider is not None, "asked of what can be touched"
     corners = np.concatenate(thing.collider.hulls)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]

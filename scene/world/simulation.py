@@ -5,6 +5,7 @@ It holds no clock and draws nothing; the same file and script give the same reco
 
 from collections.abc import Sequence
 
+from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.world.read_script import Act, HandPath
 from shapeshift.scene.world.record import Record
 from shapeshift.scene.world.world import World
@@ -36,9 +37,12 @@ class Simulation:
         self.world.grab(act.hand, act.reach_m)
 
     def control(self, act: Act) -> None:
-        thing, x = self.world.thing(act.item), act.x
+        thing = self.world.object_named(act.item)
+        x: Control | None = act.x
         if x is None:
-            x = thing.item.two_axes.x(act.balance, act.power, thing.machine.blend)
+            axes, balance, power = thing.item.two_axes, act.balance, act.power
+            assert axes is not None and balance is not None and power is not None, "as read"
+            x = axes.x(balance, power, thing.machine.blend)
         self.world.control(act.item, x)
 
 

@@ -8,20 +8,30 @@ clock and draws nothing: the same calls in the same order give the same records 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.runtime_models.model import Finding, Model
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.document.scene_file import SceneFile, SceneItem, labelled
-from shapeshift.scene.json.json_fields import control_row
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.world.grab import jumped
 from shapeshift.scene.world.reactions import Event, advance, steer
 from shapeshift.scene.world.read_script import between
 from shapeshift.scene.world.record import DECIMALS, Record, event_row, rounded
-from shapeshift.scene.world.rigid_object import Thing, after_step, drawn_thing, new_thing, same_pose
+from shapeshift.scene.world.rigid_object import (
+    RigidObject,
+    after_step,
+    drawn_object,
+    new_rigid_object,
+    same_pose,
+)
+
+if TYPE_CHECKING:
+    from shapeshift.scene.world.physics import Physics
 
 FLOOR_NAME = "floor"
 REACH_M = 0.05  # from a hand to what it grabs
@@ -43,7 +53,7 @@ class Saved:
     """A world at one moment, whole: for undo, and for a reset after play."""
 
     physics: bytes
-    things: dict
+    objects: dict
     hands: dict
     holds: dict
     impulses: dict
@@ -63,7 +73,7 @@ class World:
         file: SceneFile,
         models: Mapping[str, Model],
         colliders: Mapping,
-        physics=None,
+        physics: "Physics | None" = None,
         hz: int = 90,
     ) -> None:
         from shapeshift.scene.world.physics import Physics
@@ -71,13 +81,13 @@ class World:
         self.hz, self.paused = hz, False
         self.physics = physics or Physics(file.gravity_m_s2, file.floor_y, hz)
         self.findings: list[Finding] = []  # of the physics: clamped masses and the like
-        self.things: dict[str, Thing] = {}
+        self.objects: dict[str, RigidObject] = {}
         self.names: dict[int, str] = {}  # of bodies
         self.hands: dict[str, Pose] = {}  # where each shall be after the next step
         self.holds: dict[str, int] = {}  # hand -> grab of the physics
         self.impulses: dict[tuple[int, int], float] = {}  # N s of each pair in the step before
         self.steps = 0
-        self._told: dict[tuple, tuple] = {}  # (what, name) -> as it was told last
+        self._told: dict[tuple, object] = {}  # (what, name) -> as it was told last
         self._stirred: set[str] = set()  # came, were placed or controlled since the last step
         self._events: dict[str, list[Event]] = {}  # of hands and rays since the last step
         self._hands_told: list[dict] = []
@@ -92,64 +102,66 @@ class World:
 
     # ---- what there is
 
-    def thing(self, name: str) -> Thing:
-        if name not in self.things:
-            raise ValueError(f"there is no object '{name}'; there are {', '.join(self.things)}.")
-        return self.things[name]
+    def object_named(self, name: str) -> RigidObject:
+        if name not in self.objects:
+            raise ValueError(f"there is no object '{name}'; there are {', '.join(self.objects)}.")
+        return self.objects[name]
 
     def add(self, item: SceneItem, model: Model, collider=None, label: int | None = None) -> None:
         """One more object, last in the order; the next label that is free if none is given."""
-        if item.name in self.things:
+        if item.name in self.objects:
             raise ValueError(f"there is an object '{item.name}'; each wants a name of its own.")
         if label is None:
-            label = max((thing.drawn.label for thing in self.things.values()), default=0) + 1
+            label = max((thing.drawn.label for thing in self.objects.values()), default=0) + 1
         known = len(self.physics.findings)
-        thing = new_thing(item, model, collider, label, self.physics)
+        thing = new_rigid_object(item, model, collider, label, self.physics)
         of = f"object '{item.name}'"
         self.findings += [replace(new, file=of) for new in self.physics.findings[known:]]
-        self.things[item.name] = thing
+        self.objects[item.name] = thing
         self._stirred.add(item.name)
         if thing.body is not None:
             self.names[thing.body] = item.name
 
     def remove(self, name: str) -> None:
         """Takes an object out; hands that held it are empty, and what lay on it falls."""
-        thing = self.thing(name)
+        thing = self.object_named(name)
         for hand in [hand for hand in self.holds if self.held(hand) == name]:
-            self._let_go(hand, "release")
+            self._release_hand(hand, "release")
         if thing.body is not None:
             self.physics.remove(thing.body)
             del self.names[thing.body]
-        del self.things[name]
+        del self.objects[name]
         self._events.pop(name, None)
         self._told.pop(("pose", name), None)
         self._told.pop(("x", name), None)
 
-    def place(self, name: str, pose: Pose) -> None:
+    def move_object(self, name: str, pose: Pose) -> None:
         """Puts an object somewhere else, at rest."""
-        thing = self.thing(name)
+        thing = self.object_named(name)
         if thing.body is not None:
-            self.physics.place(thing.body, pose)
-        self.things[name] = replace(thing, pose=pose, before=pose)
+            self.physics.set_pose(thing.body, pose)
+        self.objects[name] = replace(thing, pose=pose, before=pose)
         self._stirred.add(name)
 
     def control(self, name: str, x: Control) -> None:
         """Puts an object's x there at once; no reaction under way goes on."""
-        thing = self.thing(name)
-        self.things[name] = replace(thing, standing=steer(thing.machine, thing.standing, x))
+        thing = self.object_named(name)
+        self.objects[name] = replace(
+            thing, reaction_state=steer(thing.machine, thing.reaction_state, x)
+        )
         self._stirred.add(name)
 
     def show(self, name: str, visible: bool) -> None:
         """Draws an object or does not; a hidden one is touched as before."""
-        thing = self.thing(name)
-        self.things[name] = replace(thing, drawn=replace(thing.drawn, visible=visible))
+        thing = self.object_named(name)
+        self.objects[name] = replace(thing, drawn=replace(thing.drawn, visible=visible))
 
     # ---- hands
 
     def move_hand(self, name: str, pose: Pose | None) -> None:
         """Where a hand shall be after the next step; None: it is lost, and lets go."""
         if pose is None:
-            self._let_go(name, "lose")
+            self._release_hand(name, "lose")
             self.hands.pop(name, None)
             self._hands_before.pop(name, None)
             return
@@ -166,21 +178,21 @@ class World:
             return None
         at = self.hands[name].position
         found = self.nearest(at, reach_m)
-        return self._take(name, found[0] if found else None, at)
+        return self._grab_object(name, found[0] if found else None, at)
 
     def grab_body(self, name: str, object_name: str, point: np.ndarray) -> str | None:
         """A hand takes that object at a point (3,) of the world; None where it cannot be held."""
-        thing = self.things.get(object_name)
+        thing = self.objects.get(object_name)
         held = object_name if thing is not None and thing.moves and name in self.hands else None
-        return self._take(name, held, point)
+        return self._grab_object(name, held, point)
 
-    def _take(self, hand: str, name: str | None, point: np.ndarray) -> str | None:
-        self._let_go(hand, "release")
+    def _grab_object(self, hand: str, name: str | None, point: np.ndarray) -> str | None:
+        self._release_hand(hand, "release")
         if name is None:
             self._hands_told.append({"hand": hand, "did": "miss"})
             return None
         pose = self.hands[hand]
-        self.holds[hand] = self.physics.grab(self.things[name].body, pose, point)
+        self.holds[hand] = self.physics.grab(self.objects[name].body_id, pose, point)
         self._hands_before[hand] = pose
         self._hands_told.append({"hand": hand, "did": "grab", "object": name})
         self._events.setdefault(name, []).append(Event("grab"))
@@ -188,9 +200,9 @@ class World:
 
     def release(self, name: str) -> None:
         """A hand lets go, and what it held flies on with its speed; one that is empty stays so."""
-        self._let_go(name, "release")
+        self._release_hand(name, "release")
 
-    def _let_go(self, hand: str, did: str) -> None:
+    def _release_hand(self, hand: str, did: str) -> None:
         if hand not in self.holds:
             return
         name = self.held(hand)
@@ -214,18 +226,20 @@ class World:
         for hand in [hand for hand in self.holds if self.held(hand) == held]:
             self.hands[hand] = jumped(self.hands[hand], moved)
             self._hands_before[hand] = jumped(self._hands_before[hand], moved)
-        pose = self.physics.pose(self.things[held].body)
-        self.things[held] = replace(self.things[held], pose=pose, before=pose)
+        pose = self.physics.pose(self.objects[held].body_id)
+        self.objects[held] = replace(self.objects[held], pose=pose, before=pose)
 
     def held(self, name: str) -> str | None:
         """What a hand holds."""
-        return self.names.get(self.physics.held(self.holds[name])) if name in self.holds else None
+        body = self.physics.held(self.holds[name]) if name in self.holds else None
+        return None if body is None else self.names.get(body)
 
     def nearest(self, point: np.ndarray, within: float) -> tuple[str, float] | None:
         """The object that a hand at a point (3,) would take, and how far that is in metres."""
-        found = self.physics.nearest(point, within)
-        name = self.names.get(found[0]) if found else None
-        return (name, found[1]) if name is not None and self.things[name].moves else None
+        if (found := self.physics.nearest(point, within)) is None:
+            return None
+        name = self.names.get(found[0])
+        return (name, found[1]) if name is not None and self.objects[name].moves else None
 
     # ---- rays
 
@@ -245,7 +259,7 @@ class World:
         row: dict = {"origin": [float(n) for n in origin], "object": None}
         if hit is not None:
             row |= {"object": hit.object, "distance_m": rounded(hit.distance_m)}
-            if hit.object in self.things:
+            if hit.object in self.objects:
                 self._events.setdefault(hit.object, []).append(Event("ray"))
         self._rays_told.append(row)
         return hit
@@ -262,10 +276,10 @@ class World:
         if self.holds or self._events:
             return False
         return all(
-            thing.standing.motion is None
+            thing.reaction_state.motion is None
             and same_pose(thing.before, thing.pose)
-            and (not thing.moves or self.physics.sleeps(thing.body))
-            for thing in self.things.values()
+            and (not thing.moves or self.physics.sleeps(thing.body_id))
+            for thing in self.objects.values()
         )
 
     def step(self) -> Record:
@@ -279,8 +293,8 @@ class World:
         self._part = None
         self._collide(contacts, record, events)
         held = {self.held(hand) for hand in self.holds}
-        for name in self.things:
-            self._react(name, record, events.get(name, ()), name in held)
+        for name in self.objects:
+            self._react(name, record, events.get(name, []), name in held)
         self._stirred.clear()
         return record
 
@@ -320,7 +334,7 @@ class World:
             now[pair] = now.get(pair, 0.0) + contact.impulse_n_s
             names = [self.names.get(body, FLOOR_NAME) for body in pair]
             for name in names:
-                if name in self.things:
+                if name in self.objects:
                     event = Event("collision", float(now[pair]), float(before))
                     events.setdefault(name, []).append(event)
             if pair not in self.impulses:
@@ -330,16 +344,18 @@ class World:
 
     def _react(self, name: str, record: Record, events: list[Event], held: bool) -> None:
         """The object's new pose and x; what has changed is told."""
-        thing = self.things[name]
-        pose = self.physics.pose(thing.body) if thing.moves else thing.pose
+        thing = self.objects[name]
+        pose = self.physics.pose(thing.body_id) if thing.moves else thing.pose
         still = same_pose(pose, thing.pose)
         if still and not events and thing.waits and name not in self._stirred:
             return
-        standing, fired = advance(thing.machine, thing.standing, self.time_s, events, pose.position)
-        self.things[name] = after_step(thing, thing.pose if still else pose, standing, held)
+        reaction_state, fired = advance(
+            thing.machine, thing.reaction_state, self.time_s, events, pose.position
+        )
+        self.objects[name] = after_step(thing, thing.pose if still else pose, reaction_state, held)
         record.events += [event_row(name, answer) for answer in fired]
         told = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
-        x = control_row(standing.x, DECIMALS)
+        x = control_row(reaction_state.x, DECIMALS)
         if self._told.get(("pose", name)) != told:
             self._told["pose", name] = told
             record.poses[name] = list(told)
@@ -355,8 +371,8 @@ class World:
         After `advance` what is free is drawn up to a step late, between two steps, and what a hand
         holds where it will be, so that it does not lag behind the hand.
         """
-        self.things = {name: drawn_thing(t, self._part) for name, t in self.things.items()}
-        objects = tuple(thing.drawn for thing in self.things.values())
+        self.objects = {name: drawn_object(t, self._part) for name, t in self.objects.items()}
+        objects = tuple(thing.drawn for thing in self.objects.values())
         if list(map(id, objects)) != list(map(id, self._drawn.objects)):
             self._drawn = Scene(objects)
         return self._drawn
@@ -366,16 +382,16 @@ class World:
     def snapshot(self) -> Saved:
         """The world as it is, the physics to the last bit."""
         return Saved(
-            self.physics.snapshot(), dict(self.things), dict(self.hands), dict(self.holds),
+            self.physics.snapshot(), dict(self.objects), dict(self.hands), dict(self.holds),
             dict(self.impulses), self.steps,
         )  # fmt: skip
 
     def restore(self, saved: Saved) -> None:
         """Back to a snapshot of this world; what was added since is gone, what was removed back."""
         self.physics.restore(saved.physics)
-        self.things, self.hands = dict(saved.things), dict(saved.hands)
+        self.objects, self.hands = dict(saved.objects), dict(saved.hands)
         self.holds, self.impulses, self.steps = dict(saved.holds), dict(saved.impulses), saved.steps
-        self.names = {t.body: name for name, t in self.things.items() if t.body is not None}
+        self.names = {t.body: name for name, t in self.objects.items() if t.body is not None}
         self._events, self._hands_told, self._rays_told, self._told = {}, [], [], {}
-        self._stirred = set(self.things)
+        self._stirred = set(self.objects)
         self._hands_before, self._behind_s, self._part = dict(saved.hands), 0.0, None

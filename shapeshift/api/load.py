@@ -36,7 +36,7 @@ def load(
         scan = ss.load("scan.ply", up="+Z")
     """
     reading = Reading(
-        mode, up, flip, strict, allow_huge=allow_huge, most_splats=max_splats, told=progress,
+        mode, up, flip, strict, allow_huge=allow_huge, most_splats=max_splats, progress=progress,
         memory_gb=memory_gb,
     )  # fmt: skip
     document, found = read_document(path, reading)

@@ -68,7 +68,7 @@ def compare(
 def side_of(scene: PathText | OpenedScene):
     """A scene as it stands, or what a path, or a path with @stop or @x, stands for."""
     from shapeshift.app.commands.compare_sides import SceneSide, split_stop
-    from shapeshift.runtime_models.stop_weights import told_control
+    from shapeshift.runtime_models.stop_weights import control_text
 
     at = ""
     if not isinstance(scene, OpenedScene):
@@ -76,7 +76,7 @@ def side_of(scene: PathText | OpenedScene):
         scene = opened(path).at(at or None)
     stops = {stop.x: stop.name for stop in scene.stops}
     if not at and scene.x is not None:
-        at = stops[scene.x] if scene.x in stops else told_control(scene.x)
+        at = stops[scene.x] if scene.x in stops else control_text(scene.x)
     name = scene.path.resolve().name if scene.path else "scene"
     return SceneSide(f"{name} @ {at}" if at else name, scene.subject)
 

@@ -17,7 +17,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
 from shapeshift.runtime_models.model import AnchorModel, Finding
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
-from shapeshift.runtime_models.splats.write_plain import cut, merged, writer_of
+from shapeshift.runtime_models.splats.write_plain import merged, truncate_harmonics, writer_of
 from shapeshift.scene.selectors.selector import Selector
 
 PACKAGE = ".shift"
@@ -134,7 +134,7 @@ def bake_scene(
     baked = [bake_part(Part(thing), look) for thing in scene.objects if thing.visible]
     if not baked:
         raise UsageError("all objects are hidden; nothing is there to be taken.")
-    splats = cut(merged(baked), sh_degree)
+    splats = truncate_harmonics(merged(baked), sh_degree)
     arrays: dict[str, Any] = {
         name: np.array(getattr(splats, name), np.float32)
         for name in ("means", "scales", "wxyz", "opacity", "sh")

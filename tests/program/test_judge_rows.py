@@ -5,13 +5,13 @@ import pytest
 
 from shapeshift.runtime_models.colors.spherical_harmonics import shade
 from shapeshift.runtime_models.files.blocks import BLOCK, WORTH_A_THREAD, each_block
-from shapeshift.runtime_models.lint.invalid_rows import odd_rows
+from shapeshift.runtime_models.lint.invalid_rows import invalid_rows
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.formats import read_plain
-from shapeshift.runtime_models.splats.operations.activate import to_own_units
-from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, turn
+from shapeshift.runtime_models.splats.operations.activate import activate
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import AXES, RawSplats, Reading
 from tests.support.splats.ply_files import some_splats
 
@@ -26,7 +26,7 @@ def raw_splats(count: int, coefficients: int = 4, seed: int = 0, **coding) -> Ra
 
 
 def odd_row(raw: RawSplats, i: int) -> bool:
-    """What odd_rows says in words, for one row."""
+    """What invalid_rows says in words, for one row."""
     numbers = [*raw.means[i], *raw.scales[i], *raw.wxyz[i], raw.opacity[i], *raw.sh[i].ravel()]
     if not all(np.isfinite(numbers)):
         return True
@@ -44,7 +44,7 @@ def odd_row(raw: RawSplats, i: int) -> bool:
 @pytest.mark.parametrize("count", COUNTS)
 def test_odd_rows_are_those_of_the_words(count, coded):
     raw = raw_splats(count, log_scales=coded, logits=coded)
-    assert len(odd_rows(raw)) == 0
+    assert len(invalid_rows(raw)) == 0
     rng = np.random.default_rng(count)
     arrays = [raw.means, raw.scales, raw.wxyz, raw.opacity[:, None], raw.sh.reshape(count, -1)]
     touched = {0, count - 1, *rng.integers(0, count, 60).tolist()}
@@ -54,7 +54,7 @@ def test_odd_rows_are_those_of_the_words(count, coded):
         array[i, rng.integers(array.shape[1])] = rng.choice(POISON)
     raw.wxyz[count // 2] = 0
     want = [i for i in sorted(touched | {count // 2}) if odd_row(raw, i)]
-    assert odd_rows(raw).tolist() == want and want
+    assert invalid_rows(raw).tolist() == want and want
 
 
 @pytest.mark.parametrize("coefficients", [1, 4, 9, 16])
@@ -64,7 +64,7 @@ def test_own_units_are_the_formulas(count, coefficients):
     raw.scales[0] = was.scales[0] = [-np.inf, -80, 80]
     raw.opacity[0] = was.opacity[0] = np.inf
     raw.opacity[-1] = was.opacity[-1] = -200 if count > 1 else np.inf
-    to_own_units(raw, ours_from_file("-Y"))
+    activate(raw, ours_from_file("-Y"))
     np.testing.assert_array_equal(raw.means, was.means * [1, -1, -1])
     np.testing.assert_allclose(raw.scales, np.exp(was.scales.astype(float)), rtol=2e-7)
     want = 1 / (1 + np.exp(-np.clip(was.opacity.astype(float), -700, 700)))
@@ -81,7 +81,7 @@ def test_own_units_are_the_formulas(count, coefficients):
 @pytest.mark.parametrize("flip", [False, True])
 def test_every_turn_turns_places_shapes_and_colours_together(up, flip):
     rotation, was = ours_from_file(up, flip), some_splats(BLOCK + 1, 16)
-    turned = turn(was, rotation)
+    turned = rotate_splats(was, rotation)
     np.testing.assert_allclose(turned.means, was.means @ rotation.T, atol=1e-6)
     full = np.zeros((2, len(was.means), 3, 3))
     for i, splats in enumerate((was, turned)):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.rasterizer.resolve import resolve
-from shapeshift.renderer.colors.palette import apply_palette, lay_heat, palette_colors
+from shapeshift.renderer.colors.palette import apply_palette, overlay_heat, palette_colors
 from tests.support.renderer.rasterizer_scenes import device
 
 
@@ -31,7 +31,7 @@ def test_it_equals_the_picture_that_numpy_resolves(size, name, beside):
     got = resolve(device(), rgba, background, palette, heat)
     rgba = rgba.astype(np.float64)
     if name:
-        rgba = lay_heat(rgba, heat, name) if beside else apply_palette(rgba, name)
+        rgba = overlay_heat(rgba, heat, name) if beside else apply_palette(rgba, name)
     shown = rgba[..., :3] + (1 - rgba[..., 3:]) * background
     want = shown.clip(0, 1)[::-1] * 255
     assert got.dtype == np.uint8 and got.shape == (*size, 4)

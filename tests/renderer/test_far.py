@@ -12,10 +12,10 @@ from shapeshift.runtime_models.lint.lint_whole import Sample
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.layers.read_layers import read_layers
-from shapeshift.runtime_models.splats.operations.recentre import COARSE, FINE, place_of
+from shapeshift.runtime_models.splats.operations.recentre import COARSE, FINE, origin_of
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
-from shapeshift.runtime_models.splats.write_plain import told_lost, writer_of
+from shapeshift.runtime_models.splats.write_plain import describe_losses, writer_of
 from tests.support.splats.ply_files import names_of, random_rows, write_rows
 
 FAR = (5e6 + 0.25, -3_141_592.5, 4e5)  # metres, in the file's axes
@@ -86,7 +86,7 @@ def test_float32_that_is_fine_enough_says_nothing_of_loss(tmp_path):
 @pytest.mark.parametrize("place", [FAR, (0.5, 0, -3.0)])
 def test_what_rounds_far_places_says_so(near_and_far, ending, place):
     splats = replace(read_plain(near_and_far[0]), origin=place)
-    lost = told_lost(splats, writer_of(Path("a" + ending)))
+    lost = describe_losses(splats, writer_of(Path("a" + ending)))
     if place is FAR and ending in (".splat", ".compressed.ply"):
         assert "steps of 0.5 m" in lost[0].what and ".ply and .glb keep them" in lost[0].done
     else:
@@ -106,20 +106,20 @@ def test_the_threshold_is_where_steps_are_a_hundredth_of_a_splat():
     while step > FINE * fine:
         fine = np.nextafter(fine, np.inf)
     kind = np.dtype(np.float64)
-    assert place_of(sample(far, 2, fine), kind, "a") == ((0, 0, 0), [])
-    origin, found = place_of(sample(far, 2, fine * (1 - 1e-9)), kind, "a")
+    assert origin_of(sample(far, 2, fine), kind, "a") == ((0, 0, 0), [])
+    origin, found = origin_of(sample(far, 2, fine * (1 - 1e-9)), kind, "a")
     assert origin == (far, 0, 0) and len(found) == 1
     # a scene that reaches from zero to there stays
-    assert place_of(sample(far, far, fine / 2), kind, "a")[0] == (0, 0, 0)
-    assert place_of(sample(far, far - 1e-6, fine / 2), kind, "a")[0] == (far, 0, 0)
+    assert origin_of(sample(far, far, fine / 2), kind, "a")[0] == (0, 0, 0)
+    assert origin_of(sample(far, far - 1e-6, fine / 2), kind, "a")[0] == (far, 0, 0)
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_what_is_lost_is_told_of_float32_alone(kind):
     step = float(np.spacing(np.float32(5e6)))
     size = step / COARSE
-    assert len(place_of(sample(5e6, 2, size), np.dtype(kind), "a")[1]) == 1
-    smaller = place_of(sample(5e6, 2, size * 0.999), np.dtype(kind), "a")[1]
+    assert len(origin_of(sample(5e6, 2, size), np.dtype(kind), "a")[1]) == 1
+    smaller = origin_of(sample(5e6, 2, size * 0.999), np.dtype(kind), "a")[1]
     assert len(smaller) == (2 if kind is np.float32 else 1)
 
 

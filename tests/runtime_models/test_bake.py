@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.commands.exported import Look, Part, bake_part
-from shapeshift.renderer.colors.palette import LUMINANCE, through_palette
+from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.bake import (
     BLOCK,
@@ -185,7 +185,7 @@ def test_palette_of_layers_is_laid_over_each_color():
     plain = bake_part(Part(SceneObject("hot", replace(layers, stops=stops))), Look())
     there = layers.opacity >= LEAST_ALPHA
     up = np.tile(np.array([0, 1, 0], np.float32), (there.sum(), 1))
-    false = through_palette(shade(layers.sh[there], up) @ LUMINANCE, "ironbow")
+    false = palette_values(shade(layers.sh[there], up) @ LUMINANCE, "ironbow")
     np.testing.assert_allclose(shade(plain.sh, up), false, atol=1e-5)
     as_filed = bake_part(
         Part(SceneObject("hot", replace(layers, stops=stops))), Look(palette=False)

@@ -12,9 +12,9 @@ from shapeshift.runtime_models.stop_weights import (
     StopBlend,
     StopWeights,
     check_control,
+    control_text,
     encode_control,
     parse_control,
-    told_control,
 )
 
 STOPS = (Stop("RGB", 0.1), Stop("Thermal", 0.4, "thermal"), Stop("Opened", 0.9))
@@ -90,7 +90,7 @@ def test_a_way_passes_no_third_stop_and_comes_back_the_same(blend, a, b):
     assert (np.diff(rows[:, b]) > 0).all()
     np.testing.assert_allclose([blend.weights(c) for c in back], rows, atol=1e-12)
     places = STOPS[a].x + (STOPS[b].x - STOPS[a].x) * parts
-    np.testing.assert_allclose([blend.place(c) for c in there], places, atol=1e-12)
+    np.testing.assert_allclose([blend.slider_x(c) for c in there], places, atol=1e-12)
 
 
 def test_a_way_follows_the_pace_of_its_pair():
@@ -212,7 +212,7 @@ def test_a_way_as_text_is_at_even_pace():
 
 def test_what_is_told_is_read_back():
     for control in (0.25, 0.123457, StopWeights((("RGB", 0.25), ("Opened", 0.75)))):
-        assert parse_control(told_control(control), STOPS) == control
+        assert parse_control(control_text(control), STOPS) == control
 
 
 @pytest.mark.parametrize("x", (-1e-9, 1 + 1e-9, math.nan, math.inf))

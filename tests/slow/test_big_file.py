@@ -17,7 +17,7 @@ from shapeshift.renderer.limits import TooLarge
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import SplatLayers
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.operations.prune_by_importance import thin
+from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.scene.cameras.framing import default_view
 from shapeshift.scene.scene import Scene, SceneObject
@@ -63,7 +63,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> SplatLayers:
                 file.write(rows_of(first, min(BLOCK, COUNT - first), len(names)))
         assert path.stat().st_size > 1 << 31
         told = []
-        model = read_model(path, Reading(told=lambda _, part: told.append(part)))
+        model = read_model(path, Reading(progress=lambda _, part: told.append(part)))
         assert told == sorted(told) and len(told) > 100
         return model
     finally:
@@ -88,7 +88,7 @@ def test_it_is_drawn_in_tiles_and_half_of_it_looks_alike(model):
     except NoDevice as reason:
         pytest.skip(str(reason))
     pictures = []
-    for scene in (model, thin(model, COUNT // 2)):
+    for scene in (model, prune_by_importance(model, COUNT // 2)):
         with Renderer(None, "tiles") as renderer:
             renderer.update(Scene((SceneObject("big", scene),)))
             renderer.draw([default_view(model, (320, 180))])

@@ -17,10 +17,10 @@ MOST = {
     "api": 0,
     "app": 70,
     "rasterizer": 0,
-    "renderer": 35,
-    "runtime_models": 216,
-    "scene": 124,
-    "training": 91,
+    "renderer": 0,
+    "runtime_models": 0,
+    "scene": 0,
+    "training": 90,
     "vr": 54,
 }
 

@@ -121,12 +121,12 @@ def test_what_is_let_go_flies_with_the_hand(rate, scale):
     moving = [frame(right=hand("right", place, squeeze=1.0)) for place in away]
     touching, told = run(world, [SQUEEZE, *moving], standing=room, seconds=1 / rate)
     assert told[-1].held["right"] == "a"
-    lag = world.things["a"].pose.position - room.point(away[-1])
+    lag = world.objects["a"].pose.position - room.point(away[-1])
     assert np.linalg.norm(lag) <= 0.005 + np.linalg.norm(speed) * scale / 90
     last = away[-1] + speed / rate
     _, told = run(world, [frame(right=hand("right", last))], touching, room, 1 / rate)
     assert told[-1].held["right"] is None and Pulse("right", *LEFT) in told[-1].pulses
-    flew = world.physics.velocity(world.things["a"].body)[0]
+    flew = world.physics.velocity(world.objects["a"].body)[0]
     turn = room.world_from_play.matrix()[:3, :3]
     wanted = turn @ speed * scale
     assert np.linalg.norm(flew - wanted) <= 0.05 * np.linalg.norm(wanted) + 1e-3
@@ -194,7 +194,11 @@ def test_a_trigger_acts_once_a_pull_on_what_it_meets_first():
         assert np.allclose(shot.start, HERE)
         assert np.allclose(room.point(shot.end), world.aim(
             room.point(np.array(HERE)), -room.pose(at(*HERE)).matrix()[:3, 2]).point)  # fmt: skip
-        assert world.things["a"].standing.state == "fire" != world.things["b"].standing.state
+        assert (
+            world.objects["a"].reaction_state.state
+            == "fire"
+            != world.objects["b"].reaction_state.state
+        )
         touching, told = run(world, [aimed(trigger=0.5), aimed(trigger=1)], touching, room)
         assert not any(beam.acts for t in told for beam in t.beams)
         touching, told = run(world, [aimed(trigger=0.2), aimed(trigger=1)], touching, room)
@@ -261,7 +265,7 @@ def test_how_strong_a_blow_is():
 def test_a_snap_turn_takes_what_is_held_along():
     world = world_with(HERE, (0.0, 1.2, -0.62), standing=ROOM)
     touching, _ = run(world, [SQUEEZE] * 20, standing=ROOM)
-    other = world.things["b"].pose.position
+    other = world.objects["b"].pose.position
     snap = frame(right=hand(squeeze=1.0, stick=(-1.0, 0)))
     touching, _ = touch(world, touching, snap, ROOM)
     room, _, comfort = move(ROOM, Travel(), at_rest(snap, touching), 1 / HZ)
@@ -269,11 +273,11 @@ def test_a_snap_turn_takes_what_is_held_along():
     follow(world, snap, room, True)
     world.advance(1 / HZ)
     # The hand swept over the other box, and did not strike it.
-    assert np.allclose(world.things["a"].pose.position, room.point(np.array(HERE)), atol=2e-3)
-    assert np.array_equal(world.things["b"].pose.position, other)
+    assert np.allclose(world.objects["a"].pose.position, room.point(np.array(HERE)), atol=2e-3)
+    assert np.array_equal(world.objects["b"].pose.position, other)
     touching, told = run(world, [OPEN], touching, room)
     world.advance(0.1)
-    speed = np.linalg.norm(world.physics.velocity(world.things["a"].body)[0])
+    speed = np.linalg.norm(world.physics.velocity(world.objects["a"].body)[0])
     assert told[0].held["right"] is None and speed < 0.01
 
 
@@ -287,7 +291,7 @@ def test_walking_takes_what_is_held_along():
         follow(world, walks, room, False)
         world.advance(1 / HZ)
     assert touched.held["right"] == "a" and not travel.grips
-    lag = world.things["a"].pose.position - room.point(np.array(HERE))
+    lag = world.objects["a"].pose.position - room.point(np.array(HERE))
     assert (
         np.linalg.norm(lag)
         < 0.02
@@ -303,7 +307,7 @@ def test_a_new_origin_takes_what_is_held_along():
     new = frame(right=hand("right", (0.5, 1.0, 0.3), squeeze=1.0), recentred=True)
     touch(world, touching, new, other)
     assert np.allclose(
-        world.things["a"].pose.position, other.point(np.array([0.5, 1.0, 0.3])), atol=2e-3
+        world.objects["a"].pose.position, other.point(np.array([0.5, 1.0, 0.3])), atol=2e-3
     )
 
 

@@ -93,7 +93,7 @@ class Passes:
         splats = evaluate(self.layers, 0.0, np.zeros(3))
         self.arena.write_geometry(0, splats.means, splats.scales, splats.wxyz, splats.opacity)
         self.arena.write_color(0, splats.color)
-        self.arena.place([np.eye(4)])
+        self.arena.set_poses([np.eye(4)])
         self.projector, self.sorter = Projector(gpu), Sorter(gpu, "numpy")
         self.splatter = Splatter(gpu)
         self.arena.make_room(2)

@@ -269,7 +269,7 @@ def busy(steps: int) -> str:
         if step % 100 == 0:
             body = bodies[int(rng.integers(len(bodies)))]
             start = physics.pose(body).position
-            physics.place(body, at(*np.clip(start, -0.4, 0.4)))
+            physics.set_pose(body, at(*np.clip(start, -0.4, 0.4)))
             start = physics.pose(body).position
             grab = physics.grab(body, at(*start), start)
         if step % 100 < 60:

@@ -6,7 +6,7 @@ import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.scene.captures.capture_rules import turn_upright
+from shapeshift.scene.captures.capture_rules import upright_rotation
 from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.captures.read_points import read_points
 from shapeshift.training.photos import LoadedPhoto
@@ -29,7 +29,7 @@ def cloud_points(path: Path, capture: Capture, rng: np.random.Generator) -> tupl
     if not (len(points) and np.isfinite(points).all()):
         raise BadFile(f"{path}: holds no points, or some that are no numbers; export it again.")
     up = capture.notes.get("up_in_file", (0.0, 1.0, 0.0))
-    turned = thinned(points, rng) @ turn_upright(up, str(path))[:3, :3].T
+    turned = thinned(points, rng) @ upright_rotation(up, str(path))[:3, :3].T
     return turned, count
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, BadFile
-from shapeshift.runtime_models.package.drop_unused import compact
+from shapeshift.runtime_models.package.drop_unused import drop_unused
 from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
@@ -148,7 +148,7 @@ class Fit:
     def clean(self) -> None:
         """What goes without another training: what nothing shows, and digits of the features."""
         now = self.current
-        smaller = [compact(model)[0] for model in now.models]
+        smaller = [drop_unused(model)[0] for model in now.models]
         self.try_models("what no stop shows", smaller)
         for pixels in PIXELS:
             smaller = [self.without_faint(model, pixels) for model in self.current.models]
@@ -170,7 +170,7 @@ class Fit:
     def without_faint(self, model: AnchorModel, pixels: float) -> AnchorModel:
         """The model without anchors that make up fewer pixels in every photo."""
         most = most_pixels(self.device, model, [*self.photos, *self.held_out], self.stops)
-        return compact(model, np.repeat(most[:, None] >= pixels, model.splats_per_anchor, 1))[0]
+        return drop_unused(model, np.repeat(most[:, None] >= pixels, model.splats_per_anchor, 1))[0]
 
 
 def weights_of(model: AnchorModel) -> int:

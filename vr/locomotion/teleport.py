@@ -57,7 +57,7 @@ def ground_of(world, level_y: float | None = None) -> Ground:
         if below is None:
             return hit.point, False
         stands = all(
-            met.object not in world.things or not world.things[met.object].moves
+            met.object not in world.objects or not world.objects[met.object].moves
             for met in (hit, below)
         )
         return below.point, stands

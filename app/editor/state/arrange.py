@@ -27,7 +27,7 @@ COPY_BESIDE = 1.1  # of an object's width: how far off its copy stands
 def edit(state: EditorState, file: SceneFile, what: str, together: str = "") -> None:
     """Takes an edited file over.  Raises BadFile, with all as it was, where it cannot be so."""
     state.record_regions()
-    turn_to(state, state.edited.history.take(file, what, together))
+    turn_to(state, state.edited.history.record(file, what, together))
     state.edited.amend_regions(state.regions)
 
 
@@ -206,11 +206,11 @@ def leave_for_stop(state: EditorState, index: int, number: int) -> None:
 def place(state: EditorState, index: int, pose: Pose) -> None:
     """A hand moves an object: where it starts as well, unless the world is running."""
     name = state.scene.objects[index].name
-    file = edits.place(state.edited.file, name, pose)
-    state.move(index, edits.wanted(file, name).pose)
+    file = edits.set_pose(state.edited.file, name, pose)
+    state.move(index, edits.item_named(file, name).pose)
     if not state.running:
         history = state.edited.history
-        state.edited.history = history.take(file, f"move {name}", f"place {name}")
+        state.edited.history = history.record(file, f"move {name}", f"place {name}")
         state.bodies.follow(state.edited)
 
 
@@ -218,7 +218,7 @@ def as_it_stands(state: EditorState) -> SceneFile:
     """The file with everything where it is now, at its x.  ValueError for what has flown off."""
     file = state.edited.file
     for thing in state.scene.objects:
-        file = edits.place(file, thing.name, thing.world_from_object)
+        file = edits.set_pose(file, thing.name, thing.world_from_object)
         file = edits.set_x(file, thing.name, thing.x)
     return file
 

@@ -9,7 +9,7 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
 from shapeshift.app.editor.state.files.edited_file import EditedFile, ModelKey, key_of
-from shapeshift.app.editor.state.files.opened import Told
+from shapeshift.app.editor.state.files.opened import Progress
 from shapeshift.app.opening import sentence
 from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
@@ -171,14 +171,14 @@ def making_of(item: SceneItem) -> tuple:
 
 
 def make(
-    file: SceneFile, item: SceneItem, model: Model, told: Told
+    file: SceneFile, item: SceneItem, model: Model, told: Progress
 ) -> "tuple[Collider | None, str]":
     """The collider, or None and why there is none."""
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.colliders.collider_files import one_collider
 
     try:
-        return one_collider(file, item, model, Making(told=told)), ""
+        return one_collider(file, item, model, Making(progress=told)), ""
     except BadFile as error:
         return None, f"{error} It cannot be touched."
     except MemoryError:

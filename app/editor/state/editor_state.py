@@ -245,8 +245,8 @@ class EditorState:
         """Puts an object elsewhere, at rest; what the file says stays."""
         thing = self.scene.objects[index]
         self._put(index, replace(thing, world_from_object=pose))
-        if self.world is not None and thing.name in self.world.things:
-            self.world.place(thing.name, pose)
+        if self.world is not None and thing.name in self.world.objects:
+            self.world.move_object(thing.name, pose)
 
     def take_rows(self, rows: Sequence[tuple], moved: dict[int, int]) -> None:
         """Other objects, each with model as read, sweep and source; camera and settings stay.
@@ -268,7 +268,7 @@ class EditorState:
         """Moves an object's x; what the file says stays."""
         thing = self.scene.objects[index]
         self._put(index, replace(thing, x=x))
-        if self.world is not None and thing.name in self.world.things:
+        if self.world is not None and thing.name in self.world.objects:
             self.world.control(thing.name, x)
 
     def _put(self, index: int, thing: SceneObject) -> None:

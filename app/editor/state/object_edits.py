@@ -60,7 +60,7 @@ class ObjectEdits:
             """The copy stands by what is seen, wherever that may have gone since the start."""
             file = edits.duplicate(file, name, by)
             copy = next(item.name for item in file.items if item.name not in known)
-            file = edits.place(file, copy, Pose(pose.position + by, pose.wxyz))
+            file = edits.set_pose(file, copy, Pose(pose.position + by, pose.wxyz))
             return edits.set_x(file, copy, thing.x)
 
         if self.edit(beside, what=f"copy {name}"):

@@ -9,7 +9,7 @@ from shapeshift.app.editor.state.arrange import steer
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.paths import is_bundled
 from shapeshift.runtime_models.stop_weights import Control
-from shapeshift.scene.world.follow import put_back
+from shapeshift.scene.world.follow import reset_objects
 from shapeshift.scene.world.mouse_hand import MouseHand
 from shapeshift.scene.world.record import Record
 from shapeshift.scene.world.world import World
@@ -125,13 +125,13 @@ class TouchState:
             self.world.paused = True
             self.follow([self.world.step()])
 
-    def put_back(self) -> None:
+    def reset_objects(self) -> None:
         """Everything where it was before it was touched."""
         self.let_go()
         state = self._state
         state.bodies.follow(state.edited)  # edits that the world has not heard of
         if self.world is not None:
-            put_back(self.world)
+            reset_objects(self.world)
             self.follow([])
 
     def control(self, name: str, x: Control) -> None:

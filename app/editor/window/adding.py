@@ -7,7 +7,7 @@ from shapeshift.app.camera_files import camera_reading
 from shapeshift.app.editor.panels.widgets.path_box import PathBox
 from shapeshift.app.editor.state.arrange import edit, undo
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, Told, read_files
+from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, Progress, read_files
 from shapeshift.app.editor.window.files import take_over
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.runtime_models.model import BadFile
@@ -41,7 +41,7 @@ class Adding:
         self._box.close()
         options = self._options
 
-        def read(paths: tuple[Path, ...], told: Told) -> OpenedFiles:
+        def read(paths: tuple[Path, ...], told: Progress) -> OpenedFiles:
             return read_files(
                 paths,
                 lambda path, told: open_model(path, options, told),  # finest level at once

@@ -24,12 +24,12 @@ from shapeshift.app.editor.window.window import (
 from shapeshift.scene.pose import View
 from shapeshift.scene.world.mouse_hand import (
     MouseHand,
+    hand_at,
     moved,
     pose,
     pushed,
     ray,
     rolled,
-    take,
     turned,
 )
 from shapeshift.scene.world.rigid_object import middle_of
@@ -114,7 +114,7 @@ class MouseTouch:
             case glfw.KEY_T:
                 self._touch.toggle()
             case glfw.KEY_R:
-                self._touch.put_back()
+                self._touch.reset_objects()
             case glfw.KEY_X:
                 self.shoot(world)
             case glfw.KEY_J:
@@ -134,8 +134,8 @@ class MouseTouch:
         name = self.under(view, (press.x, press.y))
         if name is None:
             return False
-        middle = middle_of(world.things[name])  # about which it is turned
-        hand = self._touch.hand = take(view, size, middle)
+        middle = middle_of(world.objects[name])  # about which it is turned
+        hand = self._touch.hand = hand_at(view, size, middle)
         world.move_hand(HAND, pose(hand, view, size))
         world.grab_body(HAND, name, middle)
         self._state.chosen = name
@@ -147,7 +147,7 @@ class MouseTouch:
         hit = world.aim(*ray(view, place, self._window.logical_size)) if world else None
         if world is None or hit is None:
             return None
-        thing = world.things.get(hit.object)
+        thing = world.objects.get(hit.object)
         return hit.object if thing is not None and thing.moves else None
 
     def drag(self, hand: MouseHand, dx: float, dy: float) -> None:

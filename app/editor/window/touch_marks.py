@@ -20,7 +20,7 @@ from shapeshift.scene.colliders.collider_edges import hull_edges, mesh_edges
 from shapeshift.scene.document.scene_file import BACKGROUND
 from shapeshift.scene.pose import View
 from shapeshift.scene.world.mouse_hand import MouseHand, Size, pose
-from shapeshift.scene.world.rigid_object import Thing, middle_of
+from shapeshift.scene.world.rigid_object import RigidObject, middle_of
 from shapeshift.scene.world.world import World
 
 Vec: TypeAlias = imgui.ImVec2
@@ -56,17 +56,17 @@ class Marks:
         self._lines = gpu_lines
         wires = [
             Wire(self.edges(thing, thing.collider), where(request, thing), self._ink(name, thing))
-            for name, thing in touch.world.things.items()
+            for name, thing in touch.world.objects.items()
             if thing.collider is not None
         ]
         gpu_lines.draw(self._window.screen(), request.view, wires)
 
-    def _ink(self, name: str, thing: Thing) -> tuple[float, float, float, float]:
+    def _ink(self, name: str, thing: RigidObject) -> tuple[float, float, float, float]:
         held = name == self._touch.held
         rgb = HELD_INK if held else MOVES_INK if thing.moves else STAYS_INK
         return (*rgb, 0.9 if held else 0.6)
 
-    def edges(self, thing: Thing, collider: Collider) -> np.ndarray:
+    def edges(self, thing: RigidObject, collider: Collider) -> np.ndarray:
         """(S, 2, 3) of its collider, made once."""
         is_mesh = thing.item.name == BACKGROUND
         key = (id(collider), is_mesh)
@@ -101,7 +101,7 @@ class Marks:
             return
         draw, ink = imgui.get_background_draw_list(), theme.color(theme.ACCENT, 0.8)
         held = self._touch.held
-        thing = None if held is None else world.things.get(held)
+        thing = None if held is None else world.objects.get(held)
         middle = on_picture(view, middle_of(thing), size) if thing else None
         if middle is not None:
             draw.add_line(Vec(*middle), Vec(*at), ink, 2 * ui_scale)
@@ -126,7 +126,7 @@ class Marks:
             draw.add_circle(Vec(*at), radius, ink, 0, 2 * ui_scale)
 
 
-def where(request: FrameRequest, touched: Thing) -> np.ndarray:
+def where(request: FrameRequest, touched: RigidObject) -> np.ndarray:
     """(4, 4) where the object is drawn, else where it stands."""
     for thing in request.scene.objects:
         if thing.name == touched.item.name:
@@ -136,7 +136,7 @@ def where(request: FrameRequest, touched: Thing) -> np.ndarray:
 
 def draw_label(label: Label, world: World, view: View, size: Size, ui_scale: float) -> None:
     """What a thing has become, rising from it; nothing where the thing is gone."""
-    thing = world.things.get(label.object)
+    thing = world.objects.get(label.object)
     at = on_picture(view, thing.pose.position, size) if thing else None
     if at is not None:
         part = label.age_s / LABEL_S

@@ -5,13 +5,15 @@ follows any path before it looks at a size, which is not for files from stranger
 """
 
 import base64
-import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields, parse_json
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account
 from shapeshift.runtime_models.model import BadFile
 
@@ -33,7 +35,7 @@ class Asset:
         data = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
         text, self._binary = split_glb(data, path.name)
         memory.charge(JSON_A_BYTE * len(text), "its JSON")
-        self.json = parse_json(text, path.name)
+        self.json = parse_asset(text, path.name)
         self._buffers: dict[int, np.ndarray] = {}
         version = str(self.item(self.json, "asset", dict, {}).get("version", ""))
         if not version.startswith("2."):
@@ -47,15 +49,11 @@ class Asset:
     def refuse(self, text: str) -> BadFile:
         return BadFile(f"{self.path.name}: {text}")
 
-    def item(self, owner: dict, name: str, kind: type, otherwise: object = None):
+    def item(
+        self, owner: Mapping[str, Any], name: str, kind: type, otherwise: object = None
+    ) -> Any:
         """owner[name], of a type; `otherwise` where it is absent.  Raises BadFile."""
-        if name not in owner:
-            return otherwise
-        value = owner[name]
-        usual = isinstance(value, kind) and (kind is not int or not isinstance(value, bool))
-        if not usual or (kind is int and not 0 <= value < 1 << 63):
-            raise self.refuse(f"'{name}' is {str(value)[:40]!r}, expected {WANTED[kind]}.")
-        return value
+        return Fields(owner, self.path.name).typed(name, kind, otherwise)
 
     def entry(self, kind: str, index: object) -> dict:
         """The object number `index` of one of the asset's lists.  Raises BadFile."""
@@ -159,10 +157,6 @@ class Asset:
         return np.maximum(table.astype(np.float32) / LARGEST[code], -1)
 
 
-WANTED = {dict: "an object", list: "a list", int: "a whole number from 0 below 2^63", str: "text",
-          bool: "true or false"}  # fmt: skip
-
-
 def split_glb(data: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     """The bytes of the JSON and of the binary chunk of a .glb; of a .gltf all is JSON."""
     if data[:4].tobytes() != MAGIC:
@@ -174,7 +168,8 @@ def split_glb(data: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
         raise BadFile(f"{name} is binary glTF {version}; 2 is read.")
     if length > len(data):
         raise BadFile(f"{name} has {len(data)} bytes, its header says {length}; it is cut off.")
-    found, place = {}, 12
+    found: dict[int, np.ndarray] = {}
+    place = 12
     while place + 8 <= length and len(found) < 2:
         size, kind = (int(n) for n in np.frombuffer(data[place : place + 8].tobytes(), "<u4"))
         if place + 8 + size > length:
@@ -186,19 +181,12 @@ def split_glb(data: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
     return found[JSON_CHUNK], found.get(BINARY_CHUNK, np.zeros(0, np.uint8))
 
 
-def parse_json(data: np.ndarray, name: str) -> dict:
+def parse_asset(data: np.ndarray, name: str) -> Mapping[str, Any]:
     """The JSON's object.  Raises BadFile, also for what would take too much memory or depth."""
     try:
-        text = str(data, "utf-8-sig")
+        text = str(data.data, "utf-8-sig")
         if sum(map(text.count, "{[,:")) > MOST_MARKS:
             raise BadFile(f"{name} has more than {MOST_MARKS:,} entries in its JSON: no scene.")
-        found = json.loads(text)
-    except RecursionError:
-        raise BadFile(f"{name} has JSON that is nested too deep.") from None
-    except BadFile:
-        raise
-    except ValueError as error:  # JSON and UTF-8 errors, and numbers of thousands of digits
-        raise BadFile(f"{name} has damaged JSON ({error}).") from None
-    if not isinstance(found, dict):
-        raise BadFile(f"{name} is JSON, but not a glTF asset.")
-    return found
+    except UnicodeDecodeError:
+        raise BadFile(f"{name} is not JSON, and no text at all; export it again.") from None
+    return Fields(parse_json(text, name), name, "it is no glTF asset").data

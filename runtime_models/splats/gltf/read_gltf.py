@@ -53,7 +53,7 @@ def read_raw_gltf(path: Path, reading: Reading) -> RawSplats:
         )
     parts = []
     for number, (primitive, matrix) in enumerate(placed):
-        reading.tell(f"reading {path.name}", number / len(placed))
+        reading.report(f"reading {path.name}", number / len(placed))
         parts.append(moved(read_primitive(asset, primitive, reading), matrix))
     raw = joined(parts, path.name)
     return replace(raw, front=not asset.in_our_axes)

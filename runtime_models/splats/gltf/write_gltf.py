@@ -20,7 +20,7 @@ from shapeshift.runtime_models.splats.gltf.gltf_files import (
     MAGIC,
 )
 from shapeshift.runtime_models.splats.gltf.read_gltf import PREFIX, SPLATS
-from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, turn
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
 KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
@@ -35,13 +35,15 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
     COLOR_0 is for programs that know no splats and show points.  Raises BadFile over 4 GB, which
     the format's lengths cannot say.
     """
-    splats = turn(splats, HALF_TURN_Y)
+    splats = rotate_splats(splats, HALF_TURN_Y)
     arrays = attributes_of(splats)
-    views, accessors, place = [], [], 0
+    views: list[dict[str, int]] = []
+    accessors: list[dict[str, object]] = []
+    place = 0
     for name, array in arrays.items():
         size = array.size * (1 if array.dtype == np.uint8 else 4)
         views.append({"buffer": 0, "byteOffset": place, "byteLength": size})
-        accessor = {
+        accessor: dict[str, object] = {
             "bufferView": len(accessors),
             "componentType": BYTE if array.dtype == np.uint8 else FLOAT,
             "count": len(array),
@@ -67,7 +69,7 @@ def write_gltf(splats: PlainSplats, path: str | Path) -> None:
             }
         },
     }
-    node = {"mesh": 0}
+    node: dict[str, object] = {"mesh": 0}
     if any(splats.origin):
         node["translation"] = list(splats.origin)
     asset = {

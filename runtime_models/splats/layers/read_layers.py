@@ -64,7 +64,7 @@ def join_layers(
     """
     counts, last = [len(part.means) for part in parts], len(parts) - 1
     kinds = sorted({part.format for part in parts})
-    provenance = {"format": " + ".join(kinds), "files": list(files)}
+    provenance: dict[str, object] = {"format": " + ".join(kinds), "files": list(files)}
     if dropped := sum(part.dropped for part in parts):
         provenance["dropped_rows"] = dropped
     origin, antialiased = parts[0].origin, any(part.antialiased for part in parts)
@@ -80,17 +80,21 @@ def join_layers(
     pieces = [vars(part) | {"extra": dict(part.extra)} for part in parts]
     parts.clear()
     shifts = [np.subtract(piece["origin"], origin) for piece in pieces]  # metres, float64
-    means = [moved(piece.pop("means"), shift) for piece, shift in zip(pieces, shifts, strict=True)]
+    means: list[np.ndarray | None] = [
+        moved(piece.pop("means"), shift) for piece, shift in zip(pieces, shifts, strict=True)
+    ]
     columns = sorted({name for piece in pieces for name in piece["extra"]})
     labels = [piece.pop("labels") for piece in pieces]
     return SplatLayers(
-        joined(means, counts),
-        *(joined([p.pop(name) for p in pieces], counts) for name in ("scales", "wxyz", "opacity")),
-        joined([widened(piece.pop("sh"), width) for piece in pieces], counts),
-        np.repeat(np.arange(last + 1, dtype=np.int32), counts),
-        stops,
-        mode or "cumulative",
-        provenance,
+        means=joined(means, counts),
+        scales=joined([piece.pop("scales") for piece in pieces], counts),
+        wxyz=joined([piece.pop("wxyz") for piece in pieces], counts),
+        opacity=joined([piece.pop("opacity") for piece in pieces], counts),
+        sh=joined([widened(piece.pop("sh"), width) for piece in pieces], counts),
+        layer=np.repeat(np.arange(last + 1, dtype=np.int32), counts),
+        stops=stops,
+        mode=mode or "cumulative",
+        provenance=provenance,
         origin=origin,
         antialiased=antialiased,
         labels=joined(labels, counts) if any(x is not None for x in labels) else None,
@@ -143,8 +147,11 @@ def widened(sh: np.ndarray, width: int) -> np.ndarray:
 
 def joined(arrays: list[np.ndarray | None], counts: list[int]) -> np.ndarray:
     """One array of the parts, the only part itself; None stands for zeros.  Empties the list."""
-    if len(arrays) == 1:
-        return arrays.pop()
+    first_part = arrays[0]
+    if len(arrays) == 1 and first_part is not None:
+        arrays.clear()
+        return first_part
+    del first_part
     known = [array for array in arrays if array is not None]
     kind = np.result_type(*known)
     out = np.empty((sum(counts), *known[0].shape[1:]), kind)  # takes memory as it is filled

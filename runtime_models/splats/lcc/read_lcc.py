@@ -13,6 +13,7 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.files.blocks import BLOCK, each_block
+from shapeshift.runtime_models.files.json_fields import Fields, parse_json
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
@@ -20,12 +21,13 @@ from shapeshift.runtime_models.splats.layers.read_layers import check_mode, join
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 from shapeshift.runtime_models.splats.ply.read_compressed_ply import from_smallest_three
 from shapeshift.runtime_models.splats.sog.read_streamed import finest_within, joined
-from shapeshift.runtime_models.splats.sog.sog_files import LARGEST_META, parse_json
+from shapeshift.runtime_models.splats.sog.sog_files import EXPORT_AGAIN, LARGEST_META
 
 ENDING, INDEX, DATA, HARMONICS = ".lcc", "index.bin", "data.bin", "shcoef.bin"
 ENVIRONMENT = "environment.bin"  # splats far away, which belong to every level
 UP = "+Z"
 MOST_LEVELS = 64
+MOST_ATTRIBUTES = 1000
 ROW = np.dtype(
     [
         ("mean", "<f4", 3),
@@ -74,6 +76,13 @@ def find_meta(path: Path, ending: str) -> Path | None:
     return path if path.name.lower().endswith(ending) and path.is_file() else None
 
 
+def meta_of(path: Path, ending: str) -> Path:
+    """The same; BadFile where there is none, or are several."""
+    if (file := find_meta(path, ending)) is None:
+        raise BadFile(f"{path} is no {ending} and no folder with one; copy the whole folder.")
+    return file
+
+
 def is_lcc(path: Path) -> bool:
     """A file that ends in .lcc, or a folder with one."""
     return find_meta(path, ENDING) is not None
@@ -82,7 +91,7 @@ def is_lcc(path: Path) -> bool:
 def read_lcc(path: Path, reading: Reading) -> SplatLayers:
     """The finest level within reading.most_splats, else the coarsest.  Raises BadFile."""
     check_mode(reading.mode)
-    file = find_meta(path, ENDING)
+    file = meta_of(path, ENDING)
     reading = reading.within(file.parent)
     lcc = read_meta(file, reading.account)
     number = finest_within(lcc.counts, reading.most_splats)
@@ -125,14 +134,13 @@ def read_meta(file: Path, memory: Account) -> Lcc:
     if (size := file.stat().st_size) > LARGEST_META:
         raise BadFile(f"{file.name} has {size:,} bytes; at most {LARGEST_META:,} are read.")
     with memory.lend(JSON_A_BYTE * size, "its JSON"):
-        said = parse_json(file.read_bytes(), file.name)
-    rows = said.get("attributes")
-    rows = rows if isinstance(rows, list) else []
-    ranges = {r["name"]: r for r in rows if isinstance(r, dict) and isinstance(r.get("name"), str)}
-    levels = said.get("totalLevel")
-    if type(levels) is not int or not 1 <= levels <= MOST_LEVELS:
-        raise BadFile(f"{file.name} states no totalLevel from 1 to {MOST_LEVELS}; export it again.")
-    kind = said.get("fileType")
+        meta = Fields(parse_json(file.read_bytes(), file.name), file.name, EXPORT_AGAIN)
+    ranges = {
+        row.data["name"]: row
+        for row in meta.rows("attributes", MOST_ATTRIBUTES, "attribute")
+        if isinstance(row.data.get("name"), str)
+    }
+    levels, kind = meta.count("totalLevel", 1, MOST_LEVELS), meta.value("fileType", None)
     harmonics = kind != "Portable" and (kind == "Quality" or "shcoef" in ranges)
     return Lcc(
         file.parent,
@@ -144,19 +152,15 @@ def read_meta(file: Path, memory: Account) -> Lcc:
     )
 
 
-def coding_of(ranges: dict, prefix: str, harmonics: bool, file: str) -> Coding:
+def coding_of(ranges: dict[str, Fields], prefix: str, harmonics: bool, file: str) -> Coding:
     """The ranges of one kind of splats; those of the environment may be those of all."""
 
     def ends(name: str) -> tuple[np.ndarray, np.ndarray]:
-        row = ranges.get(prefix + name) or ranges.get(name) or {}
-        out = []
-        for key in ("min", "max"):
-            numbers = row.get(key)
-            good = isinstance(numbers, list) and len(numbers) == 3
-            if not good or not all(type(n) in (int, float) and abs(n) < 1e30 for n in numbers):
-                raise BadFile(f"{file}: its attribute {name} has no {key} of 3 numbers; export it.")
-            out.append(np.array(numbers, np.float32))
-        return tuple(out)
+        row = ranges.get(prefix + name) or ranges.get(name)
+        if row is None:
+            raise BadFile(f"{file}: 'attributes' has no '{name}'; {EXPORT_AGAIN}.")
+        low, high = (np.array(row.numbers(key, 3, most=1e30), np.float32) for key in ("min", "max"))
+        return low, high
 
     nothing = (np.zeros(3, np.float32), np.zeros(3, np.float32))
     return Coding(ends("scale"), ends("shcoef") if harmonics else nothing)
@@ -206,7 +210,7 @@ def read_level(lcc: Lcc, number: int, reading: Reading) -> RawSplats:
         decode(table, words, lcc.coding, raw, rows)
         first = rows.stop
         if done % 64 == 0:
-            reading.tell(f"reading {lcc.file.name}", first / count)
+            reading.report(f"reading {lcc.file.name}", first / count)
     return raw
 
 

@@ -6,10 +6,11 @@ with the names of fields before and after its change.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from shapeshift.runtime_models.files.json_fields import Fields, parse_json
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account
 from shapeshift.runtime_models.model import BadFile, SplatLayers
 from shapeshift.runtime_models.splats.layers.read_layers import check_mode
@@ -18,11 +19,12 @@ from shapeshift.runtime_models.splats.lcc.read_lcc import (
     UP,
     find_meta,
     level_as_layers,
+    meta_of,
 )
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.read_streamed import finest_within
-from shapeshift.runtime_models.splats.sog.sog_files import LARGEST_META, file_inside, parse_json
+from shapeshift.runtime_models.splats.sog.sog_files import EXPORT_AGAIN, LARGEST_META, file_inside
 from shapeshift.runtime_models.splats.spz.read_spz import read_raw_spz
 from shapeshift.runtime_models.splats.spz.spz_file import count_in
 
@@ -49,15 +51,15 @@ def is_lcc2(path: Path) -> bool:
 def read_lcc2(path: Path, reading: Reading) -> SplatLayers:
     """The finest level within reading.most_splats, else the coarsest.  Raises BadFile."""
     check_mode(reading.mode)
-    file = find_meta(path, ENDING)
+    file = meta_of(path, ENDING)
     reading = reading.within(file.parent)
     lcc = read_meta(file, reading.account)
     number = finest_within(lcc.counts, reading.most_splats)
     files = list(lcc.levels[number]) + ([lcc.environment] if lcc.environment else [])
     parts = []
     for i, each in enumerate(files):
-        reading.tell(f"reading level {number} of {file.name}", i / len(files))
-        parts.append(read_chunk(each, replace(reading, told=None)))
+        reading.report(f"reading level {number} of {file.name}", i / len(files))
+        parts.append(read_chunk(each, replace(reading, progress=None)))
     names = [file.name, *(each.relative_to(file.parent).as_posix() for each in files)]
     return level_as_layers(parts, number, lcc.counts, file, reading, names)
 
@@ -82,18 +84,12 @@ def read_meta(file: Path, memory: Account) -> Lcc2:
         text = file.read_bytes().decode("utf-8", "replace")
         strict = LOOSE.sub(lambda found: found[0] if found[0] != "," else "", text)
         said = parse_json(strict.encode(), file.name)
-    root = said.get("root") if isinstance(said.get("root"), dict) else {}
-    levels = said.get("totalLevels", said.get("lod_level"))
-    names = root.get("splatFiles", root.get("files"))
-    if type(levels) is not int or not 1 <= levels <= MOST_LEVELS:
-        raise BadFile(f"{file.name} states no levels from 1 to {MOST_LEVELS}; export it again.")
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise BadFile(f"{file.name} does not name its files; export it again.")
-    ending = said.get("splatType", ".sog")
-    if ending not in (".sog", ".spz"):
-        raise BadFile(f"{file.name} has splats as {str(ending)[:20]!r}; .sog and .spz are known.")
-    old = "splatFiles" not in root
-    names = [name.lstrip("/") for name in names]
+    meta = Fields(said, file.name, EXPORT_AGAIN)
+    tree, old_levels = meta.object("root"), "totalLevels" not in meta.data
+    levels = meta.count("lod_level" if old_levels else "totalLevels", 1, MOST_LEVELS)
+    ending = meta.line("splatType", ".sog", known=(".sog", ".spz"))
+    root, old = tree.data, "splatFiles" not in tree.data
+    names = [name.lstrip("/") for name in tree.texts("files" if old else "splatFiles")]
     names = [n if n.endswith(ending) or not old else n + ending for n in names]
     far = number_of(root.get("data"), "env", len(names), file.name)
     numbers: list[set[int]] = [set() for _ in range(levels)]
@@ -113,7 +109,7 @@ def read_meta(file: Path, memory: Account) -> Lcc2:
     )
 
 
-def nodes_of(root: dict, name: str) -> Iterator[tuple[dict, int]]:
+def nodes_of(root: Mapping, name: str) -> Iterator[tuple[Mapping, int]]:
     """Every node below the root with its depth; children are a list, or an object of them."""
     waiting = [(root, 0)]
     while waiting:

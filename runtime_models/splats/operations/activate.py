@@ -5,34 +5,33 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import block_of, each_block
-from shapeshift.runtime_models.lint.invalid_rows import is_odd, odd_in
+from shapeshift.runtime_models.lint.invalid_rows import any_invalid, invalid_in
 from shapeshift.runtime_models.rotation import normalize
-from shapeshift.runtime_models.splats.operations.rotate_splats import turner
-from shapeshift.runtime_models.splats.plain_splats import RawSplats
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotator
+from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats
 
 ODD = 140  # bytes of an odd splat's numbers in float64, beside two copies as they are filed
-ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")
 
 
-def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawSplats]:
+def activate(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawSplats]:
     """Changes the arrays of `raw`: what they hold afterwards is ours, turned by rotation (3, 3).
 
-    Gives the rows (K,), rising, that are odd as odd_rows.py says, and those rows as they were in
-    the file: what has to be known to judge them.  They are converted like all others; what is not
-    finite stays so.  Arrays that may not be written to are copied first.
+    Gives the rows (K,), rising, that are invalid as invalid_rows.py says, and those rows as they
+    were in the file: what has to be known to judge them.  They are converted like all others; what
+    is not finite stays so.  Arrays that may not be written to are copied first.
     """
     for name in ARRAYS:
         array = getattr(raw, name)
         if not array.flags.writeable:
             setattr(raw, name, array.copy())
-    turn_rows = turner(rotation, raw.sh.shape[1])
+    rotate_rows = rotator(rotation, raw.sh.shape[1])
     filed = replace(raw)  # the coding, as filed
     raw.log_scales = raw.logits = False
     found: list[tuple[np.ndarray, list[np.ndarray]]] = []
 
     def work(rows: slice, _: None) -> None:
-        if is_odd(filed, rows):
-            odd = rows.start + np.flatnonzero(odd_in(filed, rows))
+        if any_invalid(filed, rows):
+            odd = rows.start + np.flatnonzero(invalid_in(filed, rows))
             raw.memory.charge(len(odd) * (ODD + 2 * raw.bytes_a_splat), f"{len(odd):,} odd splats")
             found.append((odd, [getattr(filed, name)[odd] for name in ARRAYS]))
         if filed.log_scales:
@@ -40,7 +39,7 @@ def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawS
         if filed.logits:
             sigmoid(raw.opacity[rows])
         raw.wxyz[rows] = normalize(raw.wxyz[rows])
-        turn_rows(raw.means[rows], raw.wxyz[rows], raw.sh[rows])
+        rotate_rows(raw.means[rows], raw.wxyz[rows], raw.sh[rows])
 
     with np.errstate(over="ignore", invalid="ignore"):
         each_block(len(raw.means), work, block=block_of(44 + 12 * raw.sh.shape[1]))
@@ -51,7 +50,7 @@ def to_own_units(raw: RawSplats, rotation: np.ndarray) -> tuple[np.ndarray, RawS
         np.concatenate(parts) for parts in zip(*(arrays for _, arrays in found), strict=True)
     ]
     rows = np.concatenate([odd for odd, _ in found])
-    return rows, replace(filed, **dict(zip(ARRAYS, columns, strict=True)), labels=None, extra={})
+    return rows, filed.with_arrays(columns, labels=None, extra={})
 
 
 def sigmoid(logits: np.ndarray) -> None:

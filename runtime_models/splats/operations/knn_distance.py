@@ -9,7 +9,7 @@ REACH = 6  # places along the curve, to either side, where neighbours are looked
 SHIFTS = (0.0, 1 / 3)  # of the scene: what one curve parts, the other does not
 
 
-def spacing(points: np.ndarray) -> np.ndarray:
+def knn_distance(points: np.ndarray) -> np.ndarray:
     """(N,) about the mean distance to the three nearest of the other points (N, 3).
 
     Never below a hundredth of the median nor above four times it, so that neither doubles vanish

@@ -13,7 +13,7 @@ PHASE = 0.618  # of 0..1: equal weights do not add up to just this
 NEARLY_SURE = 0.999  # chance from which a splat stays for certain
 
 
-def thin(layers: SplatLayers, most: int) -> SplatLayers:
+def prune_by_importance(layers: SplatLayers, most: int) -> SplatLayers:
     """`most` of the splats in their order, or all of them where most is 0 or there are no more.
 
     Not simply the largest: those leave holes where detail was, which costs 1 to 3.4 dB at

@@ -9,7 +9,7 @@ FINE = 0.01  # of the median splat's size: positions need no finer steps than th
 COARSE = 0.5  # of it: a file whose own numbers have coarser steps has lost its shape
 
 
-def place_of(
+def origin_of(
     sample: Sample, kind: np.dtype, file: str
 ) -> tuple[tuple[float, float, float], list[Finding]]:
     """What to take off all means where float32 could not tell splats apart there, and what to say.
@@ -34,7 +34,7 @@ def place_of(
     return (x, y, z), found
 
 
-def about(means: np.ndarray, origin: tuple[float, float, float]) -> np.ndarray:
+def recentred(means: np.ndarray, origin: tuple[float, float, float]) -> np.ndarray:
     """(N, 3) float32 means from origin: exact where they are float64, and of float32 nothing lost.
 
     Nothing is copied where there is nothing to do.

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import basis
 from shapeshift.runtime_models.files.blocks import BLOCK, each_block
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.plain_splats import AXES, PlainSplats
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # about x: between COLMAP's axes and ours
@@ -34,40 +35,40 @@ def ours_from_file(up: str, flip: bool = False, front: bool = False) -> np.ndarr
     return UPSIDE_DOWN @ turned if flip else turned
 
 
-def turn(splats: PlainSplats, rotation: np.ndarray) -> PlainSplats:
+def rotate_splats(splats: PlainSplats, rotation: np.ndarray) -> PlainSplats:
     """The splats after a rotation (3, 3) of the world about its zero."""
     if np.array_equal(rotation, np.eye(3)):
         return splats
     means, wxyz, sh = splats.means.copy(), splats.wxyz.copy(), splats.sh.copy()
-    turn_rows = turner(rotation, sh.shape[1])
-    each_block(len(means), lambda rows, _: turn_rows(means[rows], wxyz[rows], sh[rows]))
-    origin = tuple(map(float, rotation @ np.array(splats.origin)))
+    rotate_rows = rotator(rotation, sh.shape[1])
+    each_block(len(means), lambda rows, _: rotate_rows(means[rows], wxyz[rows], sh[rows]))
+    origin = three(rotation @ np.array(splats.origin))
     return replace(splats, means=means, wxyz=wxyz, sh=sh, origin=origin)
 
 
-def turn_half(splats: PlainSplats) -> PlainSplats:
+def rotate_half_turn(splats: PlainSplats) -> PlainSplats:
     """Half a turn about x, its own inverse: from COLMAP's axes (y down, z forward) and back."""
-    return turn(splats, HALF_TURN)
+    return rotate_splats(splats, HALF_TURN)
 
 
-def turner(rotation: np.ndarray, count: int) -> Callable[..., None]:
+def rotator(rotation: np.ndarray, count: int) -> Callable[..., None]:
     """A function that turns, in place, rows of means (n, 3), wxyz (n, 4) and sh (n, count, 3)."""
     if np.array_equal(rotation, np.eye(3)):
         return lambda means, wxyz, sh: None
     if np.array_equal(np.abs(rotation), np.eye(3)):
-        return half_turner(rotation.diagonal(), count)
-    harmonics = turn_harmonics(rotation, count)
+        return half_turn_rotator(rotation.diagonal(), count)
+    harmonics = rotate_harmonics(rotation, count)
 
-    def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+    def rotate_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
         means[:] = means @ rotation.T
-        wxyz[:] = turn_quaternions(wxyz, rotation)
+        wxyz[:] = rotate_quaternions(wxyz, rotation)
         sh[:, 1:] = np.einsum("ij,njc->nic", harmonics[1:, 1:], sh[:, 1:], optimize=True)
 
-    return turn_rows
+    return rotate_rows
 
 
-def half_turner(signs: np.ndarray, count: int) -> Callable[..., None]:
-    """turner() of half a turn about the axis whose sign (3,) is +1: nothing but signs.
+def half_turn_rotator(signs: np.ndarray, count: int) -> Callable[..., None]:
+    """rotator() of half a turn about the axis whose sign (3,) is +1: nothing but signs.
 
     A quaternion times that of the half turn is itself in another order, with signs.
     """
@@ -80,10 +81,10 @@ def half_turner(signs: np.ndarray, count: int) -> Callable[..., None]:
     harmonic_signs = signs_of_harmonics(signs, count)  # (count,)
     every_channel = np.repeat(harmonic_signs, 3)
 
-    def turn_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
+    def rotate_rows(means: np.ndarray, wxyz: np.ndarray, sh: np.ndarray) -> None:
         if means.flags.c_contiguous and 3 * len(means) <= len(tiled):
-            flat = means.reshape(-1)  # one long loop, not one of three for each
-            flat *= tiled[: flat.size]
+            numbers = means.reshape(-1)  # one long loop, not one of three for each
+            numbers *= tiled[: numbers.size]
         else:
             means *= tiled[:3]
         wxyz[:] = wxyz.take(order, axis=1)
@@ -96,7 +97,7 @@ def half_turner(signs: np.ndarray, count: int) -> Callable[..., None]:
         else:
             sh *= harmonic_signs[:, None]
 
-    return turn_rows
+    return rotate_rows
 
 
 def signs_of_harmonics(signs: np.ndarray, count: int) -> np.ndarray:
@@ -110,7 +111,7 @@ def signs_of_harmonics(signs: np.ndarray, count: int) -> np.ndarray:
     return np.sign((before * after).sum(axis=0)).astype(np.float32)
 
 
-def turn_quaternions(wxyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+def rotate_quaternions(wxyz: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """(N, 4) q * wxyz, q being the rotation (3, 3)."""
     w, x, y, z = quaternion_of(rotation)
     left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
@@ -131,7 +132,7 @@ def quaternion_of(rotation: np.ndarray) -> np.ndarray:
     return np.linalg.eigh(k)[1][:, -1]
 
 
-def turn_harmonics(rotation: np.ndarray, count: int) -> np.ndarray:
+def rotate_harmonics(rotation: np.ndarray, count: int) -> np.ndarray:
     """(count, count) float32: coefficients of a function after its world is turned.
 
     By its meaning, turned(d) = f(R^T d), solved on more directions than there are coefficients:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import column_names
 
 TYPES = {"float": "f4", "float32": "f4", "double": "f8", "float64": "f8", "uchar": "u1",
          "uint8": "u1", "char": "i1", "int8": "i1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -32,7 +33,7 @@ class Element:
 
     def require(self, needed: tuple[str, ...], file: str) -> None:
         """Raises BadFile where a column is missing."""
-        missing = [name for name in needed if name not in (self.layout.names or ())]
+        missing = [name for name in needed if name not in column_names(self.layout)]
         if missing:
             raise BadFile(
                 f"{file} has no {missing[0]}: a point cloud or another format, not 3DGS splats; "
@@ -73,7 +74,9 @@ class PlyHeader:
         if element.count == 0:
             raise BadFile(f"{self.file} holds no splats; export it again.")
         # A number in ASCII has a digit and a space at least; the last one needs no space.
-        least = 2 * len(element.row) if self.encoding == "ascii" else element.row.itemsize
+        least = (
+            2 * len(column_names(element.row)) if self.encoding == "ascii" else element.row.itemsize
+        )
         room = self.size - begins + (self.encoding == "ascii")
         if room < element.count * least:
             raise BadFile(
@@ -142,7 +145,7 @@ def read_table(path: Path, needed: tuple[str, ...], name: str = "vertex") -> np.
         raise BadFile(f"{path.name} is an ASCII PLY; convert it to a binary one.")
     element, begins = header.find(name)
     element.require(needed, path.name)
-    return np.memmap(path, element.row, "r", begins, (element.count,))
+    return np.memmap(path, element.layout, "r", begins, (element.count,))
 
 
 def columns(table: np.ndarray, prefix: str, count: int) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.files.blocks import each_block
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import column_names
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 from shapeshift.runtime_models.splats.ply.ply_file import PlyHeader, read_header
 from shapeshift.runtime_models.splats.ply.read_ply import teller
@@ -44,7 +45,7 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
         antialiased="splatrendermode: mip" in [comment.lower() for comment in header.comments],
         memory=memory,
     )
-    colored = set(COLORS) <= set(ranges.dtype.names)
+    colored = set(COLORS) <= set(column_names(ranges.dtype))
 
     def decode(rows: slice, _: object) -> None:
         words = packed[rows]
@@ -89,14 +90,14 @@ def records(
     element, begins = header.find(name)
     for column in columns:
         if (
-            column not in (element.layout.names or ())
+            column not in column_names(element.layout)
             or element.layout[column].newbyteorder("=") != kind
         ):
             raise BadFile(
                 f"{path.name}: its element {name} has no {column} of {np.dtype(kind)}, as a "
                 "compressed PLY has; export it again."
             )
-    return np.memmap(path, element.row, "r", begins, (element.count,))
+    return np.memmap(path, element.layout, "r", begins, (element.count,))
 
 
 def harmonics_of(path: Path, header: PlyHeader, count: int) -> np.ndarray:
@@ -104,8 +105,9 @@ def harmonics_of(path: Path, header: PlyHeader, count: int) -> np.ndarray:
     rows = [element.row for element in header.elements if element.name == "sh"]
     if not rows:
         return np.empty((count, 3, 0), np.uint8)
-    names = tuple(f"f_rest_{i}" for i in range(len(rows[0] or ())))
-    if len(names) not in REST or rows[0].names != names:
+    found = () if rows[0] is None else column_names(rows[0])
+    names = tuple(f"f_rest_{i}" for i in range(len(found)))
+    if len(names) not in REST or found != names:
         raise BadFile(f"{path.name}: its element sh has not 9, 24 or 45 columns f_rest_0, ...")
     codes = records(path, header, "sh", names, np.uint8)
     if len(codes) != count:

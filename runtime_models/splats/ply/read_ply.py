@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from io import RawIOBase
 from pathlib import Path
 from typing import BinaryIO
 
@@ -11,6 +12,7 @@ from shapeshift.runtime_models.colors.spherical_harmonics import C0, COEFFICIENT
 from shapeshift.runtime_models.files.blocks import block_of, each_block
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.model import BadFile, Finding
+from shapeshift.runtime_models.shapes import column_names, column_offset
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
 from shapeshift.runtime_models.splats.still_frame import still
@@ -31,11 +33,13 @@ def read_raw_ply(path: Path, reading: Reading) -> RawSplats:
     """Splats of a 3DGS PLY of SH degree 0 to 3, binary or ASCII.  Raises BadFile."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    shades = shades_in(vertex.layout.names)
+    shades = shades_in(column_names(vertex.layout))
     vertex.require(SHAPES if shades else GEOMETRY, path.name)
     said = {name.rstrip(":=").lower(): value.lower() for name, value in sayings(header)}
     memory = reading.within(path).account
-    splats = Columns(vertex, harmonics_of(vertex.layout.names, path.name), path.name, said, memory)
+    splats = Columns(
+        vertex, harmonics_of(column_names(vertex.layout), path.name), path.name, said, memory
+    )
     if header.encoding == "ascii":
         read_text(path, begins, splats, reading)
     else:
@@ -74,14 +78,14 @@ class Columns:
     def __init__(
         self, vertex: Element, harmonics: list[str], file: str, said: dict, memory: Account
     ) -> None:
-        names, kinds, n = vertex.layout.names, vertex.layout, vertex.count
+        names, kinds, n = column_names(vertex.layout), vertex.layout, vertex.count
         self.row = vertex.layout
         self.count = n
         self.plain = all(kinds[name] == np.dtype("<f4") for name in names)
         self.flat = SCALES[2] not in names or said.get("splatrendermode") == "2dgs"
         scales = SCALES[:2] if self.flat else SCALES
         exact = any(kinds[axis].itemsize > 4 for axis in PLACE)
-        findings = ()
+        findings: tuple[Finding, ...] = ()
         if self.flat:
             done = f"read as flat splats, {FLAT:g} as thick as wide"
             findings = (Finding("2D splats, with two scales each", n, done, (), file, False),)
@@ -103,7 +107,7 @@ class Columns:
             (("opacity",), raw.opacity[:, None]),
         ]
         self.places = [  # where they are in a row of floats
-            np.array([kinds.fields[name][1] // 4 for name in columns])
+            np.array([column_offset(kinds, name) // 4 for name in columns])
             for columns, _ in self.targets
         ]
         used = {n for columns, _ in self.targets for n in columns} | {SCALES[2], *self.shades}
@@ -146,22 +150,22 @@ def read_records(path: Path, begins: int, splats: Columns, reading: Reading) -> 
     size, block = splats.row.itemsize, block_of(splats.row.itemsize)
 
     @contextmanager
-    def opened() -> Iterator[tuple[BinaryIO, np.ndarray]]:
+    def opened() -> Iterator[tuple[RawIOBase, np.ndarray]]:
         with path.open("rb", buffering=0) as file:
             yield file, np.empty(block, splats.row)
 
-    def work(rows: slice, own: tuple[BinaryIO, np.ndarray]) -> None:
+    def work(rows: slice, own: tuple[RawIOBase, np.ndarray]) -> None:
         file, table = own[0], own[1][: rows.stop - rows.start]
         file.seek(begins + rows.start * size)
         # Not a memoryview of the records: those may have names that it does not know how to read.
-        if read_fully(file, memoryview(table.view(np.uint8))) < table.nbytes:
+        if read_fully(file, table.view(np.uint8).data) < table.nbytes:
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         splats.fill(rows, table)
 
     each_block(splats.count, work, teller(path, reading), opened, block)
 
 
-def read_fully(file: BinaryIO, into: memoryview) -> int:
+def read_fully(file: RawIOBase, into: memoryview) -> int:
     """Bytes read; fewer than asked for only at the end of the file."""
     done = 0
     while done < len(into) and (more := file.readinto(into[done:])):
@@ -171,7 +175,7 @@ def read_fully(file: BinaryIO, into: memoryview) -> int:
 
 def read_text(path: Path, begins: int, splats: Columns, reading: Reading) -> None:
     """Fills the columns from an ASCII file."""
-    width, first, pending = len(splats.row), 0, np.empty(0)
+    width, first, pending = len(column_names(splats.row)), 0, np.empty(0)
     tell = teller(path, reading)
     with path.open("rb") as file:
         file.seek(begins)
@@ -183,7 +187,7 @@ def read_text(path: Path, begins: int, splats: Columns, reading: Reading) -> Non
             table = np.empty(count, splats.row)
             part = pending[: count * width].reshape(count, width)
             with np.errstate(over="ignore", invalid="ignore"):
-                for i, name in enumerate(splats.row.names):
+                for i, name in enumerate(column_names(splats.row)):
                     table[name] = part[:, i]
             splats.fill(slice(first, first + count), table)
             pending, first = pending[count * width :], first + count
@@ -219,4 +223,4 @@ def parse(text: bytes, name: str) -> np.ndarray:
 
 
 def teller(path: Path, reading: Reading) -> Callable[[float], None]:
-    return lambda part: reading.tell(f"reading {path.name}", part)
+    return lambda part: reading.report(f"reading {path.name}", part)

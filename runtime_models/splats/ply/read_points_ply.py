@@ -7,7 +7,8 @@ import numpy as np
 
 from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import BadFile, Finding
-from shapeshift.runtime_models.splats.operations.knn_distance import spacing
+from shapeshift.runtime_models.shapes import column_names
+from shapeshift.runtime_models.splats.operations.knn_distance import knn_distance
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.splats.ply.ply_file import Element, PlyHeader, read_header
 from shapeshift.runtime_models.splats.ply.read_ply import (
@@ -39,7 +40,7 @@ def is_points(head: bytes, path: Path) -> bool:
         vertex = [e for e in read_header(path).elements if e.name == "vertex" and e.row]
     except BadFile:
         return False
-    names = set(vertex[0].row.names or ()) if vertex else set()
+    names = set(column_names(vertex[0].layout)) if vertex else set()
     return set(PLACE) <= names and not names & {*SCALES, *QUATERNION}
 
 
@@ -47,7 +48,7 @@ def read_raw_points_ply(path: Path, reading: Reading) -> RawSplats:
     """A round opaque splat for each point, binary or ASCII.  Raises BadFile, always if strict."""
     header = read_header(path)
     vertex, begins = header.find("vertex")
-    lacking = [name for name in GEOMETRY if name not in vertex.layout.names]
+    lacking = [name for name in GEOMETRY if name not in column_names(vertex.layout)]
     what = f"a point cloud, no splats: it has no {', '.join(lacking)}"
     reading = reading.within(path)
     memory = reading.account
@@ -75,9 +76,9 @@ def splats_of_points(
         places = places.astype(np.float64)
     count, memory = len(places), reading.account
     memory.charge(count * SHOWN, f"{count:,} points")
-    reading.tell(f"measuring {file}", 0.5)
+    reading.report(f"measuring {file}", 0.5)
     with memory.lend(count * MEASURED, f"measuring {count:,} points"):
-        size = (SIGMA * spacing(places)).astype(np.float32)
+        size = (SIGMA * knn_distance(places)).astype(np.float32)
     done = f"shown as {count:,} points, each as wide as the way to its neighbours"
     return RawSplats(
         means=places,
@@ -97,8 +98,8 @@ def splats_of_points(
 def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) -> np.ndarray:
     """(N,) records of the points.  Raises BadFile."""
     if header.encoding != "ascii":
-        return np.memmap(path, vertex.row, "r", begins, (vertex.count,))
-    width, table, done = len(vertex.row), np.empty(vertex.count, vertex.row), 0
+        return np.memmap(path, vertex.layout, "r", begins, (vertex.count,))
+    width, table, done = len(column_names(vertex.layout)), np.empty(vertex.count, vertex.layout), 0
     pending = np.empty(0)
     with path.open("rb") as file:
         file.seek(begins)
@@ -107,7 +108,7 @@ def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) ->
             rows = min(len(pending) // width, vertex.count - done)
             part = pending[: rows * width].reshape(rows, width)
             with np.errstate(over="ignore", invalid="ignore"):
-                for i, name in enumerate(vertex.layout.names):
+                for i, name in enumerate(column_names(vertex.layout)):
                     table[name][done : done + rows] = part[:, i]
             pending, done = pending[rows * width :], done + rows
             if done == vertex.count:
@@ -121,7 +122,7 @@ def read_records(path: Path, header: PlyHeader, vertex: Element, begins: int) ->
 def colors_of(table: np.ndarray) -> np.ndarray:
     """(N, 1, 3) float32 harmonics of degree 0: the points' colours, or gray."""
     shades = shades_of(table)
-    if shades is None and set(DIRECT) <= set(table.dtype.names):
+    if shades is None and set(DIRECT) <= set(column_names(table.dtype)):
         return np.stack([table[name] for name in DIRECT], 1, dtype=np.float32)[:, None]
     return harmonics_of(shades, len(table))
 
@@ -135,7 +136,7 @@ def harmonics_of(shades: np.ndarray | None, count: int) -> np.ndarray:
 
 def shades_of(table: np.ndarray) -> np.ndarray | None:
     """(N, 3) float32 red, green and blue, 1 the most that an integer can say; None without."""
-    names = next((three for three in COLORS if set(three) <= set(table.dtype.names)), None)
+    names = next((three for three in COLORS if set(three) <= set(column_names(table.dtype))), None)
     if names is None:
         return None
     shades = []
@@ -149,5 +150,5 @@ def shades_of(table: np.ndarray) -> np.ndarray | None:
 def others_of(table: np.ndarray) -> dict[str, np.ndarray]:
     """The columns that say neither where a point is nor how it looks."""
     shown = {*PLACE, *NORMAL, *DIRECT, "alpha", "opacity", *(n for three in COLORS for n in three)}
-    names = [name for name in table.dtype.names if name not in shown]
+    names = [name for name in column_names(table.dtype) if name not in shown]
     return {name: table[name].astype(table.dtype[name].newbyteorder("=")) for name in names}

@@ -10,7 +10,7 @@ from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.files.blocks import BLOCK, each_block
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.splats.operations.morton import morton_order
-from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, turner
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, rotator
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.runtime_models.splats.ply.read_compressed_ply import (
     BITS_11_10_11,
@@ -58,7 +58,7 @@ def in_file_axes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, quaternions and harmonics of the rows of `order`, turned back."""
     turned = splats.means[order], splats.wxyz[order], splats.sh[order]
-    turner(HALF_TURN, splats.sh.shape[1])(*turned)  # its own inverse
+    rotator(HALF_TURN, splats.sh.shape[1])(*turned)  # its own inverse
     return turned
 
 

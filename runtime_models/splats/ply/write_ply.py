@@ -8,7 +8,8 @@ import numpy as np
 
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.files.whole_file import write_whole
-from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, turner
+from shapeshift.runtime_models.shapes import column_names
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, rotator
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 
 TYPES = {"f4": "float", "f8": "double", "u1": "uchar", "i1": "char", "u2": "ushort", "i2": "short",
@@ -69,7 +70,7 @@ def properties(row: np.dtype) -> list[str]:
     """The header's lines of a record."""
     names = {"place": list("xyz"), "normal": list(NORMAL), "opacity": ["opacity"]}
     lines = []
-    for group in row.names:
+    for group in column_names(row):
         kind = row[group].base
         count = row[group].itemsize // kind.itemsize
         if group.startswith("extra "):
@@ -85,7 +86,7 @@ def records(
 ) -> Iterator[bytes]:
     """The bytes of the file, part after part."""
     yield header
-    turn_rows = turner(HALF_TURN, splats.sh.shape[1])  # its own inverse
+    rotate_rows = rotator(HALF_TURN, splats.sh.shape[1])  # its own inverse
     origin = np.array(splats.origin) * HALF_TURN.diagonal()  # metres, in the file's axes
     for first in range(0, len(splats.means), BLOCK):
         rows = slice(first, first + BLOCK)
@@ -94,7 +95,7 @@ def records(
             splats.wxyz[rows].copy(),
             splats.sh[rows].copy(),
         )
-        turn_rows(means, wxyz, sh)
+        rotate_rows(means, wxyz, sh)
         table = np.zeros(len(means), row)
         table["place"] = means + origin if origin.any() else means
         table["f_dc"], table["f_rest"] = sh[:, 0], sh[:, 1:].transpose(0, 2, 1)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.files.blocks import each_block
+from shapeshift.runtime_models.files.json_fields import Fields, shown
 from shapeshift.runtime_models.files.memory import Account
 from shapeshift.runtime_models.files.zip_files import member_names
 from shapeshift.runtime_models.model import BadFile, Finding
@@ -50,12 +51,12 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
     what = f"{sog.count:,} splats"
     memory.charge(GEOMETRY * sog.count, what)
     with memory.lend(DECODING * sog.count, what):
-        reading.tell(f"reading {path.name}", 0.0)
+        reading.report(f"reading {path.name}", 0.0)
         means = read_means(sog)
-        reading.tell(f"reading {path.name}", 0.3)
+        reading.report(f"reading {path.name}", 0.3)
         scales = decode(sog, "scales", sog.pixels("scales")[:, :3])
         wxyz = read_quaternions(sog)
-        reading.tell(f"reading {path.name}", 0.5)
+        reading.report(f"reading {path.name}", 0.5)
         sh, opacity = read_colors(sog)
     memory.release(sog.files.held)
     return RawSplats(
@@ -67,7 +68,8 @@ def read_raw_sog(path: Path, reading: Reading) -> RawSplats:
         file=sog.files.name,
         format=f"SOG v{sog.version}",
         logits=sog.version == 1,
-        antialiased=sog.meta.get("model") == "antialiased" or sog.meta.get("antialias") is True,
+        antialiased=sog.meta.data.get("model") == "antialiased"
+        or sog.meta.data.get("antialias") is True,
         findings=tuple(sog.findings),
         memory=memory,
     )
@@ -78,36 +80,27 @@ class Sog:
     """What a meta.json says; what is odd in its pictures gathers as findings."""
 
     files: SogFiles
-    meta: dict
+    meta: Fields
     version: int
     count: int
     findings: list[Finding] = field(default_factory=list)
 
     def names(self, part: str) -> list[str]:
         """The files of a part; [] where there is none, which only harmonics may be."""
-        if part not in self.meta and part != "shN":
-            raise self.bad(f"{part} is missing")
-        names = self.section(part).get("files") if part in self.meta else []
-        wanted = PICTURES[part] if part in self.meta else 0
-        if not isinstance(names, list) or len(names) != wanted:
-            raise self.bad(f"{part} needs the names of {wanted} files")
-        if not all(isinstance(name, str) for name in names):
-            raise self.bad(f"{part} needs names of files")
+        if part == "shN" and part not in self.meta.data:
+            return []
+        names = self.meta.object(part).texts("files")
+        if len(names) != PICTURES[part]:
+            raise self.bad(f"{part} needs the names of {PICTURES[part]} files")
         return names
 
     def file_names(self) -> list[str]:
         """All pictures."""
         return [name for part in PICTURES for name in self.names(part)]
 
-    def section(self, part: str) -> dict:
-        found = self.meta.get(part)
-        if not isinstance(found, dict):
-            raise self.bad(f"{part} is missing")
-        return found
-
     def numbers(self, part: str, key: str, least: int, most: int) -> np.ndarray:
         """(n,) float32, `least` to `most` of them.  Raises BadFile."""
-        found = self.section(part).get(key)
+        found = self.meta.object(part).data.get(key)
         found = found if isinstance(found, list) else [found]
         if key == "codebook" and len(found) == 256 and found[0] is None:
             found = [extrapolated(found), *found[1:]]
@@ -140,12 +133,13 @@ def open_sog(path: Path, memory: Account) -> Sog:
     """The meta.json of a SOG; no picture is read yet.  Raises BadFile."""
     files = SogFiles(path, memory)
     meta = files.meta()
-    version = meta.get("version", 1)
+    version = meta.value("version", 1)
     if type(version) is not int or version not in (1, 2):
-        raise BadFile(f"{files.name} is a SOG of version {str(version)[:20]}, known are 1 and 2.")
-    means = meta.get("means")
-    shape = means.get("shape") if isinstance(means, dict) else None
-    count = meta.get("count") if version == 2 else shape[0] if isinstance(shape, list) else None
+        raise BadFile(f"{files.name} is a SOG of version {shown(version)}, known are 1 and 2.")
+    count = meta.value("count", None)
+    if version == 1:
+        shape = meta.object("means").data.get("shape")
+        count = shape[0] if isinstance(shape, list) and shape else None
     if type(count) is not int or count < 1:
         raise BadFile(f"{files.name} does not say how many splats there are; export it again.")
     sog = Sog(files, meta, version, count)
@@ -192,19 +186,21 @@ def read_quaternions(sog: Sog) -> np.ndarray:
     def fill(rows: slice, _: object) -> None:
         small = (pixels[rows, :3].T.astype(np.float32, order="C") / 255 - 0.5) * np.float32(2**0.5)
         mode = np.maximum(pixels[rows, 3], FIRST_MODE) - np.uint8(FIRST_MODE)
-        from_smallest_three(small, mode, wxyz[rows])
+        from_smallest_three(list(small), mode, wxyz[rows])
 
     each_block(sog.count, fill)
     if unknown.any():
         wxyz[unknown] = 1, 0, 0, 0
-        sog.findings.append(odd("quaternions are of no known code", unknown, "not turned", sog))
+        sog.findings.append(
+            finding_of_pixels("quaternions are of no known code", unknown, "not turned", sog)
+        )
     return wxyz
 
 
 def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
     """(N, M, 3) harmonics and (N,) opacity: 0..1, of version 1 logits."""
     pixels = sog.pixels("sh0")
-    palette = read_palette(sog) if "shN" in sog.meta else np.zeros((1, 0, 3), np.float32)
+    palette = read_palette(sog) if "shN" in sog.meta.data else np.zeros((1, 0, 3), np.float32)
     sog.files.memory.charge(12 * sog.count * (1 + palette.shape[1]), f"{sog.count:,} splats")
     sh = np.empty((sog.count, 1 + palette.shape[1], 3), np.float32)
     if sog.version == 1:
@@ -220,7 +216,9 @@ def read_colors(sog: Sog) -> tuple[np.ndarray, np.ndarray]:
         each_block(sog.count, lambda rows, _: look_up(palette, labels[rows], sh[rows, 1:]))
         if beyond.any():
             sh[beyond, 1:] = 0
-            found = odd("splats name harmonics that are not there", beyond, "one colour", sog)
+            found = finding_of_pixels(
+                "splats name harmonics that are not there", beyond, "one colour", sog
+            )
             sog.findings.append(found)
     return sh, opacity
 
@@ -238,7 +236,7 @@ def read_palette(sog: Sog) -> np.ndarray:
     count = height * PALETTE_ROW
     coefficients = width // PALETTE_ROW
     if sog.version == 2:
-        bands, stated = (sog.section("shN").get(key) for key in ("bands", "count"))
+        bands, stated = (sog.meta.object("shN").data.get(key) for key in ("bands", "count"))
         if type(bands) is not int or bands not in (1, 2, 3):
             raise sog.bad("shN needs 1, 2 or 3 bands")
         if type(stated) is not int or not 1 <= stated <= count:
@@ -253,7 +251,7 @@ def read_palette(sog: Sog) -> np.ndarray:
         return decode(sog, "shN", codes)
 
 
-def odd(what: str, rows: np.ndarray, done: str, sog: Sog) -> Finding:
+def finding_of_pixels(what: str, rows: np.ndarray, done: str, sog: Sog) -> Finding:
     """A finding about the rows (N,) bool."""
     numbers = np.flatnonzero(rows)
     few = tuple(int(number) for number in numbers[:10])

@@ -6,23 +6,23 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.runtime_models.files.json_fields import Fields, is_count, parse_json, shown
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account, Memory
 from shapeshift.runtime_models.lint.lint import judge
 from shapeshift.runtime_models.model import BadFile, Finding, SplatLayers, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import check_mode, join_layers
-from shapeshift.runtime_models.splats.operations.prune_by_importance import thin
-from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
+from shapeshift.runtime_models.splats.operations.prune_by_importance import prune_by_importance
+from shapeshift.runtime_models.splats.plain_splats import ARRAYS, RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
 from shapeshift.runtime_models.splats.sog.sog_files import (
+    EXPORT_AGAIN,
     LARGEST_META,
     META,
     file_inside,
-    parse_json,
 )
 
 TREE = "lod-meta.json"
 MOST_LEVELS = 64
-ARRAYS = ("means", "scales", "wxyz", "opacity", "sh")  # of RawSplats
 GROWTH = 4  # while a scene is refined, the next level that is read has so many times the splats
 
 
@@ -85,7 +85,7 @@ def levels(path: Path, reading: Reading) -> Iterator[SplatLayers]:
     streamed = read_tree(path, reading.within(folder_of(path)).account)
     origin = None
     for number in steps(streamed.counts, reading.most_splats):
-        level = thin(read_level(streamed, number, reading), reading.most_splats)
+        level = prune_by_importance(read_level(streamed, number, reading), reading.most_splats)
         if origin is None:
             origin = level.origin
         shift = np.subtract(level.origin, origin)
@@ -118,17 +118,12 @@ def read_tree(path: Path, memory: Account | None = None) -> Streamed:
         raise BadFile(f"{file.name} has over {LARGEST_META:,} bytes; it is no {TREE} of a scene.")
     memory = memory or Memory().of(path)
     with memory.lend(JSON_A_BYTE * file.stat().st_size, f"its {file.name}"):
-        said = parse_json(file.read_bytes(), file.name)
-    if said.get("version", 1) != 1:
-        raise BadFile(f"{file.name} is of version {str(said['version'])[:20]}, known is 1.")
-    names, count, environment = (said.get(k) for k in ("filenames", "lodLevels", "environment"))
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise BadFile(f"{file.name} does not name its files; export it again.")
-    if type(count) is not int or not 1 <= count <= MOST_LEVELS:
-        raise BadFile(f"{file.name} states no number of levels from 1 to {MOST_LEVELS}.")
-    if not isinstance(environment, str | None):
-        raise BadFile(f"{file.name}: its environment is no name of a file; export it again.")
-    runs = runs_of(said.get("tree"), count, len(names), file.name)
+        tree = Fields(parse_json(file.read_bytes(), file.name), file.name, EXPORT_AGAIN)
+    if (version := tree.value("version", 1)) != 1:
+        raise BadFile(f"{file.name} is of version {shown(version)}, known is 1.")
+    names, environment = tree.texts("filenames"), tree.text("environment", "")
+    count = tree.count("lodLevels", 1, MOST_LEVELS)
+    runs = runs_of(tree.value("tree", None), count, len(names), file.name)
     if not any(run.count for level in runs for run in level):
         raise BadFile(f"{file.name} names no splats; export it again.")
     folder = file.parent
@@ -146,7 +141,8 @@ def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[Run
     waiting = [tree]
     while waiting:
         node = waiting.pop()
-        runs, children = ({}, None)
+        runs: object = {}
+        children: object = None
         if isinstance(node, dict):
             runs, children = node.get("lods") or {}, node.get("children") or []
         if not isinstance(runs, dict) or not isinstance(children, list):
@@ -154,14 +150,14 @@ def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[Run
         waiting += reversed(children)
         for level, run in runs.items():
             entries = run if isinstance(run, dict) else {}
-            numbers = [entries.get(key) for key in ("file", "offset", "count")]
-            if any(type(number) is not int or number < 0 for number in numbers):
+            file, first, count = (entries.get(key) for key in ("file", "offset", "count"))
+            if not (is_count(file) and is_count(first) and is_count(count)):
                 raise BadFile(f"{name} holds a level without file, offset and count.")
             if not (level.isdecimal() and level.isascii() and int(level) < levels):
                 raise BadFile(f"{name} holds a level {level[:20]!r}, it states {levels} levels.")
-            if numbers[0] >= files:
-                raise BadFile(f"{name} names file {numbers[0]}, it lists {files}.")
-            out[int(level)].append(Run(*numbers))
+            if file >= files:
+                raise BadFile(f"{name} names file {file}, it lists {files}.")
+            out[int(level)].append(Run(file, first, count))
     return tuple(map(tuple, out))
 
 
@@ -174,9 +170,9 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
         if run.count:
             runs_of_file.setdefault(run.file, []).append(run)
     parts, used = [], [streamed.folder / TREE]
-    within = replace(reading, told=None)
+    within = replace(reading, progress=None)
     for i, (file, runs) in enumerate(sorted(runs_of_file.items())):
-        reading.tell(f"reading level {number} of {streamed.folder.name}", i / len(runs_of_file))
+        reading.report(f"reading level {number} of {streamed.folder.name}", i / len(runs_of_file))
         parts.append(picked(read_raw_sog(streamed.files[file], within), runs))
         used += files_of_sog(streamed.files[file], reading)
     if streamed.environment is not None:
@@ -190,11 +186,11 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
     return replace(
         layers,
         provenance=layers.provenance | shown,
-        findings=(*layers.findings, *told_of(streamed, number)),
+        findings=(*layers.findings, *level_findings(streamed, number)),
     )
 
 
-def told_of(streamed: Streamed, number: int) -> tuple[Finding, ...]:
+def level_findings(streamed: Streamed, number: int) -> tuple[Finding, ...]:
     """A word on which level it is, where it is not the finest."""
     finest = finest_within(streamed.counts, 0)
     if number == finest:
@@ -224,9 +220,9 @@ def picked(raw: RawSplats, runs: list[Run]) -> RawSplats:
     if len(rows) == count and (np.diff(rows) == 1).all():
         return raw
     with raw.memory.lend(len(rows) * raw.bytes_a_splat, f"{len(rows):,} splats"):
-        arrays = {name: getattr(raw, name)[rows] for name in ARRAYS}
+        arrays = [getattr(raw, name)[rows] for name in ARRAYS]
     raw.memory.release((count - len(rows)) * raw.bytes_a_splat)
-    return replace(raw, **arrays)
+    return raw.with_arrays(arrays)
 
 
 def joined(parts: list[RawSplats], name: str) -> RawSplats:
@@ -244,12 +240,12 @@ def joined(parts: list[RawSplats], name: str) -> RawSplats:
     memory.charge(sum(12 * (most - p.sh.shape[1]) * len(p.means) for p in parts), "harmonics")
     for part in parts:
         part.sh = np.pad(part.sh, ((0, 0), (0, most - part.sh.shape[1]), (0, 0)))
-    arrays = {}
+    arrays = []
     with memory.lend(12 * most * count, f"{count:,} splats in one"):
         for key in ARRAYS:
-            arrays[key] = np.concatenate([getattr(part, key) for part in parts])
+            arrays.append(np.concatenate([getattr(part, key) for part in parts]))
             for part in parts:
                 setattr(part, key, None)  # each goes once it is copied
     findings = tuple(found for part in parts for found in part.findings)
     mip = any(part.antialiased for part in parts)
-    return replace(parts[0], **arrays, file=name, findings=findings, antialiased=mip)
+    return parts[0].with_arrays(arrays, file=name, findings=findings, antialiased=mip)

@@ -1,7 +1,6 @@
 """The files of a SOG: out of its folder or its zip, never more of them than its splats need."""
 
 import io
-import json
 import zipfile
 from pathlib import Path
 from typing import IO
@@ -9,11 +8,13 @@ from typing import IO
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from shapeshift.runtime_models.files.json_fields import Fields, parse_json
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account
 from shapeshift.runtime_models.files.zip_files import DAMAGED, KNOWN, opened_zip
 from shapeshift.runtime_models.model import BadFile
 
 META = "meta.json"
+EXPORT_AGAIN = "export it again"  # what to do about a wrong value
 LARGEST_META = 4 << 20  # bytes; real ones have some kilobytes
 LONGEST_NAME = 255  # bytes, of a file or a folder on disks
 SMALL = 1 << 16  # bytes that any file may have
@@ -35,11 +36,12 @@ class SogFiles:
         if path.name == META:
             self.name = f"{path.parent.name}/{META}"
 
-    def meta(self) -> dict:
+    def meta(self) -> Fields:
         """What meta.json says.  Raises BadFile."""
         data = self.read(META, LARGEST_META)
         self.memory.charge(JSON_A_BYTE * len(data), f"its {META}")
-        return parse_json(data, f"{self.name}: its {META}")
+        where = f"{self.name}: its {META}"
+        return Fields(parse_json(data, where), where, EXPORT_AGAIN)
 
     def image(self, name: str, least: int, most: int) -> np.ndarray:
         """(H, W, 4) uint8 of a WebP with `least` to `most` pixels, charged.  Raises BadFile."""
@@ -65,7 +67,7 @@ class SogFiles:
     def read(self, name: str, limit: int) -> bytes:
         """One file.  Raises BadFile: a name outside, no such file, more than `limit` bytes."""
         if self.folder is not None:
-            file = self._file(name)
+            file = file_inside(self.folder, name, self.name)
             with file.open("rb") as stream:
                 return self._bounded(stream, name, limit, file.stat().st_size)
         check_name(name, self.name)
@@ -80,9 +82,6 @@ class SogFiles:
                 raise
             except DAMAGED:
                 raise BadFile(f"{self.name}: {name[:60]!r} cannot be unpacked; copy it.") from None
-
-    def _file(self, name: str) -> Path:
-        return file_inside(self.folder, name, self.name)
 
     def _bounded(self, stream: IO[bytes], name: str, limit: int, stated: int) -> bytes:
         if stated <= limit:
@@ -143,14 +142,3 @@ def find_entry(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo | None:
 def is_meta(name: str) -> bool:
     """Whether that is meta.json at the top of a zip or in a folder at its top."""
     return name == META or (name.endswith("/" + META) and name.count("/") == 1)
-
-
-def parse_json(data: bytes, name: str) -> dict:
-    """The object that a JSON text is; `name` is for messages.  Raises BadFile."""
-    try:
-        found = json.loads(data)
-    except (ValueError, RecursionError):
-        raise BadFile(f"{name} is no JSON; copy it again.") from None
-    if not isinstance(found, dict):
-        raise BadFile(f"{name} is no JSON object; export it again.")
-    return found

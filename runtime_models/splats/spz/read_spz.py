@@ -54,11 +54,11 @@ def read_spz_bytes(data: bytes, file: str, reading: Reading) -> RawSplats:
         memory=memory,
     )
     streams = zip(header.widths, decoders(raw, header), strict=True)
-    for done, (width, decode) in enumerate(streams):
-        reading.tell(f"reading {file}", done / len(header.widths))
+    for number, (width, decode) in enumerate(streams):
+        reading.report(f"reading {file}", number / len(header.widths))
         for first in range(0, count if width else 0, BLOCK):  # one after the other, as they lie
             rows = slice(first, min(first + BLOCK, count))
-            stream = spz.take(width * (rows.stop - first))
+            stream = spz.read(width * (rows.stop - first))
             decode(rows, np.frombuffer(stream, np.uint8).reshape(-1, width))
     findings: list[Finding] = []
     raw.up = axis_up(spz.extensions(), file, findings)

@@ -55,9 +55,9 @@ class Spz:
     def __init__(self, header: SpzHeader, source: "Inflate | Raw | Zstd", extensions: bytes | None):
         self.header, self._source, self._extensions, self._taken = header, source, extensions, 0
 
-    def take(self, size: int) -> bytes:
+    def read(self, size: int) -> bytes | bytearray:
         """Exactly `size` bytes.  Raises BadFile."""
-        part = self._source.take(size)
+        part = self._source.read(size)
         self._taken += len(part)
         if len(part) < size:
             count, needed = self.header.count, sum(self.header.sizes)
@@ -69,16 +69,16 @@ class Spz:
 
     def extensions(self) -> dict[int, bytes]:
         """{type: content}; to be asked when all streams have been taken."""
-        data = self._extensions
+        data: bytes | bytearray | None = self._extensions
         if data is None:  # after the streams
-            data = self._source.take(MOST_EXTENSION_BYTES)
+            data = self._source.read(MOST_EXTENSION_BYTES)
         return read_extensions(data) if self.header.flags & EXTENSIONS else {}
 
 
 def count_in(head: bytes, file: str) -> int:
     """The splats that a file of these first bytes says that it has.  Raises BadFile."""
     if head[:2] == GZIP:
-        head = Inflate(head, file).take(LEGACY_HEADER.size)
+        head = Inflate(head, file).read(LEGACY_HEADER.size)
     if len(head) < LEGACY_HEADER.size or head[:4] != MAGIC:
         raise BadFile(f"{file} does not begin with NGSP, as an .spz does.")
     return LEGACY_HEADER.unpack_from(head)[2]
@@ -126,7 +126,7 @@ def checked(header: SpzHeader) -> SpzHeader:
 def unpack_legacy(data: bytes, file: str) -> Spz:
     """Versions 1 to 3, compressed or raw."""
     inflate = Inflate(data, file) if data[:2] == GZIP else Raw(data)
-    head = inflate.take(LEGACY_HEADER.size)
+    head = inflate.read(LEGACY_HEADER.size)
     if len(head) < LEGACY_HEADER.size or head[:4] != MAGIC:
         raise BadFile(f"{file}: its gzip stream does not begin with NGSP, as an .spz does.")
     _, version, count, degree, bits, flags, _ = LEGACY_HEADER.unpack(head)
@@ -142,7 +142,7 @@ class Raw:
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
 
-    def take(self, size: int) -> bytes:
+    def read(self, size: int) -> bytes:
         part = self._data[self._at : self._at + size]
         self._at += len(part)
         return part
@@ -155,11 +155,11 @@ class Inflate:
         self._data, self._at, self._file = memoryview(data), 0, file
         self._zlib = zlib.decompressobj(31)
 
-    def take(self, size: int) -> bytes:
+    def read(self, size: int) -> bytes:
         """`size` bytes, fewer at the end.  Raises BadFile."""
         parts, left = [], size
         while left and not self._zlib.eof:
-            given = self._zlib.unconsumed_tail
+            given: bytes | memoryview = self._zlib.unconsumed_tail
             if not given:
                 given = self._data[self._at : self._at + PIECE]
                 self._at += len(given)
@@ -209,7 +209,7 @@ class Zstd:
         self._memory, self._window = memory, 0  # bytes that the open stream looks back on
         self._at = self._size = 0  # decompressed bytes, of the stream that is open
 
-    def take(self, size: int) -> bytearray:
+    def read(self, size: int) -> bytearray:
         """`size` bytes.  Raises BadFile."""
         import zstandard
 
@@ -247,14 +247,15 @@ class Zstd:
         self._memory.charge(self._window, "unpacking it")
 
 
-def read_extensions(data: bytes) -> dict[int, bytes]:
+def read_extensions(data: bytes | bytearray) -> dict[int, bytes]:
     """{type: content} of records back to back, as far as they are whole."""
-    found, at = {}, 0
+    found: dict[int, bytes] = {}
+    at = 0
     while at + EXTENSION.size <= len(data):
         kind, size = EXTENSION.unpack_from(data, at)
         at += EXTENSION.size
         if size > len(data) - at:
             break
-        found[kind] = data[at : at + size]
+        found[kind] = bytes(data[at : at + size])
         at += size
     return found

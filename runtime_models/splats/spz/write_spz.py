@@ -39,7 +39,9 @@ def write_spz(splats: PlainSplats, path: str | Path, version: int = 3) -> None:
     count, bits = len(splats.means), fractional_bits(splats, path)
     flags = ANTIALIASED if splats.antialiased else 0
     head = (MAGIC, version, count, degree, bits, flags)
-    streams = [blocks_of(rows_of, count) for rows_of in streams_of(splats, bits, version)]
+    streams: list[Iterable[bytes]] = [
+        blocks_of(rows_of, count) for rows_of in streams_of(splats, bits, version)
+    ]
     write_whole(Path(path), (deflated if version < 4 else compressed)(head, streams))
 
 

@@ -62,7 +62,7 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
     refuse_without(path)
     reading = reading.within(path)
     memory = reading.account
-    reading.tell(f"reading {path.name}", 0.0)
+    reading.report(f"reading {path.name}", 0.0)
     with tempfile.TemporaryDirectory(prefix="shapeshift-", ignore_cleanup_errors=True) as folder:
         made = Path(folder, "splats.npz")
         run(path, made, memory)
@@ -71,12 +71,14 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
             def read(name: str) -> np.ndarray | None:
                 return read_array(archive, name, path.name, memory)
 
-            told = json.loads(read("told").tobytes())
-            parts = [
+            facts = read("told")
+            assert facts is not None, "usd_run writes it always"
+            told = json.loads(facts.tobytes())
+            found = [
                 part_of(read, number, field, told, path, memory)
                 for number, field in enumerate(told["fields"])
             ]
-    parts = [part for part in parts if part is not None]
+    parts = [part for part in found if part is not None]
     if not parts:
         held = f" (it has {', '.join(told['others'])})" if told["others"] else ""
         raise BadFile(f"{path.name} has no visible {KIND}{held}; export splats of that kind.")

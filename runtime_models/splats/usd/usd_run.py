@@ -8,6 +8,7 @@ opened, and no more memory is taken than BYTES.  The arrays of prim I are called
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,8 @@ def refuse_outside(root: Path) -> None:
     """Raises Unreadable where a layer names a file that is not in the scene's folder or package."""
     from pxr import Sdf
 
-    folder, seen, waiting = root.parent.resolve(), set(), [str(root)]
+    folder, waiting = root.parent.resolve(), [str(root)]
+    seen: set[str] = set()
     while waiting:
         if len(seen) > MOST_LAYERS:
             raise Unreadable(f"it has over {MOST_LAYERS} layers")
@@ -92,7 +94,9 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
         "states metres": UsdGeom.StageHasAuthoredMetersPerUnit(stage),
         "fields": [],
     }
-    arrays, others, seen = {}, set(), 0
+    arrays: dict[str, np.ndarray] = {}
+    others: set[str] = set()
+    seen = 0
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         seen += 1
         if seen > MOST_PRIMS:
@@ -172,8 +176,8 @@ def main(given: str, wanted: str, memory: str) -> None:
         text = str(error) if isinstance(error, Unreadable) else "no USD that can be read"
         sys.stderr.write(f"\n{' '.join(text.split())[:300]}\n")
         sys.exit(REFUSED)
-    text = np.frombuffer(json.dumps(told).encode(), np.uint8)
-    np.savez(wanted, told=text, **arrays)
+    save: Callable[..., None] = np.savez  # numpy takes its keywords for one flag
+    save(wanted, told=np.frombuffer(json.dumps(told).encode(), np.uint8), **arrays)
 
 
 if __name__ == "__main__":

@@ -126,13 +126,13 @@ def test_bad_options_are_one_sentence_and_write_nothing(scene, tmp_path, extra):
 
 CAMERAS = {
     "[]": "holds no camera",
-    "[3]": "must be a list of objects",
+    "[3]": "camera 0 is 3; one object",
     "{": "is not JSON",
     '[{"matrix": [[1]]}]': "not 4 x 4",
     '[{"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,NaN, 0,0,0,1], "fov_y": 1}]': "holds NaN or Inf",
     '[{"matrix": [2,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1], "fov_y": 1}]': "is no rotation",
     '[{"matrix": [-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1], "fov_y": 1}]': "mirrors",
-    '[{"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}]': "'fov_y' is None",
+    '[{"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}]': "'fov_y' is missing",
     '[{"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1], "tangents": [1,0,0,1]}]': "left < right",
 }
 

@@ -108,7 +108,7 @@ def test_a_scene_file_is_a_world_with_a_floor():
     document, world = open_xr(DEMO, Options())
     assert document.floor_y == -0.7 and document.background_or(DARK) == DARK
     named = {thing.name for thing in document.scene.objects}
-    assert named == set(world.things) >= {"cube", "ball", "ring", "plate"}
+    assert named == set(world.objects) >= {"cube", "ball", "ring", "plate"}
     eye = document.view((640, 360)).world_from_eye
     np.testing.assert_allclose(eye.position, (0.05, 0.5, 0.95))
     assert world.aim((-0.22, 1.0, 0.05), (0.0, -1.0, 0.0)).object == "cube"

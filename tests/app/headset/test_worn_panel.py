@@ -81,7 +81,7 @@ def test_sliders_are_of_what_is_seen_and_goes_somewhere():
 
 def test_a_ring_ends_where_it_begins():
     states = (State("normal", 0.0), State("fire", 0.5))
-    ring = replace(a_world().things["leg"], item=item("leg", states=states, ring=True))
+    ring = replace(a_world().objects["leg"], item=item("leg", states=states, ring=True))
     assert [(stop.name, stop.x) for stop in named_stops(ring.item, ring.drawn.model)] == [
         ("normal", 0.0), ("fire", 0.5), ("normal", 1.0)
     ]  # fmt: skip
@@ -132,7 +132,7 @@ def test_a_frame_shows_the_world_and_moves_it():
         right = hand_at((0.25, 1.1, -0.2), target, trigger=trigger)
         frame = panel.act(a_frame(LEFT, right), 1 / 72)
     assert frame.hands["right"].trigger == 0 and frame.hands["left"] == LEFT
-    assert state.world.things["lamp"].standing.x == pytest.approx(0.3, abs=0.01)
+    assert state.world.objects["lamp"].reaction_state.x == pytest.approx(0.3, abs=0.01)
     panel.act(a_frame(LEFT), 1 / 72)
     assert panel_row(panel.carried)["shown"] == "layer 0 \u2192 layer 1  60 %"
 

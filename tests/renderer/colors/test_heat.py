@@ -25,7 +25,7 @@ from shapeshift.renderer.colors.palette import (
     LUMINANCE,
     apply_palette,
     palette_colors,
-    through_palette,
+    palette_values,
 )
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
@@ -260,7 +260,7 @@ def test_colours_that_are_no_numbers_are_culled_and_no_pixel_is(renderer):
 
 
 def test_values_beyond_the_palette_are_held_at_its_ends():
-    ends = through_palette(np.array([-5.0, 0, 1, 7]), "ironbow")
+    ends = palette_values(np.array([-5.0, 0, 1, 7]), "ironbow")
     np.testing.assert_array_equal(ends[[0, 3]], ends[[1, 2]])
-    assert np.isnan(through_palette(np.array([np.nan]), "ironbow")).all()
+    assert np.isnan(palette_values(np.array([np.nan]), "ironbow")).all()
     assert LUMINANCE.sum() == pytest.approx(1)

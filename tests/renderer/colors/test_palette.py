@@ -7,8 +7,8 @@ from shapeshift.renderer.colors.palette import (
     LUMINANCE,
     PALETTES,
     apply_palette,
-    lay_heat,
     legend_opacity,
+    overlay_heat,
     palette_colors,
     thermal_blend,
 )
@@ -101,11 +101,11 @@ def test_the_palette_colors_what_is_there_and_leaves_coverage_alone():
         # The same values as heat of half the weight, beside colours of the other half.
         photo = np.array([0.1, 0.9, 0.2, 0.0]) * alpha
         heat = np.stack([gray, np.ones(4)], axis=1) * alpha / 2
-        half = lay_heat(np.broadcast_to(photo / 2, (1, 4, 4)), heat[None], "ironbow")[0]
+        half = overlay_heat(np.broadcast_to(photo / 2, (1, 4, 4)), heat[None], "ironbow")[0]
         np.testing.assert_allclose(half[:, :3], (out[:, :3] + photo[:3]) / 2, atol=1e-9)
     empty = np.zeros((2, 2, 4))
     np.testing.assert_array_equal(apply_palette(empty, "turbo"), empty)
-    np.testing.assert_array_equal(lay_heat(empty, empty[..., :2], "turbo"), empty)
+    np.testing.assert_array_equal(overlay_heat(empty, empty[..., :2], "turbo"), empty)
 
 
 @pytest.mark.parametrize(("weight", "shown"), [(0, 0), (0.25, 0.5), (0.5, 1), (0.75, 1), (1, 1)])

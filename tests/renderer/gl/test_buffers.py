@@ -97,7 +97,7 @@ def test_groups_cover():
 
 def test_an_empty_scene_is_a_scene(gpu):
     with Arena(gpu, []) as arena, Splatter(gpu) as splatter:
-        arena.place([])
+        arena.set_poses([])
         Projector(gpu).project(arena, [make_view()], RenderSettings())
         Sorter(gpu, "gl").sort(arena)
         splatter.draw(arena, 0, (8, 4), 1 / 255)

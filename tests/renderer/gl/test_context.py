@@ -118,16 +118,16 @@ def test_the_timer_sums_a_pass_and_keeps_the_order_of_passes():
     for name in ("project", "sort", "project"):
         with timer.time(name):
             pass
-    took = timer.take()
+    took = timer.collect()
     assert list(took) == ["project", "sort"] and all(ms >= 0 for ms in took.values())
-    assert timer.take() == {}
+    assert timer.collect() == {}
 
 
 def test_a_failing_pass_does_not_break_the_timer():
     timer = PassTimer(None)
     with pytest.raises(ValueError, match="in the pass"), timer.time("splat"):
         raise ValueError("in the pass")
-    assert timer.take() == {}
+    assert timer.collect() == {}
 
 
 def test_the_drivers_timer_counts_what_the_driver_does(ctx):
@@ -138,6 +138,6 @@ def test_the_drivers_timer_counts_what_the_driver_does(ctx):
         for name, on_gpu in (("decode", False), ("splat", True), ("splat", True)):
             with timer.time(name, on_gpu):
                 target.clear(0.5, 0.5, 0.5, 1.0)
-        took = timer.take()
+        took = timer.collect()
         assert list(took) == ["decode", "splat"] and all(ms >= 0 for ms in took.values())
     assert len(timer._unused) == 2

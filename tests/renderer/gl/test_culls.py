@@ -49,7 +49,9 @@ def seen(
             arena.write_geometry(i, splats.means, splats.scales, splats.wxyz, splats.opacity)
             arena.write_color(i, splats.color)
         nowhere = np.full((4, 4), np.nan)
-        arena.place([o.world_from_object.matrix() if o.visible else nowhere for o in scene.objects])
+        arena.set_poses(
+            [o.world_from_object.matrix() if o.visible else nowhere for o in scene.objects]
+        )
         projector = Projector(gpu)
         projector.project(arena, views, settings, **order)
         n = arena.count

@@ -32,7 +32,7 @@ def projected(
     with Arena(gpu, [count]) as arena:
         arena.write_geometry(0, splats.means, splats.scales, splats.wxyz, splats.opacity)
         arena.write_color(0, splats.color)
-        arena.place([np.eye(4) if pose is None else pose])
+        arena.set_poses([np.eye(4) if pose is None else pose])
         projector = Projector(gpu)
         projector.project(arena, [view], settings or RenderSettings())
         keys = read(arena.keys, np.uint32)[:count]

@@ -44,10 +44,10 @@ def broken(request, ctx, monkeypatch):
         return [(path, number, line.replace(text, wrong)) for path, number, line in lines]
 
     monkeypatch.setattr(shader, "read_shader", read)
-    sort_check._tell_once.cache_clear()
+    sort_check.warn_once.cache_clear()
     with Gpu(ctx) as gpu:
         yield gpu
-    sort_check._tell_once.cache_clear()
+    sort_check.warn_once.cache_clear()
     assert replaced
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.palette import apply_palette, lay_heat, palette_colors
+from shapeshift.renderer.colors.palette import apply_palette, overlay_heat, palette_colors
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.decode import Decoder
 from shapeshift.renderer.gl.gpu import Gpu
@@ -57,7 +57,7 @@ def draw(
             eye = np.linalg.inv(pose) @ [*view.world_from_eye.position, 1]
             decoder.geometry(i, thing.x)
             decoder.color(i, thing.x, eye[:3])
-        arena.place(poses)
+        arena.set_poses(poses)
         Projector(gpu).project(arena, [view], settings)
         Sorter(gpu, sort).sort(arena, settings.key_bits)
         splatter.draw(arena, 0, view.size, settings.min_alpha)
@@ -264,7 +264,7 @@ def test_resolve_is_the_numpy_palette_over_the_background(gpu, palette, way, as_
     heat *= rng.random((12, 20, 1))
     mixed = rgba if way == "final" else apply_palette(rgba, palette)
     if way == "heat":
-        mixed = lay_heat(rgba, heat, palette)
+        mixed = overlay_heat(rgba, heat, palette)
     expected = mixed[..., :3] + (1 - mixed[..., 3:]) * np.float32(background)
     target = gpu.target((20, 12), "f4")
     source = gpu.ctx.texture((20, 12), 4, f32(rgba[::-1]).tobytes(), dtype="f4")

@@ -153,14 +153,14 @@ def test_a_driver_that_refuses_gets_half_floats_and_is_named(ctx, monkeypatch, c
         return real(self, size, dtype, *images)
 
     monkeypatch.setattr(Gpu, "target", refusing)
-    target_module.tell_once.cache_clear()
+    target_module.warn_once.cache_clear()
     with caplog.at_level(logging.WARNING, "renderer"), Renderer(ctx, "quads") as renderer:
         for wish in ("auto", "rgba16", "auto"):
             (image,) = draw(renderer, alone(random_layers(300)), [VIEW], target=wish)
             assert renderer.backends["drawing"] == "quads (rgba16f)" and image.any()
     told = [r.message for r in caplog.records]
     assert len(told) == 1 and "GL_RGBA16" in told[0] and ctx.info["GL_RENDERER"] in told[0]
-    target_module.tell_once.cache_clear()
+    target_module.warn_once.cache_clear()
 
 
 def test_what_is_asked_for_is_taken(gpu):

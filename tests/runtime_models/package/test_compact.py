@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import HEADS
-from shapeshift.runtime_models.package.drop_unused import LEAST_ALPHA, compact, shown
+from shapeshift.runtime_models.package.drop_unused import LEAST_ALPHA, drop_unused, visible_slots
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.runtime_models.package.write_package import write_package
 from tests.support.models import make_random_model, without_control
@@ -36,8 +36,8 @@ def drawn(model, x, eye=EYE):
 @pytest.mark.parametrize("everywhere", [0.0, 0.8, 3.0])
 def test_every_stop_shows_what_it_showed(hidden, everywhere):
     model = faint(make_random_model(200, k=4, hidden=hidden), (1, 3), everywhere)
-    smaller, removed = compact(model)
-    living = shown(model)
+    smaller, removed = drop_unused(model)
+    living = visible_slots(model)
     assert removed.slots == 4 - living.any(axis=0).sum() >= 2
     assert removed.anchors == 200 - living.any(axis=1).sum()
     assert smaller.splats_per_anchor == 4 - removed.slots
@@ -47,7 +47,7 @@ def test_every_stop_shows_what_it_showed(hidden, everywhere):
         before = drawn(model, stop.x)
         assert len(before)
         np.testing.assert_allclose(drawn(smaller, stop.x), before, atol=2e-6)
-    assert compact(smaller)[1].splats == 0
+    assert drop_unused(smaller)[1].splats == 0
 
 
 def test_shown_is_what_some_stop_draws():
@@ -55,8 +55,12 @@ def test_shown_is_what_some_stop_draws():
     by_hand = np.zeros((50, 3), bool)
     for stop in model.stops:
         by_hand |= evaluate(model, stop.x, EYE).opacity.reshape(50, 3) >= 1 / 255
-    np.testing.assert_array_equal(shown(model), by_hand)
-    assert shown(model, [0.0]).sum() < shown(model).sum() <= shown(model, [0, 0.5, 1]).sum()
+    np.testing.assert_array_equal(visible_slots(model), by_hand)
+    assert (
+        visible_slots(model, [0.0]).sum()
+        < visible_slots(model).sum()
+        <= visible_slots(model, [0, 0.5, 1]).sum()
+    )
 
 
 @pytest.mark.parametrize("names", [(), ("color",), HEADS])
@@ -69,7 +73,7 @@ def test_silent_units_go_and_no_number_changes_anywhere(names):
         bias[5] = -1e-3  # awake for some
         networks[name] = replace(mlp, biases=(bias, *mlp.biases[1:]))
     model = replace(model, networks=networks)
-    smaller, removed = compact(model, np.ones((100, 2), bool))
+    smaller, removed = drop_unused(model, np.ones((100, 2), bool))
     assert (removed.anchors, removed.slots, removed.splats) == (0, 0, 0)
     assert removed.units == 25
     rng = np.random.default_rng(1)
@@ -82,7 +86,7 @@ def test_silent_units_go_and_no_number_changes_anywhere(names):
 
 def test_a_model_that_shows_nothing_keeps_a_splat(tmp_path):
     model = faint(make_random_model(20, k=3), range(3))
-    smaller, removed = compact(model)
+    smaller, removed = drop_unused(model)
     assert smaller.splat_count == 1 and removed.splats == 59
     write_package(smaller, tmp_path / "nothing.shift")
     assert read_package(tmp_path / "nothing.shift").splat_count == 1
@@ -93,5 +97,5 @@ def test_networks_whose_units_all_sleep_keep_one():
     networks = {
         n: replace(m, biases=(m.biases[0] - 100, m.biases[1])) for n, m in model.networks.items()
     }
-    smaller, removed = compact(replace(model, networks=networks), np.ones((10, 1), bool))
+    smaller, removed = drop_unused(replace(model, networks=networks), np.ones((10, 1), bool))
     assert removed.units == 25 and all(len(m.biases[0]) == 1 for m in smaller.networks.values())

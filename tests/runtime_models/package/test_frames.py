@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from shapeshift.runtime_models.evaluate import Evaluator, evaluate
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.package.drop_unused import compact
+from shapeshift.runtime_models.package.drop_unused import drop_unused
 from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.package_files import ANCHORS, MANIFEST
 from shapeshift.runtime_models.package.read_package import read_files, read_package
@@ -120,7 +120,7 @@ def test_a_quaternion_of_no_length_turns_nothing():
 def test_what_nothing_shows_goes_with_its_frame():
     model = with_frames(make_random_model(40, k=2))
     alive = np.random.default_rng(2).random((40, 2)) < 0.4
-    smaller, removed = compact(model, alive)
+    smaller, removed = drop_unused(model, alive)
     kept = alive.any(axis=1)
     assert removed.anchors == (~kept).sum() > 0
     np.testing.assert_array_equal(smaller.frames.scales, model.frames.scales[kept])

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
 from shapeshift.runtime_models.splats.gltf.read_gltf import display_from_linear, read_raw_gltf
 from shapeshift.runtime_models.splats.gltf.write_gltf import write_gltf
-from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, turn
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN_Y, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from tests.support.splats.gltf_files import (
     P,
@@ -238,7 +238,9 @@ def test_spz_within(tmp_path, draft):
     asset["extensionsRequired"] = ["KHR_gaussian_splatting_compression_spz_2"]
     asset["nodes"][0]["translation"] = [0, 5, 0]
     within = read_plain(write_glb(tmp_path / "a.glb", asset, data))
-    turned = turn(alone, HALF_TURN_Y) if draft else alone  # drafts are taken as they are stored
+    turned = (
+        rotate_splats(alone, HALF_TURN_Y) if draft else alone
+    )  # drafts are taken as they are stored
     np.testing.assert_allclose(within.means, np.add(turned.means, (0, 5, 0)), atol=1e-6)
     np.testing.assert_allclose(within.scales, turned.scales, rtol=1e-6)
     np.testing.assert_allclose(within.opacity, turned.opacity)
@@ -304,7 +306,7 @@ def test_a_third_party_finds_our_numbers(tmp_path):
     write_gltf(splats, tmp_path / "a.glb")
     found = pygltflib.GLTF2().load(tmp_path / "a.glb")
     assert found.nodes[0].translation == [-4e6, -1.5, -2.25e6]
-    arrays, turned = attributes_in(tmp_path / "a.glb"), turn(splats, HALF_TURN_Y)
+    arrays, turned = attributes_in(tmp_path / "a.glb"), rotate_splats(splats, HALF_TURN_Y)
     assert len(arrays) == 5 + 16
     np.testing.assert_array_equal(arrays["POSITION"], splats.means * [-1, 1, -1])
     np.testing.assert_array_equal(arrays[P + "ROTATION"], -turned.wxyz[:, [1, 2, 3, 0]])
@@ -332,7 +334,7 @@ def test_a_glb_has_gltfs_axes_and_one_of_ours_before_0_5_had_ours(tmp_path):
     asset["asset"]["generator"] = "Shapeshift"
     old = read_plain(write_glb(tmp_path / "old.glb", asset, data))
     np.testing.assert_allclose(
-        old.means, turn(splats, HALF_TURN_Y).means
+        old.means, rotate_splats(splats, HALF_TURN_Y).means
     )  # its numbers as they are
 
 

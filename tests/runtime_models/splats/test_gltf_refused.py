@@ -10,7 +10,7 @@ import pytest
 
 from shapeshift.runtime_models.files.memory import A_BYTE, FREE
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.runtime_models.splats.gltf.gltf_files import MOST_MARKS, parse_json
+from shapeshift.runtime_models.splats.gltf.gltf_files import MOST_MARKS, parse_asset
 from shapeshift.runtime_models.splats.gltf.read_gltf import read_raw_gltf
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
@@ -60,7 +60,7 @@ def change(asset: dict, place: str, value: object) -> dict:
 CHANGES = [
     ("asset.version", "1.0", "glTF 1.0; 2.0 is read"),
     ("asset", None, "without a version"),
-    ("asset", 7, "'asset' is '7', expected an object"),
+    ("asset", 7, "'asset' is 7; an object"),
     ("extensionsRequired", ["KHR_draco_mesh_compression"], "needs the extension KHR_draco"),
     ("extensionsRequired", [["x"]], "needs the extension"),
     ("accessors.0.count", HUGE, "promises|of memory"),
@@ -82,7 +82,7 @@ CHANGES = [
     ("accessors.0.bufferView", "0", "there is none"),
     ("accessors.0.normalized", "yes", "true or false"),
     ("accessors.0", 5, "there is none"),
-    ("accessors", {}, "expected a list"),
+    ("accessors", {}, "a list is wanted"),
     ("bufferViews.0.byteLength", HUGE, "it is cut off"),
     ("bufferViews.0.byteLength", 59, "it is cut off"),
     ("bufferViews.0.byteOffset", 10**400, "whole number"),
@@ -98,7 +98,7 @@ CHANGES = [
     (ATTRIBUTES + P + "SH_DEGREE_0_COEF_0", None, "degree 1 or below"),
     (ATTRIBUTES + P + "SH_DEGREE_1_COEF_1", None, "degree 1 or below"),
     ("meshes.0.primitives.0.extensions", {}, "no Gaussian splats"),
-    ("meshes.0.primitives.0.extensions.KHR_gaussian_splatting", 3, "expected an object"),
+    ("meshes.0.primitives.0.extensions.KHR_gaussian_splatting", 3, "an object in braces is wanted"),
     ("meshes.0.primitives", [3], "that is no object"),
     ("meshes.0", None, "there is none"),
     ("nodes.0.mesh", 1.0, "there is none"),
@@ -165,16 +165,16 @@ def test_json_that_is_none_or_too_much(tmp_path):
         "deep": (deep, "nested too deep|entries"),
         "deeper": (b"[" * 5000 + b"]" * 5000, "nested too deep"),
         "many": (b'{"a":[' + b"[]," * MOST_MARKS + b"1]}", "more than"),
-        "digits": (b'{"asset":{"version":' + b"9" * 10_000 + b"}}", "damaged JSON|without|glTF 9"),
-        "broken": (b'{"asset":', "damaged JSON"),
-        "bytes": (b'{"asset":"\xff\xfe"}', "damaged JSON"),
-        "list": (b"[]", "not a glTF asset"),
-        "text": (b'"x"', "not a glTF asset"),
+        "digits": (b'{"asset":{"version":' + b"9" * 10_000 + b"}}", "is not JSON|without|glTF 9"),
+        "broken": (b'{"asset":', "is not JSON"),
+        "bytes": (b'{"asset":"\xff\xfe"}', "is not JSON"),
+        "list": (b"[]", "no glTF asset"),
+        "text": (b'"x"', "no glTF asset"),
     }
     for name, (text, words) in cases.items():
         refused(write_glb(tmp_path / f"{name}.glb", text), words)
         with pytest.raises(BadFile):
-            parse_json(np.frombuffer(text, np.uint8), name)
+            parse_asset(np.frombuffer(text, np.uint8), name)
             raw(tmp_path / f"{name}.glb")
 
 

@@ -170,12 +170,12 @@ def cut(name: str, size: int):
 
 
 BROKEN = {
-    "no levels": (lambda p: edited(p, totalLevel=None), "states no totalLevel"),
-    "too many levels": (lambda p: edited(p, totalLevel=65), "states no totalLevel"),
+    "no levels": (lambda p: edited(p, totalLevel=None), "'totalLevel' is missing; export"),
+    "too many levels": (lambda p: edited(p, totalLevel=65), "'totalLevel' is 65; a whole number"),
     "other levels": (lambda p: edited(p, totalLevel=3), "expected a multiple of 52 for 3"),
-    "no ranges": (lambda p: edited(p, attributes=None), "its attribute scale has no min"),
+    "no ranges": (lambda p: edited(p, attributes=None), "'attributes' has no 'scale'; export"),
     "ranges of text": (lambda p: edited(p, attributes=[{"name": "scale", "min": "a", "max": 1}]),
-                       "its attribute scale has no min"),
+                       "attribute 1: 'min' is .a.; a list of 3"),
     "no index": (lambda p: p.with_name(INDEX).unlink(), "lacks index.bin"),
     "no data": (lambda p: p.with_name("data.bin").unlink(), "lacks data.bin"),
     "no harmonics": (lambda p: p.with_name("shcoef.bin").unlink(), "shcoef.bin has 0 bytes"),
@@ -184,7 +184,7 @@ BROKEN = {
     "cut index": (cut(INDEX, 50), "it is cut off"),
     "empty index": (cut(INDEX, 0), "has 0 bytes"),
     "cut environment": (cut("environment.bin", 100), "no multiple of 96"),
-    "no JSON": (lambda p: put(p, b"{"), "no JSON"),
+    "no JSON": (lambda p: put(p, b"{"), "is not JSON"),
     "nothing": (lambda p: p.with_name(INDEX).write_bytes(bytes(36)), "names no splats"),
     "negative": (lambda p: p.with_name(INDEX).write_bytes(bytes(4) + b"\xff" * 16 + bytes(16)),
                  "beyond the end"),
@@ -202,9 +202,9 @@ def test_broken_lcc_is_one_sentence(tmp_path, how):
 
 
 BROKEN_2 = {
-    "no levels": ({"totalLevels": 0}, "states no levels"),
-    "no root": ({"root": None}, "does not name its files"),
-    "unknown kind": ({"splatType": ".ply"}, "has splats as '.ply'"),
+    "no levels": ({"totalLevels": 0}, "'totalLevels' is 0; a whole number from 1 to 64"),
+    "no root": ({"root": None}, "'root' is missing; export"),
+    "unknown kind": ({"splatType": ".ply"}, "'splatType' is .\\.ply.; '.sog' or"),
     "outside": ({"root": {"splatFiles": ["../a.sog"], "child": [{"data": {"3dgs": {"name": 0}}}]}},
                 "none of its own"),
     "not there": ({"root": {"splatFiles": ["a.sog"], "child": [{"data": {"3dgs": {"name": 0}}}]}},

@@ -12,7 +12,7 @@ from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.formats import read_plain as read_ply
 from shapeshift.runtime_models.splats.layers.read_layers import read_layers
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.read_splat import ROW
@@ -36,7 +36,7 @@ def test_ply_round_trip(tmp_path, count, coefficients):
 
 def test_turning_turns_places_shapes_and_colours_together():
     splats, turn = some_splats(), np.diag([1.0, -1, -1])
-    turned = turn_half(splats)
+    turned = rotate_half_turn(splats)
     np.testing.assert_allclose(turned.means, splats.means @ turn.T, atol=1e-6)
     c, t = covariance(splats.scales, splats.wxyz), covariance(turned.scales, turned.wxyz)
     np.testing.assert_allclose(t, c * [1, -1, -1, 1, 1, 1], atol=1e-5)  # xy, xz change sign
@@ -81,7 +81,7 @@ def test_header_lines_may_end_as_windows_ends_them_and_hold_comments(tmp_path):
 def test_columns_of_several_types_in_another_order(tmp_path):
     """Written by hand, row by row: the slow twin of the reader."""
     splats, rng = some_splats(6, 4), np.random.default_rng(5)
-    back = turn_half(splats)  # twice half a turn is none
+    back = rotate_half_turn(splats)  # twice half a turn is none
     names = [*"xyz", "red", "opacity", "f_dc_2", "f_dc_1", "f_dc_0"]
     names += [f"f_rest_{i}" for i in range(9)] + [f"rot_{i}" for i in range(4)]
     names += [f"scale_{i}" for i in range(3)]

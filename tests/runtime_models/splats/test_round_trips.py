@@ -11,7 +11,7 @@ import pytest
 
 from shapeshift.runtime_models.splats.formats import read_plain
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats, Reading
-from shapeshift.runtime_models.splats.write_plain import cut
+from shapeshift.runtime_models.splats.write_plain import truncate_harmonics
 from tests.support.splats.round_trips import compare, rows
 from tests.support.splats.writers import EACH_WRITER
 
@@ -64,12 +64,12 @@ def read_by_them(path: Path, ending: str, folder: Path) -> PlainSplats:
 @pytest.mark.parametrize("scene", ["leg", "extremes"])
 @EACH_WRITER
 def test_ours_and_theirs_see_the_same(renderer, tmp_path, request, writer, scene, degree):
-    splats = cut(request.getfixturevalue(scene), degree)
+    splats = truncate_harmonics(request.getfixturevalue(scene), degree)
     path = tmp_path / f"file{writer.ending}"
     writer.write(splats, path)
     ours = read_plain(path)
     assert len(ours.means) == len(splats.means)
-    held = cut(splats, min(degree, writer.sh_degree))
+    held = truncate_harmonics(splats, min(degree, writer.sh_degree))
     cost = compare(renderer, ours, held)
     print(f"{scene} {writer.ending} SH {degree}: {cost:.1f} dB to what was written")
     assert cost > COST[writer.ending], f"{cost:.1f} dB"

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import describe, read_model
 from shapeshift.runtime_models.rotation import covariance
 from shapeshift.runtime_models.splats.formats import format_of, read_plain
-from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, turn
+from shapeshift.runtime_models.splats.operations.rotate_splats import ours_from_file, rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.usd import read_usd
 from shapeshift.runtime_models.splats.usd.write_usd import write_usd
@@ -93,7 +93,7 @@ def test_a_stage_says_its_up_and_its_units(tmp_path, up, metres):
     splats = some_splats(20, 4)
     stage_with(tmp_path / "a.usda", splats, up, metres)
     back, unit = read_plain(tmp_path / "a.usda", HUGE), metres or 0.01
-    wanted = turn(splats, ours_from_file(f"+{up}"))
+    wanted = rotate_splats(splats, ours_from_file(f"+{up}"))
     np.testing.assert_allclose(back.means, wanted.means * unit, rtol=1e-5, atol=1e-7)
     np.testing.assert_allclose(back.scales, wanted.scales * unit, rtol=1e-5)
     np.testing.assert_allclose(back.sh, wanted.sh, atol=1e-5)

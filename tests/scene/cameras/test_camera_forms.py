@@ -152,7 +152,7 @@ def test_a_size_replaces_the_files(tmp_path, form):
 
 PATHS = {
     '{"camera_path": [{}]}': "not 4 x 4",
-    '{"camera_path": [3]}': "list of objects",
+    '{"camera_path": [3]}': "camera 0 is 3; one object",
     '{"camera_path": "x"}': "list of objects",
     '{"keyframes": []}': "holds no camera",
     '{"keyframes": null}': "list of objects",

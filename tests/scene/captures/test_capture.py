@@ -12,7 +12,7 @@ from PIL import Image
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.runtime_models.splats.layers.read_layers import layer_files, read_layers
 from shapeshift.scene.captures.capture import Capture, Photo
-from shapeshift.scene.captures.capture_rules import spread_stops, turn_upright
+from shapeshift.scene.captures.capture_rules import spread_stops, upright_rotation
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_points import read_points
@@ -138,7 +138,7 @@ def test_ply_points_both_ways_of_writing(tmp_path):
     "up", [(0, -1, 0), (0, 1, 0), (0, 0, 1), (0, 0, -2), (1, 0, 0), (1, -5, 2)]
 )
 def test_turning_upright_is_a_rotation_to_plus_y(up):
-    turn = turn_upright(up, "test")[:3, :3]
+    turn = upright_rotation(up, "test")[:3, :3]
     np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turn) == pytest.approx(1)
     np.testing.assert_allclose(turn @ up / np.linalg.norm(up), (0, 1, 0), atol=1e-12)

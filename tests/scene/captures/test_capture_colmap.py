@@ -69,7 +69,7 @@ def test_capture_json_names_the_modalities_of_a_colmap_folder(tmp_path):
     np.testing.assert_allclose(np.sort(capture.points, 0), np.sort(up_z, 0), atol=1e-6)
     stops[0]["folder"] = "lidar"
     (tmp_path / "capture.json").write_text(json.dumps({"modalities": stops}))
-    with pytest.raises(BadFile, match="'Heat' has no images"):
+    with pytest.raises(BadFile, match='"Heat" has no images'):
         read_capture(tmp_path)
 
 

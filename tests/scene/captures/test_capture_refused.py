@@ -84,7 +84,7 @@ def negative_focal(frames, more):
 
 def nan_focal(frames, more):
     more["fl_x"] = float("nan")
-    return "'fl_x' is nan; a number"
+    return "'fl_x' is NaN; a finite number"
 
 
 def folded_lens(frames, more):
@@ -121,13 +121,13 @@ def empty_modality(frames, more):
     more["modalities"] = [{"name": "RGB", "x": 0}, {"name": "IR", "x": 1}]
     for f in frames:
         f["modality"] = "RGB"
-    return "'IR' has no images"
+    return '"IR" has no images'
 
 
 def unknown_modality(frames, more):
     more["modalities"] = [{"name": "RGB", "x": 0}]
     frames[0]["modality"] = "UV"
-    return "of modality 'UV'"
+    return 'of modality "UV"'
 
 
 def only_tests(frames, more):
@@ -143,7 +143,7 @@ def odd_split(frames, more):
 
 def stop_outside(frames, more):
     more["modalities"] = [{"name": "RGB", "x": 1.5}]
-    return "x = 1.5"
+    return "'x' is 1.5; 0 to 1 is wanted"
 
 
 def twin_stops(frames, more):
@@ -153,7 +153,7 @@ def twin_stops(frames, more):
 
 def odd_kind(frames, more):
     more["modalities"] = [{"name": "RGB", "x": 0, "kind": "sonar"}]
-    return "kind 'sonar'"
+    return "'kind' is \"sonar\"; 'rgb' or"
 
 
 def upside_range(frames, more):
@@ -211,7 +211,7 @@ def test_refused_folders_and_files(tmp_path):
     with pytest.raises(BadFile, match="not JSON"):
         read_capture(tmp_path)
     (tmp_path / "transforms.json").write_text("[1]")
-    with pytest.raises(BadFile, match="holds a list"):
+    with pytest.raises(BadFile, match=r"holds \[1\]; an object"):
         read_capture(tmp_path)
     (tmp_path / "transforms.json").write_text('{"poses": []}')
     with pytest.raises(BadFile, match="no list 'frames'"):

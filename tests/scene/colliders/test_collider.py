@@ -202,7 +202,7 @@ def test_told_ends_it_and_leaves_no_process():
     begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         cloud = splatted(shapes()["torus"], 4000)
-        collider_of_splats(*cloud.columns, Making(kept=False, told=told))
+        collider_of_splats(*cloud.columns, Making(kept=False, progress=told))
     assert time.monotonic() - begun < 20
     assert all(0 <= part <= 1 for _, part in heard)
     assert {what for what, _ in heard} >= {"wrapping the splats", "cutting it into convex pieces"}

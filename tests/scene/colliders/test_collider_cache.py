@@ -11,10 +11,10 @@ from shapeshift.scene.colliders.collider import Making, collider_of_splats
 from shapeshift.scene.colliders.collider_cache import (
     MARK,
     content_key,
-    find_kept,
-    keep,
     pack,
+    read_cached,
     unpack,
+    write_cached,
 )
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from tests.support.scene.collider_shapes import shapes, splatted
@@ -46,9 +46,9 @@ def same(one, two) -> bool:
 
 def test_what_is_kept_is_found_in_the_users_cache(own_folder):
     made = some_made()
-    assert keep(KEY, made) == own_folder / f"{KEY}.collider"
-    assert same(find_kept(KEY), made)
-    assert find_kept(KEY[::-1]) is None
+    assert write_cached(KEY, made) == own_folder / f"{KEY}.collider"
+    assert same(read_cached(KEY), made)
+    assert read_cached(KEY[::-1]) is None
     if os.name != "nt":
         assert own_folder.stat().st_mode & 0o077 == 0
 
@@ -58,7 +58,7 @@ def test_nothing_is_written_beside_a_scene(tmp_path):
     before = set(tmp_path.iterdir())
     made = collider_of_splats(*cloud.columns)
     assert {path.name for path in set(tmp_path.iterdir()) - before} == {"own"}
-    assert same((made.hulls, made.mesh), find_kept(next(kept(tmp_path)).stem))
+    assert same((made.hulls, made.mesh), read_cached(next(kept(tmp_path)).stem))
 
 
 def kept(tmp_path: Path):
@@ -67,7 +67,7 @@ def kept(tmp_path: Path):
 
 def test_nowhere_to_keep_is_no_harm(tmp_path):
     (tmp_path / "own").write_text("a file where the user's cache should be")
-    assert keep(KEY, some_made()) is None and find_kept(KEY) is None
+    assert write_cached(KEY, some_made()) is None and read_cached(KEY) is None
 
 
 @posix
@@ -80,28 +80,28 @@ def test_a_link_in_the_way_is_not_followed(tmp_path, where):
     link = tmp_path / "own" / where
     link.parent.mkdir(parents=True)
     link.symlink_to(victim)
-    assert keep(KEY, some_made()) is None and find_kept(f"{0:064x}") is None
+    assert write_cached(KEY, some_made()) is None and read_cached(f"{0:064x}") is None
     assert len(list(victim.iterdir())) == 3
 
 
 @posix
 def test_a_link_in_place_of_a_file_is_replaced(tmp_path, own_folder):
     mine = tmp_path / "mine"
-    keep(KEY, some_made(1))
+    write_cached(KEY, some_made(1))
     (own_folder / f"{KEY}.collider").rename(mine)
     (own_folder / f"{KEY}.collider").symlink_to(mine)
     before = mine.read_bytes()
-    assert find_kept(KEY) is None
-    path = keep(KEY, some_made(2))
-    assert not path.is_symlink() and same(find_kept(KEY), some_made(2))
+    assert read_cached(KEY) is None
+    path = write_cached(KEY, some_made(2))
+    assert not path.is_symlink() and same(read_cached(KEY), some_made(2))
     assert mine.read_bytes() == before
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes in folders")
 def test_a_pipe_in_place_of_a_file_is_not_waited_for(own_folder):
-    keep(KEY, some_made()).unlink()
+    write_cached(KEY, some_made()).unlink()
     (own_folder / f"{KEY}.collider").mkdir()
-    assert find_kept(KEY) is None and keep(KEY, some_made()) is None
+    assert read_cached(KEY) is None and write_cached(KEY, some_made()) is None
 
 
 def test_every_damage_is_seen():
@@ -146,7 +146,7 @@ def test_numbers_that_are_none_are_no_collider(number, place):
 def test_a_damaged_file_is_made_again(tmp_path):
     cloud = splatted(shapes()["sphere"], 500)
     heard = []
-    making = Making(told=lambda what, part: heard.append(what))
+    making = Making(progress=lambda what, part: heard.append(what))
     first = collider_of_splats(*cloud.columns, making)
     (path,) = kept(tmp_path)
     whole = path.read_bytes()
@@ -187,15 +187,15 @@ def test_the_oldest_files_go_first_and_only_ours(own_folder, monkeypatch, tmp_pa
     (own_folder / f"{'f' * 64}.collider").symlink_to(own_folder / others[0])
     keys = [f"{number:064x}" for number in range(5)]
     for number, key in enumerate(keys):
-        os.utime(keep(key, some_made()), (number + 1, number + 1))
+        os.utime(write_cached(key, some_made()), (number + 1, number + 1))
         if number == 2:
-            assert find_kept(keys[0]) is not None  # used: young again
+            assert read_cached(keys[0]) is not None  # used: young again
     left = {path.stem for path in own_folder.iterdir() if path.name not in others}
     assert left == {keys[0], keys[3], keys[4], "f" * 64}
     assert all((own_folder / name).exists() for name in others)
 
 
 def test_a_huge_file_is_not_read(monkeypatch):
-    path = keep(KEY, some_made())
+    path = write_cached(KEY, some_made())
     monkeypatch.setattr(collider_cache, "MOST_BYTES", path.stat().st_size - 1)
-    assert find_kept(KEY) is None
+    assert read_cached(KEY) is None

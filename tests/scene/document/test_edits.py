@@ -28,7 +28,7 @@ def names(file: SceneFile) -> list[str]:
 
 
 def test_a_file_is_edited_and_nothing_else_is_touched(file):
-    moved = edits.place(file, "ball", Pose(np.array([1.0, 2, 3]), np.array([TURN, TURN, 0, 0])))
+    moved = edits.set_pose(file, "ball", Pose(np.array([1.0, 2, 3]), np.array([TURN, TURN, 0, 0])))
     ball = edits.find(moved, "ball")
     assert (ball.position, ball.wxyz) == ((1, 2, 3), (TURN, TURN, 0, 0))
     assert replace(ball, position=(0, 0.061, -0.12), wxyz=(1, 0, 0, 0)) == edits.find(file, "ball")
@@ -37,7 +37,7 @@ def test_a_file_is_edited_and_nothing_else_is_touched(file):
     assert edits.find(edits.set_x(file, "cube", 0.25), "cube").x == 0.25
     assert not edits.find(edits.hide(file, BACKGROUND), BACKGROUND).visible
     assert edits.hide(file, "ball", hidden=False) is file  # it is to be seen already
-    assert edits.place(moved, "ball", ball.pose) is moved
+    assert edits.set_pose(moved, "ball", ball.pose) is moved
 
 
 def test_copies_stand_behind_the_original_under_a_free_name(file):
@@ -93,7 +93,7 @@ def test_x_beyond_its_range_is_refused(file, x):
 @pytest.mark.parametrize("metres", [2e4, math.nan, math.inf])
 def test_a_place_out_of_reach_is_refused(file, metres):
     with pytest.raises(ValueError, match="farther"):
-        edits.place(file, "ball", Pose(np.array([0, metres, 0]), np.array([1.0, 0, 0, 0])))
+        edits.set_pose(file, "ball", Pose(np.array([0, metres, 0]), np.array([1.0, 0, 0, 0])))
 
 
 def test_a_full_file_takes_no_more():
@@ -159,7 +159,7 @@ def test_undo_and_redo_walk_the_same_files(file):
     history, files = History.of(file), [file]
     for number in range(5):
         files.append(edits.set_x(files[-1], "ball", (number + 1) / 10))
-        history = history.take(files[-1], f"edit {number}")
+        history = history.record(files[-1], f"edit {number}")
     assert history.undoes == "edit 4" and history.redoes == ""
     for number in range(4, -1, -1):
         history = history.undo()
@@ -171,19 +171,19 @@ def test_undo_and_redo_walk_the_same_files(file):
     assert history.redo().file is files[-1]
     back = history.undo().undo()
     other = edits.hide(back.file, "cube")
-    after = back.take(other, "hide")
+    after = back.record(other, "hide")
     assert after.redoes == "" and after.undoes == "hide" and after.undo().file is files[3]
-    assert after.take(other, "nothing new") is after
+    assert after.record(other, "nothing new") is after
 
 
 def test_a_drag_is_one_step_until_the_hand_lets_go(file):
     history = History.of(file)
     for x in (0.1, 0.2, 0.3):
-        history = history.take(edits.set_x(history.file, "ball", x), "x of ball", "x ball")
+        history = history.record(edits.set_x(history.file, "ball", x), "x of ball", "x ball")
     history = history.rest()
     for x in (0.4, 0.5):
-        history = history.take(edits.set_x(history.file, "ball", x), "x of ball", "x ball")
-    history = history.take(edits.set_x(history.file, "cube", 0.5), "x of cube", "x cube")
+        history = history.record(edits.set_x(history.file, "ball", x), "x of ball", "x ball")
+    history = history.record(edits.set_x(history.file, "cube", 0.5), "x of cube", "x cube")
     xs = []
     while history.undoes:
         history = history.undo()
@@ -195,7 +195,7 @@ def test_a_drag_is_one_step_until_the_hand_lets_go(file):
 def test_a_long_history_forgets_its_beginning(file):
     history = History.of(file)
     for number in range(edits.MOST_STEPS + 100):
-        history = history.take(edits.set_x(history.file, "ball", number % 2 / 2 + 0.1), "x")
+        history = history.record(edits.set_x(history.file, "ball", number % 2 / 2 + 0.1), "x")
     count = 0
     while history.undoes:
         history, count = history.undo(), count + 1

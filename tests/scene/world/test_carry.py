@@ -89,7 +89,7 @@ def test_a_world_carries_the_object_and_all_its_hands():
         assert world.grab(side) == "a"
     world.move_hand("empty", at(1, 1, 1))
     world.advance(0.1)
-    before = world.things["a"].pose
+    before = world.objects["a"].pose
     hands = dict(world.hands)
     world.carry("right", JUMP)
     assert np.allclose(world.hands["left"].position, jumped(hands["left"], JUMP).position)
@@ -98,4 +98,4 @@ def test_a_world_carries_the_object_and_all_its_hands():
     assert np.allclose(world.drawn().objects[0].world_from_object.position, wanted, atol=1e-6)
     record = world.advance(1 / 90)[-1]
     assert not record.contacts and not record.hands
-    assert np.linalg.norm(world.things["a"].pose.position - wanted) < 0.01
+    assert np.linalg.norm(world.objects["a"].pose.position - wanted) < 0.01

@@ -75,7 +75,7 @@ def test_a_table_that_is_put_elsewhere_carries_there():
     top = table(physics, "slab")
     body = physics.add_body([box(0.05, 0.05, 0.05)], at(0, 0.0501, 0), 0.3)
     run(physics, 3)
-    physics.place(top, at(0, -0.5, 0))
+    physics.set_pose(top, at(0, -0.5, 0))
     run(physics, 1)
     assert physics.pose(body).position[1] == pytest.approx(-0.44, abs=0.001)
     assert physics.cast_ray((0.8, 1, 0), (0, -1, 0)) == (top, pytest.approx(1.49, abs=1e-4))

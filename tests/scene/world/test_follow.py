@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.scene.document.scene_file import SceneFile
 from shapeshift.scene.selectors.selector import Sphere
-from shapeshift.scene.world.follow import changed, follow, put_back
+from shapeshift.scene.world.follow import changed, follow, reset_objects
 from shapeshift.scene.world.world import World
 from tests.support.scene.world_scenes import BOX, STATES, at, item, model, place, reaction, real
 
@@ -32,17 +32,17 @@ def fallen(*items) -> World:
 def test_what_was_not_edited_stays_where_it_fell():
     a, b = item("a"), item("b", position=(1, 1, 0))
     world = fallen(a, b)
-    lies, body = place(world, "b").copy(), world.things["b"].body
+    lies, body = place(world, "b").copy(), world.objects["b"].body
     assert lies[1] < 0.1
     edited(world, replace(a, position=(0, 2, 0)), b)
     assert list(place(world, "a")) == [0, 2, 0] and list(place(world, "b")) == list(lies)
     edited(world, replace(a, position=(0, 2, 0)), replace(b, x=0.5, visible=False))
     drawn = world.drawn().objects[1]
-    assert (drawn.x, drawn.visible, world.things["b"].body) == (0.5, False, body)
+    assert (drawn.x, drawn.visible, world.objects["b"].body) == (0.5, False, body)
     assert list(place(world, "b")) == list(lies)
     before = world.snapshot()
-    edited(world, *(thing.item for thing in world.things.values()))
-    assert world.snapshot().things == before.things
+    edited(world, *(thing.item for thing in world.objects.values()))
+    assert world.snapshot().objects == before.objects
 
 
 def test_objects_come_go_and_change_their_order():
@@ -51,7 +51,7 @@ def test_objects_come_go_and_change_their_order():
     world.move_hand("right", at(0, 1, 0))
     world.grab("right")
     edited(world, c, b)
-    assert list(world.things) == ["c", "b"] and world.held("right") is None
+    assert list(world.objects) == ["c", "b"] and world.held("right") is None
     assert [thing.label for thing in world.drawn().objects] == [1, 2]
     table = item("background", static=True, position=(0, -1, 0))
     edited(world, a, b, c, background=table)  # an undo
@@ -67,10 +67,10 @@ def test_a_new_name_keeps_body_pose_and_hand():
     lies = place(world, "a").copy()
     world.move_hand("right", at(*lies))
     world.grab("right")
-    body = world.things["a"].body
-    edited(world, replace(a, name="cup"), world.things["b"].item)
-    assert list(world.things) == ["cup", "b"] and world.held("right") == "cup"
-    assert world.things["cup"].body == body and list(place(world, "cup")) == list(lies)
+    body = world.objects["a"].body
+    edited(world, replace(a, name="cup"), world.objects["b"].item)
+    assert list(world.objects) == ["cup", "b"] and world.held("right") == "cup"
+    assert world.objects["cup"].body == body and list(place(world, "cup")) == list(lies)
     assert [thing.name for thing in world.drawn().objects] == ["cup", "b"]
     assert world.aim(lies + np.array([0, 1, 0]), (0, -1, 0)).object == "cup"
 
@@ -81,21 +81,21 @@ def test_another_body_stands_where_the_old_one_stood():
     lies = place(world).copy()
     world.control("a", 0.3)
     edited(world, replace(a, static=True))
-    assert list(place(world)) == list(lies) and not world.things["a"].moves
-    assert world.things["a"].standing.x == 0.3
+    assert list(place(world)) == list(lies) and not world.objects["a"].moves
+    assert world.objects["a"].reaction_state.x == 0.3
     world.move_hand("right", at(*lies))
     assert world.grab("right") is None
     edited(world, replace(a, mass_kg=4.0))
-    assert world.physics.mass(world.things["a"].body) == 4.0 and list(place(world)) == list(lies)
+    assert world.physics.mass(world.objects["a"].body) == 4.0 and list(place(world)) == list(lies)
 
 
 def test_reactions_and_selectors_are_taken_over():
     a = item("a", position=(0, 0.05, 0))
     world = real(a)
-    body = world.things["a"].body
+    body = world.objects["a"].body
     part = Sphere(centre=(0, 0, 0), radius=0.1, x=1.0)
     edited(world, replace(a, reactions=(reaction("ray", "ice"),), selectors=(part,)))
-    assert world.things["a"].body == body and world.drawn().objects[0].selectors == (part,)
+    assert world.objects["a"].body == body and world.drawn().objects[0].selectors == (part,)
     world.ray((0, 1, 0), (0, -1, 0))
     assert world.step().events[0]["to"] == "ice" and world.drawn().objects[0].selectors == (part,)
 
@@ -103,14 +103,14 @@ def test_reactions_and_selectors_are_taken_over():
 def test_put_back_is_the_file_again():
     a = item("a", states=STATES, x=0.5, reactions=(reaction("collision", "fire"),))
     world = fallen(a, item("b", position=(1, 1, 0)))
-    assert world.things["a"].standing.x == 1.0
+    assert world.objects["a"].reaction_state.x == 1.0
     world.move_hand("right", at(*place(world, "b")))
     world.grab("right")
-    put_back(world)
-    assert world.held("right") is None and world.things["a"].standing.x == 0.5
+    reset_objects(world)
+    assert world.held("right") is None and world.objects["a"].reaction_state.x == 0.5
     for name, x in (("a", 0.0), ("b", 1.0)):
         assert list(place(world, name)) == [x, 1, 0]
-        assert not np.any(world.physics.velocity(world.things[name].body))
+        assert not np.any(world.physics.velocity(world.objects[name].body))
     again = [world.step() for _ in range(60)]
     assert [row["to"] for record in again for row in record.events] == ["fire"]
 

@@ -7,13 +7,13 @@ from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.world.mouse_hand import (
     NOTCH,
     MouseHand,
+    hand_at,
     moved,
     multiply,
     pose,
     pushed,
     ray,
     rolled,
-    take,
     turned,
 )
 
@@ -47,7 +47,7 @@ def test_a_ray_goes_through_its_pixel(tangents, place):
 def test_what_is_taken_stays_under_the_mouse(tangents):
     eye = view(tangents)
     point = np.array([0.1, -0.2, 0.3])
-    hand = take(eye, SIZE, point)
+    hand = hand_at(eye, SIZE, point)
     np.testing.assert_allclose(hand.place, on_picture(eye, point), atol=1e-9)
     np.testing.assert_allclose(pose(hand, eye, SIZE).position, point, atol=1e-9)
     hand = moved(moved(hand, 30.0, 10.0, SIZE), -7.0, 33.0, SIZE)
@@ -79,7 +79,7 @@ def test_it_leaves_neither_the_picture_nor_the_eye():
     outside = MouseHand((-50.0, 700.0), 2.0)  # the middle of something large
     assert moved(outside, -10, 10, SIZE).place == outside.place
     assert moved(outside, 10, -10, SIZE).place == (-40.0, 690.0)
-    behind = take(eye, SIZE, eye.world_from_eye.position)
+    behind = hand_at(eye, SIZE, eye.world_from_eye.position)
     assert behind.depth_m == 0.02
 
 

@@ -242,7 +242,7 @@ def test_rays_and_hands_find_the_nearest():
     assert physics.cast_ray((0, 1, -1), (0, 1, 0)) == (near, 0)  # from inside
     assert physics.nearest((0, 1.15, -1), 0.2) == (near, pytest.approx(0.1, abs=1e-5))
     assert physics.nearest((0, 1.15, -1), 0.05) is None
-    physics.place(near, at(0, 1, -2.5))
+    physics.set_pose(near, at(0, 1, -2.5))
     assert physics.cast_ray((0, 1, 0), (0, 0, -1))[0] == far
     physics.remove(far)
     assert physics.cast_ray((0, 1, 0), (0, 0, -1))[0] == near
@@ -327,7 +327,7 @@ BAD_CALLS = {
     "velocity NaN": lambda p, b: p.set_velocity(b, (NAN, 0, 0)),
     "turning Inf": lambda p, b: p.set_velocity(b, (0, 0, 0), (0, INF, 0)),
     "velocity of the floor": lambda p, b: p.set_velocity(FLOOR, (1, 0, 0)),
-    "place NaN": lambda p, b: p.place(b, at(0, NAN, 0)),
+    "place NaN": lambda p, b: p.set_pose(b, at(0, NAN, 0)),
     "hand NaN": lambda p, b: p.grab(b, at(NAN, 0, 0), (0, 0, 0)),
     "grab at NaN": lambda p, b: p.grab(b, at(0, 0, 0), (0, NAN, 0)),
     "grab of the floor": lambda p, b: p.grab(FLOOR, at(0, 0, 0), (0, 0, 0)),
@@ -377,7 +377,7 @@ def test_no_number_is_ever_lost_whatever_hands_do():
         elif deed == 3:
             physics.set_velocity(body, rng.normal(0, 1000, 3), rng.normal(0, 1000, 3))
         elif deed == 4:
-            physics.place(body, at(*rng.normal(0, 0.2, 3)))  # into the floor and each other
+            physics.set_pose(body, at(*rng.normal(0, 0.2, 3)))  # into the floor and each other
         else:
             for grab in grabs:
                 turn = rng.standard_normal(4)

@@ -17,7 +17,7 @@ from shapeshift.scene.world.reactions import (
     Machine,
     Motion,
     Reaction,
-    Standing,
+    ReactionState,
     State,
     TwoAxes,
     advance,
@@ -288,7 +288,7 @@ def test_a_hand_on_the_slider_ends_a_motion():
 
 
 def test_the_same_events_give_the_same_standings():
-    def run() -> list[Standing]:
+    def run() -> list[ReactionState]:
         table = machine(reaction(seconds=0.2), reaction("ray", "ice", seconds=0.5))
         standing, out = start(table, 0.0), []
         for step in range(200):

@@ -87,13 +87,13 @@ def test_a_jump_takes_hand_and_body_along():
         if number == 30:
             world.carry("right", turn)
             turned = turn[:3, :3]
-            np.testing.assert_allclose(world.things["a"].pose.position[0], 0, atol=1e-3)
+            np.testing.assert_allclose(world.objects["a"].pose.position[0], 0, atol=1e-3)
         hand = turned @ np.array([2.0 * number / 90, 1, 0])
         world.move_hand("right", Pose(hand, world.hands["right"].wxyz))
         world.advance(1 / 90)
     world.release("right")
     world.step()
-    thrown, _ = world.physics.velocity(world.things["a"].body)
+    thrown, _ = world.physics.velocity(world.objects["a"].body)
     assert np.linalg.norm(thrown - [0, 0, -2.0]) < 0.1
     world.carry("right", turn)  # empty: nothing is carried
     assert np.allclose(world.hands["right"].position, hand)
@@ -115,11 +115,11 @@ def test_a_ray_acts_and_an_aim_does_not():
     hit = world.aim((0, 1, 2), (0, 0, -3))
     assert hit.object == "a" and hit.distance_m == pytest.approx(2 - HALF, abs=1e-4)
     np.testing.assert_allclose(hit.point, [0, 1, HALF], atol=1e-4)
-    assert world.step().rays == [] and world.things["a"].standing.x == 0
+    assert world.step().rays == [] and world.objects["a"].reaction_state.x == 0
     assert world.ray((0, 1, 2), (0, 0, -3)).object == "a"
     record = world.step()
     assert record.rays[0]["object"] == "a" and record.events[0]["on"] == "ray"
-    assert world.things["a"].standing.x == 0.5
+    assert world.objects["a"].reaction_state.x == 0.5
     assert world.aim((5, 1, 0), (0, -1, 0)).object == FLOOR_NAME
     assert world.ray((5, 1, 0), (0, 1, 0)) is None and world.step().rays[0]["object"] is None
 
@@ -151,7 +151,7 @@ def test_what_is_thrown_flies_with_its_hand_at_any_frame_rate(frame_hz):
         world.advance(1 / frame_hz)
     world.release("right")
     world.advance(1 / frame_hz)
-    thrown, _ = world.physics.velocity(world.things["a"].body)
+    thrown, _ = world.physics.velocity(world.objects["a"].body)
     assert np.linalg.norm(thrown - [speed, 0, 0]) < 0.05 * speed
 
 
@@ -174,14 +174,14 @@ def test_a_hand_that_moved_while_all_held_still_flings_nothing():
     world.paused = False
     world.advance(0.1)
     world.release("right")
-    speed = np.linalg.norm(world.physics.velocity(world.things["a"].body)[0])
+    speed = np.linalg.norm(world.physics.velocity(world.objects["a"].body)[0])
     assert speed < 0.05
 
 
 def test_between_two_steps_it_is_drawn_between_them():
     world = thought(item())
     world.advance(8.0 / 90)
-    before, now = world.things["a"].before.position[1], place(world)[1]
+    before, now = world.objects["a"].before.position[1], place(world)[1]
     assert before > now and world.drawn().objects[0].world_from_object.position[1] == before
     world.advance(0.25 / 90)  # no step is due
     assert world.steps == 8
@@ -245,7 +245,7 @@ def test_objects_come_go_are_placed_and_hidden():
     with pytest.raises(ValueError, match="there is an object 'b'"):
         world.add(item("b"), model(), BOX)
     assert [thing.label for thing in world.drawn().objects] == [1, 2]
-    world.place("b", at(2, 3, 4))
+    world.move_object("b", at(2, 3, 4))
     world.show("b", False)
     thing = world.drawn().objects[1]
     assert list(thing.world_from_object.position) == [2, 3, 4] and not thing.visible
@@ -253,7 +253,7 @@ def test_objects_come_go_are_placed_and_hidden():
     world.remove("b")
     assert world.aim((2, 9, 4), (0, -1, 0)).object == FLOOR_NAME
     assert [thing.name for thing in world.drawn().objects] == ["a"]
-    for deed in (world.remove, world.thing, lambda name: world.control(name, 0.5)):
+    for deed in (world.remove, world.object_named, lambda name: world.control(name, 0.5)):
         with pytest.raises(ValueError, match="there is no object 'b'; there are a"):
             deed("b")
 
@@ -263,11 +263,14 @@ def test_a_control_ends_what_a_reaction_began():
     world.ray((0, 1, 1), (0, 0, -1))
     for _ in range(30):
         world.step()
-    assert 0 < world.things["a"].standing.x < 1
+    assert 0 < world.objects["a"].reaction_state.x < 1
     world.control("a", 0.25)
     for _ in range(90):
         world.step()
-    assert world.things["a"].standing.x == 0.25 and world.things["a"].standing.state == "normal"
+    assert (
+        world.objects["a"].reaction_state.x == 0.25
+        and world.objects["a"].reaction_state.state == "normal"
+    )
 
 
 def test_what_is_put_elsewhere_by_hand_is_told_though_it_lies_still():
@@ -276,7 +279,7 @@ def test_what_is_put_elsewhere_by_hand_is_told_though_it_lies_still():
         world.step()
     assert not world.step().is_news
     world.control("a", 0.25)
-    world.place("post", at(2, 1, 0))
+    world.move_object("post", at(2, 1, 0))
     record = world.step()
     assert record.x == {"a": 0.25} and record.poses["post"][:3] == [2, 1, 0]
     saved = world.snapshot()
@@ -301,5 +304,5 @@ def test_a_snapshot_brings_all_of_it_back():
         world.add(item("b", position=(0, 2, 0)), model(), BOX)
         world.remove("a")
         world.restore(saved)
-        assert list(world.things) == ["a"] and world.held("right") == "a" and world.steps == 11
+        assert list(world.objects) == ["a"] and world.held("right") == "a" and world.steps == 11
     assert first[0][0] == first[1][0] and str(first[0][1][1:]) == str(first[1][1][1:])

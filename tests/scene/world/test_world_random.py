@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.document.scene_file import SceneFile
-from shapeshift.scene.world.follow import follow, put_back
+from shapeshift.scene.world.follow import follow, reset_objects
 from shapeshift.scene.world.world import World
 from tests.support.scene.world_scenes import BOX, STATES, at, item, model, reaction, real
 
@@ -72,13 +72,13 @@ class Random:
         self.world.step()
 
     def do_place(self) -> None:
-        self.world.place(self.pick(self.items), at(*self.somewhere()))
+        self.world.move_object(self.pick(self.items), at(*self.somewhere()))
 
     def do_control(self) -> None:
         self.world.control(self.pick(self.items), self.rng.random())
 
     def do_back(self) -> None:
-        put_back(self.world)
+        reset_objects(self.world)
 
     def do_edit(self) -> None:
         name, items = self.pick(self.items), dict(self.items)
@@ -110,15 +110,15 @@ class Random:
 
 
 def check(world: World, items: dict) -> None:
-    assert list(world.things) == list(items)
-    assert world.names == {t.body: name for name, t in world.things.items()}
+    assert list(world.objects) == list(items)
+    assert world.names == {t.body: name for name, t in world.objects.items()}
     assert set(world.physics.ids()) - {0} == set(world.names)
     for hand in HANDS:
         held = world.held(hand)
         assert (held is None) == (hand not in world.holds)
-        assert held is None or (world.things[held].moves and hand in world.hands)
-    for thing in world.things.values():
-        assert np.isfinite(thing.pose.position).all() and 0 <= thing.standing.x <= 1
+        assert held is None or (world.objects[held].moves and hand in world.hands)
+    for thing in world.objects.values():
+        assert np.isfinite(thing.pose.position).all() and 0 <= thing.reaction_state.x <= 1
     drawn = world.drawn()
     assert [thing.name for thing in drawn.objects] == list(items)
     assert world.drawn() is drawn

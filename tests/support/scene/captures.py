@@ -7,7 +7,7 @@ import numpy as np
 import pycolmap
 from PIL import Image
 
-from shapeshift.scene.captures.capture_rules import turn_upright
+from shapeshift.scene.captures.capture_rules import upright_rotation
 from shapeshift.scene.pose import OPENCV_FROM_EYE, View, look_at
 
 RANDOM = np.random.default_rng(7)
@@ -26,7 +26,7 @@ def save_image(path: Path, size=(16, 12), seed=0, mode="RGB") -> Path:
 def opencv_pose(i: int, up=(0.0, -1.0, 0.0)) -> np.ndarray:
     """(4, 4) world_from_camera of a camera on a circle round the origin in a world with that up."""
     side = np.array([np.cos(i), 0.4, np.sin(i)]) * 3
-    eye = turn_upright(up, "test")[:3, :3].T @ side
+    eye = upright_rotation(up, "test")[:3, :3].T @ side
     return look_at(eye, np.zeros(3), up).matrix() @ OPENCV_FROM_EYE
 
 

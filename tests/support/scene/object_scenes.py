@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.runtime_models.model import SplatLayers, Stop
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_splats
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
@@ -56,7 +56,7 @@ def exact_cloud(count: int, seed: int = 0) -> SplatLayers:
 def put(cloud: SplatLayers, pose: Pose) -> SplatLayers:
     """The cloud where the pose puts it, harmonics turned with it, as one that stands unposed."""
     arrays = (cloud.means, cloud.scales, cloud.wxyz, cloud.opacity, cloud.sh)
-    turned = turn(PlainSplats(*arrays), pose.matrix()[:3, :3])
+    turned = rotate_splats(PlainSplats(*arrays), pose.matrix()[:3, :3])
     means = (turned.means + pose.position).astype(np.float32)
     return replace(cloud, means=means, wxyz=turned.wxyz, sh=turned.sh)
 

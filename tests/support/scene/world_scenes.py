@@ -123,4 +123,4 @@ def real(*items, floor_y: float | None = 0.0, **file) -> World:
 
 
 def place(world: World, name: str = "a") -> np.ndarray:
-    return world.things[name].pose.position
+    return world.objects[name].pose.position

@@ -9,7 +9,7 @@ from shapeshift.runtime_models.evaluate import evaluate
 from shapeshift.runtime_models.model import AnchorModel, Mlp
 from shapeshift.runtime_models.package.write_onnx import write_onnx
 from shapeshift.runtime_models.read_scene import read_model
-from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, turn_quaternions
+from shapeshift.runtime_models.splats.operations.rotate_splats import HALF_TURN, rotate_quaternions
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from tests.support.models import psi_of
 from tests.support.splats.torch_files import write_tensors
@@ -222,7 +222,7 @@ def from_anchors(model: AnchorModel, x: float) -> Raw:
     limit = 100 * largest  # metres
     b1 = b1 + np.log(heads["scale"].gain / limit)
     (v0, c0), (v1, c1) = rotation
-    v1, c1 = (turn_quaternions(a.reshape(k, 4, -1).transpose(0, 2, 1).reshape(-1, 4), HALF_TURN)
+    v1, c1 = (rotate_quaternions(a.reshape(k, 4, -1).transpose(0, 2, 1).reshape(-1, 4), HALF_TURN)
               .reshape(k, -1, 4).transpose(0, 2, 1) for a in (v1, c1))  # fmt: skip
     hidden = np.concatenate([w0, v0]), np.concatenate([b0, c0])
     last = np.zeros((k, 7, len(b0) + len(c0)))

@@ -47,17 +47,17 @@ def test_grab_carry_and_drop_onto_the_floor_changes_x():
     standing, felt = run(person, [squeeze] * 30)
     assert person.touched.held["right"] == "a"
     assert [len(pulses) for pulses in felt] == [1] + [0] * 29
-    assert np.allclose(person.world.things["a"].pose.position, HERE, atol=5e-3)
+    assert np.allclose(person.world.objects["a"].pose.position, HERE, atol=5e-3)
     run(person, [frame()] * 90, standing)
     assert person.touched.held["right"] is None
-    assert person.world.things["a"].standing.state == "fire"
-    assert person.world.things["a"].pose.position[1] < 0.06
+    assert person.world.objects["a"].reaction_state.state == "fire"
+    assert person.world.objects["a"].pose.position[1] < 0.06
 
 
 def held_after(person: XrUser, standing: Standing) -> float:
     """Metres from the hand to what it holds."""
     return float(
-        np.linalg.norm(person.world.things["a"].pose.position - standing.point(np.array(HERE)))
+        np.linalg.norm(person.world.objects["a"].pose.position - standing.point(np.array(HERE)))
     )
 
 
@@ -72,7 +72,7 @@ def test_a_menu_that_moves_or_scales_the_room_takes_along_what_is_held():
         person.jumped()
         standing, _ = run(person, [squeeze], wished)
         assert held_after(person, standing) < 2e-3
-        speed = person.world.physics.velocity(person.world.things["a"].body)[0]
+        speed = person.world.physics.velocity(person.world.objects["a"].body)[0]
         assert np.linalg.norm(speed) < 0.05
 
 

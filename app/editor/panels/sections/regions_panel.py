@@ -86,7 +86,7 @@ def _row(state: EditorState, number: int, ui_scale: float) -> None:
     tip("Choose it to edit it; click again to leave it.", ui_scale)
     imgui.same_line()
     blend = state.scene.objects[region.index].model.blend
-    right_aligned(f"x {blend.place(region.x):.2f}")
+    right_aligned(f"x {blend.slider_x(region.x):.2f}")
 
 
 def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
@@ -110,7 +110,7 @@ def _chosen(state: EditorState, region: Region, ui_scale: float) -> None:
     tip("Over this far x goes over from inside to outside; at 0 shapes may tear.", ui_scale)
     regions.edit(number, border=border)
     stops, blend = state.stops(region.index), things[region.index].model.blend
-    moved = track(stops, (blend.place(region.x),), state.grip, 46 * ui_scale)
+    moved = track(stops, (blend.slider_x(region.x),), state.grip, 46 * ui_scale)
     if moved.knob is not None:
         regions.edit(number, x=moved.x)
     elif moved.stop is not None:

@@ -7,7 +7,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import button_row, tip
 from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.world.reactions import TwoAxes
-from shapeshift.scene.world.rigid_object import Thing
+from shapeshift.scene.world.rigid_object import RigidObject
 
 Vec = imgui.ImVec2
 PAD, KNOB = 120.0, 9.0  # logical pixels: a pad's height, and half of its knob
@@ -23,30 +23,30 @@ def draw_touch(touch: TouchState, ui_scale: float) -> None:
         "Put back": "Everything where it was before it was touched. Key R.",
     }
     clicked = button_row(tips, ui_scale, 3)
-    deeds = {f"{play}###play": touch.toggle, "Step": touch.step, "Put back": touch.put_back}
+    deeds = {f"{play}###play": touch.toggle, "Step": touch.step, "Put back": touch.reset_objects}
     if clicked:
         deeds[clicked]()
     _, touch.colliders = imgui.checkbox("show colliders", touch.colliders)
     tip("Key C. What the physics touches: green moves, blue stays.", ui_scale)
     name = pad_object(touch)
     if name is not None:
-        draw_pad(touch, name, world.things[name].item.two_axes, ui_scale)
+        draw_pad(touch, name, world.objects[name].item.two_axes, ui_scale)
     for line in touch.told:
         imgui.text_disabled(line)
 
 
 def pad_object(touch: TouchState) -> str | None:
     """Whose pad is shown: of those that have one the chosen object, else the first."""
-    names = [n for n, thing in touch.world.things.items() if thing.item.two_axes is not None]
+    names = [n for n, thing in touch.world.objects.items() if thing.item.two_axes is not None]
     chosen = touch.chosen
     return chosen if chosen in names else names[0] if names else None
 
 
 def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> None:
     """A square to drag in: to the sides balance -1 to 1, upwards power 0 to 1."""
-    thing = touch.world.things[name]
+    thing = touch.world.objects[name]
     balance, power = touch.pads[name] = pad_of(
-        axes, thing.machine.blend.place(thing.standing.x), touch.pads.get(name, (0.0, 1.0))
+        axes, thing.machine.blend.slider_x(thing.reaction_state.x), touch.pads.get(name, (0.0, 1.0))
     )
     imgui.text_disabled(f"{name}: balance {balance:+.2f}, power {power:.2f}")
     corner = imgui.get_cursor_screen_pos()
@@ -77,7 +77,7 @@ def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> No
     draw.add_circle_filled(knob, 3 * ui_scale, theme.color(theme.SURFACE))
 
 
-def side_names(thing: Thing, axes: TwoAxes) -> tuple[str, str]:
+def side_names(thing: RigidObject, axes: TwoAxes) -> tuple[str, str]:
     """What is at both sides: a state or a stop that lies there, "" where none does."""
     stops = named_stops(thing.item, thing.drawn.model)
     named = (next((s.name for s in stops if s.x == x), "") for x in (axes.below, axes.above))

@@ -70,7 +70,7 @@ class EditedFile:
         if not regions.did:
             self.amend_regions(regions)
             return
-        self.history = self.history.take(
+        self.history = self.history.record(
             self.file, regions.did, regions.together, regions.kept, regions.bytes
         )
         regions.did = ""

@@ -37,7 +37,7 @@ def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, EditedFile]:
     edited = edited_from_file(found.path, file, found.sources[:inside])
     for source in found.sources[inside:]:
         file = edits.add(file, edited.item(source))
-        edited.history = edited.history.take(file, f"add {file.items[-1].name}")
+        edited.history = edited.history.record(file, f"add {file.items[-1].name}")
     models = edited.models_by_name()
     if x:
         file = file_at(file, models, x)

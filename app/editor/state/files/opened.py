@@ -26,8 +26,8 @@ from shapeshift.scene.captures.colmap_tables import TABLES, find_model
 from shapeshift.scene.document.read_scene_file import read_scene_file
 from shapeshift.scene.document.scene_file import SceneFile, is_scene_file, read_models
 
-Told = Callable[[str, float], None]  # what is being done, part done 0..1
-ReadModel = Callable[[Path, Told | None], Model]
+Progress = Callable[[str, float], None]  # what is being done, part done 0..1
+ReadModel = Callable[[Path, Progress | None], Model]
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def read_files(
     paths: Sequence[Path],
     read_model: ReadModel,
     reading: CameraReading,
-    told: Told | None,
+    told: Progress | None,
     plain: Reading | None = None,
     beside: bool = True,
 ) -> OpenedFiles:
@@ -94,13 +94,13 @@ def read_files(
     return OpenedFiles(tuple(sources), file, scene_file, last(lists), last(floors), tuple(notes))
 
 
-def read_scene(path: Path, plain: Reading, told: Told | None) -> tuple[SceneFile, list[Source]]:
+def read_scene(path: Path, plain: Reading, told: Progress | None) -> tuple[SceneFile, list[Source]]:
     """A scene file and the model of each of its objects; findings go to stderr."""
     if plain.mode or plain.up or plain.flip:
         raise BadFile(f"{path.name} says for each object how layers add up and which way is up.")
     file = read_scene_file(path)
     with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
-        models = read_models(file, replace(plain, told=tell))
+        models = read_models(file, replace(plain, progress=tell))
     tell_findings(models)
     facts: dict[Path, dict] = {}
     sources = []
@@ -165,7 +165,7 @@ class Opener:
         return f"Opening {names} \u2026" + (f" {part:.0%}" if what and part > 0 else "")
 
     def start(
-        self, paths: tuple[Path, ...], read: Callable[[tuple[Path, ...], Told], OpenedFiles]
+        self, paths: tuple[Path, ...], read: Callable[[tuple[Path, ...], Progress], OpenedFiles]
     ) -> None:
         """Begins; while another reading is under way, after that one, whose result is forgotten."""
         if self.busy:

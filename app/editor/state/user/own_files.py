@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 
 FILE = "saved.json"
@@ -45,13 +46,7 @@ def _key(path: Path) -> str:
 
 
 def _read(path: Path) -> dict[str, Stamp]:
-    try:
-        if path.stat().st_size > LARGEST:
-            return {}
-        data = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
-        return {}
-    rows = data.get("saved") if isinstance(data, dict) else None
+    rows = saved_object(path, LARGEST).get("saved")
     found = {}
     for row in rows if isinstance(rows, list) else []:
         name, stamp = (row.get("path"), row.get("stamp")) if isinstance(row, dict) else (0, 0)

@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from shapeshift.runtime_models.files.json_fields import saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 
 MOST = 10
@@ -20,14 +21,7 @@ class RecentFiles:
 
     @staticmethod
     def read(folder: Path) -> "RecentFiles":
-        path = folder / FILE
-        try:
-            if path.stat().st_size > LARGEST:
-                return RecentFiles(folder)
-            data = json.loads(path.read_bytes())
-        except (OSError, ValueError, RecursionError):
-            return RecentFiles(folder)
-        listed = data.get("recent") if isinstance(data, dict) else None
+        listed = saved_object(folder / FILE, LARGEST).get("recent")
         texts = listed if isinstance(listed, list) else []
         good = [t for t in texts if isinstance(t, str) and t and "\0" not in t]
         return RecentFiles(folder, tuple(map(Path, dict.fromkeys(good)))[:MOST])

@@ -3,8 +3,8 @@
 import json
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
+from shapeshift.runtime_models.files.json_fields import is_number, saved_object
 from shapeshift.runtime_models.files.whole_file import write_whole
 
 FILE = "settings.json"
@@ -25,18 +25,9 @@ class Settings:
 
     @staticmethod
     def read(folder: Path) -> "Settings":
-        path = folder / FILE
-        try:
-            if path.stat().st_size > LARGEST:
-                return Settings(folder)
-            data = json.loads(path.read_bytes())
-        except (OSError, ValueError, RecursionError):
-            return Settings(folder)
-        found: dict[str, Any] = data if isinstance(data, dict) else {}
+        found = saved_object(folder / FILE, LARGEST)
         size, panel = found.get("text_size"), found.get("panel_open")
-        if isinstance(size, bool) or not isinstance(size, int | float):
-            size = None
-        elif not TEXT_SIZES[0] <= size <= TEXT_SIZES[-1]:
+        if not (is_number(size) and TEXT_SIZES[0] <= size <= TEXT_SIZES[-1]):
             size = None
         return Settings(
             folder,

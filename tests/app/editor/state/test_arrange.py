@@ -20,7 +20,7 @@ from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from shapeshift.scene.document import edits
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.selectors.selector import Painted, Sphere
-from shapeshift.scene.world.follow import put_back
+from shapeshift.scene.world.follow import reset_objects
 
 ROOT = Path(__file__).resolve().parents[4]
 NAMES = ["background", "cube", "ball", "ring", "plate"]
@@ -99,7 +99,7 @@ def test_every_edit_is_shown_and_taken_back(state):
     pose = Pose(np.array([1.0, 2.0, 3.0]), np.array([1.0, 0, 0, 0]))
     steps = [
         (edits.remove, "cube"), (edits.duplicate, "ball", (0.1, 0.0, 0.0)),
-        (edits.rename, "ring", "torus"), (edits.hide, "plate"), (edits.place, "torus", pose),
+        (edits.rename, "ring", "torus"), (edits.hide, "plate"), (edits.set_pose, "torus", pose),
         (edits.ground, -0.3), (edits.remove, "background"), (edits.remove, "ball"),
     ]  # fmt: skip
     scenes = [first]
@@ -323,7 +323,7 @@ def test_whatever_is_edited_undone_and_redone_all_stay_one(state, seed, monkeypa
             state.world.paused = False
             for _ in range(5):
                 state.world.step()
-            put_back(state.world)
+            reset_objects(state.world)
             state.follow_world()
             same_as_file(state)
     for _ in range(500):
@@ -382,9 +382,9 @@ def ready(state: EditorState) -> None:
 def same_in_world(state: EditorState) -> None:
     """The world has the same objects in the same order, places, values and bodies."""
     items = state.edited.file.all_items
-    assert list(state.world.things) == [item.name for item in items]
-    for item, thing in zip(items, state.world.things.values(), strict=True):
-        assert thing.item is item and thing.standing.x == item.x
+    assert list(state.world.objects) == [item.name for item in items]
+    for item, thing in zip(items, state.world.objects.values(), strict=True):
+        assert thing.item is item and thing.reaction_state.x == item.x
         assert (thing.body is not None) == (item.collider is not None)
         assert thing.pose.position == pytest.approx(item.position, abs=1e-5)
 

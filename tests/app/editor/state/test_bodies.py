@@ -73,7 +73,7 @@ def test_one_collider_serves_all_that_are_alike(made):
     of = edited(thing("a"), thing("b"), thing("c", x=1.0), thing("d", collider=None))
     until_there(bodies, of)
     assert made == [("a", 0.0), ("c", 1.0)]  # another x is another shape
-    things = bodies.world.things
+    things = bodies.world.objects
     assert list(things) == ["a", "b", "c", "d"] and bodies.world.paused
     assert [things[name].body is not None for name in things] == [True, True, True, False]
 
@@ -91,17 +91,17 @@ def test_a_slider_does_not_make_it_anew(made):
     bodies, of = Bodies(), edited(thing("a"))
     until_there(bodies, of)
     for x in (0.1, 0.2, 0.3):
-        of.history = of.history.take(edits.set_x(of.file, "a", x), "x")
+        of.history = of.history.record(edits.set_x(of.file, "a", x), "x")
         bodies.follow(of)
         until_there(bodies, of)
-    assert made == [("a", 0.0)] and bodies.world.things["a"].standing.x == 0.3
+    assert made == [("a", 0.0)] and bodies.world.objects["a"].reaction_state.x == 0.3
 
 
 def test_what_cannot_be_made_is_said_once_and_the_rest_can_be_touched(made):
     bodies, of = Bodies(), edited(thing("bad", x=0.5), thing("a"))
     until_there(bodies, of)
     assert "bad" in bodies.problem and "cannot be touched" in bodies.problem
-    things = bodies.world.things
+    things = bodies.world.objects
     assert things["bad"].body is None and things["a"].body is not None
     bodies.problem = ""
     for _ in range(5):
@@ -124,7 +124,7 @@ def test_without_physics_a_scene_can_be_seen_and_edited(made, monkeypatch):
     until_there(bodies, of)
     assert "rapier3d" in bodies.problem and bodies.world is None
     bodies.problem = ""
-    of.history = of.history.take(edits.hide(of.file, "a"), "hide")
+    of.history = of.history.record(edits.hide(of.file, "a"), "hide")
     bodies.follow(of)  # is no refusal of the edit
     until_there(bodies, of)
     assert bodies.problem == "" and bodies.world is None
@@ -137,7 +137,7 @@ def test_another_scene_ends_what_is_being_made(monkeypatch):
         try:
             while True:
                 begun.set()
-                making.tell("cutting it into convex pieces", 0.5)
+                making.report("cutting it into convex pieces", 0.5)
                 time.sleep(0.001)
         finally:
             ended.set()

@@ -11,7 +11,7 @@ def state() -> EditorState:
     return EditorState(lambda path: pytest.fail("nothing is read"))
 
 
-@pytest.mark.parametrize("deed", ["toggle", "step", "put_back", "let_go"])
+@pytest.mark.parametrize("deed", ["toggle", "step", "reset_objects", "let_go"])
 def test_without_a_world_nothing_moves_and_nothing_is_said(state, deed):
     touch, before = TouchState(state, play=False), state.scene
     getattr(touch, deed)()

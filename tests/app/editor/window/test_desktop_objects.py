@@ -43,7 +43,7 @@ def plain(splats_viewer):
 
 def test_a_scene_file_is_open_with_its_world(viewer):
     assert names(viewer) == NAMES
-    assert set(viewer.state.world.things) == set(NAMES) and viewer.state.world.paused
+    assert set(viewer.state.world.objects) == set(NAMES) and viewer.state.world.paused
     assert viewer.window.title.startswith("touch.scene.json")
 
 
@@ -82,7 +82,7 @@ def test_handles_move_the_chosen_thing_along_one_axis_as_one_edit(viewer):
     item = state.edited.file.items[1]
     assert item.position == pytest.approx(moved.position, abs=1e-6) and item.wxyz == (1, 0, 0, 0)
     assert tuple(moved.position) == item.position
-    there = state.world.physics.pose(state.world.things["ball"].body).position
+    there = state.world.physics.pose(state.world.objects["ball"].body).position
     assert there == pytest.approx(moved.position, abs=1e-6)
     assert len(state.edited.history.steps) == 2 and viewer.objects.unsaved
     key(viewer, glfw.KEY_Z, CTRL)
@@ -120,7 +120,7 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     copy = thing(viewer, "ball 2")
     assert copy.model is thing(viewer, "ball").model
     assert copy.world_from_object.position[0] > 0.05  # beside it, not in it
-    assert "ball 2" in viewer.state.world.things
+    assert "ball 2" in viewer.state.world.objects
     assert objects.edits.edit(edits.rename, "ball 2", "globe", what="rename")
     key(viewer, glfw.KEY_DELETE)
     assert names(viewer) == [*NAMES[:2], "ball", "ring", "plate"] or viewer.state.chosen == ""
@@ -129,7 +129,7 @@ def test_copy_delete_hide_and_rename_with_undo(viewer):
     key(viewer, glfw.KEY_ESCAPE)
     while viewer.state.edited.history.undoes:
         key(viewer, glfw.KEY_Z, CTRL)
-    assert names(viewer) == NAMES and list(viewer.state.world.things) == NAMES
+    assert names(viewer) == NAMES and list(viewer.state.world.objects) == NAMES
     key(viewer, glfw.KEY_Z, CTRL)
     assert "Nothing" in viewer.state.messages.note
 
@@ -143,7 +143,7 @@ def test_objects_are_added_by_dropping_while_the_box_is_open(viewer, tmp_path):
     viewer.take(Drop((tmp_path / "ball.ply",)))
     until_added(viewer)
     assert names(viewer) == [*NAMES, "ball 2"] and viewer.state.chosen == "ball 2"
-    assert not objects.adding.asking and "ball 2" in viewer.state.world.things
+    assert not objects.adding.asking and "ball 2" in viewer.state.world.objects
     key(viewer, glfw.KEY_Z, CTRL)
     assert names(viewer) == NAMES
     for path, words in ((TOUCH, "scene file"), (tmp_path / "none.ply", "none.ply")):
@@ -208,13 +208,13 @@ def test_a_body_is_given_taken_and_weighed(viewer):
     objects, world = viewer.objects, viewer.state.world
     item = edits.find(viewer.state.edited.file, "ball")
     assert objects.edits.change(item, "body", collider=None)
-    assert world.things["ball"].body is None
+    assert world.objects["ball"].body is None
     key(viewer, glfw.KEY_Z, CTRL)
-    assert world.things["ball"].body is not None
+    assert world.objects["ball"].body is not None
     item = edits.find(viewer.state.edited.file, "ball")
     assert objects.edits.change(item, "mass", mass_kg=2.0)
-    assert world.physics.mass(world.things["ball"].body) == pytest.approx(2.0)
-    assert objects.edits.change(item, "body", static=True) and not world.things["ball"].moves
+    assert world.physics.mass(world.objects["ball"].body) == pytest.approx(2.0)
+    assert objects.edits.change(item, "body", static=True) and not world.objects["ball"].moves
 
 
 def test_a_collider_that_cannot_be_made_is_a_sentence(viewer):
@@ -227,7 +227,7 @@ def test_a_collider_that_cannot_be_made_is_a_sentence(viewer):
         time.sleep(0.005)
     run_frames(viewer, 2)
     assert "ball" in state.problem and "touched" in state.problem
-    assert state.world.things["ball"].body is None
+    assert state.world.objects["ball"].body is None
     state.problem = ""
 
 

@@ -214,7 +214,7 @@ def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
     first = state.world
     assert objects.edits.edit(edits.ground, -0.2, what="floor")
     assert state.edited.file.floor_y == -0.2 and state.world is not first
-    assert state.world.paused and list(state.world.things) == NAMES
+    assert state.world.paused and list(state.world.objects) == NAMES
     viewer.viewpoint.camera.turn(0.3, -0.1)
     run_frames(viewer, 60)
     objects.edits.look_from_here()

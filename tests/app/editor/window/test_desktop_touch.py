@@ -73,7 +73,7 @@ def on_screen(viewer, point: np.ndarray) -> tuple[float, float]:
 
 
 def place(viewer, name: str = "cube") -> np.ndarray:
-    return viewer.state.world.things[name].pose.position
+    return viewer.state.world.objects[name].pose.position
 
 
 def hold(viewer, name: str = "cube") -> tuple[float, float]:
@@ -107,7 +107,7 @@ def test_a_flick_throws(viewer):
         viewer.take(Drag("left", 12.0, -6.0))
         run_frames(viewer, 1, seconds=1 / 60)
     viewer.take(Release("left"))
-    speed = viewer.state.world.physics.velocity(viewer.state.world.things["cube"].body)[0]
+    speed = viewer.state.world.physics.velocity(viewer.state.world.objects["cube"].body)[0]
     assert speed[0] > 0.5 and speed[1] > 0.2
 
 
@@ -125,7 +125,7 @@ def test_the_wheel_pushes_and_shift_turns(viewer, monkeypatch):
     viewer.take(Drag("left", 100.0, 0.0))
     run_frames(viewer, 12, seconds=0.08)
     np.testing.assert_allclose(place(viewer), where, atol=0.02)
-    w, _, y, _ = viewer.state.world.things["cube"].pose.wxyz
+    w, _, y, _ = viewer.state.world.objects["cube"].pose.wxyz
     assert 2 * np.arctan2(y, w) == pytest.approx(0.8, abs=0.05)  # 100 pixels of 0.008
     monkeypatch.undo()
 
@@ -196,7 +196,7 @@ def test_keys_play_step_and_put_back(viewer):
     hold(viewer)
     viewer.take(Drag("left", 80.0, -80.0))
     run_frames(viewer, 10)
-    assert world.things["cube"].standing.x == 0.5
+    assert world.objects["cube"].reaction_state.x == 0.5
     press_key(viewer, glfw.KEY_R)
     np.testing.assert_allclose(place(viewer), [0, 0.1, 0], atol=1e-6)
     thing = viewer.state.scene.objects[0]
@@ -213,7 +213,7 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
     assert len(viewer.touch.flashes) == 1
     run_frames(viewer, 2)
     if paused:
-        assert world.things["cube"].standing.state == "hot"
+        assert world.objects["cube"].reaction_state.state == "hot"
         world.paused = False
     run_frames(viewer, 15)
     assert viewer.state.scene.objects[0].x == 1.0
@@ -302,8 +302,8 @@ def test_a_pad_is_of_the_chosen_object_and_moves_its_x(viewer):
     assert state.scene.objects[1].x == pytest.approx(0.3)
     balance, power = touch.pads["post"]
     assert TwoAxes().x(balance, power) == pytest.approx(0.3)
-    assert side_names(touch.world.things["cube"], TwoAxes()) == ("cold", "hot")
-    assert side_names(touch.world.things["post"], TwoAxes(0.0, 0.2, 0.7)) == ("photo", "")
+    assert side_names(touch.world.objects["cube"], TwoAxes()) == ("cold", "hot")
+    assert side_names(touch.world.objects["post"], TwoAxes(0.0, 0.2, 0.7)) == ("photo", "")
 
 
 # The pad, without a window

@@ -8,6 +8,7 @@ import pytest
 from shapeshift.renderer.colors.false_colors import Heat, Shade, mixed_colors, split_colors
 from shapeshift.renderer.colors.heat import Heater
 from shapeshift.renderer.colors.palette import palette_colors
+from shapeshift.renderer.gl import shader
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
@@ -110,3 +111,23 @@ def test_a_window_shows_what_is_resolved(ctx, drawing, dtype):
             shown = pixels.reshape(*VIEW.size[::-1], 4)[::-1, :, :3] / (255 if dtype == "f1" else 1)
             away = np.abs(shown - np.clip(renderer.resolved(), 0, 1)).max()
             assert away < (0.503 / 255 if dtype == "f1" else 1e-4)
+
+
+@pytest.mark.parametrize("mlps", ["gl", "onnxruntime"])
+def test_the_first_frame_with_heat_compiles_nothing(ctx, monkeypatch, mlps):
+    compiled = []
+    for name in ("compile_program", "compile_compute"):
+        make = getattr(shader, name)
+        monkeypatch.setattr(
+            shader, name, lambda *a, make=make, **more: compiled.append(a[1:]) or make(*a, **more)
+        )
+    opened = model(60)
+    with Renderer(ctx, "quads", mlps) as renderer:
+        renderer.update(scene_of(opened))
+        renderer.draw([VIEW])
+        before = len(compiled)
+        assert before > 0
+        renderer.update(scene_of(opened, x=0.2))
+        renderer.draw([VIEW])
+        assert renderer.drawing.draws_heat, "no heat was drawn: the test sees nothing"
+        assert not compiled[before:]

@@ -101,9 +101,9 @@ def read_file_sh(folder: Path, twin: PlainSplats, thermal: np.ndarray) -> np.nda
     """Our harmonics of a PLY whose own ones, in its axes, are `thermal`."""
     from dataclasses import replace
 
-    from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
+    from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 
-    write_ply(turn_half(replace(twin, sh=thermal)), folder / "twin.ply")
+    write_ply(rotate_half_turn(replace(twin, sh=thermal)), folder / "twin.ply")
     return read_plain(folder / "twin.ply").sh
 
 

@@ -14,7 +14,7 @@ from shapeshift.runtime_models.splats.operations.prune_by_importance import (
     largest,
     left_whole,
     prominence,
-    thin,
+    prune_by_importance,
 )
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -76,7 +76,7 @@ def test_what_shows_is_opacity_times_the_two_larger_sides():
     )  # fmt: skip
     area = np.array([1e-3, 1.0, 1e-2, 0.25, 1e-2, 0.0])  # opacity * middle * most
     np.testing.assert_allclose(prominence(layers), area**0.25, rtol=1e-6)
-    kept = {tuple(row) for row in np.round(thin(layers, 4).scales, 4).tolist()}
+    kept = {tuple(row) for row in np.round(prune_by_importance(layers, 4).scales, 4).tolist()}
     assert (1.0, 0.001, 0.001) not in kept, "a needle stays for its length alone"
 
 
@@ -104,7 +104,7 @@ def test_a_scene_is_thinned_over_all_layers_together(tmp_path):
     for most in (0, 800, 801):
         same = read_model(tmp_path, Reading(most_splats=most))
         assert same.splat_count == 800 and same.findings == ()
-    assert thin(whole, 800) is whole
+    assert prune_by_importance(whole, 800) is whole
 
 
 def test_one_part_is_not_copied():

@@ -16,10 +16,10 @@ from shapeshift.runtime_models.splats.operations.rotate_splats import (
     UPSIDE_DOWN,
     ours_from_file,
     quaternion_of,
-    turn,
-    turn_harmonics,
-    turn_quaternions,
-    turner,
+    rotate_harmonics,
+    rotate_quaternions,
+    rotate_splats,
+    rotator,
 )
 from shapeshift.runtime_models.splats.plain_splats import AXES, Reading
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply
@@ -66,16 +66,16 @@ def test_a_half_turn_by_signs_is_the_turn_of_any_rotation(axis, count):
     means, wxyz = rng.normal(size=(7, 3)).astype("f4"), rng.normal(size=(7, 4)).astype("f4")
     sh = rng.normal(size=(7, count, 3)).astype("f4")
     short = [means.copy(), wxyz.copy(), sh.copy()]
-    turner(np.diag(signs), count)(*short)
+    rotator(np.diag(signs), count)(*short)
     np.testing.assert_allclose(short[0], means @ np.diag(signs), atol=1e-7)
     np.testing.assert_allclose(
-        np.abs((short[1] * turn_quaternions(wxyz, np.diag(signs))).sum(1)),
+        np.abs((short[1] * rotate_quaternions(wxyz, np.diag(signs))).sum(1)),
         (wxyz * wxyz).sum(1), rtol=1e-5,
     )  # fmt: skip
-    wanted = np.einsum("ij,njc->nic", turn_harmonics(np.diag(signs), count), sh)
+    wanted = np.einsum("ij,njc->nic", rotate_harmonics(np.diag(signs), count), sh)
     np.testing.assert_allclose(short[2], wanted, atol=1e-5)
     strided = [np.repeat(array, 2, axis=0)[::2] for array in (means, wxyz, sh)]
-    turner(np.diag(signs), count)(*strided)
+    rotator(np.diag(signs), count)(*strided)
     for one, other in zip(short, strided, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -102,7 +102,7 @@ def test_other_axes_are_one_sentence(up):
 def test_each_splat_one_by_one(rotation, count):
     """Places, axes of the ellipsoid with their lengths, and colours, by their meaning."""
     was = some_splats(12, count)
-    now = turn(was, rotation)
+    now = rotate_splats(was, rotation)
     before, after = rotation_matrices(was.wxyz), rotation_matrices(now.wxyz)
     np.testing.assert_array_equal(now.scales, was.scales)
     np.testing.assert_array_equal(now.opacity, was.opacity)
@@ -120,12 +120,12 @@ def test_each_splat_one_by_one(rotation, count):
 def test_turns_follow_each_other_as_matrices_do(count):
     was = some_splats(30, count)
     for first, second in itertools.product(ALL[::3], ALL[1::3]):
-        one = turn(was, second @ first)
-        two = turn(turn(was, first), second)
+        one = rotate_splats(was, second @ first)
+        two = rotate_splats(rotate_splats(was, first), second)
         assert_same(one, two)
         np.testing.assert_allclose(
-            turn_harmonics(second, count) @ turn_harmonics(first, count),
-            turn_harmonics(second @ first, count),
+            rotate_harmonics(second, count) @ rotate_harmonics(first, count),
+            rotate_harmonics(second @ first, count),
             atol=2e-6,
         )
 
@@ -135,27 +135,27 @@ def test_four_quarters_are_nothing(rotation):
     was = some_splats(300, 16)
     now = was
     for _ in range(4):
-        now = turn(now, rotation)
+        now = rotate_splats(now, rotation)
     assert_same(now, was)
 
 
 @pytest.mark.parametrize("rotation", ALL)
 def test_there_and_back(rotation):
     was = some_splats(300, 16)
-    assert_same(turn(turn(was, rotation), rotation.T), was)
+    assert_same(rotate_splats(rotate_splats(was, rotation), rotation.T), was)
 
 
 def test_half_a_turn_is_nothing_but_signs():
     was = some_splats(300, 16)
-    now = turn(was, HALF_TURN)
+    now = rotate_splats(was, HALF_TURN)
     for name in ("means", "wxyz", "sh"):
         a, b = np.abs(getattr(was, name)), np.abs(getattr(now, name))
         np.testing.assert_array_equal(
             np.sort(a.reshape(300, -1), 1), np.sort(b.reshape(300, -1), 1)
         )
-    slow = turn(was, HALF_TURN + 1e-30 * np.eye(3)[::-1])  # by way of matrices
+    slow = rotate_splats(was, HALF_TURN + 1e-30 * np.eye(3)[::-1])  # by way of matrices
     assert_same(now, slow)
-    assert turn(was, np.eye(3)) is was
+    assert rotate_splats(was, np.eye(3)) is was
 
 
 @pytest.mark.parametrize("rotation", ALL)
@@ -176,7 +176,9 @@ def test_an_origin_turns_with_its_scene():
 
     was = replace(some_splats(5), origin=(5e6, -3.0, 7.25e5))
     for rotation in ALL:
-        np.testing.assert_allclose(turn(was, rotation).origin, rotation @ was.origin, rtol=1e-12)
+        np.testing.assert_allclose(
+            rotate_splats(was, rotation).origin, rotation @ was.origin, rtol=1e-12
+        )
 
 
 @pytest.mark.parametrize("flip", [False, True])
@@ -189,13 +191,13 @@ def test_a_file_read_turned_written_and_read_again_is_the_same(tmp_path, up, fli
     assert_same(again, first)
     np.testing.assert_allclose(again.scales, first.scales, rtol=1e-6)
     plain = read_plain(tmp_path / "a.ply", Reading(up="+Y"))  # the file's own axes
-    assert_same(first, turn(plain, ours_from_file(up, flip)))
+    assert_same(first, rotate_splats(plain, ours_from_file(up, flip)))
 
 
 def test_a_real_file_upside_down_is_its_own_picture_turned(data):
     path = data / "anatomy_leg_ml3dgs" / "layer2.ply"
     was, now = read_plain(path), read_plain(path, Reading(flip=True))
-    assert_same(now, turn(was, UPSIDE_DOWN))
+    assert_same(now, rotate_splats(was, UPSIDE_DOWN))
     assert now.findings == was.findings == ()
 
 

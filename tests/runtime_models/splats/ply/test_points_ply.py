@@ -8,7 +8,7 @@ import pytest
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.runtime_models.splats.formats import format_of
-from shapeshift.runtime_models.splats.operations.knn_distance import nearest_distances, spacing
+from shapeshift.runtime_models.splats.operations.knn_distance import knn_distance, nearest_distances
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.read_points_ply import SIGMA, read_raw_points_ply
 
@@ -56,7 +56,7 @@ def test_points_with_colours(tmp_path, encoding, count):
     wanted = np.stack([columns[name] for name in ("red", "green", "blue")], 1) / 255
     assert np.abs(raw.sh[:, 0] * C0 + 0.5 - wanted).max() < 1e-6
     assert (raw.opacity == 1).all() and (raw.wxyz == (1, 0, 0, 0)).all()
-    assert np.allclose(raw.scales, (SIGMA * spacing(places))[:, None], rtol=1e-6)
+    assert np.allclose(raw.scales, (SIGMA * knn_distance(places))[:, None], rtol=1e-6)
     layers = read_model(path)
     assert layers.splat_count == count
     assert np.allclose(layers.means, places * (1, -1, -1), atol=1e-6)  # COLMAP's axes, turned
@@ -103,7 +103,7 @@ def test_far_points_keep_their_double_precision(tmp_path):
     raw = read_raw_points_ply(write_points(tmp_path / "points.ply", columns), Reading())
     assert raw.means.dtype == np.float64
     assert np.array_equal(raw.means[:, 0], columns["x"])
-    near = spacing(raw.means - 5e6)
+    near = knn_distance(raw.means - 5e6)
     assert np.allclose(raw.scales[:, 0], SIGMA * near, rtol=1e-4)
 
 
@@ -161,11 +161,13 @@ def test_distances_are_near_those_of_all_pairs(count):
 
 
 def test_spacing_where_there_is_none():
-    assert np.array_equal(spacing(np.zeros((1, 3))), [0.01])
-    assert np.array_equal(spacing(np.zeros((5, 3))), [0.01] * 5)
-    assert np.array_equal(spacing(np.full((5, 3), np.nan)), [0.01] * 5)
-    assert spacing(np.zeros((0, 3))).shape == (0,)
+    assert np.array_equal(knn_distance(np.zeros((1, 3))), [0.01])
+    assert np.array_equal(knn_distance(np.zeros((5, 3))), [0.01] * 5)
+    assert np.array_equal(knn_distance(np.full((5, 3), np.nan)), [0.01] * 5)
+    assert knn_distance(np.zeros((0, 3))).shape == (0,)
     line = np.arange(100.0)[:, None] * (1, 0, 0)
     line[0] = -1000  # a stray
-    assert spacing(line)[50] == pytest.approx(4 / 3) and spacing(line)[0] == pytest.approx(16 / 3)
-    assert (spacing(line) > 0).all()
+    assert knn_distance(line)[50] == pytest.approx(4 / 3) and knn_distance(line)[
+        0
+    ] == pytest.approx(16 / 3)
+    assert (knn_distance(line) > 0).all()

@@ -118,7 +118,7 @@ def test_elements_behind_the_splats_are_passed_over(tmp_path):
 def test_progress_rises_to_one(tmp_path):
     write_ply(some_splats(2 * block_of(68) + 1, 1), tmp_path / "a.ply")
     told = []
-    read_raw_ply(tmp_path / "a.ply", Reading(told=lambda *word: told.append(word)))
+    read_raw_ply(tmp_path / "a.ply", Reading(progress=lambda *word: told.append(word)))
     parts = [part for _, part in told]
     assert {what for what, _ in told} == {"reading a.ply"}
     assert parts == sorted(parts) and parts[-1] == 1 and len(parts) == 3

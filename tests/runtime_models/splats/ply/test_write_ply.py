@@ -8,7 +8,7 @@ import pytest
 from shapeshift.runtime_models.files.blocks import BLOCK
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.runtime_models.splats.formats import read_plain
-from shapeshift.runtime_models.splats.operations.rotate_splats import turn_half
+from shapeshift.runtime_models.splats.operations.rotate_splats import rotate_half_turn
 from shapeshift.runtime_models.splats.plain_splats import Reading
 from shapeshift.runtime_models.splats.ply.ply_file import read_header, read_table
 from shapeshift.runtime_models.splats.ply.read_ply import read_raw_ply
@@ -130,7 +130,7 @@ def test_the_splats_given_are_not_changed(tmp_path):
     write_ply(splats, tmp_path / "a.ply")
     for name in ("means", "scales", "wxyz", "opacity", "sh"):
         np.testing.assert_array_equal(getattr(splats, name), getattr(same, name))
-    np.testing.assert_array_equal(turn_half(turn_half(splats)).sh, same.sh)
+    np.testing.assert_array_equal(rotate_half_turn(rotate_half_turn(splats)).sh, same.sh)
 
 
 @pytest.mark.parametrize("data_of", [bytes, bytearray, memoryview, lambda b: iter([b[:3], b[3:]])])

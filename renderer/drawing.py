@@ -1,0 +1,157 @@
+"""What a drawing back end does, whichever way: tiles/ by OpenCL, gl/ by quads."""
+
+from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
+
+import moderngl
+import numpy as np
+
+from shapeshift.renderer.colors.false_colors import Shade
+from shapeshift.renderer.settings import RenderSettings
+from shapeshift.renderer.surface import Surface
+from shapeshift.renderer.timing import PassTimer
+from shapeshift.runtime_models.model import Model
+from shapeshift.runtime_models.stop_weights import Controls
+from shapeshift.scene.pose import View
+
+SAMPLE = 4096  # splats, for a median
+
+
+class Drawing(ABC):
+    """The arena of all objects, and the passes that draw it.
+
+    Its life: allocate, decode what changed, place, draw.
+    """
+
+    decodes_on_gpu: bool  # says which clock times the decoding: GL's or the wall's
+    backends: dict[str, str]  # what is in use: drawing, mlps, sort
+    sorts: int  # of the last frame, as order_age: see FrameStats
+    order_age: int
+    draws_heat: bool  # beside the colours, from the next frame on
+
+    @abstractmethod
+    def allocate(self, models: list[Model]) -> None:
+        """Room for these objects; what was decoded before is gone."""
+
+    @abstractmethod
+    def decode_geometry(
+        self,
+        i: int,
+        x: Controls,
+        eye_object: np.ndarray | None = None,
+        seen: np.ndarray | None = None,
+    ) -> None:
+        """Means, covariances and opacities of object i at control value x; (A,): one an anchor.
+
+        eye_object: (3,) in the object's frame, for a model that follows it; seen: (A,) bool, the
+        anchors of such a model that are there, None: all.
+        """
+
+    @abstractmethod
+    def color_set(self, which: int, count: int) -> None:
+        """From now on colours are decoded into set `which` of `count`: 1 for all views of a frame,
+        or one a view.
+        """
+
+    @abstractmethod
+    def decode_color(
+        self,
+        i: int,
+        shade: Shade,
+        eye_object: np.ndarray,
+        seen: np.ndarray | None = None,
+        at_once: bool = False,
+    ) -> None:
+        """Colours of object i, towards an eye (3,) in the object's frame, and what of them is heat.
+
+        seen: (A,) bool, one an anchor (tiles: a splat of layers): the rest may keep what it has.
+        at_once: the heat becomes colours of its palettes here.
+        """
+
+    @abstractmethod
+    def wait_decoded(self) -> None:
+        """Returns when what was decoded is there, or when what follows waits for it anyway."""
+
+    @abstractmethod
+    def set_poses(self, world_from_objects: list[np.ndarray]) -> None:
+        """Poses (4, 4) of all objects; one full of NaN hides its object."""
+
+    @abstractmethod
+    def draw(
+        self, views: list[View], settings: RenderSettings, timer: PassTimer, first: int = 0
+    ) -> None:
+        """Draws every view; view i is then image(first + i)."""
+
+    @abstractmethod
+    def order_set_aside(self) -> AbstractContextManager[None]:
+        """Whatever the body does to the order, afterwards it is the one that was in use before."""
+
+    @abstractmethod
+    def counts(self) -> dict[str, int]:
+        """{drawn, *CULL_REASONS} of the view drawn last: gates in their order."""
+
+    @abstractmethod
+    def presentable(self, i: int) -> np.ndarray | moderngl.Texture:
+        """The image of view i as resolve takes it: (H, W, 4), row 0 on top, or on the GPU, row 0 at
+        the bottom; its colours count in unit_of(i).
+        """
+
+    @abstractmethod
+    def unit_of(self, i: int) -> float:
+        """The display value that 1 in presentable(i) stands for."""
+
+    @abstractmethod
+    def presentable_heat(self, i: int) -> np.ndarray | moderngl.Texture:
+        """What resolve takes beside it, of a frame with heat."""
+
+    def presentable_rgba8(
+        self, i: int, background: tuple[float, float, float], palette: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(H, W, 4) uint8 of view i as a window shows it, opaque, row 0 at the bottom.
+
+        palette: of the heat, where the frame has any, else of the picture.  Only where
+        presentable() is an array.
+        """
+        raise TypeError("this drawing's pictures are textures; present them by GL.")
+
+    @abstractmethod
+    def image(self, i: int) -> np.ndarray:
+        """(H, W, 4) float32 premultiplied, row 0 on top, of the view last drawn as number i."""
+
+    @abstractmethod
+    def heat(self, i: int) -> np.ndarray:
+        """(H, W, 2) float32, row 0 on top, of the same view: value and weight, both times alpha."""
+
+    @abstractmethod
+    def splat_points(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """mean_opacity (N, 4), object index (N,), covariance (N, 8), for debug views."""
+
+    @abstractmethod
+    def write_colors(self, color: np.ndarray) -> None:
+        """Replaces the colours of all splats, (N, 3) display sRGB, until they are decoded again."""
+
+    @abstractmethod
+    def overdraw(self, i: int, view: View, settings: RenderSettings) -> np.ndarray:
+        """(H, W): how many splats each pixel of view i, just drawn, blends, for a debug view."""
+
+    @abstractmethod
+    def surface(self, view: View, settings: RenderSettings) -> Surface:
+        """Depth, normals and coverage from a view; the last frame and its counts stay."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Gives the memory of the scene back."""
+
+
+def median_distance(
+    eye_from_objects: np.ndarray, mean_opacity: np.ndarray, owner: np.ndarray
+) -> float:
+    """Metres from an eye to the median of the splats that are there; 0 without any.
+
+    eye_from_objects (O, 4, 4); of a sample of the splats mean_opacity (n, 4) and their object (n,).
+    """
+    rows = eye_from_objects[owner, :3]  # (n, 3, 4)
+    places = (rows[..., :3] @ mean_opacity[:, :3, None])[..., 0] + rows[..., 3]
+    distance = np.linalg.norm(places[mean_opacity[:, 3] > 0], axis=1)
+    distance = distance[np.isfinite(distance)]
+    return float(np.median(distance)) if distance.size else 0.0
