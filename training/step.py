@@ -13,9 +13,8 @@ from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.depth_loss import DepthWish
-from shapeshift.training.losses.losses import ImageLoss, Target, regularise
-from shapeshift.training.losses.smooth import smooth_picture
-from shapeshift.training.rise import draw_up
+from shapeshift.training.losses.losses import ImageLoss, Target
+from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradient
 
 
 class Step:
@@ -64,13 +63,9 @@ class Step:
         drawing: Drawing,
         loss: ImageLoss,
         target: Target,
-        ssim_share: float,
-        opacity_share: float = 0.0,
-        scale_share: float = 0.0,
         evidence: Evidence | None = None,
         depth: DepthWish | None = None,
-        revive: float = 0.0,
-        smooth: float = 0.0,
+        min_opacity_share: float = SHARE,
     ) -> dict[str, object]:
         """Gradients of the loss by what the optimiser holds, under its names.
 
@@ -78,9 +73,7 @@ class Step:
         """
         device = self.device
         with self.timed("loss"):
-            grad_image = loss.compare(drawing.frame.image, target, ssim_share)
-            if smooth:
-                smooth_picture(device, drawing.frame.image, grad_image, smooth)
+            grad_image = loss.compare(drawing.frame.image, target)
         watched = evidence is not None
         grad, grad_record = splats_backward(
             device, drawing, grad_image, depth, self.timed, absolute=watched, weight=watched
@@ -90,10 +83,8 @@ class Step:
                 record, opacity = drawing.projected.record, drawing.splats.opacity
                 evidence.add(record, grad_record, opacity, drawing.camera.size, self.rows)
         with self.timed("heads backward"):
-            if opacity_share or scale_share:
-                regularise(device, drawing.splats, grad, opacity_share, scale_share)
-            if revive:
-                draw_up(device, drawing.splats, grad, revive)
+            if min_opacity_share:
+                add_min_opacity_gradient(device, drawing.splats, grad, min_opacity_share)
             return self.backward(grad)
 
     def backward(self, grad: Gaussians) -> dict[str, object]:

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.model import AnchorModel, BadFile, ControlEncoding
+from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.between import Between, Way, add, blended, own_blend, straight_pull
-from shapeshift.training.coarse import Coarse
+from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
 from shapeshift.training.density.densify import absent_as_nan, change, changed_state
 from shapeshift.training.density.density import Evidence
 from shapeshift.training.density.density_budget import most_anchors
@@ -27,9 +27,8 @@ from shapeshift.training.photos import (
     load_photos,
     memory_doubts,
 )
-from shapeshift.training.rise import Rise, after_fall
 from shapeshift.training.run import SETTLE, Run
-from shapeshift.training.schedule import Budget, Schedule, balance_of, turns_of
+from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
 from shapeshift.training.settings import Rates, TrainSettings
 from shapeshift.training.step import Step
 from shapeshift.training.supervision.backgrounds import choose_background, told_background
@@ -75,7 +74,6 @@ class Trainer(Run):
 
         loaded: photos of the splits train and test, where they were read before.
         """
-        settings = settings.for_stops(capture.stops)
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
@@ -95,22 +93,14 @@ class Trainer(Run):
         if settings.background == "auto" and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
             self.doubts.append(told_background(background))
-        turns = turns_of(balance_of(settings.balance), list(by_modality))
-        self.schedule = Schedule(by_modality, settings.seed, background, turns)
-        self.between = Between(
-            settings.between, settings.between_share, settings.seed, self.stops, by_modality
-        )
-        self.encoding = ControlEncoding(
-            settings.control, 1 / max(settings.control - 1, 1), settings.sigma
-        )
-        self.layout = settings.layout()
-        self.coarse = Coarse(settings.coarse, settings.coarse_until, {})
+        self.schedule = Schedule(by_modality, settings.seed, background)
+        self.blending = ShapeBlending(settings.blended_shapes, settings.seed, self.stops)
+        self.encoding = encoding_for([stop.x for stop in self.stops])
+        self.layout = settings.layout(self.encoding.d)
         self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
-        self.targets, self.photo_factor = Targets(device), 1
+        self.targets = Targets(device)
         self.exposures = Exposures(device, by_modality)
-        self.rise = Rise(settings.rise, 0, settings.revive)
-        thermal = [stop.name for stop in self.stops if stop.kind == "thermal"]
-        self.roughness = dict.fromkeys(thermal, settings.thermal_smooth)
+        self.warm_up_rates = LrWarmup()
         self.contrast: dict[tuple, float] = {}
         if resume is None:
             self.start(photos)
@@ -136,7 +126,7 @@ class Trainer(Run):
         values = {"weights": initial_weights(self.layout, rng), "features": features}
         values |= {n: getattr(start, n) for n in self.layout.per_anchor if n != "features"}
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
-        self.rate_scale, self.run_length = settings.rate_scale, settings.iterations
+        self.rate_scale, self.run_length = 1.0, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
         self.evidence, self.visibility = self.unwatched(count)
 
@@ -153,7 +143,7 @@ class Trainer(Run):
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
         self.grown_at, self.rate_scale = notes["grown_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
-        self.rise = Rise(*notes.get("rise", ()))
+        self.warm_up_rates = LrWarmup(notes["warm_up_from"])
         groups = ("weights", *self.layout.per_anchor)
         values = {n: state[f"{n}.value"] for n in groups}
         self.adam = Adam(self.device, values, self.all_rates())
@@ -170,7 +160,7 @@ class Trainer(Run):
             "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
             "run_length": self.run_length, "first_loss": self.guard.first_loss,
             "settings": self.settings.as_dict(),
-            "rise": [self.rise.steps, self.rise.since, self.rise.pull],
+            "warm_up_from": self.warm_up_rates.start,
         }  # fmt: skip
         known = self.evidence.state() | self.visibility.state() | self.exposures.state()
         return self.adam.state() | known, notes
@@ -185,7 +175,7 @@ class Trainer(Run):
 
     def all_rates(self) -> dict[str, np.ndarray]:
         rates = parameter_rates(self.layout, self.rates(), self.voxel)
-        return self.rise.rates(rates, self.iteration)
+        return self.warm_up_rates.rates(rates, self.iteration)
 
     def control(self, modality: str) -> np.ndarray:
         x = next(s.x for s in self.stops if s.name == modality)
@@ -201,99 +191,47 @@ class Trainer(Run):
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
             whole = {(p.view.size, p.depth is None): p for p in photos}.values()
-            for photo in [self.coarse.photo(p, f) for f in self.coarse.factors for p in whole]:
+            for photo in whole:
                 self.step.update(self.learn(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
                 self.guard.expect(modality, loss, self.visible(), self.shown(photo, background))
-                if self.between.middle is not None:
-                    self.learn_at(photo, background, self.between.middle)
         self.adam.load(before)
         self.evidence.load(known)
         self.visibility.load(known)
         self.exposures.load(known)
 
-    def next_photo(self) -> LoadedPhoto:
-        """The photo of this step, as small as this part of the run has them."""
-        factor = self.coarse.factor(self.budget.fraction(self.iteration, self.elapsed))
-        if factor != self.photo_factor:
-            self.photo_factor = factor
-            self.targets.forget()
-            self.coarse.drop(factor)
-        return self.coarse.photo(self.schedule.photo(self.iteration), factor)
-
     def learn(
-        self, photo: LoadedPhoto, background: Color, control: np.ndarray | None = None
+        self, photo: LoadedPhoto, background: Color, shapes: BlendedShapes | None = None
     ) -> dict[str, object]:
-        """Gradients of how a photo differs.  control: Psi of each head, if not that of its stop."""
-        settings = self.settings
-        at_stop, rows = control is None, None
+        """Gradients of how a photo differs.  shapes: None for those of its stop."""
         self.evidence.stop = stop = [s.name for s in self.stops].index(photo.modality)
-        depth = self.targets.wish(photo, settings.depth_share)
-        if at_stop:
-            control, rows = self.control(photo.modality), self.rows(photo)
+        depth, rows = self.targets.wish(photo, self.settings.depth_share), None
+        if shapes is None:
+            control = self.control(photo.modality)
+            rows = self.visibility.rows(stop, camera_of(photo.view), self.adam["anchors"])
+        else:
+            control = shapes.control(self.encoding)
         self.drawing = self.step.draw(photo.view, control, background, depth is not None, rows)
-        if at_stop:
+        if shapes is None:
             self.visibility.note(stop, rows, self.step.there["anchors"], self.drawing.splats)
-        target = self.target(photo, background, at_stop)
-        return self.step.gradients(
-            self.drawing, self.targets.loss(photo), target, settings.ssim_share,
-            settings.opacity_share, settings.scale_share, self.evidence, depth,
-            self.rise.pull, self.roughness.get(photo.modality, 0.0),
-        )  # fmt: skip
-
-    def rows(self, photo: LoadedPhoto):
-        """Which anchors a step from this photo runs; None: all."""
-        if self.between.often and self.between.cure == "splats":
-            return None  # its gradients are added to those of all anchors
-        stop = [s.name for s in self.stops].index(photo.modality)
-        return self.visibility.rows(stop, camera_of(photo.view), self.adam["anchors"])
-
-    def learn_at(self, photo: LoadedPhoto, background: Color, way: Way | None) -> dict[str, object]:
-        """From the photo, or as the run's cure of what lies between two stops has it."""
-        if way is None:
-            return self.learn(photo, background)
-        if self.between.cure == "shapes":
-            return self.learn(photo, background, way.psi_of_heads(self.encoding))
-        if self.between.replaces:
-            return self.learn_between(photo, way)
-        eye, pull = photo.view.world_from_eye.position, self.settings.between_pull
-        more = straight_pull(self.step, way, self.encoding, eye, self.voxel, pull)
-        grads = self.learn(photo, background)
-        add(self.device, grads, more)
-        return grads
-
-    def learn_between(self, photo: LoadedPhoto, way: Way) -> dict[str, object]:
-        """From a blend of what two stops show, at an x between them."""
-        if self.between.cure == "photos":
-            pair = (self.coarse.photo(p, self.photo_factor) for p in self.between.pair(way))
-            photo = blended(*pair, way.share)
-        background = self.schedule.background_of(self.iteration, photo)
-        if self.between.cure == "pictures":
-            photo = own_blend(self.step, photo, way, self.encoding, background)
+        target = self.target(photo, background, shapes is None)
         loss = self.targets.loss(photo)
-        target = loss.target(self.device.upload(photo.rgba), background, photo.weight)
-        self.drawing = self.step.draw(photo.view, way.psi(self.encoding), background)
-        settings = self.settings
-        return self.step.gradients(
-            self.drawing, loss, target, settings.ssim_share, settings.opacity_share,
-            settings.scale_share, revive=self.rise.pull,
-        )  # fmt: skip
+        return self.step.gradients(self.drawing, loss, target, self.evidence, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""
-        photo = self.next_photo()
+        photo = self.schedule.photo(self.iteration)
         background = self.schedule.background_of(self.iteration, photo)
-        way = self.between.way(self.iteration, photo.modality)
-        grads = self.learn_at(photo, background, way)
-        at_stop = way is None or self.between.cure == "splats"
+        shapes = self.blending.sample(self.iteration, photo.modality)
+        grads = self.learn(photo, background, shapes)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
-        if self.rise.going(self.iteration):
+        if self.warm_up_rates.changes(self.iteration):
             self.adam.set_rates(self.all_rates())
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
         self.iteration += 1
         loss, fell_back = None, False
         rounds = -(-self.iteration // len(self.stops))
-        if rounds % GUARD_EVERY == 0 and at_stop:  # every modality in turn, however many there are
+        if rounds % GUARD_EVERY == 0 and shapes is None:  # every modality, however many there are
             loss = self.targets.loss(photo).value()
             fell_back = self.look_after(photo, background, loss)
         self.find_pace()
@@ -325,9 +263,9 @@ class Trainer(Run):
                 self.guard.remember(self.adam.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
-        self.rise = after_fall(self.iteration, self.rate_scale / 2, self.rise)
-        looks = self.rise.steps if self.rise.since == self.iteration else 0
-        self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
+        self.warm_up_rates = LrWarmup(self.iteration)
+        looks = WARM_UP_STEPS // (GUARD_EVERY * len(self.stops))
+        self.go_on_from(self.guard.fall_back(looks))
         self.rate_scale /= 2
         self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
         return True
@@ -354,7 +292,7 @@ class Trainer(Run):
             means.append(absent_as_nan(*fields))
         now, anchors = self.adam.state(), self.device.download(self.adam["anchors"])
         sizes = np.full(len(anchors), self.voxel)
-        if "frame" in self.layout.own:
+        if "frame" in self.layout.attributes:
             sizes = self.voxel * np.exp(now["frames.value"][:, :3].mean(axis=1))
         kept, new = change(anchors, sizes, means, self.evidence.state(), self.most_anchors)
         self.go_on_from(changed_state(now, self.layout.per_anchor, kept, new))

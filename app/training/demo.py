@@ -12,7 +12,7 @@ from shapeshift.app.terminal import say
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 12 minutes of a core
 MOST_ANCHORS = 18000
-BETWEEN, SHARE = "shapes", 0.5  # what lies between the stops, and in how many of the steps
+BLENDED_SHAPES = 0.5  # see TrainSettings
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,14 @@ def run(options: Options) -> int:
     else:
         photograph(folder, size, options)
     package = options.out / "workshop.shift"
-    limited = options.seconds is not None
+    length = {"iterations": options.iterations}
+    if options.seconds is not None:
+        length = {"seconds": options.seconds}
     code = train.run(
         train.Options(
             capture=folder,
             out=package,
-            seconds=options.seconds,
-            iterations=None if limited else options.iterations,
-            max_anchors=MOST_ANCHORS,
-            between=BETWEEN,
-            between_share=SHARE,
+            asked={"max_anchors": MOST_ANCHORS, "blended_shapes": BLENDED_SHAPES} | length,
         )
     )
     if code == 0 and options.package is not None:

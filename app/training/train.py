@@ -17,17 +17,13 @@ from shapeshift.app.training.run_loop import (
     time_unit,
     train,
 )
-from shapeshift.app.training.train_options import Options, preset_defaults, settings_of
+from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
 
-FEW_STEPS = 1000  # half of what is usual: scenes that are worth looking at need about so many
-
-
-def defaults() -> dict[str, str]:
-    """What --help says of options that are left to the preset."""
-    return preset_defaults()
+USUAL_STEPS = 2000  # those of TrainSettings
+FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so many
 
 
 def run(options: Options) -> int:
@@ -56,7 +52,7 @@ def run(options: Options) -> int:
     refuse_foreign(options.out)
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
-    settings = settings_of(options, resume[1]["settings"] if resume else None)
+    settings = settings_of(options.asked, resume[1]["settings"] if resume else None)
     capture = open_capture(options.capture, options.memory)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
@@ -100,10 +96,9 @@ def refuse_plain_options(options: Options) -> None:
     """Raises UsageError for what only plain splats have."""
     from shapeshift.app.errors import UsageError
 
-    for name in ("sh_degree", "splats", "max_splats"):
-        if getattr(options, name) is not None:
-            option = f"--{name.replace('_', '-')}"
-            raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
+    for name in options.splats:
+        option = f"--{name.replace('_', '-')}"
+        raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
 
 
 def what_next(options: Options, steps: int, step_s: float, interrupted: bool) -> list[str]:
@@ -111,12 +106,10 @@ def what_next(options: Options, steps: int, step_s: float, interrupted: bool) ->
 
     step_s: by the clock, which is what a person waits.
     """
-    from shapeshift.training.settings import preset
-
     again = [program(), "train", shlex.quote(full(options.capture))]
     out = shlex.quote(full(options.out))
     again += ["--out", out, "--resume"]
-    usual, lines = preset(options.preset).iterations, []
+    usual, lines = USUAL_STEPS, []
     if interrupted:
         lines = [f"go on: {' '.join(again)}"]
     elif steps < FEW_STEPS:

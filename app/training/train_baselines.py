@@ -24,14 +24,9 @@ if TYPE_CHECKING:
     from shapeshift.training.baselines.plain_settings import PlainSettings
     from shapeshift.training.settings import TrainSettings
 
-# Options that say where and how long, or how photos are read: they go for every kind of model.
-COMMON = {"capture", "out", "model", "separate", "resume", "preset", "device", "downscale", "masks",
-          "background", "seconds", "iterations", "memory"}  # fmt: skip
-PAPER_ITERATIONS = 30000  # of 3DGS, and of the shape-shifting paper
-
 
 @dataclass(frozen=True)
-class Run:
+class TrainedFile:
     """What the training of one model left behind."""
 
     file: Path
@@ -43,7 +38,7 @@ class Run:
 class Outcome:
     """What the training of a model a modality left behind."""
 
-    runs: dict[str, Run]  # of every modality that was trained
+    runs: dict[str, TrainedFile]  # of every modality that was trained
     interrupted: bool
 
     @property
@@ -66,7 +61,8 @@ def run_baseline(options: Options) -> int:
         )
     if options.separate and options.model == "splats":
         raise UsageError("plain splats are one model a modality already; leave out --separate.")
-    settings = plain_settings(options) if options.model == "splats" else settings_of(options, None)
+    of_splats = options.model == "splats"
+    settings = plain_settings(options) if of_splats else settings_of(options.asked)
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
@@ -83,16 +79,13 @@ def plain_settings(options: Options) -> "PlainSettings":
     from shapeshift.training.baselines.plain_settings import PlainSettings
 
     names = {f.name for f in fields(PlainSettings)}
-    asked = {f.name: getattr(options, f.name) for f in fields(options)}
-    for name, default in ((f.name, f.default) for f in fields(options)):
-        if name not in names | COMMON and asked[name] != default:
+    for name in options.asked:
+        if name not in names:
             option = f"--{name.replace('_', '-')}"
             raise UsageError(f"{option} is of anchor models; leave it out with --model splats.")
-    chosen = {n: asked[n] for n in names & asked.keys() if asked[n] is not None}
+    chosen = options.asked | options.splats
     if "seconds" in chosen and "iterations" not in chosen:
         chosen["iterations"] = None
-    elif options.preset == "paper":
-        chosen.setdefault("iterations", PAPER_ITERATIONS)
     try:
         return PlainSettings(**chosen)
     except ValueError as error:
@@ -133,7 +126,7 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
         interrupted = train(trainer, None)
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
-        runs[trainer.stop.name] = Run(file, trainer.elapsed, trainer.iteration)
+        runs[trainer.stop.name] = TrainedFile(file, trainer.elapsed, trainer.iteration)
         say(told(trainer, trainer.count), *trainer.exposures.remarks())
         if interrupted:
             break
@@ -163,7 +156,7 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
         say(describe(trainer))
         interrupted = train(trainer, None)
         write_package(trainer.model(), files[name])
-        runs[name] = Run(files[name], trainer.elapsed, trainer.iteration)
+        runs[name] = TrainedFile(files[name], trainer.elapsed, trainer.iteration)
         say(told(trainer, trainer.anchors_count), *trainer.exposures.remarks())
         if interrupted:
             break

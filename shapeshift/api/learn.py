@@ -49,7 +49,6 @@ def train(
     *,
     seconds: float | None = None,
     iterations: int | None = None,
-    preset: Literal["fast", "paper"] = "fast",
     resume: bool = False,
     device: Kind | None = None,
     calibrate: str | None = None,
@@ -59,7 +58,7 @@ def train(
 ) -> TrainedScene:
     """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
 
-    seconds or iterations: how long; without either the preset says.  Seconds are of one core, the
+    seconds or iterations: how long; without either 2,000 iterations.  Seconds are of one core, the
     processor time of all threads; on a GPU by the clock.  The same iterations give the same bits on
     one device.  out: a package, NAME.shift or a folder, that is written with its checkpoint beside
     it, also every minute and when Ctrl-C ends the run; resume goes on from there.  calibrate: a
@@ -90,7 +89,7 @@ def train(
         raise UsageError("resume goes on from the checkpoint beside out; give out, too.")
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
     settings |= {"iterations": iterations, "seconds": seconds}
-    wished = settings_of(preset, settings, before[1]["settings"] if before else None)
+    wished = settings_of(settings, before[1]["settings"] if before else None)
     found, on = read_capture(plain(str(capture))), open_device(device)
     if calibrate is not None:
         if resume:
@@ -105,17 +104,16 @@ def train(
     return finished(trainer, path, pace)
 
 
-def settings_of(preset: str, asked: dict[str, Any], before: dict | None) -> "TrainSettings":
-    """The preset's numbers with those that were asked for; or a checkpoint's with another budget.
+def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
+    """The usual settings with those that were asked for; or a checkpoint's with another budget.
 
     None stands for what was not asked.  Raises UsageError.
     """
     from shapeshift.app.command_line import nearest
     from shapeshift.training.settings import TrainSettings, adjusted, resumed
-    from shapeshift.training.settings import preset as preset_of
 
     asked = {name: value for name, value in asked.items() if value is not None}
-    known = [field.name for field in fields(TrainSettings) if field.name != "preset"]
+    known = [field.name for field in fields(TrainSettings)]
     for name in asked:
         if name not in known:
             meant = nearest(name, known)
@@ -124,7 +122,7 @@ def settings_of(preset: str, asked: dict[str, Any], before: dict | None) -> "Tra
     try:
         if before is not None:
             return resumed(before, asked)
-        return adjusted(preset_of(preset), asked)
+        return adjusted(TrainSettings(), asked)
     except ValueError as error:
         raise UsageError(str(error)) from None
 

@@ -16,7 +16,6 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.training.baselines.plain_reference import decode_plain_reference
 from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
-from shapeshift.training.coarse import smaller
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.evaluate import evaluate_model, report
 from shapeshift.training.heads.optimizer import Adam
@@ -68,7 +67,7 @@ def test_every_gradient_of_a_step_with_depth(device, seed):
     drawing = step.draw(view, control, BACKGROUND, with_depth=True)
     target = image_loss.target(device.upload(rgba), BACKGROUND)
     wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
-    grads = step.gradients(drawing, image_loss, target, 0.2, depth=wish)
+    grads = step.gradients(drawing, image_loss, target, depth=wish, min_opacity_share=0.0)
     total = image_loss.value() + SHARE * depth_loss.value()
     assert total == pytest.approx(loss("anchors", parameters["anchors"]), rel=1e-4)
     for name, grad in grads.items():
@@ -99,7 +98,7 @@ def test_every_gradient_of_plain_splats_with_depth(device):
     target = image_loss.target(device.upload(rgba), BACKGROUND)
     wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
     drawing = step.draw(view, BACKGROUND, with_depth=True)
-    grads = step.gradients(drawing, image_loss, target, 0.2, None, wish)
+    grads = step.gradients(drawing, image_loss, target, None, wish)
     for name in ("means", "scales", "wxyz", "opacity", "base"):
         have = device.download(grads[name]).astype(np.float64)
         values = parameters[name].astype(np.float64)
@@ -132,7 +131,6 @@ def test_depth_follows_its_photo_through_masks_and_sizes(balls):
     photo = balls.photos[0]
     loaded = read(photo, 2, "object")
     assert loaded.depth.shape == (32, 32) and loaded.depth.any()
-    assert smaller(loaded, 2).depth.shape == (16, 16)
     targets = Targets(open_device("cpu"))
     assert targets.wish(loaded, 0.0) is None
     assert targets.wish(replace(loaded, depth=None), 0.1) is None
@@ -186,9 +184,9 @@ def test_without_depth_photos_or_a_share_the_bits_are_the_same(device, balls):
 
 
 def test_photos_with_and_without_depth_train_together(device, balls):
-    """And small photos first; what has no depth learns from its colours alone."""
+    """What has no depth learns from its colours alone."""
     photos = tuple(replace(p, depth=None) if i % 3 else p for i, p in enumerate(balls.photos))
-    trainer = trained(device, replace(balls, photos=photos), coarse=2, depth_share=0.1)
+    trainer = trained(device, replace(balls, photos=photos), depth_share=0.1)
     assert min(trainer.held_out_psnr(9).values()) > 15
     assert all(np.isfinite(values).all() for values in trainer.adam.state().values())
 

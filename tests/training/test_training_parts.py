@@ -21,7 +21,7 @@ from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.schedule import Budget, Schedule
-from shapeshift.training.settings import LONG, PAPER, SHORT, TrainSettings, preset
+from shapeshift.training.settings import LONG, SHORT, TrainSettings, adjusted
 from shapeshift.training.supervision.backgrounds import choose_background
 
 RNG = np.random.default_rng
@@ -179,10 +179,10 @@ def test_budget_follows_whichever_ends_first():
     ("changes", "sentence"),
     [
         ({"iterations": None}, "needs an end"), ({"iterations": 0}, "iterations is 0"),
-        ({"seconds": float("nan")}, "seconds is nan"), ({"ssim_share": 1.1}, "0 to 1"),
-        ({"hidden": -3}, "at least 1"), ({"own": "size"}, "no 'size' of their own"),
-        ({"seed": -1}, "seed"),
-        ({"rate_scale": float("inf")}, "rate_scale is inf"),
+        ({"seconds": float("nan")}, "seconds is nan"), ({"blended_shapes": 1.1}, "0 to 1"),
+        ({"blended_shapes": -0.1}, "blended_shapes is -0.1"), ({"seed": -1}, "seed"),
+        ({"hidden": -3}, "at least 1"), ({"anchor_attributes": "size"}, "no attribute 'size'"),
+        ({"depth_share": float("inf")}, "depth_share is inf"),
     ],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused(changes, sentence):
@@ -191,25 +191,26 @@ def test_settings_that_cannot_be_are_refused(changes, sentence):
 
 
 def test_settings_name_the_networks():
-    settings = TrainSettings(layers=2, fixed="scale, offset", view_dependent=False)
-    assert settings.layout() == HeadLayout(5, 16, 32, 16, 2, ("scale", "offset"), False)
-    assert TrainSettings(own="").layout().per_anchor == ("anchors", "features")
+    settings = TrainSettings(fixed="scale, offset", view_dependent=False)
+    assert settings.layout(7) == HeadLayout(5, 16, 32, 7, ("scale", "offset"), False)
+    assert TrainSettings(anchor_attributes="").layout(2).per_anchor == ("anchors", "features")
     assert TrainSettings(**settings.as_dict()) == settings
-    assert TrainSettings().layout() == HeadLayout(5)
-    with pytest.raises(ValueError, match="layers is 4; networks have 1 to 3 hidden ones"):
-        TrainSettings(layers=4)
+    assert TrainSettings().layout(16) == HeadLayout(5)
     with pytest.raises(ValueError, match="no head 'shape' to fix; they are offset"):
         TrainSettings(fixed="shape")
 
 
-def test_presets():
-    paper = preset("paper")
-    assert paper.rates(30000) is PAPER and paper.splats_per_anchor == 10
-    assert (paper.features, paper.control, paper.sigma) == (16, 16, 0.04)
-    assert paper.encoding == "even" and preset("fast").encoding == "stops"
-    assert preset("fast").rates(4000) is SHORT and preset("fast").rates(4001) is LONG
-    with pytest.raises(ValueError, match="no preset 'slow'"):
-        preset("slow")
+def test_rates_decay_further_in_long_runs():
+    assert TrainSettings().rates(4000) is SHORT and TrainSettings().rates(4001) is LONG
+
+
+def test_a_budget_of_one_kind_takes_the_place_of_the_other():
+    timed = adjusted(TrainSettings(), {"seconds": 5.0})
+    assert (timed.seconds, timed.iterations) == (5.0, None)
+    assert adjusted(timed, {"iterations": 9}) == TrainSettings(iterations=9)
+    both = adjusted(TrainSettings(), {"iterations": 9, "seconds": 5.0})
+    assert (both.seconds, both.iterations) == (5.0, 9)
+    assert adjusted(timed, {"seed": 2}).seconds == 5.0
 
 
 def test_the_guard_goes_further_back_each_time():

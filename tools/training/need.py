@@ -82,12 +82,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--tolerance-db", type=float, default=0.1)
     parser.add_argument("--max-anchors", type=int, default=TrainSettings().max_anchors)
-    parser.add_argument("--layers", type=int, default=1)
     parser.add_argument("--downscale", type=int)
     options = parser.parse_args()
     settings = TrainSettings(
         iterations=options.iterations, max_anchors=options.max_anchors,
-        layers=options.layers, downscale=options.downscale,
+        downscale=options.downscale,
     )  # fmt: skip
     rows = []
     for folder in options.captures:

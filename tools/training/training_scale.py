@@ -82,7 +82,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         step.ms = {} if number <= 1 else step.ms
         start = time.process_time()
         drawing = step.draw(View(eye, lens, 0.05, 100.0, size), rng.random(16), (0, 0, 0))
-        step.update(step.gradients(drawing, loss, target, 0.2, evidence=evidence), 1.0)
+        step.update(step.gradients(drawing, loss, target, evidence=evidence), 1.0)
         device.queue.finish()
         cpu += time.process_time() - start if number else 0.0
     if not np.isfinite(loss.value()):

@@ -76,7 +76,7 @@ class PlainTrainer(Run):
         self.targets = Targets(device)
         self.exposures = Exposures(device, self.schedule.photos)
         self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
-        self.run_length, self.rate_scale = settings.iterations, settings.rate_scale
+        self.run_length, self.rate_scale = settings.iterations, 1.0
         self.adam = Adam(device, self.first_values(photos), self.all_rates())
         self.step = PlainStep(device, self.adam, settings.sh_degree)
         self.evidence = PlainEvidence(device, self.count)
@@ -131,7 +131,7 @@ class PlainTrainer(Run):
         loss, (width, height) = self.targets.loss(photo), photo.view.size
         image = np.broadcast_to(np.float32(background)[:, None, None], (3, height, width))
         target = self.targets.target(photo, background)
-        loss.compare(self.device.upload(image), target, self.settings.ssim_share)
+        loss.compare(self.device.upload(image), target)
         return loss.value()
 
     def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
@@ -139,8 +139,7 @@ class PlainTrainer(Run):
         self.drawing = self.step.draw(photo.view, background, depth is not None)
         target = self.target(photo, background)
         loss = self.targets.loss(photo)
-        share = self.settings.ssim_share
-        return self.step.gradients(self.drawing, loss, target, share, self.evidence, depth)
+        return self.step.gradients(self.drawing, loss, target, self.evidence, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""

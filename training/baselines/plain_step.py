@@ -76,13 +76,12 @@ class PlainStep:
         drawing: Drawing,
         loss: ImageLoss,
         target: Target,
-        ssim_share: float,
         evidence: PlainEvidence | None = None,
         depth: DepthWish | None = None,
     ) -> dict[str, Any]:
         """Gradients of the loss by what the optimiser holds, under its names."""
         device, splats = self.device, drawing.splats
-        grad_image = loss.compare(drawing.frame.image, target, ssim_share)
+        grad_image = loss.compare(drawing.frame.image, target)
         grad, grad_record = splats_backward(device, drawing, grad_image, depth, absolute=False)
         if evidence is not None:
             evidence.add(drawing.projected.record, grad_record, drawing.camera.size[0])

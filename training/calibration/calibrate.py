@@ -135,7 +135,7 @@ def factors_of(capture: Capture, modality: str, other: str, downscale: int) -> t
 def shape_settings(settings: TrainSettings, steps: int, factor: int) -> TrainSettings:
     """Those of the run that makes the shape: as asked for, but of one modality, without growing."""
     return replace(
-        settings, iterations=steps, seconds=None, grow=False, coarse=1, between="none",
+        settings, iterations=steps, seconds=None, grow=False, blended_shapes=0.0,
         view_dependent=False, downscale=factor,
     )  # fmt: skip
 

@@ -96,8 +96,8 @@ def hopeless(trainer: Trainer) -> list[str]:
         return []
     return [
         f"{', '.join(lost)}: the pictures are no nearer to the photos than one colour all over; "
-        "train longer, take other --points (hull where the background is known), or a smaller "
-        "--rate-scale, and check that photos and poses belong together."
+        "train longer, or take other --points (hull where the background is known), and check "
+        "that photos and poses belong together."
     ]
 
 

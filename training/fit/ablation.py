@@ -14,6 +14,7 @@ from shapeshift.runtime_models.model import AnchorModel, Stop
 from shapeshift.training.settings import TrainSettings
 
 SHAPE = ("offset", "scale", "rotation", "opacity")
+UNITS = 2  # of the control encoding: which parts there are does not depend on it
 LEAST_HIDDEN, LEAST_FEATURES, LEAST_ANCHORS = 8, 4, 50
 DROPPED, KEPT, UNSURE = "dropped", "kept", "kept: not sure"
 
@@ -134,7 +135,7 @@ class Part:
 
 
 def _fix(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    fixed = settings.layout().fixed
+    fixed = settings.layout(UNITS).fixed
     more = [name for name in part.heads if name not in fixed]
     if len(stops) < 2 or not more or (len(part.heads) > 1 and len(more) < len(part.heads)):
         return None
@@ -143,10 +144,6 @@ def _fix(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | N
 
 def _no_view(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
     return replace(settings, view_dependent=False) if settings.view_dependent else None
-
-
-def _layer(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    return replace(settings, layers=settings.layers - 1) if settings.layers > 1 else None
 
 
 def _hidden(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
@@ -171,13 +168,13 @@ def _anchors(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings
 
 
 def _own(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    own = settings.layout().own
+    own = settings.layout(UNITS).attributes
     fewer = [name for name in own if name not in part.heads]
-    return replace(settings, own=",".join(fewer)) if len(fewer) < len(own) else None
+    return replace(settings, anchor_attributes=",".join(fewer)) if len(fewer) < len(own) else None
 
 
 REDUCE = {
-    "fix": _fix, "view": _no_view, "layer": _layer, "hidden": _hidden, "features": _features,
+    "fix": _fix, "view": _no_view, "hidden": _hidden, "features": _features,
     "slot": _slot, "anchors": _anchors, "own": _own,
 }  # fmt: skip
 # What costs most to run comes first; the shape as a whole before its networks one by one.
@@ -186,7 +183,6 @@ PARTS = (
     *(Part(f"{name} that follows x", "fix", (name,)) for name in SHAPE),
     Part("colour that follows x", "fix", ("color",)),
     Part("colour that follows the eye", "view"),
-    Part("a hidden layer", "layer", again=True),
     Part("half of the hidden units", "hidden", again=True),
     Part("half of the features", "features", again=True),
     Part("anchors' own axes and sizes", "own", ("frame",)),

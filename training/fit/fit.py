@@ -127,7 +127,7 @@ class Fit:
             if not trainer.settled:
                 raise BadFile(
                     f"A trial of {trainer.iteration} steps ends while new anchors still settle; "
-                    "give more --iterations, or --no-grow."
+                    "give more --iterations."
                 )
             models.append(trainer.model())
             seconds.append(trainer.elapsed)

@@ -257,7 +257,7 @@ def test_the_folder_draws_what_was_trained(trained, device, balls, tmp_path):
 def test_what_cannot_be_trained_is_refused(device, balls):
     with pytest.raises(BadFile, match="'Xray' has no training photos"):
         one_modality(balls, "Xray")
-    for wrong in ({"sh_degree": 4}, {"splats": 0}, {"iterations": None}, {"ssim_share": 1.5}):
+    for wrong in ({"sh_degree": 4}, {"splats": 0}, {"iterations": None}, {"depth_share": -1}):
         with pytest.raises(ValueError):
             PlainSettings(**wrong)
 

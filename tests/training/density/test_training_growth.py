@@ -8,7 +8,6 @@ import pytest
 from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.training.coarse import Coarse, smaller
 from shapeshift.training.density.densify import (
     LEAST_STEPS,
     THRESHOLD,
@@ -28,7 +27,6 @@ from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
@@ -47,7 +45,7 @@ def test_what_a_splat_gives_equals_the_float64_reference(device):
     evidence = Evidence(device, LAYOUT, len(parameters["anchors"]), 2)
     evidence.stop = 1
     drawing = step.draw(view, control, BACKGROUND)
-    step.gradients(drawing, loss, target, 0.2, evidence=evidence)
+    step.gradients(drawing, loss, target, evidence=evidence)
     eye = view.world_from_eye.position
     splats = decode_reference(LAYOUT, parameters, control, eye, VOXEL)
     weights = picture_weights(splats, camera_of(view)).sum(axis=(1, 2))
@@ -248,52 +246,10 @@ def test_a_budget_that_holds_nothing_is_refused():
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"max_anchors": 0}, "max_anchors is 0"), ({"coarse": 3}, "power of two"),
-        ({"coarse": 0}, "coarse is 0"), ({"coarse_until": 1.1}, "coarse_until is 1.1"),
+        ({"max_anchors": 0}, "max_anchors is 0"),
         ({"max_mb": float("nan")}, "max_mb is nan"), ({"grow_every": 0}, "grow_every is 0"),
     ],
 )  # fmt: skip
 def test_settings_of_growing_that_cannot_be_are_refused(changes, sentence):
     with pytest.raises(ValueError, match=sentence):
         TrainSettings(**changes)
-
-
-def test_sizes_of_photos_over_a_run():
-    coarse = Coarse(4, 0.4, {})
-    at = [coarse.factor(f) for f in (0, 0.19, 0.2, 0.39, 0.4, 0.7, 1.0)]
-    assert at == [4, 4, 2, 2, 1, 1, 1] and coarse.factors == [1, 2, 4]
-    assert {Coarse(1).factor(f) for f in (0, 0.1, 0.9)} == {1}
-    assert {Coarse(8, 0.0, {}).factor(f) for f in (0, 0.1)} == {1}
-
-
-def photo_of(rgba: np.ndarray, weight=None) -> LoadedPhoto:
-    _, _, view, _ = situation(0)
-    return LoadedPhoto(view.resized(rgba.shape[1::-1]), "RGB", rgba, weight, "p")
-
-
-def test_a_smaller_photo_has_the_mean_colours():
-    rgba = RNG(0).integers(0, 256, (64, 48, 4)).astype(np.uint8)
-    weight = RNG(1).random((64, 48)).astype(np.float32)
-    half = smaller(photo_of(rgba, weight), 2)
-    assert half.view.size == (24, 32) and half.rgba.shape == (32, 24, 4)
-    blocks = rgba.reshape(32, 2, 24, 2, 4).astype(float)
-    alpha = blocks[..., 3:] / 255
-    laid = (blocks[..., :3] * alpha).mean(axis=(1, 3))
-    for background in ((0, 0, 0), (1, 1, 1)):  # laid over anything it looks like the large one
-        over = laid / 255 + (1 - alpha.mean(axis=(1, 3))) * np.array(background)
-        np.testing.assert_allclose(half.over(background), over, atol=0.006)
-    np.testing.assert_allclose(half.weight, weight.reshape(32, 2, 24, 2).mean((1, 3)), rtol=1e-5)
-    odd = smaller(photo_of(rgba[:33, :35]), 2)
-    assert odd.view.size == (18, 16)
-    tiny = photo_of(rgba[:20, :20])
-    assert smaller(tiny, 2) is tiny  # 10 pixels would say nothing
-
-
-def test_small_photos_are_made_once_and_dropped_when_their_time_is_over():
-    photo = photo_of(np.full((64, 64, 4), 255, np.uint8))
-    coarse = Coarse(4, 0.4, {})
-    assert coarse.photo(photo, 4) is coarse.photo(photo, 4)
-    coarse.photo(photo, 2)
-    coarse.drop(2)
-    assert [key[2] for key in coarse.made] == [2]
-    assert coarse.photo(photo, 1) is photo

@@ -18,8 +18,6 @@ from tests.support.training.fit_scenes import make_shapes
 
 SMALL = TrainSettings(
     iterations=250,
-    encoding="even",  # tells two stops apart within fewer steps than one unit a stop does
-    rate_scale=0.5,
     grow=False,
     max_anchors=400,
     splats_per_anchor=3,
@@ -43,7 +41,7 @@ def test_stops_of_one_shape_share_it(captures):
     need = needs(captures["shared"], PARTS[:5])
     first = need.verdicts[0]
     assert (first.part, first.word) == ("shape that follows x", DROPPED)
-    assert need.settings.layout().fixed == SHAPE
+    assert need.settings.layout(2).fixed == SHAPE
     model = need.fitted.models[0]
     assert all(("control" in model.networks[n].inputs) == (n == "color") for n in HEADS)
     assert "rotation that follows x" not in [v.part for v in need.verdicts]  # went with the shape
@@ -74,8 +72,8 @@ def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkey
     monkeypatch.setattr("shapeshift.training.fit.fit.Fit.__init__.__defaults__", (PARTS[-2:], None))
     options = command.Options(
         captures["shared"].folder, tmp_path / "fit.shift", tolerance_db=5.0, seeds=2,
-        json=tmp_path / "fit.json", iterations=20, grow=False, max_anchors=90, splats_per_anchor=2,
-        features=4, hidden=8,
+        json=tmp_path / "fit.json", iterations=20,
+        asked={"max_anchors": 90, "splats_per_anchor": 2, "features": 4, "hidden": 8},
     )  # fmt: skip
     assert command.run(options) == 0
     result = json.loads((tmp_path / "fit.json").read_text())

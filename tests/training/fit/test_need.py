@@ -97,29 +97,28 @@ def test_what_another_part_won_is_not_used_up():
 
 
 def test_settings_without_each_part():
-    settings = TrainSettings(layers=2)
+    settings = TrainSettings()
     found = {name: part.without(settings, STOPS) for name, part in BY_NAME.items()}
-    assert found["shape that follows x"].layout().fixed == SHAPE
+    assert found["shape that follows x"].layout(2).fixed == SHAPE
     assert found["scale that follows x"].fixed == "scale"
     assert found["colour that follows x"].fixed == "color"
     assert not found["colour that follows the eye"].view_dependent
-    assert found["a hidden layer"].layers == 1
     assert found["half of the hidden units"].hidden == 16
     assert found["half of the features"].features == 8
     assert found["one splat of every anchor"].splats_per_anchor == 4
     assert found["a third of the anchors"].max_anchors == 8000
-    assert found["anchors' own axes and sizes"].own == "color"
-    assert found["anchors' own base colours"].own == "frame"
+    assert found["anchors' own axes and sizes"].anchor_attributes == "color"
+    assert found["anchors' own base colours"].anchor_attributes == "frame"
 
 
 def test_parts_that_are_not_there_are_not_tried():
     small = TrainSettings(
         fixed="offset, color", view_dependent=False, hidden=8, features=4, splats_per_anchor=1,
-        max_anchors=60, own="",
+        max_anchors=60, anchor_attributes="",
     )  # fmt: skip
     left = [name for name, part in BY_NAME.items() if part.without(small, STOPS)]
     assert left == ["scale that follows x", "rotation that follows x", "opacity that follows x"]
-    assert BY_NAME["scale that follows x"].without(small, STOPS).layout().fixed == (
+    assert BY_NAME["scale that follows x"].without(small, STOPS).layout(2).fixed == (
         "offset", "color", "scale",
     )  # fmt: skip
     one_stop = (Stop("RGB", 0.0),)
@@ -129,7 +128,7 @@ def test_parts_that_are_not_there_are_not_tried():
 def test_settings_can_be_taken_down_to_nothing():
     """Every part ends: the search does."""
     for part in PARTS:
-        settings, steps = TrainSettings(layers=3), 0
+        settings, steps = TrainSettings(), 0
         while settings is not None:
             settings, steps = part.without(settings, STOPS), steps + 1
         assert steps < 30
