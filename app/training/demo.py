@@ -8,6 +8,7 @@ from typing import Annotated
 from shapeshift.app.command_line import EXPERT, SIZE
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.app.training.train_options import Asked
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 12 minutes of a core
@@ -50,7 +51,7 @@ def run(options: Options) -> int:
     else:
         photograph(folder, size, options)
     package = options.out / "workshop.shift"
-    length = {"iterations": options.iterations}
+    length: Asked = {"iterations": options.iterations}
     if options.seconds is not None:
         length = {"seconds": options.seconds}
     code = train.run(
@@ -97,7 +98,7 @@ def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
     with progress_bar(transient=False) as progress:
         task = progress.add_task("photographing the workshop")
 
-        def tell(done: int, all_of_them: int) -> None:
+        def report(done: int, all_of_them: int) -> None:
             progress.update(task, completed=done, total=all_of_them)
 
-        make_workshop(folder, size, options.views, options.test_views, processes, tell)
+        make_workshop(folder, size, options.views, options.test_views, processes, report)

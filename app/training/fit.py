@@ -11,8 +11,8 @@ from shapeshift.app.training.train_options import Asked, MachineOptions
 from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
-    from shapeshift.training.fit.ablation import Measured, Verdict
-    from shapeshift.training.fit.fit import Need
+    from shapeshift.training.fit.ablation import Decision, Trial
+    from shapeshift.training.fit.fit import FitReport
 
 
 USUAL = ("max_anchors", "downscale", "masks", "background")
@@ -63,7 +63,7 @@ def run(options: Options) -> int:
     from shapeshift.app.training.train_options import settings_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
-    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
 
     if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
@@ -75,15 +75,15 @@ def run(options: Options) -> int:
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-        capture = with_found(capture, settings.rig)
+        capture = with_extrinsics(capture, settings.rig)
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
 
-        def tell(what: str, done: float) -> None:
+        def report(what: str, done: float) -> None:
             bar.update(task, description=what, completed=done)
 
         fit = Fit(
-            device, capture, settings, options.tolerance_db, options.seeds, tell, last=last,
+            device, capture, settings, options.tolerance_db, options.seeds, report, last=last,
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]
@@ -115,7 +115,7 @@ def without_times(result: object) -> object:
     return [without_times(part) for part in result] if isinstance(result, list) else result
 
 
-def print_report(need: "Need") -> None:
+def print_report(need: "FitReport") -> None:
     """The need report on standard error."""
     from rich.table import Table
 
@@ -124,7 +124,7 @@ def print_report(need: "Need") -> None:
     table = Table(
         "without", *(f"{n} dB" for n in names), "verdict", "bytes", "decode ms", "train s"
     )
-    for verdict in need.verdicts:
+    for verdict in need.decisions:
         table.add_row(verdict.part, *cells(verdict, names))
     console.print(table)
     console.print(
@@ -139,14 +139,14 @@ def print_report(need: "Need") -> None:
         console.print(f"{word}: {describe(found)}")
 
 
-def cells(verdict: "Verdict", names: list[str]) -> list[str]:
+def cells(verdict: "Decision", names: list[str]) -> list[str]:
     """The columns of one row of the report, all but the first."""
     needed = f" ({', '.join(verdict.needed_by)})" if verdict.needed_by and len(names) > 1 else ""
     saved = (f"{verdict.bytes:+,}", f"{verdict.decode_ms:+.2f}", f"{verdict.train_s:+.1f}")
-    return [*(str(verdict.change[n]) for n in names), verdict.word + needed, *saved]
+    return [*(str(verdict.change[n]) for n in names), verdict.verdict + needed, *saved]
 
 
-def describe(found: "Measured") -> str:
+def describe(found: "Trial") -> str:
     facts = found.as_dict()
     quality = ", ".join(f"{name} {value:.2f} dB" for name, value in facts["psnr_db"].items())
     return (

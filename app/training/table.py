@@ -64,7 +64,7 @@ def run(options: Options) -> int:
     from shapeshift.app.charts.chart_rows import RowsFile
     from shapeshift.app.errors import UsageError
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
     if options.seconds is None and options.iterations is None:
@@ -77,20 +77,20 @@ def run(options: Options) -> int:
         raise UsageError(f"{options.out} is a file; --out is a folder.")
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    refuse_capture(capture, options, distance)
+    check_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)
     head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
     table = RowsFile(options.out / "table.csv", VggRow if distance else Row, head)
     say(head[1])
     rig = offset_of(device, capture, options)
-    capture = with_found(capture, rig)
+    capture = with_extrinsics(capture, rig)
     for method in sorted(set(options.methods), key=list(PLACES).index):
         if any(row.method == method and row.modality == MEAN for row in table.rows):
             say(f"{NAMES[method]}: already in {full(table.path)}")
             continue
         say(f"{NAMES[method]}:")
         if method == "spz":
-            runs = pack_splats(capture, options.out, table.rows)
+            runs: dict[str, TrainedFile] | None = pack_splats(capture, options.out, table.rows)
         else:
             runs = train_method(method, device, capture, options, rig)
         if runs is None:
@@ -103,10 +103,10 @@ def run(options: Options) -> int:
     return 0
 
 
-def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
+def check_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
     """What would come to light after the training, now.  Raises BadFile."""
     from shapeshift.runtime_models.model import BadFile
-    from shapeshift.training.evaluation.vgg_distance import refuse_small
+    from shapeshift.training.evaluation.vgg_distance import check_size
     from shapeshift.training.photos import choose_downscale
 
     factor = options.asked.get("downscale") or choose_downscale(capture.photos)
@@ -119,7 +119,7 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
             )
         if distance is not None:
             for photo in held_out:
-                refuse_small(*photo.view.divided(factor).size)
+                check_size(*photo.view.divided(factor).size)
 
 
 def offset_of(device, capture: "Capture", options: Options) -> str:
@@ -165,7 +165,7 @@ def train_method(
         refuse_foreign(out)
         trainer = Trainer(device, capture, replace(settings_of(asked.asked), rig=rig))
         say(describe(trainer))
-        if train(trainer, None):
+        if train(trainer):
             return None
         write_package(trainer.model(), out)
         one = TrainedFile(out, trainer.elapsed, trainer.iteration)
@@ -201,8 +201,8 @@ def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> "dict[str, Tr
 
 def train_options(method: str, options: Options) -> TrainOptions:
     """What `launch.py train` would be asked for, without --calibrate: its offset is found once."""
-    asked = {"seconds": options.seconds, "iterations": options.iterations}
-    asked = {name: value for name, value in asked.items() if value is not None} | options.asked
+    budget = {"seconds": options.seconds, "iterations": options.iterations}
+    asked = {name: value for name, value in budget.items() if value is not None} | options.asked
     of_splats = method == "splats"
     if of_splats:
         asked.pop("max_anchors", None)
@@ -236,7 +236,7 @@ def rows_of(
             method, stop.name, round(score.psnr_db, 3), round(score.median_db, 3),
             round(score.ssim, 5),
             bytes_on_disk(made.file) / 1e6, round(made.seconds, 1), made.steps, score.alive,
-            score.photos, *([round(score.vgg, 5)] if distance else []),
+            score.photos, *([] if score.vgg is None else [round(score.vgg, 5)]),
         ))  # fmt: skip
     return [*rows, mean_row(rows, list({run.file: run for run in runs.values()}.values()))]
 

@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,26 +30,31 @@ FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so m
 def run(options: Options) -> int:
     from shapeshift.app.pace import pace_package
     from shapeshift.app.progress import working
-    from shapeshift.app.training.keeping import (
-        kept_when_memory_ends,
+    from shapeshift.app.training.saving import (
+        check_writable,
         memory_for_training,
-        refuse_place,
         save,
+        save_checkpoint,
+        saved_when_memory_ends,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
-    from shapeshift.training.calibration.extrinsics import with_found
-    from shapeshift.training.calibration.outlier_views import hopeless, report, suspects
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
+    from shapeshift.training.calibration.outlier_views import (
+        failed_modalities,
+        find_outlier_views,
+        report,
+    )
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.train import Trainer
 
-    refuse_calibrating(options)
+    check_calibrate(options)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
         return run_baseline(options)
-    refuse_plain_options(options)
-    refuse_place(options.out)  # now, not after the training
+    check_plain_options(options)
+    check_writable(options.out)  # now, not after the training
     refuse_foreign(options.out)
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
@@ -59,25 +65,27 @@ def run(options: Options) -> int:
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training(), working("reading photos, finding the first anchors"):
-        trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
-    say(describe(trainer), *trainer.doubts)
+        trainer = Trainer(device, with_extrinsics(capture, settings.rig), settings, resume)
+    say(describe(trainer), *trainer.warnings)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     began, before = time.monotonic(), trainer.iteration
-    with kept_when_memory_ends(trainer, options.out, checkpoint):
-        interrupted = train(trainer, checkpoint)
+    with saved_when_memory_ends(trainer, options.out, checkpoint):
+        interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
     save(trainer, options.out, checkpoint)
     if not interrupted:
         pace_package(options.out)
-    say(summary(trainer, options.out, interrupted), *trainer.exposures.remarks())
-    if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
+    say(summary(trainer, options.out, interrupted), *trainer.exposures.warnings())
+    if not interrupted and (
+        found := failed_modalities(trainer) or report(find_outlier_views(trainer))
+    ):
         say(*found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
     return INTERRUPTED if interrupted else 0
 
 
-def refuse_calibrating(options: Options) -> None:
+def check_calibrate(options: Options) -> None:
     """Raises UsageError where --calibrate would do nothing, or could not be kept."""
     from shapeshift.app.errors import UsageError
 
@@ -92,7 +100,7 @@ def refuse_calibrating(options: Options) -> None:
         raise UsageError("--resume goes on with the checkpoint's offset; leave out --calibrate.")
 
 
-def refuse_plain_options(options: Options) -> None:
+def check_plain_options(options: Options) -> None:
     """Raises UsageError for what only plain splats have."""
     from shapeshift.app.errors import UsageError
 

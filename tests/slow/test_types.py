@@ -20,7 +20,7 @@ MOST = {
     "renderer": 35,
     "runtime_models": 216,
     "scene": 124,
-    "training": 91,
+    "training": 0,
     "vr": 54,
 }
 

@@ -45,7 +45,7 @@ def trained(device, balls) -> Trainer:
 def test_two_hundred_steps_reach_a_picture(trained):
     psnr = trained.held_out_psnr(most=99)
     assert psnr["RGB"] > 22.5 and psnr["Thermal"] > 29.5, psnr
-    assert trained.guard.trips == 0
+    assert trained.guard.rollbacks == 0
 
 
 def test_the_same_seed_gives_the_same_bits(device, balls, trained):
@@ -99,7 +99,7 @@ def test_the_guard_rescues_rates_that_are_too_high(device, balls, factor):
     trainer = Trainer(device, balls, replace(SETTINGS, iterations=750))
     trainer.rate_scale = factor
     run(trainer)
-    assert trainer.guard.trips > 0
+    assert trainer.guard.rollbacks > 0
     assert trainer.rate_scale < factor
     psnr = trainer.held_out_psnr(most=99)
     assert psnr["RGB"] > 22 and psnr["Thermal"] > 27, psnr
@@ -114,7 +114,7 @@ def test_the_guard_rescues_weights_that_are_not_numbers(device, balls):
             trainer.adam.load(state)
         if now.iteration == 120:
             break
-    assert trainer.guard.trips > 0
+    assert trainer.guard.rollbacks > 0
     assert all(np.isfinite(a).all() for a in trainer.adam.state().values())
 
 
@@ -142,7 +142,7 @@ def test_the_package_draws_what_was_trained(trained, device, balls, tmp_path):
 
 
 def test_growing_ends_higher(device, balls):
-    settings = replace(SETTINGS, iterations=400)  # after 200 steps the newcomers still cost
+    settings = replace(SETTINGS, iterations=400)  # after 200 steps the new_anchors still cost
     few = replace(balls, points=balls.points[::40])  # of enough points a run starts at its cap
     plain = run(Trainer(device, few, settings))
     growing = replace(settings, grow=True, grow_every=25, max_anchors=3000)

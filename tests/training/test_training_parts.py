@@ -8,6 +8,7 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.divergence_guard import DivergenceGuard
 from shapeshift.training.first_anchors.initial import (
     choose_voxel,
     filler_points,
@@ -16,7 +17,6 @@ from shapeshift.training.first_anchors.initial import (
     pixel_of,
     voxel_centres,
 )
-from shapeshift.training.guard import Guard
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
@@ -214,10 +214,10 @@ def test_a_budget_of_one_kind_takes_the_place_of_the_other():
 
 
 def test_the_guard_goes_further_back_each_time():
-    guard = Guard({"a": np.array(0)})
+    guard = DivergenceGuard({"a": np.array(0)})
     for i in range(1, 6):
-        guard.remember({"a": np.array(i)})
-    assert [int(guard.fall_back()["a"]) for _ in range(4)] == [5, 4, 3, 3]
+        guard.save_snapshot({"a": np.array(i)})
+    assert [int(guard.rollback()["a"]) for _ in range(4)] == [5, 4, 3, 3]
 
 
 @pytest.mark.parametrize(
@@ -228,24 +228,24 @@ def test_the_guard_goes_further_back_each_time():
     ],
 )  # fmt: skip
 def test_what_the_guard_calls_healthy(visible, shown, healthy):
-    guard = Guard({})
-    guard.expect("RGB", 0.5, 1.0, 1.2)
-    looks = [guard.healthy("RGB", 0.1, visible, shown) for _ in range(4)]
+    guard = DivergenceGuard({})
+    guard.observe("RGB", 0.5, 1.0, 1.2)
+    looks = [guard.is_healthy("RGB", 0.1, visible, shown) for _ in range(4)]
     assert looks == ([True] * 4 if healthy else [True, True, False, False])
-    assert guard.sure == healthy
-    guard.fall_back()
-    assert guard.healthy("RGB", 0.1, visible, shown)
+    assert guard.stable == healthy
+    guard.rollback()
+    assert guard.is_healthy("RGB", 0.1, visible, shown)
     for loss in (np.nan, np.inf, -np.inf):
-        assert not Guard({}).healthy("RGB", loss, 0.5, 1.0)
+        assert not DivergenceGuard({}).is_healthy("RGB", loss, 0.5, 1.0)
 
 
 @pytest.mark.parametrize(("loss", "healthy"), [(0.29, True), (0.31, False), (np.nan, False)])
 def test_after_falling_back_the_loss_has_to_fall(loss, healthy):
-    guard = Guard({})
-    guard.expect("RGB", 0.5, 1.0, 1.0)
-    assert all(guard.healthy("RGB", 0.6, 1.0, 1.0) for _ in range(50))  # never fell: no demands
-    guard.fall_back()
-    looks = [guard.healthy("RGB", loss, 1.0, 1.0) for _ in range(8)]
+    guard = DivergenceGuard({})
+    guard.observe("RGB", 0.5, 1.0, 1.0)
+    assert all(guard.is_healthy("RGB", 0.6, 1.0, 1.0) for _ in range(50))  # never fell: no demands
+    guard.rollback()
+    looks = [guard.is_healthy("RGB", loss, 1.0, 1.0) for _ in range(8)]
     assert looks[-1] == healthy
 
 

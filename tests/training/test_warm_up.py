@@ -62,12 +62,12 @@ def test_the_loss_of_absent_splats_has_its_gradient(device, count):
 
 def test_a_capture_of_shapes_apart_is_turned_back_once_and_learned(device, apart, tmp_path):
     whole = run(Trainer(device, apart, SETTINGS))
-    assert whole.guard.trips >= 1 and whole.warm_up_rates.start is not None
+    assert whole.guard.rollbacks >= 1 and whole.lr_warmup.start is not None
     for name, psnr in whole.held_out_psnr(9).items():
         assert psnr > 20, (name, psnr)  # 13 dB is an empty picture
-    part = run(Trainer(device, apart, SETTINGS), steps=whole.warm_up_rates.start + 30)
+    part = run(Trainer(device, apart, SETTINGS), steps=whole.lr_warmup.start + 30)
     write_checkpoint(tmp_path / "c.npz", *part.checkpoint())  # while the rates rise
     resumed = run(Trainer(device, apart, SETTINGS, read_checkpoint(tmp_path / "c.npz")))
-    assert resumed.warm_up_rates == whole.warm_up_rates
+    assert resumed.lr_warmup == whole.lr_warmup
     for name, psnr in resumed.held_out_psnr(9).items():
         assert psnr > 20, (name, psnr)

@@ -28,7 +28,7 @@ def bytes_without_anchors(
     return int(GROWN * len(zip_files(package_files(one, "float16")))) + NOTES_BYTES
 
 
-def most_anchors(
+def anchor_cap(
     settings: TrainSettings,
     layout: HeadLayout,
     encoding: ControlEncoding,

@@ -1,7 +1,7 @@
 """Raw outputs of the heads to Gaussians and back: bounded offsets, clipped scales."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,11 +52,11 @@ class Activation:
             for name in self.layout.per_anchor[2:]
         }
 
-    def attributes_of(self, rows: dict[str, object]) -> tuple:
+    def attributes_of(self, rows: dict[str, Any]) -> tuple:
         """Frames and base colours of a step's anchors, or what stands in their place."""
         return tuple(rows.get(name, self.nothing) for name in ATTRIBUTE_WIDTH)
 
-    def forward(self, raw, rows: dict[str, object]) -> Gaussians:
+    def forward(self, raw, rows: dict[str, Any]) -> Gaussians:
         """`rows`: of the optimiser's groups that have a row an anchor, those of the step."""
         self.resize(len(rows["anchors"]))
         by_row = self.device.kind == "cpu"  # an anchor a work-item, else a splat
@@ -68,7 +68,7 @@ class Activation:
         )  # fmt: skip
         return self.splats
 
-    def backward(self, raw, rows: dict[str, object], grad: Gaussians) -> tuple:
+    def backward(self, raw, rows: dict[str, Any], grad: Gaussians) -> tuple:
         """(grad_raw (A, RAW), by group those of `rows` but the features) of the last `forward`."""
         splats = self.splats
         self.device.launch(

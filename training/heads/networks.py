@@ -12,7 +12,7 @@ KERNELS = Path(__file__).parents[1] / "kernels"
 DIRECTION = 3
 CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
-RATED = 32  # hidden units of the networks for which the learning rates were chosen
+RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
 # What anchors may have beside their features, and the optimiser's group of it.
 ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors"}
 ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
@@ -115,13 +115,13 @@ class HeadLayout:
     def rate_shares(self) -> np.ndarray:
         """(weights,) float32: what part of a head's learning rate each of its weights takes.
 
-        Rates are chosen for RATED hidden units.  Steps of Adam do not shrink where more inputs add
+        Rates are chosen for RATED_HIDDEN units.  Steps of Adam do not shrink where more inputs add
         up, so weights behind wider layers take smaller ones.
         """
         shares = np.ones(self.weights_at[-1], np.float32)
         for head in range(len(HEADS)):
             views = self.parts(shares, head)
-            views[2][:] *= min(1.0, RATED / self.hidden)
+            views[2][:] *= min(1.0, RATED_HIDDEN / self.hidden)
         return shares
 
     def first_rows(self, name: str) -> list[int]:

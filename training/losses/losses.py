@@ -46,9 +46,9 @@ class ImageLoss:
         self.derivative = device.empty((3, 3, height, self.stride))
         self.grad_image = device.empty((3, height, width))
         self.ssim_rows, self.l1_rows = device.empty(3 * height), device.empty(3 * height)
-        self.told = self.ssim_rows, self.l1_rows  # what the kernels fill
+        self.sums = self.ssim_rows, self.l1_rows  # what the kernels fill
         if self.form == "gpu":  # a value a pixel, summed up when it is asked for
-            self.told = tuple(device.empty((3, height, self.stride)) for _ in range(2))
+            self.sums = tuple(device.empty((3, height, self.stride)) for _ in range(2))
         self.nothing = device.zeros(1)
 
     def launch(self, name: str, *arguments) -> None:
@@ -78,12 +78,12 @@ class ImageLoss:
         self.ssim_share, self.values = ssim_share, target.values
         self.launch("image_rows", masked, image, target.planes, weight, self.blurred)
         self.launch(
-            "ssim_columns", self.blurred, target.mean, target.square, self.derivative, self.told[0]
+            "ssim_columns", self.blurred, target.mean, target.square, self.derivative, self.sums[0]
         )
         self.launch("derivative_rows", self.derivative, self.blurred)
         self.launch(
             "gradient_columns", masked, np.float32(ssim_share), np.float32(1 / target.values),
-            self.blurred, image, target.planes, weight, self.grad_image, self.told[1],
+            self.blurred, image, target.planes, weight, self.grad_image, self.sums[1],
         )  # fmt: skip
         return self.grad_image
 
@@ -93,7 +93,7 @@ class ImageLoss:
         if self.form == "gpu":
             self.device.launch(
                 self.kernels["sum_rows"], 3 * height, 64, width, 3 * height, self.stride,
-                *self.told, self.ssim_rows, self.l1_rows,
+                *self.sums, self.ssim_rows, self.l1_rows,
             )  # fmt: skip
         everything = 3.0 * width * height
         ssim = self.device.download(self.ssim_rows).sum(dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.networks import KERNELS
 
-MIN_OPACITY = 0.02  # below it the loss pulls; the same number stands in min_opacity.cl
+MIN_OPACITY = 0.02  # below it the loss is above 0; the same number stands in min_opacity.cl
 SHARE = 0.05  # of mean max(MIN_OPACITY - opacity, 0); bone of the leg gains 1 dB, docs/growth.md
 
 

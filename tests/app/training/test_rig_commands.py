@@ -15,7 +15,12 @@ from shapeshift.app.training.train import run as train
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.calibration import calibrate as rig_search
-from shapeshift.training.calibration.extrinsics import moved_by, offset_capture, rig_of, told
+from shapeshift.training.calibration.extrinsics import (
+    moved_by,
+    offset_capture,
+    offset_of_matrix,
+    rig_of,
+)
 from shapeshift.training.synthetic.balls import make_balls
 
 PLANTED = moved_by(np.array([0.1, -0.2, 0.05, 0.1, 0.05, -0.1]))
@@ -40,7 +45,7 @@ def asked(monkeypatch) -> list[str]:
 
     def calibrate(device, capture, settings, modality, **more):
         found.append(modality)
-        return told(PLANTED, 3.0)
+        return offset_of_matrix(PLANTED, 3.0)
 
     monkeypatch.setattr(rig_search, "calibrate", calibrate)
     return found
@@ -87,9 +92,9 @@ def test_separate_models_keep_it(folders, asked, tmp_path):
 def test_fit_keeps_it(folders, asked, tmp_path, monkeypatch):
     from shapeshift.training.fit.fit import Fit
 
-    monkeypatch.setattr("shapeshift.training.fit.fit.PARTS", ())
+    monkeypatch.setattr("shapeshift.training.fit.fit.COMPONENTS", ())
     monkeypatch.setattr(Fit.__init__, "__defaults__", ((), None))
-    monkeypatch.setattr(Fit, "clean", lambda self: None)
+    monkeypatch.setattr(Fit, "prune_models", lambda self: None)
     out = tmp_path / "fit.shift"
     options = fit.Options(
         folders[1], out, {"max_anchors": 300}, calibrate="Thermal", seeds=1, iterations=20,

@@ -34,7 +34,7 @@ def balls(tmp_path_factory) -> Capture:
 
 def run(trainer: Trainer, steps: int | None = None) -> Trainer:
     for now in trainer.steps():
-        assert now.anchors <= trainer.most_anchors
+        assert now.anchors <= trainer.anchor_cap
         if steps is not None and now.iteration >= steps:
             break
     return trainer
@@ -46,7 +46,7 @@ def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way,
     whole = run(Trainer(device, balls, settings))
     cap = settings.max_anchors
     assert (cap == FIRST or whole.anchors_count > FIRST) and whole.anchors_count <= cap
-    assert whole.grown_at > 0 and whole.guard.trips == 0
+    assert whole.densified_at > 0 and whole.guard.rollbacks == 0
     part = run(Trainer(device, balls, settings), steps=33)  # with some statistics
     write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
     resumed = run(Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz")))
@@ -61,13 +61,13 @@ def test_nothing_changes_within_the_steps_that_a_picture_needs_to_settle(device,
     for steps in (SETTLE + 19, SETTLE + 20, 100):
         trainer = run(Trainer(device, balls, replace(BASE, iterations=steps, grow_every=20)))
         assert trainer.settled, steps
-        assert (trainer.grown_at > 0) == (steps >= SETTLE + 20)
+        assert (trainer.densified_at > 0) == (steps >= SETTLE + 20)
 
 
 def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
     settings = replace(BASE, max_mb=0.085, max_anchors=12000)
     trainer = run(Trainer(device, balls, settings))
-    assert FIRST < trainer.anchors_count <= trainer.most_anchors < 12000
+    assert FIRST < trainer.anchors_count <= trainer.anchor_cap < 12000
     assert write_package(trainer.model(), tmp_path / "a.shift") <= 0.085e6
     finite = all(np.isfinite(a).all() for a in trainer.adam.state().values())
     assert finite
