@@ -19,7 +19,7 @@ import textwrap
 import types
 import typing
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
@@ -44,6 +44,18 @@ class Opt:
     metavar: str = ""  # how help calls its value; "": by the type
 
 
+@dataclass(frozen=True)
+class Settings:
+    """An annotation: the options of this field, a dict, are fields of another dataclass.
+
+    `parse` puts those that were given into the dict, by name; help shows that dataclass's defaults.
+    """
+
+    of: type
+    usual: tuple[str, ...] = ()  # fields, in the order of help
+    expert: tuple[str, ...] = ()
+
+
 POSITIONAL, EXPERT = Opt(positional=True), Opt(expert=True)
 SIZE, CONTROL, REGIONS, MODALITY = (Opt(metavar=m) for m in ("SIZE", "X", "REGION", "MODALITY"))
 
@@ -58,6 +70,7 @@ class Argument:
     count: int | None  # values: 1, or of a tuple so many, None: any number
     is_tuple: bool
     help: str
+    into: str = ""  # the dict among the dataclass's fields that takes the value: see Settings
 
     @property
     def name(self) -> str:
@@ -111,6 +124,9 @@ def parse(kind: type[Options], words: Sequence[str], prog: str) -> Options:
     values |= _place([each for each in arguments if each.opt.positional], loose, prog)
     missing = [a for a in arguments if a.required and a.field.name not in values]
     _refuse_missing(missing, values, prog)
+    for each in arguments:
+        if each.into and each.field.name in values:
+            values.setdefault(each.into, {})[each.field.name] = values.pop(each.field.name)
     return kind(**values)
 
 
@@ -133,9 +149,20 @@ def arguments_of(kind: type) -> tuple[Argument, ...]:
         hint, opt = hints[field.name], Opt()
         if typing.get_origin(hint) is Annotated:
             hint, *notes = typing.get_args(hint)
+            if isinstance(notes[0], Settings):
+                made += _arguments_in(notes[0], field.name)
+                continue
             opt = next((note for note in notes if isinstance(note, Opt)), opt)
         made.append(Argument(field, opt, *_value_of(hint), texts.get(field.name, "")))
     return tuple(made)
+
+
+def _arguments_in(settings: Settings, into: str) -> list[Argument]:
+    """Those of the fields of another dataclass."""
+    known = {each.field.name: each for each in arguments_of(settings.of)}
+    usual = [replace(known[name], into=into) for name in settings.usual]
+    expert = [replace(known[name], into=into, opt=EXPERT) for name in settings.expert]
+    return usual + expert
 
 
 def nearest(word: str, known: Sequence[str]) -> str:

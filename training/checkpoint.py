@@ -3,6 +3,7 @@
 import json
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,8 @@ def checkpoint_path(out: Path) -> Path:
 def write_checkpoint(path: Path, state: dict[str, np.ndarray], notes: dict) -> None:
     """All arrays and notes in one file, never half-written."""
     with whole_file(path) as file:
-        np.savez(file, notes=np.array(json.dumps(notes)), **state)
+        arrays: dict[str, Any] = state | {"notes": np.array(json.dumps(notes))}
+        np.savez(file, **arrays)
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, np.ndarray], dict]:

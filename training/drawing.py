@@ -17,7 +17,7 @@ from shapeshift.rasterizer.surface import (
 )
 from shapeshift.scene.pose import View
 from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.depth_loss import DepthWish
+from shapeshift.training.losses.depth_loss import DepthTerm
 
 Color = tuple[float, float, float]
 Timed = Callable[[str], AbstractContextManager]  # of a pass, by its name
@@ -33,6 +33,13 @@ class Drawing:
     tiles: Tiles
     frame: Frame
     depth: DepthFrame | None = None  # the same frame with its depth, where that was asked for
+
+    @property
+    def depth_frame(self) -> DepthFrame:
+        """The frame with its depth.  Raises ValueError where it was drawn without."""
+        if self.depth is None:
+            raise ValueError("the view was drawn without depth")
+        return self.depth
 
 
 def camera_of(view: View) -> Camera:
@@ -66,7 +73,7 @@ def draw_splats(
 
 
 def splats_backward(
-    device, drawing: Drawing, grad_image, depth: DepthWish | None = None, timed: Timed = untimed,
+    device, drawing: Drawing, grad_image, depth: DepthTerm | None = None, timed: Timed = untimed,
     **asked: Any,
 ) -> tuple[Gaussians, object]:  # fmt: skip
     """Gradients of the splats and (N, 12) of the records by those of the image.
@@ -74,23 +81,24 @@ def splats_backward(
     depth: what is to be learned from a depth photo, for a drawing that has depth.  asked: what
     rasterize_backward is to tell beside them.
     """
+    drawn = None if depth is None else drawing.depth_frame
     with timed("rasterize backward"):
-        if depth is None:
+        if depth is None or drawn is None:
             grad_record = rasterize_backward(
                 device, drawing.projected, drawing.tiles, drawing.frame, grad_image, None, **asked
             )
         else:
-            by_metres, by_through = depth.loss.compare(drawing.depth, depth.target, depth.share)
+            by_metres, by_through = depth.loss.compare(drawn, depth.target, depth.share)
             grad_record, by_surface = rasterize_depth_backward(
-                device, drawing.projected, drawing.tiles, drawing.depth, grad_image, by_through,
+                device, drawing.projected, drawing.tiles, drawn, grad_image, by_through,
                 by_metres, **asked,
             )  # fmt: skip
     fields, camera = drawing.splats.fields(), drawing.camera
     with timed("project backward"):
         grad = Gaussians(*project_backward(device, *fields, camera, drawing.projected, grad_record))
-        if depth is not None:
+        if drawn is not None:
             surface_backward(
-                device, *fields[:3], camera, drawing.projected, drawing.depth.surface, by_surface,
+                device, *fields[:3], camera, drawing.projected, drawn.surface, by_surface,
                 grad.fields()[:3],
             )  # fmt: skip
     return grad, grad_record

@@ -13,7 +13,7 @@ from shapeshift.runtime_models.model import (
 )
 from shapeshift.runtime_models.rotation import normalize
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
-from shapeshift.training.heads.networks import OWN_WIDTH, HeadLayout
+from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout
 
 ACTIVATION = {
     "offset": "tanh", "scale": "exp", "rotation": "none", "opacity": "tanh", "color": "sigmoid",
@@ -35,7 +35,7 @@ def model_of(
     """
     gain = {"offset": REACH * voxel, "scale": UNIT * voxel}
     features = state["features.value"][:, : layout.features]
-    own_colors = "color" in layout.own
+    own_colors = "color" in layout.attributes
     if own_colors:
         features = np.concatenate([features, state["colors.value"]], axis=1)
     networks = {}
@@ -47,11 +47,11 @@ def model_of(
             SCALE_CLIP if name == "scale" else None, gain.get(name, 1.0),
         )  # fmt: skip
         if own_colors:
-            extra = OWN_WIDTH["colors"] if name == "color" else 0
-            mlp = with_skip(mlp, layout.features, OWN_WIDTH["colors"], extra)
+            extra = ATTRIBUTE_WIDTH["colors"] if name == "color" else 0
+            mlp = with_skip(mlp, layout.features, ATTRIBUTE_WIDTH["colors"], extra)
         networks[name] = mlp
     frames = None
-    if "frame" in layout.own:
+    if "frame" in layout.attributes:
         values = state["frames.value"]
         frames = AnchorFrames(np.exp(values[:, :3]), normalize(values[:, 3:]))
     return AnchorModel(
@@ -73,15 +73,9 @@ def with_skip(mlp: Mlp, features: int, more: int, added: int) -> Mlp:
         rows = np.zeros((2 * more, first.shape[1]), np.float32)
         rows[:, features : features + more] = both
         weights[0] = np.concatenate([first, rows])
-        for i, middle in enumerate(weights[1:-1], 1):
-            units, takes = middle.shape
-            wide = np.zeros((units + 2 * more, takes + 2 * more), np.float32)
-            wide[:units, :takes] = middle
-            wide[units:, takes:] = np.eye(2 * more)
-            weights[i] = wide
         splats = len(weights[-1]) // SIZE_PER_SPLAT["color"]
         last = np.tile(both.T, (splats, 1))  # (k * 3, 2 more)
         weights[-1] = np.concatenate([weights[-1], last], axis=1)
         nothing = np.zeros(2 * more, np.float32)
-        biases[:-1] = [np.concatenate([bias, nothing]) for bias in biases[:-1]]
+        biases[0] = np.concatenate([biases[0], nothing])
     return Mlp(tuple(weights), tuple(biases), mlp.head, mlp.inputs, mlp.clip, mlp.gain)

@@ -63,7 +63,7 @@ def memory_for_photos() -> int:
     return int(PHOTOS * Memory().most)
 
 
-def too_much(photos: tuple[Photo, ...], factor: int) -> str:
+def memory_excess(photos: tuple[Photo, ...], factor: int) -> str:
     """Why photos of this size do not fit into memory, in words; "" where they do."""
     needed, may = memory_of(photos, factor), memory_for_photos()
     if needed <= may:
@@ -75,10 +75,10 @@ def too_much(photos: tuple[Photo, ...], factor: int) -> str:
     )
 
 
-def memory_doubts(photos: tuple[Photo, ...], factor: int) -> list[str]:
+def memory_warnings(photos: tuple[Photo, ...], factor: int) -> list[str]:
     """A sentence where photos are smaller than usual because of memory."""
     usual = -(-max(max(photo.view.size) for photo in photos) // MOST_PIXELS)
-    why = too_much(photos, usual) if usual < factor else ""
+    why = memory_excess(photos, usual) if usual < factor else ""
     return [f"{why}: they are made {factor} times smaller; --memory GB allows more."] if why else []
 
 
@@ -107,7 +107,7 @@ def read(photo: Photo, factor: int, masks: str) -> LoadedPhoto:
 def load_photos(capture: Capture, split: str, factor: int, masks: str) -> list[LoadedPhoto]:
     """All photos of a split.  Raises BadFile, also where they would need too much memory."""
     mine = tuple(photo for photo in capture.photos if photo.split == split)
-    if mine and (why := too_much(mine, factor)):
+    if mine and (why := memory_excess(mine, factor)):
         fits = choose_downscale(capture.photos)
         raise BadFile(f"{capture.folder}: {why}; --downscale {fits} fits, --memory GB allows more.")
     return [read(photo, factor, masks) for photo in mine]

@@ -8,7 +8,8 @@ from shapeshift.runtime_models.model import HEADS
 from shapeshift.runtime_models.rotation import normalize, product, rotation_matrices
 from shapeshift.scene.metrics import ssim_map
 from shapeshift.training.heads.gaussians import REACH, SCALE_CLIP, UNIT
-from shapeshift.training.heads.networks import OWN_WIDTH, HeadLayout
+from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, HeadLayout
+from shapeshift.training.losses.min_opacity import MIN_OPACITY
 
 
 def directions(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
@@ -72,7 +73,7 @@ def decode_reference(
     features = np.asarray(parameters["features"], np.float64)[:, : layout.features]
     networks = layout.unpack(parameters["weights"])
     heads = heads_reference(layout, networks, features, directions(anchors, eye), control)
-    own = (parameters.get(name) for name in OWN_WIDTH)
+    own = (parameters.get(name) for name in ATTRIBUTE_WIDTH)
     own = (None if rows is None else np.asarray(rows, np.float64) for rows in own)
     return activate_reference({n: raw for n, (_, raw) in heads.items()}, anchors, voxel, *own)
 
@@ -88,11 +89,10 @@ def image_loss_reference(image, photo, share: float, weight=None) -> float:
 
 
 def step_loss_reference(
-    splats: tuple, camera: Camera, photo, background, shares: tuple[float, float, float]
+    splats: tuple, camera: Camera, photo, background, shares: tuple[float, float]
 ) -> float:
-    """Eq. 8 and 9 of drawn splats; shares: of D-SSIM, lambda_alpha, lambda_S."""
-    ssim_share, opacity_share, scale_share = shares
+    """Eq. 8 of drawn splats and the loss of min_opacity.py; shares: of D-SSIM, and of that."""
+    ssim_share, min_opacity_share = shares
     image, _ = render_reference(splats, camera, background)
     image_loss = image_loss_reference(image.transpose(1, 2, 0), photo, ssim_share)
-    regularisers = opacity_share * np.abs(splats[3]).mean() + scale_share * splats[1].mean()
-    return float(image_loss + regularisers)
+    return float(image_loss + min_opacity_share * np.maximum(MIN_OPACITY - splats[3], 0).mean())

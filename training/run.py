@@ -8,19 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.rasterizer.device import Device
-from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettings
+from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.drawing import Color, Drawing
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import Target
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.schedule import Budget
-from shapeshift.training.settings import Rates, TrainSettings
+from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
 
 SETTLE = 50  # steps after growing in which the picture is worse: no evaluation, no export
-PACE_STEPS = 20  # steps after which the length of a timed run is known
+LENGTH_STEPS = 20  # steps after which the length of a timed run is known
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Progress:
     loss: float | None  # every few steps
     anchors: int
     elapsed: float  # seconds, as Run.elapsed
-    fell_back: bool = False  # the guard turned the run back
+    rolled_back: bool = False  # the guard turned the run back
 
 
 def clock_of(device: Device) -> Callable[[], float]:
@@ -47,8 +47,8 @@ def clock_of(device: Device) -> Callable[[], float]:
 class Run(ABC):
     """A run that an optimiser makes step by step.  Who derives from it sets what is named here."""
 
-    unit: str  # what Progress counts ...
-    counted: str  # ... and the group of the optimiser that has a row for each
+    primitive: str  # what Progress counts ...
+    param_group: str  # ... and the group of the optimiser that has a row for each
     device: Device
     settings: TrainSettings | PlainSettings
     budget: Budget
@@ -58,7 +58,7 @@ class Run(ABC):
     drawing: Drawing  # the last one
     iteration: int  # steps done
     elapsed: float  # seconds that the steps took, by clock_of
-    grown_at: int  # iteration of the last change of what is counted
+    densified_at: int  # iteration of the last change of what is counted
     run_length: int | None  # iterations in all; None until a timed run's is known
 
     @property
@@ -67,7 +67,7 @@ class Run(ABC):
         """How many splats the model has at any stop, absent ones too."""
 
     @abstractmethod
-    def warm_up(self) -> None:
+    def compile_kernels(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted."""
 
     @abstractmethod
@@ -80,30 +80,27 @@ class Run(ABC):
 
     def steps(self) -> Iterator[Progress]:
         """Train until the budget is used; yields after every step."""
-        self.warm_up()
+        self.compile_kernels()
         clock = clock_of(self.device)
         while self.budget.fraction(self.iteration, self.elapsed) < 1:
             start = clock()
-            loss, fell_back = self.one_step()
+            loss, rolled_back = self.one_step()
             self.elapsed += clock() - start
-            fraction, count = self.budget.fraction(self.iteration, self.elapsed), self.counted
+            fraction, count = self.budget.fraction(self.iteration, self.elapsed), self.param_group
             yield Progress(
-                self.iteration, fraction, loss, len(self.adam[count]), self.elapsed, fell_back
+                self.iteration, fraction, loss, len(self.adam[count]), self.elapsed, rolled_back
             )
 
     @property
     def settled(self) -> bool:
         """Whether the last growing lies far enough back for the picture to count."""
-        return self.iteration - self.grown_at >= SETTLE
+        return self.iteration - self.densified_at >= SETTLE
 
-    def rates(self) -> Rates | PlainRates:
-        """The settings' learning rates for a run of this length."""
-        return self.settings.rates(self.run_length or 0)
-
-    def find_pace(self) -> None:
+    def fix_run_length(self) -> None:
         """A timed run's length follows from its first steps, and its rates from the length."""
-        if self.run_length is None and self.iteration == PACE_STEPS:
-            self.run_length = int(self.settings.seconds / (self.elapsed / (PACE_STEPS - 1)))
+        seconds = self.settings.seconds
+        if self.run_length is None and seconds is not None and self.iteration == LENGTH_STEPS:
+            self.run_length = int(seconds / (self.elapsed / (LENGTH_STEPS - 1)))
             self.adam.set_rates(self.all_rates())
 
     def target(self, photo: LoadedPhoto, background: Color, own: bool = True) -> Target:

@@ -1,4 +1,4 @@
-"""Which photo comes at which step, over which background, and how far the run has come.
+"""Which photo comes at which step, over which background, how far the run is, and LR warm-up.
 
 Everything about a step follows from the seed and its number, so a resumed run needs no memory.
 """
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.runtime_models.model import BadFile
 from shapeshift.training.photos import BLACK, LoadedPhoto
 
-MOST_TURNS = 100  # of a modality in a round
+WARM_UP_STEPS = 200
+LEAST_RATE = 0.01  # of the networks' rates, at the first step of a warm-up
 
 
 @dataclass(frozen=True)
@@ -18,15 +18,11 @@ class Schedule:
     photos: dict[str, list[LoadedPhoto]]  # training photos of every modality, none empty
     seed: int
     background: tuple[float, float, float] | None  # None: a random one where photos show it
-    turns: tuple[int, ...] = ()  # indices of modalities, over and over; none: each in its turn
 
     def photo(self, iteration: int) -> LoadedPhoto:
         """Modalities take turns; each goes through all of its photos in a new order every time."""
         names = list(self.photos)
-        turns = self.turns or tuple(range(len(names)))
-        again, at = divmod(iteration, len(turns))
-        which = turns[at]
-        turn = again * turns.count(which) + turns[:at].count(which)
+        turn, which = divmod(iteration, len(names))
         photos = self.photos[names[which]]
         epoch, place = divmod(turn, len(photos))
         order = np.random.default_rng([self.seed, 1, which, epoch]).permutation(len(photos))
@@ -38,39 +34,6 @@ class Schedule:
         if not photo.see_through:
             return BLACK
         return tuple(np.random.default_rng([self.seed, 2, iteration]).random(3).tolist())
-
-
-def balance_of(text: str) -> dict[str, int]:
-    """Turns by modality out of "RGB=3,Thermal=1"; nothing: none.  Raises ValueError."""
-    found = {}
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        name, _, turns = part.rpartition("=")
-        if not (name.strip() and turns.strip().isdecimal() and 1 <= int(turns) <= MOST_TURNS):
-            raise ValueError(
-                f"balance has '{part}'; it is NAME=TURNS, for example RGB=3,Thermal=1, with 1 to "
-                f"{MOST_TURNS} turns."
-            )
-        found[name.strip()] = int(turns)
-    return found
-
-
-def turns_of(balance: dict[str, int], names: list[str]) -> tuple[int, ...]:
-    """A round in which every modality has its turns, spread evenly; 1 where nothing is said.
-
-    Raises BadFile where there is no modality of a name.
-    """
-    if len(names) < 2 or not balance:  # a capture of one modality out of several has no balance
-        return ()
-    for name in balance:
-        if name not in names:
-            raise BadFile(f"balance names '{name}'; the modalities are {', '.join(names)}.")
-    shares = np.array([balance.get(name, 1) for name in names])
-    given, order = np.zeros(len(names)), []
-    for slot in range(int(shares.sum())):
-        due = shares * (slot + 1) / shares.sum() - given
-        order.append(int(np.argmax(due)))
-        given[order[-1]] += 1
-    return tuple(order)
 
 
 @dataclass(frozen=True)
@@ -85,3 +48,33 @@ class Budget:
         steps = iteration / max(self.iterations, 1) if self.iterations is not None else 0.0
         time = elapsed / max(self.seconds, 1e-9) if self.seconds is not None else 0.0
         return max(steps, time)
+
+
+@dataclass(frozen=True)
+class LrWarmup:
+    """Learning rates of the networks that rise quadratically, after a run was turned back.
+
+    Where photos are mostly background, the first steps have one direction for all splats alike:
+    "away".  The heads can follow it until nothing is left, before the features tell the anchors
+    apart.  With rates that rise the features learn first.  Runs of few hundred steps cannot spare
+    the steps, so a run begins without (docs/growth.md).
+    """
+
+    start: int | None = None  # the iteration at which it begins; None: there is none
+
+    def factor(self, iteration: int) -> float:
+        """Of the networks' rates at a step."""
+        if self.start is None:
+            return 1.0
+        done = iteration - self.start + 1
+        return 1.0 if done >= WARM_UP_STEPS else max((done / WARM_UP_STEPS) ** 2, LEAST_RATE)
+
+    def changes(self, iteration: int) -> bool:
+        """Whether the rates of this step differ from those of the step before."""
+        return self.start is not None and iteration - self.start < WARM_UP_STEPS
+
+    def rates(self, rates: dict[str, np.ndarray], iteration: int) -> dict[str, np.ndarray]:
+        """The optimiser's rates at a step."""
+        if self.factor(iteration) == 1:
+            return rates
+        return rates | {"weights": rates["weights"] * np.float32(self.factor(iteration))}

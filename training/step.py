@@ -7,15 +7,14 @@ from contextlib import contextmanager
 import numpy as np
 
 from shapeshift.scene.pose import View
-from shapeshift.training.density.density import Evidence
+from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.drawing import Color, Drawing, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthWish
-from shapeshift.training.losses.losses import ImageLoss, Target, regularise
-from shapeshift.training.losses.smooth import smooth_picture
-from shapeshift.training.rise import draw_up
+from shapeshift.training.losses.depth_loss import DepthTerm
+from shapeshift.training.losses.losses import ImageLoss, Target
+from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradient
 
 
 class Step:
@@ -26,7 +25,7 @@ class Step:
         self.heads = Heads(device, layout)
         self.activation = Activation(device, layout, voxel)
         self.rows = None  # (R,) int32 on the device: the anchors of the last drawing; None: all
-        self.there: dict[str, object] = {}  # what the optimiser has of these, by group
+        self.gathered: dict[str, object] = {}  # what the optimiser has of these, by group
         self.ms: dict[str, float] | None = None  # of each pass, summed; a dict switches it on
 
     @contextmanager
@@ -45,12 +44,12 @@ class Step:
         """
         adam, self.rows = self.adam, rows
         with self.timed("heads"):
-            self.there = {n: adam.gather(n, rows) for n in self.layout.per_anchor}
+            self.gathered = {n: adam.gather(n, rows) for n in self.layout.per_anchor}
             raw = self.heads.forward(
-                adam["weights"], self.there["anchors"], self.there["features"], control, eye
+                adam["weights"], self.gathered["anchors"], self.gathered["features"], control, eye
             )
         with self.timed("activate"):
-            return self.activation.forward(raw, self.there)
+            return self.activation.forward(raw, self.gathered)
 
     def draw(
         self, view: View, control: np.ndarray, background: Color, with_depth: bool = False,
@@ -64,13 +63,9 @@ class Step:
         drawing: Drawing,
         loss: ImageLoss,
         target: Target,
-        ssim_share: float,
-        opacity_share: float = 0.0,
-        scale_share: float = 0.0,
-        evidence: Evidence | None = None,
-        depth: DepthWish | None = None,
-        revive: float = 0.0,
-        smooth: float = 0.0,
+        stats: DensificationStats | None = None,
+        depth: DepthTerm | None = None,
+        min_opacity_share: float = SHARE,
     ) -> dict[str, object]:
         """Gradients of the loss by what the optimiser holds, under its names.
 
@@ -78,27 +73,23 @@ class Step:
         """
         device = self.device
         with self.timed("loss"):
-            grad_image = loss.compare(drawing.frame.image, target, ssim_share)
-            if smooth:
-                smooth_picture(device, drawing.frame.image, grad_image, smooth)
-        watched = evidence is not None
+            grad_image = loss.compare(drawing.frame.image, target)
+        watched = stats is not None
         grad, grad_record = splats_backward(
             device, drawing, grad_image, depth, self.timed, absolute=watched, weight=watched
         )
         with self.timed("density"):
-            if evidence is not None:
+            if stats is not None:
                 record, opacity = drawing.projected.record, drawing.splats.opacity
-                evidence.add(record, grad_record, opacity, drawing.camera.size, self.rows)
+                stats.add(record, grad_record, opacity, drawing.camera.size, self.rows)
         with self.timed("heads backward"):
-            if opacity_share or scale_share:
-                regularise(device, drawing.splats, grad, opacity_share, scale_share)
-            if revive:
-                draw_up(device, drawing.splats, grad, revive)
+            if min_opacity_share:
+                add_min_opacity_gradient(device, drawing.splats, grad, min_opacity_share)
             return self.backward(grad)
 
     def backward(self, grad: Gaussians) -> dict[str, object]:
         """The gradients by what the optimiser holds of those by the last splats decoded."""
-        there = self.there
+        there = self.gathered
         grad_raw, found = self.activation.backward(self.heads.raw, there, grad)
         weights, features = self.heads.backward(
             self.adam["weights"], there["anchors"], there["features"], grad_raw, found["anchors"]

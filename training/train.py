@@ -4,20 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from shapeshift.runtime_models.model import AnchorModel, BadFile, ControlEncoding
+from shapeshift.runtime_models.model import AnchorModel, BadFile
+from shapeshift.runtime_models.package.refit_encoding import encoding_for
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.between import Between, Way, add, blended, own_blend, straight_pull
-from shapeshift.training.coarse import Coarse
-from shapeshift.training.density.densify import absent_as_nan, change, changed_state
-from shapeshift.training.density.density import Evidence
-from shapeshift.training.density.density_budget import most_anchors
-from shapeshift.training.doubts import usable
+from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
+from shapeshift.training.density.densification_stats import DensificationStats
+from shapeshift.training.density.densify import (
+    absent_as_nan,
+    densify_and_prune,
+    resize_optimizer_state,
+)
+from shapeshift.training.density.density_budget import anchor_cap
+from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
+from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color, camera_of
 from shapeshift.training.export import model_of
 from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import initial_points
-from shapeshift.training.guard import EVERY as GUARD_EVERY
-from shapeshift.training.guard import SNAPSHOT_EVERY, Guard
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import (
@@ -25,16 +28,16 @@ from shapeshift.training.photos import (
     LoadedPhoto,
     choose_downscale,
     load_photos,
-    memory_doubts,
+    memory_warnings,
 )
-from shapeshift.training.rise import Rise, after_fall
 from shapeshift.training.run import SETTLE, Run
-from shapeshift.training.schedule import Budget, Schedule, balance_of, turns_of
+from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
 from shapeshift.training.settings import Rates, TrainSettings
 from shapeshift.training.step import Step
-from shapeshift.training.supervision.backgrounds import choose_background, told_background
+from shapeshift.training.supervision.backgrounds import background_warning, choose_background
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
+from shapeshift.training.view_checks import validate_views
 from shapeshift.training.visibility import Visibility
 
 GROW_FROM, GROW_UNTIL = 0.05, 0.8  # of the run
@@ -60,7 +63,7 @@ def parameter_rates(layout: HeadLayout, rates: Rates, voxel: float) -> dict[str,
 class Trainer(Run):
     """One run.  `steps` trains; `model` may be called between any two steps."""
 
-    unit = counted = "anchors"
+    primitive = param_group = "anchors"
     settings: TrainSettings
 
     def __init__(
@@ -75,7 +78,6 @@ class Trainer(Run):
 
         loaded: photos of the splits train and test, where they were read before.
         """
-        settings = settings.for_stops(capture.stops)
         self.device, self.capture, self.settings = device, capture, settings
         self.budget = Budget(settings.iterations, settings.seconds)
         self.factor = settings.downscale or choose_downscale(capture.photos)
@@ -84,50 +86,43 @@ class Trainer(Run):
             loaded[split] if loaded else load_photos(capture, split, self.factor, settings.masks)
             for split in ("train", "test")
         )
-        photos, self.doubts = usable(photos, settings.masks)
+        photos, self.warnings = validate_views(photos, settings.masks)
         if not settings.downscale:
-            self.doubts += memory_doubts(capture.photos, self.factor)
+            self.warnings += memory_warnings(capture.photos, self.factor)
         by_modality = {s.name: [p for p in photos if p.modality == s.name] for s in self.stops}
         for name, found in by_modality.items():
             if not found:
                 raise BadFile(f"{capture.folder}: modality '{name}' has no training photos.")
         background = choose_background(settings.background, capture.background, photos)
-        if settings.background == "auto" and background != capture.background:
+        if settings.background == "auto" and background and background != capture.background:
             self.capture = replace(capture, background=background)  # hulls are carved out of it
-            self.doubts.append(told_background(background))
-        turns = turns_of(balance_of(settings.balance), list(by_modality))
-        self.schedule = Schedule(by_modality, settings.seed, background, turns)
-        self.between = Between(
-            settings.between, settings.between_share, settings.seed, self.stops, by_modality
-        )
-        self.encoding = ControlEncoding(
-            settings.control, 1 / max(settings.control - 1, 1), settings.sigma
-        )
-        self.layout = settings.layout()
-        self.coarse = Coarse(settings.coarse, settings.coarse_until, {})
-        self.most_anchors = most_anchors(settings, self.layout, self.encoding, self.stops)
-        self.targets, self.photo_factor = Targets(device), 1
+            self.warnings.append(background_warning(background))
+        self.schedule = Schedule(by_modality, settings.seed, background)
+        self.blending = ShapeBlending(settings.blended_shapes, settings.seed, self.stops)
+        self.encoding = encoding_for([stop.x for stop in self.stops])
+        self.layout = settings.layout(self.encoding.d)
+        self.anchor_cap = anchor_cap(settings, self.layout, self.encoding, self.stops)
+        self.targets = Targets(device)
         self.exposures = Exposures(device, by_modality)
-        self.rise = Rise(settings.rise, 0, settings.revive)
-        thermal = [stop.name for stop in self.stops if stop.kind == "thermal"]
-        self.roughness = dict.fromkeys(thermal, settings.thermal_smooth)
-        self.contrast: dict[tuple, float] = {}
+        self.lr_warmup = LrWarmup()
+        self.photo_contrast: dict[tuple, float] = {}
         if resume is None:
-            self.start(photos)
+            self.initialise(photos)
         else:
-            self.go_on(*resume)
+            self.restore(*resume)
         self.step = Step(device, self.layout, self.voxel, self.adam)
-        self.guard, self.next_snapshot = Guard(self.adam.state()), self.iteration + SNAPSHOT_EVERY
+        self.guard = DivergenceGuard(self.adam.state())
+        self.next_snapshot = self.iteration + SNAPSHOT_EVERY
         if resume is not None:
             self.guard.first_loss = dict(resume[1]["first_loss"])
 
-    def start(self, photos: list[LoadedPhoto]) -> None:
+    def initialise(self, photos: list[LoadedPhoto]) -> None:
         """Anchors, features and weights of a new run."""
         settings = self.settings
         rng = np.random.default_rng([settings.seed, 0])
         first = initial_points(self.capture, photos, rng, settings.points)
         self.origin, background = first.origin, self.schedule.background
-        start = first_anchors(first, self.most_anchors, photos, background)
+        start = first_anchors(first, self.anchor_cap, photos, background)
         self.voxel, count = start.voxel, len(start.anchors)
         features = np.zeros((count, padded(settings.features)), np.float32)
         features[:, : settings.features] = (
@@ -135,31 +130,31 @@ class Trainer(Run):
         )
         values = {"weights": initial_weights(self.layout, rng), "features": features}
         values |= {n: getattr(start, n) for n in self.layout.per_anchor if n != "features"}
-        self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
-        self.rate_scale, self.run_length = settings.rate_scale, settings.iterations
+        self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
+        self.rate_scale, self.run_length = 1.0, settings.iterations
         self.adam = Adam(self.device, values, self.all_rates())
-        self.evidence, self.visibility = self.unwatched(count)
+        self.stats, self.visibility = self.fresh_statistics(count)
 
-    def unwatched(self, count: int) -> tuple[Evidence, Visibility]:
-        """For `count` anchors of which nothing is known yet: what they pull at, show and reach."""
+    def fresh_statistics(self, count: int) -> tuple[DensificationStats, Visibility]:
+        """Statistics and visibility of `count` anchors of which nothing is known yet."""
         return (
-            Evidence(self.device, self.layout, count, len(self.stops)),
+            DensificationStats(self.device, self.layout, count, len(self.stops)),
             Visibility(self.device, count, len(self.stops), self.layout.splats),
         )
 
-    def go_on(self, state: dict[str, np.ndarray], notes: dict) -> None:
+    def restore(self, state: dict[str, np.ndarray], notes: dict) -> None:
         """Everything as it was when the checkpoint was written."""
         self.voxel, self.origin = notes["voxel"], notes["origin"]
         self.iteration, self.elapsed = notes["iteration"], notes["elapsed"]
-        self.grown_at, self.rate_scale = notes["grown_at"], notes["rate_scale"]
+        self.densified_at, self.rate_scale = notes["densified_at"], notes["rate_scale"]
         self.run_length = notes["run_length"]
-        self.rise = Rise(*notes.get("rise", ()))
+        self.lr_warmup = LrWarmup(notes["lr_warmup_start"])
         groups = ("weights", *self.layout.per_anchor)
         values = {n: state[f"{n}.value"] for n in groups}
         self.adam = Adam(self.device, values, self.all_rates())
         self.adam.load(state)
-        self.evidence, self.visibility = self.unwatched(len(values["anchors"]))
-        self.evidence.load(state)
+        self.stats, self.visibility = self.fresh_statistics(len(values["anchors"]))
+        self.stats.load(state)
         self.visibility.load(state)
         self.exposures.load(state)
 
@@ -167,12 +162,12 @@ class Trainer(Run):
         """(state, notes) from which `resume` goes on to the same bits."""
         notes = {
             "voxel": self.voxel, "origin": self.origin, "iteration": self.iteration,
-            "elapsed": self.elapsed, "grown_at": self.grown_at, "rate_scale": self.rate_scale,
-            "run_length": self.run_length, "first_loss": self.guard.first_loss,
-            "settings": self.settings.as_dict(),
-            "rise": [self.rise.steps, self.rise.since, self.rise.pull],
+            "elapsed": self.elapsed, "densified_at": self.densified_at,
+            "rate_scale": self.rate_scale, "run_length": self.run_length,
+            "first_loss": self.guard.first_loss, "settings": self.settings.as_dict(),
+            "lr_warmup_start": self.lr_warmup.start,
         }  # fmt: skip
-        known = self.evidence.state() | self.visibility.state() | self.exposures.state()
+        known = self.stats.state() | self.visibility.state() | self.exposures.state()
         return self.adam.state() | known, notes
 
     @property
@@ -183,169 +178,122 @@ class Trainer(Run):
     def splat_count(self) -> int:
         return self.anchors_count * self.layout.splats
 
+    def rates(self) -> Rates:
+        """The settings' learning rates for a run of this length."""
+        return self.settings.rates(self.run_length or 0)
+
     def all_rates(self) -> dict[str, np.ndarray]:
         rates = parameter_rates(self.layout, self.rates(), self.voxel)
-        return self.rise.rates(rates, self.iteration)
+        return self.lr_warmup.rates(rates, self.iteration)
 
     def control(self, modality: str) -> np.ndarray:
         x = next(s.x for s in self.stops if s.name == modality)
         return self.encoding.encode(x)
 
-    def warm_up(self) -> None:
+    def compile_kernels(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted.
 
         On the way the guard learns what a healthy picture of every modality has on screen.
         """
         before = self.adam.state()
-        known = self.evidence.state() | self.visibility.state() | self.exposures.state()
+        known = self.stats.state() | self.visibility.state() | self.exposures.state()
         background = self.schedule.background or BLACK
         for modality, photos in self.schedule.photos.items():
             whole = {(p.view.size, p.depth is None): p for p in photos}.values()
-            for photo in [self.coarse.photo(p, f) for f in self.coarse.factors for p in whole]:
-                self.step.update(self.learn(photo, background), 0.0)
+            for photo in whole:
+                self.step.update(self.photo_gradients(photo, background), 0.0)
                 loss = self.targets.loss(photo).value()
-                self.guard.expect(modality, loss, self.visible(), self.shown(photo, background))
-                if self.between.middle is not None:
-                    self.learn_at(photo, background, self.between.middle)
+                contrast = self.contrast_ratio(photo, background)
+                self.guard.observe(modality, loss, self.visible(), contrast)
         self.adam.load(before)
-        self.evidence.load(known)
+        self.stats.load(known)
         self.visibility.load(known)
         self.exposures.load(known)
 
-    def next_photo(self) -> LoadedPhoto:
-        """The photo of this step, as small as this part of the run has them."""
-        factor = self.coarse.factor(self.budget.fraction(self.iteration, self.elapsed))
-        if factor != self.photo_factor:
-            self.photo_factor = factor
-            self.targets.forget()
-            self.coarse.drop(factor)
-        return self.coarse.photo(self.schedule.photo(self.iteration), factor)
-
-    def learn(
-        self, photo: LoadedPhoto, background: Color, control: np.ndarray | None = None
+    def photo_gradients(
+        self, photo: LoadedPhoto, background: Color, shapes: BlendedShapes | None = None
     ) -> dict[str, object]:
-        """Gradients of how a photo differs.  control: Psi of each head, if not that of its stop."""
-        settings = self.settings
-        at_stop, rows = control is None, None
-        self.evidence.stop = stop = [s.name for s in self.stops].index(photo.modality)
-        depth = self.targets.wish(photo, settings.depth_share)
-        if at_stop:
-            control, rows = self.control(photo.modality), self.rows(photo)
+        """Gradients of how a photo differs.  shapes: None for those of its stop."""
+        self.stats.stop = stop = [s.name for s in self.stops].index(photo.modality)
+        depth, rows = self.targets.depth_term(photo, self.settings.depth_share), None
+        if shapes is None:
+            control = self.control(photo.modality)
+            rows = self.visibility.rows(stop, camera_of(photo.view), self.adam["anchors"])
+        else:
+            control = shapes.control(self.encoding)
         self.drawing = self.step.draw(photo.view, control, background, depth is not None, rows)
-        if at_stop:
-            self.visibility.note(stop, rows, self.step.there["anchors"], self.drawing.splats)
-        target = self.target(photo, background, at_stop)
-        return self.step.gradients(
-            self.drawing, self.targets.loss(photo), target, settings.ssim_share,
-            settings.opacity_share, settings.scale_share, self.evidence, depth,
-            self.rise.pull, self.roughness.get(photo.modality, 0.0),
-        )  # fmt: skip
-
-    def rows(self, photo: LoadedPhoto):
-        """Which anchors a step from this photo runs; None: all."""
-        if self.between.often and self.between.cure == "splats":
-            return None  # its gradients are added to those of all anchors
-        stop = [s.name for s in self.stops].index(photo.modality)
-        return self.visibility.rows(stop, camera_of(photo.view), self.adam["anchors"])
-
-    def learn_at(self, photo: LoadedPhoto, background: Color, way: Way | None) -> dict[str, object]:
-        """From the photo, or as the run's cure of what lies between two stops has it."""
-        if way is None:
-            return self.learn(photo, background)
-        if self.between.cure == "shapes":
-            return self.learn(photo, background, way.psi_of_heads(self.encoding))
-        if self.between.replaces:
-            return self.learn_between(photo, way)
-        eye, pull = photo.view.world_from_eye.position, self.settings.between_pull
-        more = straight_pull(self.step, way, self.encoding, eye, self.voxel, pull)
-        grads = self.learn(photo, background)
-        add(self.device, grads, more)
-        return grads
-
-    def learn_between(self, photo: LoadedPhoto, way: Way) -> dict[str, object]:
-        """From a blend of what two stops show, at an x between them."""
-        if self.between.cure == "photos":
-            pair = (self.coarse.photo(p, self.photo_factor) for p in self.between.pair(way))
-            photo = blended(*pair, way.share)
-        background = self.schedule.background_of(self.iteration, photo)
-        if self.between.cure == "pictures":
-            photo = own_blend(self.step, photo, way, self.encoding, background)
+        if shapes is None:
+            self.visibility.note(stop, rows, self.step.gathered["anchors"], self.drawing.splats)
+        target = self.target(photo, background, shapes is None)
         loss = self.targets.loss(photo)
-        target = loss.target(self.device.upload(photo.rgba), background, photo.weight)
-        self.drawing = self.step.draw(photo.view, way.psi(self.encoding), background)
-        settings = self.settings
-        return self.step.gradients(
-            self.drawing, loss, target, settings.ssim_share, settings.opacity_share,
-            settings.scale_share, revive=self.rise.pull,
-        )  # fmt: skip
+        return self.step.gradients(self.drawing, loss, target, self.stats, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""
-        photo = self.next_photo()
+        photo = self.schedule.photo(self.iteration)
         background = self.schedule.background_of(self.iteration, photo)
-        way = self.between.way(self.iteration, photo.modality)
-        grads = self.learn_at(photo, background, way)
-        at_stop = way is None or self.between.cure == "splats"
+        shapes = self.blending.sample(self.iteration, photo.modality)
+        grads = self.photo_gradients(photo, background, shapes)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
-        if self.rise.going(self.iteration):
+        if self.lr_warmup.changes(self.iteration):
             self.adam.set_rates(self.all_rates())
         self.step.update(grads, self.rate_scale * self.rates().decay ** fraction)
         self.iteration += 1
-        loss, fell_back = None, False
+        loss, rolled_back = None, False
         rounds = -(-self.iteration // len(self.stops))
-        if rounds % GUARD_EVERY == 0 and at_stop:  # every modality in turn, however many there are
+        if rounds % GUARD_EVERY == 0 and shapes is None:  # every modality, however many there are
             loss = self.targets.loss(photo).value()
-            fell_back = self.look_after(photo, background, loss)
-        self.find_pace()
+            rolled_back = self.check_divergence(photo, background, loss)
+        self.fix_run_length()
         if self.settings.grow and self.iteration % self.settings.grow_every == 0:
-            if GROW_FROM <= fraction <= GROW_UNTIL and self.steps_to_go() >= SETTLE:
-                self.grow()
-        return loss, fell_back
+            if GROW_FROM <= fraction <= GROW_UNTIL and self.remaining_steps() >= SETTLE:
+                self.densify()
+        return loss, rolled_back
 
-    def shown(self, photo: LoadedPhoto, background: Color) -> float:
+    def contrast_ratio(self, photo: LoadedPhoto, background: Color) -> float:
         """Contrast of the last drawing to its background, over that of its photo."""
         behind = np.asarray(background, np.float32)
         key = (photo.name, photo.view.size, background)
-        contrast = self.contrast.get(key)
+        contrast = self.photo_contrast.get(key)
         if contrast is None:
             contrast = float(np.abs(photo.over(background) - behind).mean())
             if self.schedule.background is not None or not photo.see_through:
-                self.contrast[key] = contrast
+                self.photo_contrast[key] = contrast
         if not contrast > EMPTY_PHOTO:
             return 1.0
         image = self.device.view(self.drawing.frame.image)
         return float(np.abs(image - behind[:, None, None]).mean()) / contrast
 
-    def look_after(self, photo: LoadedPhoto, background: Color, loss: float) -> bool:
+    def check_divergence(self, photo: LoadedPhoto, background: Color, loss: float) -> bool:
         """The guard's look at the last step; True when it turned the run back."""
-        shown = self.shown(photo, background)
-        if self.guard.healthy(photo.modality, loss, self.visible(), shown):
+        contrast = self.contrast_ratio(photo, background)
+        if self.guard.is_healthy(photo.modality, loss, self.visible(), contrast):
             last = photo.modality == self.stops[-1].name
-            if self.iteration >= self.next_snapshot and last and self.guard.sure:
-                self.guard.remember(self.adam.state())
+            if self.iteration >= self.next_snapshot and last and self.guard.stable:
+                self.guard.save_snapshot(self.adam.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
-        self.rise = after_fall(self.iteration, self.rate_scale / 2, self.rise)
-        looks = self.rise.steps if self.rise.since == self.iteration else 0
-        self.go_on_from(self.guard.fall_back(looks // (GUARD_EVERY * len(self.stops))))
+        self.lr_warmup = LrWarmup(self.iteration)
+        looks = WARM_UP_STEPS // (GUARD_EVERY * len(self.stops))
+        self.load_state(self.guard.rollback(looks))
         self.rate_scale /= 2
-        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
+        self.exposures.reset(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
         return True
 
-    def go_on_from(self, state: dict[str, np.ndarray]) -> None:
+    def load_state(self, state: dict[str, np.ndarray]) -> None:
         """Another state, of perhaps other anchors; all as it was where memory does not suffice."""
-        unwatched = self.unwatched(len(state["anchors.value"]))
+        fresh = self.fresh_statistics(len(state["anchors.value"]))
         self.adam.load(state)
-        self.evidence, self.visibility = unwatched
+        self.stats, self.visibility = fresh
 
-    def mend(self) -> bool:
+    def restore_last_good(self) -> bool:
         """Back to the last good state where the run died after the guard's last look."""
         good = all(np.isfinite(array).all() for array in self.adam.state().values())
         if not good:
-            self.go_on_from(self.guard.snapshots[-1])
+            self.load_state(self.guard.snapshots[-1])
         return not good
 
-    def grow(self) -> None:
+    def densify(self) -> None:
         """New anchors where they are needed; anchors that show nothing go."""
         means = []
         for stop in self.stops:
@@ -354,13 +302,13 @@ class Trainer(Run):
             means.append(absent_as_nan(*fields))
         now, anchors = self.adam.state(), self.device.download(self.adam["anchors"])
         sizes = np.full(len(anchors), self.voxel)
-        if "frame" in self.layout.own:
+        if "frame" in self.layout.attributes:
             sizes = self.voxel * np.exp(now["frames.value"][:, :3].mean(axis=1))
-        kept, new = change(anchors, sizes, means, self.evidence.state(), self.most_anchors)
-        self.go_on_from(changed_state(now, self.layout.per_anchor, kept, new))
-        self.grown_at = self.iteration
+        kept, new = densify_and_prune(anchors, sizes, means, self.stats.state(), self.anchor_cap)
+        self.load_state(resize_optimizer_state(now, self.layout.per_anchor, kept, new))
+        self.densified_at = self.iteration
 
-    def steps_to_go(self) -> int:
+    def remaining_steps(self) -> int:
         """How many more the budget allows, as fast as they have been."""
         done = self.budget.fraction(self.iteration, self.elapsed)
         return round(self.iteration * (1 - done) / done)

@@ -8,11 +8,12 @@ from typing import Annotated
 from shapeshift.app.command_line import EXPERT, SIZE
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
+from shapeshift.app.training.train_options import Asked
 
 MOST_BYTES = 2_000_000  # the package lies in the repository
 ITERATIONS = 7000  # 12 minutes of a core
 MOST_ANCHORS = 18000
-BETWEEN, SHARE = "shapes", 0.5  # what lies between the stops, and in how many of the steps
+BLENDED_SHAPES = 0.5  # see TrainSettings
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,14 @@ def run(options: Options) -> int:
     else:
         photograph(folder, size, options)
     package = options.out / "workshop.shift"
-    limited = options.seconds is not None
+    length: Asked = {"iterations": options.iterations}
+    if options.seconds is not None:
+        length = {"seconds": options.seconds}
     code = train.run(
         train.Options(
             capture=folder,
             out=package,
-            seconds=options.seconds,
-            iterations=None if limited else options.iterations,
-            max_anchors=MOST_ANCHORS,
-            between=BETWEEN,
-            between_share=SHARE,
+            asked={"max_anchors": MOST_ANCHORS, "blended_shapes": BLENDED_SHAPES} | length,
         )
     )
     if code == 0 and options.package is not None:
@@ -99,7 +98,7 @@ def photograph(folder: Path, size: tuple[int, int], options: Options) -> None:
     with progress_bar(transient=False) as progress:
         task = progress.add_task("photographing the workshop")
 
-        def tell(done: int, all_of_them: int) -> None:
+        def report(done: int, all_of_them: int) -> None:
             progress.update(task, completed=done, total=all_of_them)
 
-        make_workshop(folder, size, options.views, options.test_views, processes, tell)
+        make_workshop(folder, size, options.views, options.test_views, processes, report)

@@ -46,7 +46,7 @@ def run(options: Options) -> int:
     from shapeshift.app.progress import working
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.document.scene_file import is_scene_file
-    from shapeshift.training.calibration.extrinsics import rig_of, with_found
+    from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
     from shapeshift.training.evaluation.evaluate import evaluate_model, report
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
@@ -61,7 +61,7 @@ def run(options: Options) -> int:
     if options.modality is not None:
         capture = only(capture, options.modality)
     model = open_model(options.scene, options)
-    capture = with_found(capture, rig_of(model.provenance))
+    capture = with_extrinsics(capture, rig_of(model.provenance))
     downscale = options.downscale or trained_downscale(model.provenance)
     with working("comparing with the photos"):
         scores = evaluate_model(

@@ -1,27 +1,35 @@
 """launch.py fit: the smallest scene that shows a capture as well as the largest, and why."""
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
-from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
+from shapeshift.app.command_line import MODALITY, POSITIONAL, Settings
 from shapeshift.app.terminal import open_console, say, tell_json
-from shapeshift.app.training.train_options import ModelOptions, PhotoOptions, SizeOptions
+from shapeshift.app.training.train_options import Asked, MachineOptions
+from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
-    from shapeshift.training.fit.ablation import Measured, Verdict
-    from shapeshift.training.fit.fit import Need
+    from shapeshift.training.fit.ablation import Decision, Trial
+    from shapeshift.training.fit.fit import FitReport
+
+
+USUAL = ("max_anchors", "downscale", "masks", "background")
+EXPERTS = ("seed", "splats_per_anchor", "features", "hidden", "fixed")  # as of train
 
 
 @dataclass(frozen=True)
-class TrialOptions:
-    """The trials: of what, into what, how long, and what they may lose."""
+class Options(MachineOptions):
+    """Take away what a scene does not need: train without one part after the other, and compare
+    the held-out photos.  The options say how large a model it starts from.
+    """
 
     capture: Annotated[Path, POSITIONAL]
     """A folder of posed photos, as of train."""
     out: Path
     """The package to write: NAME.shift or a folder."""
+    asked: Annotated[Asked, Settings(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
     tolerance_db: float = 0.1
     """dB that each modality may lose in all against the largest model, its error included."""
     seeds: int = 2
@@ -31,41 +39,17 @@ class TrialOptions:
     iterations: int | None = None
     """Steps of every training.  Default: 600."""
     seconds: float | None = None
-    """Train every trial for this long instead."""
+    """Train every trial for this long instead.  Default: no limit, --iterations decides."""
     final_iterations: int | None = None
     """Train the chosen model again for this many steps.  Default: the trial's model is written."""
     final_seconds: float | None = None
     """Train the chosen model again for this long.  Default: the trial's model is written."""
-    preset: Literal["fast", "paper"] = "fast"
-    """As of train: options that are left out take its numbers."""
-    seed: Annotated[int | None, EXPERT] = None
-    """Seed of the first training; the others count on from it."""
-    grow: Annotated[bool | None, EXPERT] = None
-    """Add anchors and move the least useful ones up to 80 % of each training; --no-grow: keep the
-    first ones."""
-
-
-@dataclass(frozen=True)
-class Options(PhotoOptions, SizeOptions, ModelOptions, TrialOptions):
-    """Take away what a scene does not need: train without one part after the other, and compare
-    the held-out photos.  The options say how large a model it starts from.
-    """
-
     calibrate: Annotated[str | None, MODALITY] = None
     """A modality whose cameras' offset is found first, as of train.  Default: none."""
-    fixed: Annotated[str | None, EXPERT] = None
-    """Networks that do not see x from the start, as offset,scale,rotation."""
 
 
 TRIAL = 600  # steps
 CLOCKS = ("decode_ms", "train_s")  # how keys of the report end that hold times
-
-
-def defaults() -> dict[str, str]:
-    """What --help says of options that are left to the preset."""
-    from shapeshift.app.training.train_options import preset_defaults
-
-    return preset_defaults() | {"seconds": "no limit, --iterations decides"}
 
 
 def run(options: Options) -> int:
@@ -79,30 +63,27 @@ def run(options: Options) -> int:
     from shapeshift.app.training.train_options import settings_of
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign, write_package
-    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.fit.fit import Fit
 
     if not (options.seeds >= 1 and 0 <= options.tolerance_db < float("inf")):
         raise UsageError("--seeds has to be 1 or more, and --tolerance-db 0 or more.")
-    if options.iterations is None and options.seconds is None:
-        options = replace(options, iterations=TRIAL)
     refuse_foreign(options.out)  # now, not after the trials
-    settings, last = settings_of(options, None), None
-    if options.final_iterations is not None or options.final_seconds is not None:
-        longer = {"iterations": options.final_iterations, "seconds": options.final_seconds}
-        last = settings_of(replace(options, **longer), None)
+    settings = settings_of(options.asked | budget(options.iterations, options.seconds))
+    longer = options.final_iterations, options.final_seconds
+    last = None if longer == (None, None) else settings_of(options.asked | budget(*longer))
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-        capture = with_found(capture, settings.rig)
+        capture = with_extrinsics(capture, settings.rig)
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
 
-        def tell(what: str, done: float) -> None:
+        def report(what: str, done: float) -> None:
             bar.update(task, description=what, completed=done)
 
         fit = Fit(
-            device, capture, settings, options.tolerance_db, options.seeds, tell, last=last,
+            device, capture, settings, options.tolerance_db, options.seeds, report, last=last,
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]
@@ -120,6 +101,12 @@ def run(options: Options) -> int:
     return 0
 
 
+def budget(iterations: int | None, seconds: float | None) -> Asked:
+    """What was asked for of a trial's length; TRIAL where nothing was."""
+    given = {"iterations": iterations, "seconds": seconds}
+    return {n: value for n, value in given.items() if value is not None} or {"iterations": TRIAL}
+
+
 def without_times(result: object) -> object:
     """The report but for what clocks say: a package is the same bytes for the same seed."""
     if isinstance(result, dict):
@@ -128,7 +115,7 @@ def without_times(result: object) -> object:
     return [without_times(part) for part in result] if isinstance(result, list) else result
 
 
-def print_report(need: "Need") -> None:
+def print_report(need: "FitReport") -> None:
     """The need report on standard error."""
     from rich.table import Table
 
@@ -137,7 +124,7 @@ def print_report(need: "Need") -> None:
     table = Table(
         "without", *(f"{n} dB" for n in names), "verdict", "bytes", "decode ms", "train s"
     )
-    for verdict in need.verdicts:
+    for verdict in need.decisions:
         table.add_row(verdict.part, *cells(verdict, names))
     console.print(table)
     console.print(
@@ -152,14 +139,14 @@ def print_report(need: "Need") -> None:
         console.print(f"{word}: {describe(found)}")
 
 
-def cells(verdict: "Verdict", names: list[str]) -> list[str]:
+def cells(verdict: "Decision", names: list[str]) -> list[str]:
     """The columns of one row of the report, all but the first."""
     needed = f" ({', '.join(verdict.needed_by)})" if verdict.needed_by and len(names) > 1 else ""
     saved = (f"{verdict.bytes:+,}", f"{verdict.decode_ms:+.2f}", f"{verdict.train_s:+.1f}")
-    return [*(str(verdict.change[n]) for n in names), verdict.word + needed, *saved]
+    return [*(str(verdict.change[n]) for n in names), verdict.verdict + needed, *saved]
 
 
-def describe(found: "Measured") -> str:
+def describe(found: "Trial") -> str:
     facts = found.as_dict()
     quality = ", ".join(f"{name} {value:.2f} dB" for name, value in facts["psnr_db"].items())
     return (

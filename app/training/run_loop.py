@@ -2,14 +2,12 @@
 
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shapeshift.app.terminal import say
-from shapeshift.app.training.keeping import save_on_the_way
 
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
@@ -28,22 +26,22 @@ def calibrated(
     """The settings with the offset of a modality's cameras, which is looked for now."""
     from shapeshift.app.progress import progress_bar
     from shapeshift.training.calibration.calibrate import calibrate
-    from shapeshift.training.calibration.extrinsics import noted
+    from shapeshift.training.calibration.extrinsics import rig_json
 
     say(f"looking for the offset of the cameras of {modality} ...")
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
 
-        def tell(what: str, done: float) -> None:
+        def report(what: str, done: float) -> None:
             bar.update(task, description=what, completed=done)
 
-        found = calibrate(device, capture, settings, modality, tell=tell)
+        found = calibrate(device, capture, settings, modality, report=report)
     say(
         f"{modality}: cameras sit {found.turn_deg:.2f} degrees and {found.shift_m:.4f} m beside "
         "their stated poses, each in its own axes; its photos fit "
         f"{found.gain_db:.1f} dB better so.  Trained with that."
     )
-    return replace(settings, rig=noted(modality, found))
+    return replace(settings, rig=rig_json(modality, found))
 
 
 def describe(trainer: "Trainer") -> str:
@@ -76,10 +74,12 @@ def interrupts() -> Iterator[list]:
         signal.signal(signal.SIGINT, before)
 
 
-def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
+def train(
+    trainer: "Trainer | PlainTrainer", save_checkpoint: Callable[[], str] | None = None
+) -> bool:
     """The run with its progress on standard error; True when Ctrl-C ended it early.
 
-    checkpoint: written to every SAVE_EVERY seconds; None: never.
+    save_checkpoint: called every SAVE_EVERY seconds; returns why nothing was written, or "".
     """
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 
@@ -97,11 +97,11 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
         task = bar.add_task("compiling kernels", total=1.0, psnr="", loss="")
         for now in trainer.steps():
             text = f"{now.iteration} steps, {now.elapsed:.0f}{most} {time_unit(trainer.device)}, "
-            text += f"{now.anchors:,} {trainer.unit}"
+            text += f"{now.anchors:,} {trainer.primitive}"
             bar.update(task, completed=min(now.fraction, 1.0), description=text)
             if now.loss is not None:
                 bar.update(task, loss=f"loss {now.loss:.4f}")
-            if now.fell_back:
+            if now.rolled_back:
                 bar.console.print(
                     f"step {now.iteration}: the picture was lost; back to the last good state "
                     "with half the learning rates",
@@ -110,8 +110,8 @@ def train(trainer: "Trainer | PlainTrainer", checkpoint: Path | None) -> bool:
             if now.fraction >= look and trainer.settled:
                 look += 1 / LOOKS
                 bar.update(task, psnr=decibels(trainer.held_out_psnr()))
-            if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
-                if failed := save_on_the_way(trainer, checkpoint):
+            if save_checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
+                if failed := save_checkpoint():
                     bar.console.print(failed, soft_wrap=True)
                 saved = time.monotonic()
             if asked and trainer.settled:

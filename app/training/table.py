@@ -1,20 +1,23 @@
 """launch.py table: one shape-shifting model beside separate models and plain splats."""
 
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, Settings
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED
 from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
+from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
 from shapeshift.app.training.train_options import Options as TrainOptions
-from shapeshift.app.training.train_options import PhotoOptions, SizeOptions
+from shapeshift.training.baselines.plain_settings import PlainSettings
+from shapeshift.training.settings import TrainSettings
 
 if TYPE_CHECKING:
+    from shapeshift.app.training.train_baselines import TrainedFile
     from shapeshift.scene.captures.capture import Capture
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
@@ -24,14 +27,22 @@ PLACES = {
 }  # in --out  # fmt: skip
 
 
+USUAL = ("max_anchors", "downscale", "masks", "background")  # as of train
+
+
 @dataclass(frozen=True)
-class MethodOptions:
-    """The methods: of what, into what, how long, and how large each may become."""
+class Options(MachineOptions):
+    """Train a capture in three ways with the same budget and compare them on held-out photos.
+
+    The form is that of the paper's Tables 1 and 2: method by modality.
+    """
 
     capture: Annotated[Path, POSITIONAL]
     """A folder of posed photos; each modality needs held-out ones."""
     out: Path
     """A folder for the models, table.csv and table.md.  A method that is in it is not run again."""
+    asked: Annotated[Asked, Settings(TrainSettings, USUAL, ("seed",))] = field(default_factory=dict)
+    splats: Annotated[Asked, Settings(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
     seconds: float | None = None
     """Budget of every method; its models share it.  Default: none, give this or --iterations."""
     iterations: int | None = None
@@ -44,41 +55,16 @@ class MethodOptions:
     vgg: Annotated[Path | None, EXPERT] = None
     """An ONNX file of VGG16's first layers: adds a distance of its features, which is no LPIPS.
     Default: not measured."""
-    seed: Annotated[int | None, EXPERT] = None
-    """Seed of all random numbers."""
-    max_anchors: int | None = None
-    """Most anchors that each model may have."""
-    splats: Annotated[int | None, EXPERT] = None
-    """Most plain splats that a modality starts with."""
-    max_splats: Annotated[int | None, EXPERT] = None
-    """Most plain splats that growing may reach, for each modality."""
-    sh_degree: Annotated[int | None, EXPERT] = None
-    """Degree of the spherical harmonics of plain splats, 0 to 3."""
     calibrate: Annotated[str | None, MODALITY] = None
     """A modality whose cameras' offset is found first, for all methods alike, as of train.
     Default: none."""
-
-
-@dataclass(frozen=True)
-class Options(PhotoOptions, SizeOptions, MethodOptions):
-    """Train a capture in three ways with the same budget and compare them on held-out photos.
-
-    The form is that of the paper's Tables 1 and 2: method by modality.
-    """
-
-
-def defaults() -> dict[str, str]:
-    """What --help says of options that are left to the preset."""
-    from shapeshift.app.training.train_options import preset_defaults
-
-    return preset_defaults()
 
 
 def run(options: Options) -> int:
     from shapeshift.app.charts.chart_rows import RowsFile
     from shapeshift.app.errors import UsageError
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
     if options.seconds is None and options.iterations is None:
@@ -91,20 +77,20 @@ def run(options: Options) -> int:
         raise UsageError(f"{options.out} is a file; --out is a folder.")
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     distance = None if options.vgg is None else VggDistance(options.vgg)
-    refuse_capture(capture, options, distance)
+    check_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)
     head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
     table = RowsFile(options.out / "table.csv", VggRow if distance else Row, head)
     say(head[1])
     rig = offset_of(device, capture, options)
-    capture = with_found(capture, rig)
+    capture = with_extrinsics(capture, rig)
     for method in sorted(set(options.methods), key=list(PLACES).index):
         if any(row.method == method and row.modality == MEAN for row in table.rows):
             say(f"{NAMES[method]}: already in {full(table.path)}")
             continue
         say(f"{NAMES[method]}:")
         if method == "spz":
-            runs = pack_splats(capture, options.out, table.rows)
+            runs: dict[str, TrainedFile] | None = pack_splats(capture, options.out, table.rows)
         else:
             runs = train_method(method, device, capture, options, rig)
         if runs is None:
@@ -117,13 +103,13 @@ def run(options: Options) -> int:
     return 0
 
 
-def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
+def check_capture(capture: "Capture", options: Options, distance: "VggDistance | None") -> None:
     """What would come to light after the training, now.  Raises BadFile."""
     from shapeshift.runtime_models.model import BadFile
-    from shapeshift.training.evaluation.vgg_distance import refuse_small
+    from shapeshift.training.evaluation.vgg_distance import check_size
     from shapeshift.training.photos import choose_downscale
 
-    factor = options.downscale or choose_downscale(capture.photos)
+    factor = options.asked.get("downscale") or choose_downscale(capture.photos)
     for stop in capture.stops:
         held_out = capture.of(stop.name, "test")
         if not held_out:
@@ -133,7 +119,7 @@ def refuse_capture(capture: "Capture", options: Options, distance: "VggDistance 
             )
         if distance is not None:
             for photo in held_out:
-                refuse_small(*photo.view.divided(factor).size)
+                check_size(*photo.view.divided(factor).size)
 
 
 def offset_of(device, capture: "Capture", options: Options) -> str:
@@ -146,21 +132,21 @@ def offset_of(device, capture: "Capture", options: Options) -> str:
         return ""
     kept = options.out / "rig.json"
     if not kept.exists():
-        settings = settings_of(train_options("joint", options), None)
+        settings = settings_of(train_options("joint", options).asked)
         write_text(kept, calibrated(device, capture, settings, options.calibrate).rig)
     return kept.read_text(encoding="utf-8")
 
 
 def train_method(
     method: str, device, capture: "Capture", options: Options, rig: str
-) -> dict | None:
-    """A Run of app.training.train_baselines for each modality; None where Ctrl-C ended it early.
+) -> "dict[str, TrainedFile] | None":
+    """What the training of each modality's model left behind; None where Ctrl-C ended it early.
 
     rig: of TrainSettings, what the capture's cameras were moved by.
     """
     from shapeshift.app.training.run_loop import describe, train
     from shapeshift.app.training.train_baselines import (
-        Run,
+        TrainedFile,
         plain_settings,
         train_separate,
         train_splats,
@@ -173,24 +159,24 @@ def train_method(
     if method == "splats":
         outcome = train_splats(device, capture, plain_settings(asked), out)
     elif method == "separate":
-        settings = replace(settings_of(asked, None), rig=rig)
+        settings = replace(settings_of(asked.asked), rig=rig)
         outcome = train_separate(device, capture, settings, out)
     else:
         refuse_foreign(out)
-        trainer = Trainer(device, capture, replace(settings_of(asked, None), rig=rig))
+        trainer = Trainer(device, capture, replace(settings_of(asked.asked), rig=rig))
         say(describe(trainer))
-        if train(trainer, None):
+        if train(trainer):
             return None
         write_package(trainer.model(), out)
-        one = Run(out, trainer.elapsed, trainer.iteration)
+        one = TrainedFile(out, trainer.elapsed, trainer.iteration)
         return {stop.name: one for stop in capture.stops}
     return None if outcome.interrupted else outcome.runs
 
 
-def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
-    """A Run for each modality: the files of `splats` as spz, trained when those were."""
+def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> "dict[str, TrainedFile]":
+    """Each modality: the files of `splats` as spz, trained when those were."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.app.training.train_baselines import Run
+    from shapeshift.app.training.train_baselines import TrainedFile
     from shapeshift.runtime_models.splats.formats import read_plain
     from shapeshift.runtime_models.splats.layers.write_layer_list import (
         layer_name,
@@ -205,7 +191,7 @@ def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
         layers.append((stop, read_plain(source, reading)))
         made = next(r for r in rows if (r.method, r.modality) == ("splats", stop.name))
         file = out / PLACES["spz"] / layer_name(number, stop, ".spz")
-        runs[stop.name] = Run(file, made.seconds, made.steps)
+        runs[stop.name] = TrainedFile(file, made.seconds, made.steps)
     try:
         write_layer_list(layers, out / PLACES["spz"], write_spz, ".spz")
     except ValueError as error:  # places that spz cannot hold
@@ -214,13 +200,17 @@ def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> dict:
 
 
 def train_options(method: str, options: Options) -> TrainOptions:
-    """What `launch.py train` would be asked for."""
-    shared = {f.name for f in fields(TrainOptions)} & {f.name for f in fields(options)}
-    strange = {"splats": ("max_anchors",)}.get(method, ("splats", "max_splats", "sh_degree"))
-    shared -= {"calibrate", *strange}  # what it finds is the same for all methods
-    asked = {n: getattr(options, n) for n in shared}
-    model = "splats" if method == "splats" else "anchors"
-    return TrainOptions(**asked, model=model, separate=method == "separate")
+    """What `launch.py train` would be asked for, without --calibrate: its offset is found once."""
+    budget = {"seconds": options.seconds, "iterations": options.iterations}
+    asked = {name: value for name, value in budget.items() if value is not None} | options.asked
+    of_splats = method == "splats"
+    if of_splats:
+        asked.pop("max_anchors", None)
+    return TrainOptions(
+        options.capture, options.out, asked, options.splats if of_splats else {},
+        model="splats" if of_splats else "anchors", separate=method == "separate",
+        device=options.device, memory=options.memory,
+    )  # fmt: skip
 
 
 def rows_of(
@@ -233,20 +223,20 @@ def rows_of(
     from shapeshift.training.evaluation.evaluate import bytes_on_disk, evaluate_model
     from shapeshift.training.photos import choose_downscale
 
-    factor = options.downscale or choose_downscale(capture.photos)
+    factor = options.asked.get("downscale") or choose_downscale(capture.photos)
     kind, reading, rows = VggRow if distance else Row, Reading(allow_huge=True), []
     whole = read_model(options.out / PLACES[method], reading) if method != "separate" else None
     for stop in capture.stops:
         part, made = one_modality(capture, stop.name), runs[stop.name]
         score = evaluate_model(
             device, whole or read_model(made.file, reading), part, factor,
-            options.masks or "object", options.background or "auto", distance,
+            options.asked.get("masks", "object"), options.asked.get("background", "auto"), distance,
         )[stop.name]  # fmt: skip
         rows.append(kind(
             method, stop.name, round(score.psnr_db, 3), round(score.median_db, 3),
             round(score.ssim, 5),
             bytes_on_disk(made.file) / 1e6, round(made.seconds, 1), made.steps, score.alive,
-            score.photos, *([round(score.vgg, 5)] if distance else []),
+            score.photos, *([] if score.vgg is None else [round(score.vgg, 5)]),
         ))  # fmt: skip
     return [*rows, mean_row(rows, list({run.file: run for run in runs.values()}.values()))]
 
@@ -254,11 +244,13 @@ def rows_of(
 def command_line(options: Options) -> str:
     """The command without folders: what else is asked for stands in it, methods aside."""
     words = ["python3 launch.py table", options.capture.resolve().name]
-    for field in fields(options):
-        value = getattr(options, field.name)
-        if field.name not in ("capture", "out", "methods") and value is not None:
+    named = {each.name: getattr(options, each.name) for each in fields(options)}
+    for unnamed in ("capture", "out", "methods", "asked", "splats"):
+        del named[unnamed]
+    for name, value in (named | options.asked | options.splats).items():
+        if value is not None:
             shown = value.name if isinstance(value, Path) else value
-            words.append(f"--{field.name.replace('_', '-')} {shown}")
+            words.append(f"--{name.replace('_', '-')} {shown}")
     return " ".join([*words, "--out DIR"])
 
 
@@ -271,7 +263,7 @@ def machine_line(device) -> str:
 def capture_line(capture: "Capture", options: Options, distance: "VggDistance | None") -> str:
     from shapeshift.training.photos import choose_downscale
 
-    factor = options.downscale or choose_downscale(capture.photos)
+    factor = options.asked.get("downscale") or choose_downscale(capture.photos)
     each = []
     for stop in capture.stops:
         train, test = (capture.of(stop.name, split) for split in ("train", "test"))

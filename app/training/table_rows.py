@@ -67,9 +67,9 @@ def finish(rows: list[Row], out: Path, head: list[str]) -> None:
     verdicts = compare(rows)
     for text in (*verdicts, head[2]):
         console.print(text, highlight=False, markup=False)
-    text = [f"`{head[0]}`  ", f"{head[1]}  ", head[2], "", row_of(columns)]
-    text += [row_of(["---"] * len(columns)), *map(row_of, lines), "", *verdicts]
-    write_text(out / "table.md", "\n".join(text) + "\n")
+    page = [f"`{head[0]}`  ", f"{head[1]}  ", head[2], "", row_of(columns)]
+    page += [row_of(["---"] * len(columns)), *map(row_of, lines), "", *verdicts]
+    write_text(out / "table.md", "\n".join(page) + "\n")
 
 
 def row_of(cells: list[str]) -> str:
@@ -93,7 +93,7 @@ def cells(rows: list[Row]) -> tuple[list[str], list[list[str]]]:
     ]
     lines, before = [], ""
     for row in rows:
-        more = [f"{row.vgg_distance:.4f}"] if vgg else []
+        more = [f"{row.vgg_distance:.4f}"] if isinstance(row, VggRow) else []
         name, before = NAMES[row.method] if row.method != before else "", row.method
         whole = row.method != "joint" or row.modality == MEAN  # one file for all: told once
         size = [f"{row.mb:.2f}", f"{row.steps:,}", f"{row.seconds:.1f}"] if whole else [""] * 3

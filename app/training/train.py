@@ -2,6 +2,7 @@
 
 import shlex
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,71 +18,74 @@ from shapeshift.app.training.run_loop import (
     time_unit,
     train,
 )
-from shapeshift.app.training.train_options import Options, preset_defaults, settings_of
+from shapeshift.app.training.train_options import Options, settings_of
 
 if TYPE_CHECKING:
     from shapeshift.training.train import Trainer
 
-FEW_STEPS = 1000  # half of what is usual: scenes that are worth looking at need about so many
-
-
-def defaults() -> dict[str, str]:
-    """What --help says of options that are left to the preset."""
-    return preset_defaults()
+USUAL_STEPS = 2000  # those of TrainSettings
+FEW_STEPS = USUAL_STEPS // 2  # scenes that are worth looking at need about so many
 
 
 def run(options: Options) -> int:
     from shapeshift.app.pace import pace_package
     from shapeshift.app.progress import working
-    from shapeshift.app.training.keeping import (
-        kept_when_memory_ends,
+    from shapeshift.app.training.saving import (
+        check_writable,
         memory_for_training,
-        refuse_place,
         save,
+        save_checkpoint,
+        saved_when_memory_ends,
     )
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
-    from shapeshift.training.calibration.extrinsics import with_found
-    from shapeshift.training.calibration.outlier_views import hopeless, report, suspects
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
+    from shapeshift.training.calibration.outlier_views import (
+        failed_modalities,
+        find_outlier_views,
+        report,
+    )
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.train import Trainer
 
-    refuse_calibrating(options)
+    check_calibrate(options)
     if options.model == "splats" or options.separate:
         from shapeshift.app.training.train_baselines import run_baseline
 
         return run_baseline(options)
-    refuse_plain_options(options)
-    refuse_place(options.out)  # now, not after the training
+    check_plain_options(options)
+    check_writable(options.out)  # now, not after the training
     refuse_foreign(options.out)
     checkpoint = checkpoint_path(options.out)
     resume = read_checkpoint(checkpoint) if options.resume else None
-    settings = settings_of(options, resume[1]["settings"] if resume else None)
+    settings = settings_of(options.asked, resume[1]["settings"] if resume else None)
     capture = open_capture(options.capture, options.memory)
     device = open_device(options.device)
     say(f"{device.name}, {device.platform}")
     if options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
     with memory_for_training(), working("reading photos, finding the first anchors"):
-        trainer = Trainer(device, with_found(capture, settings.rig), settings, resume)
-    say(describe(trainer), *trainer.doubts)
+        trainer = Trainer(device, with_extrinsics(capture, settings.rig), settings, resume)
+    say(describe(trainer), *trainer.warnings)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     began, before = time.monotonic(), trainer.iteration
-    with kept_when_memory_ends(trainer, options.out, checkpoint):
-        interrupted = train(trainer, checkpoint)
+    with saved_when_memory_ends(trainer, options.out, checkpoint):
+        interrupted = train(trainer, partial(save_checkpoint, trainer, checkpoint))
     step_s = (time.monotonic() - began) / max(trainer.iteration - before, 1)
     save(trainer, options.out, checkpoint)
     if not interrupted:
         pace_package(options.out)
-    say(summary(trainer, options.out, interrupted), *trainer.exposures.remarks())
-    if not interrupted and (found := hopeless(trainer) or report(suspects(trainer))):
+    say(summary(trainer, options.out, interrupted), *trainer.exposures.warnings())
+    if not interrupted and (
+        found := failed_modalities(trainer) or report(find_outlier_views(trainer))
+    ):
         say(*found)
     for line in what_next(options, trainer.iteration, step_s, interrupted):
         say(line)
     return INTERRUPTED if interrupted else 0
 
 
-def refuse_calibrating(options: Options) -> None:
+def check_calibrate(options: Options) -> None:
     """Raises UsageError where --calibrate would do nothing, or could not be kept."""
     from shapeshift.app.errors import UsageError
 
@@ -96,14 +100,13 @@ def refuse_calibrating(options: Options) -> None:
         raise UsageError("--resume goes on with the checkpoint's offset; leave out --calibrate.")
 
 
-def refuse_plain_options(options: Options) -> None:
+def check_plain_options(options: Options) -> None:
     """Raises UsageError for what only plain splats have."""
     from shapeshift.app.errors import UsageError
 
-    for name in ("sh_degree", "splats", "max_splats"):
-        if getattr(options, name) is not None:
-            option = f"--{name.replace('_', '-')}"
-            raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
+    for name in options.splats:
+        option = f"--{name.replace('_', '-')}"
+        raise UsageError(f"{option} is of plain splats; add --model splats, or leave it out.")
 
 
 def what_next(options: Options, steps: int, step_s: float, interrupted: bool) -> list[str]:
@@ -111,12 +114,10 @@ def what_next(options: Options, steps: int, step_s: float, interrupted: bool) ->
 
     step_s: by the clock, which is what a person waits.
     """
-    from shapeshift.training.settings import preset
-
     again = [program(), "train", shlex.quote(full(options.capture))]
     out = shlex.quote(full(options.out))
     again += ["--out", out, "--resume"]
-    usual, lines = preset(options.preset).iterations, []
+    usual, lines = USUAL_STEPS, []
     if interrupted:
         lines = [f"go on: {' '.join(again)}"]
     elif steps < FEW_STEPS:

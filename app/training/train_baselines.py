@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import open_capture
@@ -23,15 +23,13 @@ if TYPE_CHECKING:
     from shapeshift.training.baselines.plain import PlainTrainer
     from shapeshift.training.baselines.plain_settings import PlainSettings
     from shapeshift.training.settings import TrainSettings
+    from shapeshift.training.train import Trainer
 
-# Options that say where and how long, or how photos are read: they go for every kind of model.
-COMMON = {"capture", "out", "model", "separate", "resume", "preset", "device", "downscale", "masks",
-          "background", "seconds", "iterations", "memory"}  # fmt: skip
-PAPER_ITERATIONS = 30000  # of 3DGS, and of the shape-shifting paper
+    Kind = TypeVar("Kind", TrainSettings, PlainSettings)
 
 
 @dataclass(frozen=True)
-class Run:
+class TrainedFile:
     """What the training of one model left behind."""
 
     file: Path
@@ -43,7 +41,7 @@ class Run:
 class Outcome:
     """What the training of a model a modality left behind."""
 
-    runs: dict[str, Run]  # of every modality that was trained
+    runs: dict[str, TrainedFile]  # of every modality that was trained
     interrupted: bool
 
     @property
@@ -57,7 +55,7 @@ class Outcome:
 
 def run_baseline(options: Options) -> int:
     from shapeshift.rasterizer.device import open_device
-    from shapeshift.training.calibration.extrinsics import with_found
+    from shapeshift.training.calibration.extrinsics import with_extrinsics
 
     if options.resume:
         raise UsageError(
@@ -66,15 +64,18 @@ def run_baseline(options: Options) -> int:
         )
     if options.separate and options.model == "splats":
         raise UsageError("plain splats are one model a modality already; leave out --separate.")
-    settings = plain_settings(options) if options.model == "splats" else settings_of(options, None)
+    plain = plain_settings(options) if options.model == "splats" else None
+    settings = settings_of(options.asked) if plain is None else None
     capture, device = open_capture(options.capture, options.memory), open_device(options.device)
     say(f"{device.name}, {device.platform}")
-    if options.calibrate is not None:
+    if settings is not None and options.calibrate is not None:
         settings = calibrated(device, capture, settings, options.calibrate)
-        capture = with_found(capture, settings.rig)
-    train_all = train_splats if options.model == "splats" else train_separate
-    outcome = train_all(device, capture, settings, options.out)
-    say(word_on(outcome, capture, options.out))
+        capture = with_extrinsics(capture, settings.rig)
+    if plain is not None:
+        outcome = train_splats(device, capture, plain, options.out)
+    elif settings is not None:
+        outcome = train_separate(device, capture, settings, options.out)
+    say(outcome_line(outcome, capture, options.out))
     return INTERRUPTED if outcome.interrupted else 0
 
 
@@ -83,25 +84,20 @@ def plain_settings(options: Options) -> "PlainSettings":
     from shapeshift.training.baselines.plain_settings import PlainSettings
 
     names = {f.name for f in fields(PlainSettings)}
-    asked = {f.name: getattr(options, f.name) for f in fields(options)}
-    for name, default in ((f.name, f.default) for f in fields(options)):
-        if name not in names | COMMON and asked[name] != default:
+    for name in options.asked:
+        if name not in names:
             option = f"--{name.replace('_', '-')}"
             raise UsageError(f"{option} is of anchor models; leave it out with --model splats.")
-    chosen = {n: asked[n] for n in names & asked.keys() if asked[n] is not None}
+    chosen = options.asked | options.splats
     if "seconds" in chosen and "iterations" not in chosen:
         chosen["iterations"] = None
-    elif options.preset == "paper":
-        chosen.setdefault("iterations", PAPER_ITERATIONS)
     try:
         return PlainSettings(**chosen)
     except ValueError as error:
         raise UsageError(str(error)) from None
 
 
-def share_of(
-    settings: "TrainSettings | PlainSettings", capture: "Capture"
-) -> "TrainSettings | PlainSettings":
+def share_of(settings: "Kind", capture: "Capture") -> "Kind":
     """The settings of one modality's model: its share of the budget, photos as small as all are."""
     from shapeshift.training.photos import choose_downscale
 
@@ -130,11 +126,11 @@ def train_splats(device, capture: "Capture", settings: "PlainSettings", out: Pat
     for number, part in enumerate(parts):
         trainer = PlainTrainer(device, part, settings)
         say(describe_plain(trainer))
-        interrupted = train(trainer, None)
+        interrupted = train(trainer)
         layers.append((trainer.stop, trainer.splats()))
         file = out / layer_name(number, trainer.stop)
-        runs[trainer.stop.name] = Run(file, trainer.elapsed, trainer.iteration)
-        say(told(trainer, trainer.count), *trainer.exposures.remarks())
+        runs[trainer.stop.name] = TrainedFile(file, trainer.elapsed, trainer.iteration)
+        say(result_line(trainer, trainer.count), *trainer.exposures.warnings())
         if interrupted:
             break
     write_layer_list(layers, out)
@@ -161,10 +157,10 @@ def train_separate(device, capture: "Capture", settings: "TrainSettings", out: P
     for part in parts:
         trainer, name = Trainer(device, part, settings), part.stops[0].name
         say(describe(trainer))
-        interrupted = train(trainer, None)
+        interrupted = train(trainer)
         write_package(trainer.model(), files[name])
-        runs[name] = Run(files[name], trainer.elapsed, trainer.iteration)
-        say(told(trainer, trainer.anchors_count), *trainer.exposures.remarks())
+        runs[name] = TrainedFile(files[name], trainer.elapsed, trainer.iteration)
+        say(result_line(trainer, trainer.anchors_count), *trainer.exposures.warnings())
         if interrupted:
             break
     return Outcome(runs, interrupted)
@@ -185,19 +181,19 @@ def describe_plain(trainer: "PlainTrainer") -> str:
     )
 
 
-def told(trainer, count: int) -> str:
+def result_line(trainer: "Trainer | PlainTrainer", count: int) -> str:
     psnr = decibels(trainer.held_out_psnr(most=len(trainer.held_out)))
     return (
         f"{trainer.iteration} steps in {trainer.elapsed:.1f} {time_unit(trainer.device)}, "
-        f"{count:,} {trainer.unit}; "
+        f"{count:,} {trainer.primitive}; "
         + (f"held-out photos: {psnr}" if psnr else "no photo was held out")
     )
 
 
-def word_on(outcome: Outcome, capture: "Capture", out: Path) -> str:
-    out = full(out)
+def outcome_line(outcome: Outcome, capture: "Capture", out: Path) -> str:
+    where = full(out)
     missing = [s.name for s in capture.stops if s.name not in outcome.runs]
     if outcome.interrupted:
         rest = f"; not trained: {', '.join(missing)}" if missing else ""
-        return f"{out}: interrupted after {outcome.seconds:.1f} s{rest}"
-    return f"{out}: done after {outcome.steps} steps in {outcome.seconds:.1f} s"
+        return f"{where}: interrupted after {outcome.seconds:.1f} s{rest}"
+    return f"{where}: done after {outcome.steps} steps in {outcome.seconds:.1f} s"

@@ -89,7 +89,7 @@ def find_pairs(photos: list[PhotoFile]) -> dict[PhotoFile, str]:
     alone = [photo for photo in thermal if photo not in found]
     if visible and alone:
         raise BadFile(
-            f"{len(alone)} thermal photos, for example {path_end(Path(alone[0].name))}, have no photo "
+            f"{len(alone)} thermal photos, for example {path_end(alone[0].name)}, have no photo "
             "of visible light with the same name; name the two of a pair alike, or leave them out."
         )
     return found

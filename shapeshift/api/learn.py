@@ -40,7 +40,7 @@ class TrainedScene(Scene):
         self.anchors: int = trainer.anchors_count
         # held-out photos: decibels of each modality, {} where none is held out
         self.psnr_db: dict[str, float] = trainer.held_out_psnr(most=len(trainer.held_out))
-        self.doubts: tuple[str, ...] = tuple(trainer.doubts)  # about the capture, in sentences
+        self.warnings: tuple[str, ...] = tuple(trainer.warnings)  # about the capture, in sentences
 
 
 def train(
@@ -49,7 +49,6 @@ def train(
     *,
     seconds: float | None = None,
     iterations: int | None = None,
-    preset: Literal["fast", "paper"] = "fast",
     resume: bool = False,
     device: Kind | None = None,
     calibrate: str | None = None,
@@ -59,7 +58,7 @@ def train(
 ) -> TrainedScene:
     """Trains a shape-shifting scene of posed photos of one or several modalities (docs/capture.md).
 
-    seconds or iterations: how long; without either the preset says.  Seconds are of one core, the
+    seconds or iterations: how long; without either 2,000 iterations.  Seconds are of one core, the
     processor time of all threads; on a GPU by the clock.  The same iterations give the same bits on
     one device.  out: a package, NAME.shift or a folder, that is written with its checkpoint beside
     it, also every minute and when Ctrl-C ends the run; resume goes on from there.  calibrate: a
@@ -73,49 +72,48 @@ def train(
         model = ss.train("capture", seconds=60, max_anchors=4000)
         model.save("scene.shift"); model.render("Thermal")
     """
-    from shapeshift.app.training.keeping import memory_for_training, refuse_place
+    from shapeshift.app.training.saving import check_writable, memory_for_training
     from shapeshift.rasterizer.device import open_device
     from shapeshift.runtime_models.package.write_package import refuse_foreign
     from shapeshift.scene.captures.read_capture import read_capture
     from shapeshift.training.calibration.calibrate import calibrate as calibrate_cameras
-    from shapeshift.training.calibration.extrinsics import noted, with_found
+    from shapeshift.training.calibration.extrinsics import rig_json, with_extrinsics
     from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint
     from shapeshift.training.train import Trainer
 
     path = None if out is None else plain(str(out))
     if path is not None:
-        refuse_place(path)
+        check_writable(path)
         refuse_foreign(path)
     elif resume:
         raise UsageError("resume goes on from the checkpoint beside out; give out, too.")
     before = read_checkpoint(checkpoint_path(path)) if resume and path is not None else None
     settings |= {"iterations": iterations, "seconds": seconds}
-    wished = settings_of(preset, settings, before[1]["settings"] if before else None)
+    wished = settings_of(settings, before[1]["settings"] if before else None)
     found, on = read_capture(plain(str(capture))), open_device(device)
     if calibrate is not None:
         if resume:
             raise UsageError("resume goes on with the checkpoint's offset; leave out calibrate.")
-        offset = calibrate_cameras(on, found, wished, calibrate, tell=lambda what, part: None)
-        wished = replace(wished, rig=noted(calibrate, offset))
+        offset = calibrate_cameras(on, found, wished, calibrate, report=lambda what, part: None)
+        wished = replace(wished, rig=rig_json(calibrate, offset))
     with memory_for_training():
-        trainer = Trainer(on, with_found(found, wished.rig), wished, before)
+        trainer = Trainer(on, with_extrinsics(found, wished.rig), wished, before)
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
     run(trainer, path, progress)
     return finished(trainer, path, pace)
 
 
-def settings_of(preset: str, asked: dict[str, Any], before: dict | None) -> "TrainSettings":
-    """The preset's numbers with those that were asked for; or a checkpoint's with another budget.
+def settings_of(asked: dict[str, Any], before: dict | None) -> "TrainSettings":
+    """The usual settings with those that were asked for; or a checkpoint's with another budget.
 
     None stands for what was not asked.  Raises UsageError.
     """
     from shapeshift.app.command_line import nearest
     from shapeshift.training.settings import TrainSettings, adjusted, resumed
-    from shapeshift.training.settings import preset as preset_of
 
     asked = {name: value for name, value in asked.items() if value is not None}
-    known = [field.name for field in fields(TrainSettings) if field.name != "preset"]
+    known = [field.name for field in fields(TrainSettings)]
     for name in asked:
         if name not in known:
             meant = nearest(name, known)
@@ -124,7 +122,7 @@ def settings_of(preset: str, asked: dict[str, Any], before: dict | None) -> "Tra
     try:
         if before is not None:
             return resumed(before, asked)
-        return adjusted(preset_of(preset), asked)
+        return adjusted(TrainSettings(), asked)
     except ValueError as error:
         raise UsageError(str(error)) from None
 
@@ -133,7 +131,7 @@ def run(
     trainer: "Trainer", path: Path | None, progress: "Callable[[Progress], object] | None"
 ) -> None:
     """The steps; what there is is written every minute, and when anything ends them early."""
-    from shapeshift.app.training.keeping import memory_errors, save, save_on_the_way
+    from shapeshift.app.training.saving import memory_errors, save, save_checkpoint
     from shapeshift.training.checkpoint import checkpoint_path
 
     saved = time.monotonic()
@@ -143,7 +141,7 @@ def run(
             if progress is not None and progress(now) is False and trainer.settled:
                 break
             if path is not None and time.monotonic() - saved > SAVE_EVERY_S:
-                save_on_the_way(trainer, checkpoint_path(path))
+                save_checkpoint(trainer, checkpoint_path(path))
                 saved = time.monotonic()
     except ends:
         if path is not None and trainer.iteration:
@@ -153,12 +151,12 @@ def run(
 
 def finished(trainer: "Trainer", path: Path | None, pace: bool) -> TrainedScene:
     """The scene of a run that has ended, written where it was asked for."""
-    from shapeshift.app.training.keeping import save
+    from shapeshift.app.training.saving import save
     from shapeshift.renderer.pace import measure_pace
     from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.training.checkpoint import checkpoint_path
 
-    trainer.mend()
+    trainer.restore_last_good()
     if path is not None:
         save(trainer, path, checkpoint_path(path))  # before anything else can go wrong
     model = trainer.model()
@@ -194,7 +192,7 @@ def evaluate(
     from shapeshift.app.training.evaluate import only, trained_downscale
     from shapeshift.rasterizer.device import open_device
     from shapeshift.scene.captures.read_capture import read_capture
-    from shapeshift.training.calibration.extrinsics import rig_of, with_found
+    from shapeshift.training.calibration.extrinsics import rig_of, with_extrinsics
     from shapeshift.training.evaluation.evaluate import evaluate_model, report
     from shapeshift.training.evaluation.vgg_distance import VggDistance
 
@@ -206,7 +204,7 @@ def evaluate(
     distance = None if vgg is None else VggDistance(plain(str(vgg)))
     photos = read_capture(plain(str(capture)))
     photos = photos if modality is None else only(photos, modality)
-    photos = with_found(photos, rig_of(model.provenance))
+    photos = with_extrinsics(photos, rig_of(model.provenance))
     factor = downscale or trained_downscale(model.provenance)
     scores = evaluate_model(open_device(device), model, photos, factor, masks, background, distance)
     result = report(scene.path, scores, started)

@@ -184,15 +184,24 @@ def test_every_option_of_every_command_says_what_it_does_and_what_holds_without_
         assert stated or is_switch or arguments[name].opt.positional, f"{command} {name}: {text}"
 
 
-def test_presets_numbers_are_those_of_the_training(capsys):
-    from shapeshift.training.settings import preset
+def test_the_settings_of_a_training_are_its_options(capsys):
+    """Their defaults are those of the dataclass, their texts the fields' own."""
+    from shapeshift.training.settings import TrainSettings
 
     assert cli.main(["train", "--help"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    fast, paper = preset("fast"), preset("paper")
-    assert f"same bits. (default: {fast.iterations}; paper: {paper.iterations})" in told
-    assert f"(default: {fast.splats_per_anchor}; paper: {paper.splats_per_anchor})" in told
-    assert "Hidden layers of each of the five networks, 1 to 3. (default: 1)" in told
+    told, usual = " ".join(capsys.readouterr().out.split()), TrainSettings()
+    assert f"gives the same bits. (default: {usual.iterations})" in told
+    assert f"k in the paper. (default: {usual.splats_per_anchor})" in told
+    assert f"those are not used. (default: {usual.depth_share})" in told
+    options = parse(options_of("train"), ["photos", "--out", "a", "--seed", "3"], PROG)
+    assert options.asked == {"seed": 3} and options.splats == {}
+
+
+@pytest.mark.parametrize("option", ["--preset", "--rise", "--sigma", "--balance", "--layers"])
+def test_options_that_left_the_training_are_refused_in_a_sentence(option, capsys, tmp_path):
+    assert cli.main(["train", str(tmp_path), "--out", str(tmp_path / "a.shift"), option, "1"]) == 2
+    told = capsys.readouterr().err
+    assert f"there is no option '{option}'" in told and "Traceback" not in told
 
 
 def test_a_slip_of_the_hand_is_known():

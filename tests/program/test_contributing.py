@@ -1,7 +1,6 @@
 """CONTRIBUTING.md: what it says is so.  Its steps are walked with a small thing of each kind."""
 
 import ast
-import io
 import re
 import struct
 import sys
@@ -15,7 +14,7 @@ import pytest
 
 import shapeshift as ss
 from shapeshift.app import cli
-from shapeshift.app.command_line import POSITIONAL
+from shapeshift.app.command_line import POSITIONAL, arguments_of
 from shapeshift.runtime_models.splats import formats as formats_module
 from shapeshift.runtime_models.splats.formats import Format
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, empty_splats
@@ -121,28 +120,11 @@ def test_a_command_is_a_dataclass_and_a_function(monkeypatch, capsys):
 
 
 def test_every_training_setting_says_what_it_is_and_python_takes_it():
-    import tokenize
-
-    source = (ROOT / "training/settings.py").read_text()
-    lines = source.splitlines()
-    body = next(
-        node for node in ast.parse(source).body
-        if isinstance(node, ast.ClassDef) and node.name == "TrainSettings"
-    )  # fmt: skip
-    comments = {
-        token.start[0]
-        for token in tokenize.generate_tokens(io.StringIO(source).readline)
-        if token.type == tokenize.COMMENT
-    }
-    rows = {n.target.id: n.lineno for n in body.body if isinstance(n, ast.AnnAssign)}
-    assert set(rows) == {field.name for field in fields(TrainSettings)}
-    plain = {"preset", "seed", "hidden"}  # their names say it all
-    silent = [lines[at - 1] for name, at in rows.items() if at not in comments - {0}
-              and name not in plain]  # fmt: skip
-    assert not silent
+    texts = {each.field.name: each.help for each in arguments_of(TrainSettings)}
+    assert texts.keys() == {field.name for field in fields(TrainSettings)}
+    assert all(len(text) > 15 and text.endswith((".", ")")) for text in texts.values()), texts
     with pytest.raises(ss.BadFile):  # every field is taken; the capture is what is missing
-        values = {f.name: getattr(TrainSettings(), f.name) for f in fields(TrainSettings)}
-        ss.train("no capture", preset="fast", **{n: values[n] for n in ("max_anchors", "revive")})
+        ss.train("no capture", **TrainSettings().as_dict())
 
 
 def test_every_kernel_is_named_by_the_module_that_launches_it_or_a_kernel_that_includes_it():

@@ -194,8 +194,9 @@ def test_what_a_training_does_not_know_is_refused(capture, tmp_path):
         ss.train(capture, iterations=0)
     with pytest.raises(ss.BadFile, match="does not exist"):
         ss.train(tmp_path / "nowhere", iterations=1)
-    with pytest.raises(ss.UsageError, match="encoding stops sets control and sigma itself"):
-        ss.train(capture, encoding="stops", control=8)
+    for left in ("preset", "encoding", "rise", "balance"):  # what trainings had once
+        with pytest.raises(ss.UsageError, match=f"no setting '{left}' of a training"):
+            ss.train(capture, **{left: "fast"})
     with pytest.raises(ss.UsageError, match="no modality 'Heat'"):
         ss.evaluate(ss.DEMO, capture, modality="Heat")
 

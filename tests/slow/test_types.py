@@ -20,7 +20,7 @@ MOST = {
     "renderer": 0,
     "runtime_models": 0,
     "scene": 0,
-    "training": 90,
+    "training": 0,
     "vr": 54,
 }
 

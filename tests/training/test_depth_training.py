@@ -16,11 +16,10 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.captures.depth_photo import load_depth
 from shapeshift.training.baselines.plain_reference import decode_plain_reference
 from shapeshift.training.baselines.plain_step import GROUPS, PlainStep
-from shapeshift.training.coarse import smaller
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.evaluate import evaluate_model, report
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import HOLE, DepthLoss, DepthWish
+from shapeshift.training.losses.depth_loss import HOLE, DepthLoss, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.photos import read
 from shapeshift.training.reference import decode_reference, image_loss_reference
@@ -67,8 +66,8 @@ def test_every_gradient_of_a_step_with_depth(device, seed):
     image_loss, depth_loss = ImageLoss(device, size), DepthLoss(device, size)
     drawing = step.draw(view, control, BACKGROUND, with_depth=True)
     target = image_loss.target(device.upload(rgba), BACKGROUND)
-    wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
-    grads = step.gradients(drawing, image_loss, target, 0.2, depth=wish)
+    term = DepthTerm(depth_loss, depth_loss.target(depth), SHARE)
+    grads = step.gradients(drawing, image_loss, target, depth=term, min_opacity_share=0.0)
     total = image_loss.value() + SHARE * depth_loss.value()
     assert total == pytest.approx(loss("anchors", parameters["anchors"]), rel=1e-4)
     for name, grad in grads.items():
@@ -97,9 +96,9 @@ def test_every_gradient_of_plain_splats_with_depth(device):
         PlainStep(device, adam, 0), ImageLoss(device, SIZE), DepthLoss(device, SIZE)
     )  # fmt: skip
     target = image_loss.target(device.upload(rgba), BACKGROUND)
-    wish = DepthWish(depth_loss, depth_loss.target(depth), SHARE)
+    term = DepthTerm(depth_loss, depth_loss.target(depth), SHARE)
     drawing = step.draw(view, BACKGROUND, with_depth=True)
-    grads = step.gradients(drawing, image_loss, target, 0.2, None, wish)
+    grads = step.gradients(drawing, image_loss, target, None, term)
     for name in ("means", "scales", "wxyz", "opacity", "base"):
         have = device.download(grads[name]).astype(np.float64)
         values = parameters[name].astype(np.float64)
@@ -132,15 +131,14 @@ def test_depth_follows_its_photo_through_masks_and_sizes(balls):
     photo = balls.photos[0]
     loaded = read(photo, 2, "object")
     assert loaded.depth.shape == (32, 32) and loaded.depth.any()
-    assert smaller(loaded, 2).depth.shape == (16, 16)
     targets = Targets(open_device("cpu"))
-    assert targets.wish(loaded, 0.0) is None
-    assert targets.wish(replace(loaded, depth=None), 0.1) is None
-    first = targets.wish(loaded, 0.1)
-    assert targets.wish(loaded, 0.1).target is first.target
+    assert targets.depth_term(loaded, 0.0) is None
+    assert targets.depth_term(replace(loaded, depth=None), 0.1) is None
+    first = targets.depth_term(loaded, 0.1)
+    assert targets.depth_term(loaded, 0.1).target is first.target
     assert first.target.known == (loaded.depth > 0).sum()
     nothing = replace(loaded, name="other", depth=loaded.depth * 0)
-    assert targets.wish(nothing, 0.1) is None
+    assert targets.depth_term(nothing, 0.1) is None
     covered = read(replace(photo, mask=black_half(photo.path)), 1, "object").depth
     assert covered[:, 32:].any() and not covered[:, :32].any()
 
@@ -186,9 +184,9 @@ def test_without_depth_photos_or_a_share_the_bits_are_the_same(device, balls):
 
 
 def test_photos_with_and_without_depth_train_together(device, balls):
-    """And small photos first; what has no depth learns from its colours alone."""
+    """What has no depth learns from its colours alone."""
     photos = tuple(replace(p, depth=None) if i % 3 else p for i, p in enumerate(balls.photos))
-    trainer = trained(device, replace(balls, photos=photos), coarse=2, depth_share=0.1)
+    trainer = trained(device, replace(balls, photos=photos), depth_share=0.1)
     assert min(trainer.held_out_psnr(9).values()) > 15
     assert all(np.isfinite(values).all() for values in trainer.adam.state().values())
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from shapeshift.training.evaluation.metrics import psnr, ssim, weighted_mean
-from shapeshift.training.heads.gaussians import Gaussians
-from shapeshift.training.losses.losses import ImageLoss, regularise
+from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.reference import image_loss_reference
 
 
@@ -137,22 +136,3 @@ def test_metrics_know_equal_and_different_pictures():
     half[:15] = photo[:15]
     assert psnr(half, photo, weight) == 100
     assert weighted_mean(np.ones((30, 40, 3)), weight) == pytest.approx(1)
-
-
-def test_regularisers_are_equation_9(device):
-    rng = np.random.default_rng(4)
-    opacity = rng.uniform(-1, 1, 70).astype(np.float32)
-    opacity[3] = 0
-    shapes = ((70, 3), (70, 3), (70, 4), 70, (70, 3))
-    start = [rng.normal(size=s).astype(np.float32) for s in shapes]
-    grad = Gaussians(*(device.upload(a) for a in start))
-    splats = Gaussians(*(device.upload(a) for a in start))
-    splats = Gaussians(
-        splats.means, splats.scales, splats.wxyz, device.upload(opacity), splats.color
-    )
-    regularise(device, splats, grad, 0.7, 0.3)
-    found = [device.download(a) for a in grad.fields()]
-    np.testing.assert_allclose(found[3], start[3] + 0.7 / 70 * np.sign(opacity), atol=1e-6)
-    np.testing.assert_allclose(found[1], start[1] + 0.3 / 210, atol=1e-6)
-    for i in (0, 2, 4):
-        np.testing.assert_array_equal(found[i], start[i])

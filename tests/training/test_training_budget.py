@@ -8,7 +8,7 @@ import pytest
 from shapeshift.app import cli, progress
 from shapeshift.app.training.fit import without_times
 from shapeshift.app.training.train import train
-from shapeshift.training.run import PACE_STEPS, Progress, Run
+from shapeshift.training.run import LENGTH_STEPS, Progress, Run
 from shapeshift.training.schedule import Budget
 from shapeshift.training.synthetic.balls import make_balls
 
@@ -16,7 +16,7 @@ from shapeshift.training.synthetic.balls import make_balls
 class Steps(Run):
     """A run whose steps do what they are told."""
 
-    unit = counted = "anchors"
+    primitive = param_group = "anchors"
     settled = True
 
     def __init__(self, kind: str, step, seconds: float | None = None) -> None:
@@ -28,7 +28,7 @@ class Steps(Run):
 
     splat_count = 1
 
-    def warm_up(self) -> None:
+    def compile_kernels(self) -> None:
         burn(0.05)
 
     def one_step(self):
@@ -79,9 +79,9 @@ def test_a_budget_of_seconds_ends_a_run():
 
 def test_the_pace_is_that_of_the_steps_before(monkeypatch):
     timed = Steps("cpu", lambda: None, seconds=60.0)
-    timed.iteration, timed.elapsed = PACE_STEPS, 0.1 * (PACE_STEPS - 1)
+    timed.iteration, timed.elapsed = LENGTH_STEPS, 0.1 * (LENGTH_STEPS - 1)
     timed.adam = SimpleNamespace(set_rates=lambda rates: None)
-    timed.find_pace()
+    timed.fix_run_length()
     assert timed.run_length == pytest.approx(600, abs=1)
 
 
@@ -92,7 +92,7 @@ def test_without_a_terminal_lines_say_steps_seconds_and_decibels(monkeypatch, ca
         assert not train(Steps("cpu", lambda: time.sleep(0.2)), None)
     said = capsys.readouterr().err.splitlines()
     assert "train: 4 steps, 0 core s, 1 anchors, 80 %, RGB 20.00 dB (0 min)" in said
-    assert Progress(1, 0.5, None, 3, 1.0).fell_back is False
+    assert Progress(1, 0.5, None, 3, 1.0).rolled_back is False
 
 
 def test_the_same_seed_gives_the_same_file_to_the_byte(tmp_path):

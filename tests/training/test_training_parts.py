@@ -8,6 +8,7 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.pose import View, look_at, perspective
+from shapeshift.training.divergence_guard import DivergenceGuard
 from shapeshift.training.first_anchors.initial import (
     choose_voxel,
     filler_points,
@@ -16,12 +17,11 @@ from shapeshift.training.first_anchors.initial import (
     pixel_of,
     voxel_centres,
 )
-from shapeshift.training.guard import Guard
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.schedule import Budget, Schedule
-from shapeshift.training.settings import LONG, PAPER, SHORT, TrainSettings, preset
+from shapeshift.training.settings import LONG, SHORT, TrainSettings, adjusted
 from shapeshift.training.supervision.backgrounds import choose_background
 
 RNG = np.random.default_rng
@@ -179,10 +179,10 @@ def test_budget_follows_whichever_ends_first():
     ("changes", "sentence"),
     [
         ({"iterations": None}, "needs an end"), ({"iterations": 0}, "iterations is 0"),
-        ({"seconds": float("nan")}, "seconds is nan"), ({"ssim_share": 1.1}, "0 to 1"),
-        ({"hidden": -3}, "at least 1"), ({"own": "size"}, "no 'size' of their own"),
-        ({"seed": -1}, "seed"),
-        ({"rate_scale": float("inf")}, "rate_scale is inf"),
+        ({"seconds": float("nan")}, "seconds is nan"), ({"blended_shapes": 1.1}, "0 to 1"),
+        ({"blended_shapes": -0.1}, "blended_shapes is -0.1"), ({"seed": -1}, "seed"),
+        ({"hidden": -3}, "at least 1"), ({"anchor_attributes": "size"}, "no attribute 'size'"),
+        ({"depth_share": float("inf")}, "depth_share is inf"),
     ],
 )  # fmt: skip
 def test_settings_that_cannot_be_are_refused(changes, sentence):
@@ -191,32 +191,33 @@ def test_settings_that_cannot_be_are_refused(changes, sentence):
 
 
 def test_settings_name_the_networks():
-    settings = TrainSettings(layers=2, fixed="scale, offset", view_dependent=False)
-    assert settings.layout() == HeadLayout(5, 16, 32, 16, 2, ("scale", "offset"), False)
-    assert TrainSettings(own="").layout().per_anchor == ("anchors", "features")
+    settings = TrainSettings(fixed="scale, offset", view_dependent=False)
+    assert settings.layout(7) == HeadLayout(5, 16, 32, 7, ("scale", "offset"), False)
+    assert TrainSettings(anchor_attributes="").layout(2).per_anchor == ("anchors", "features")
     assert TrainSettings(**settings.as_dict()) == settings
-    assert TrainSettings().layout() == HeadLayout(5)
-    with pytest.raises(ValueError, match="layers is 4; networks have 1 to 3 hidden ones"):
-        TrainSettings(layers=4)
+    assert TrainSettings().layout(16) == HeadLayout(5)
     with pytest.raises(ValueError, match="no head 'shape' to fix; they are offset"):
         TrainSettings(fixed="shape")
 
 
-def test_presets():
-    paper = preset("paper")
-    assert paper.rates(30000) is PAPER and paper.splats_per_anchor == 10
-    assert (paper.features, paper.control, paper.sigma) == (16, 16, 0.04)
-    assert paper.encoding == "even" and preset("fast").encoding == "stops"
-    assert preset("fast").rates(4000) is SHORT and preset("fast").rates(4001) is LONG
-    with pytest.raises(ValueError, match="no preset 'slow'"):
-        preset("slow")
+def test_rates_decay_further_in_long_runs():
+    assert TrainSettings().rates(4000) is SHORT and TrainSettings().rates(4001) is LONG
+
+
+def test_a_budget_of_one_kind_takes_the_place_of_the_other():
+    timed = adjusted(TrainSettings(), {"seconds": 5.0})
+    assert (timed.seconds, timed.iterations) == (5.0, None)
+    assert adjusted(timed, {"iterations": 9}) == TrainSettings(iterations=9)
+    both = adjusted(TrainSettings(), {"iterations": 9, "seconds": 5.0})
+    assert (both.seconds, both.iterations) == (5.0, 9)
+    assert adjusted(timed, {"seed": 2}).seconds == 5.0
 
 
 def test_the_guard_goes_further_back_each_time():
-    guard = Guard({"a": np.array(0)})
+    guard = DivergenceGuard({"a": np.array(0)})
     for i in range(1, 6):
-        guard.remember({"a": np.array(i)})
-    assert [int(guard.fall_back()["a"]) for _ in range(4)] == [5, 4, 3, 3]
+        guard.save_snapshot({"a": np.array(i)})
+    assert [int(guard.rollback()["a"]) for _ in range(4)] == [5, 4, 3, 3]
 
 
 @pytest.mark.parametrize(
@@ -227,24 +228,24 @@ def test_the_guard_goes_further_back_each_time():
     ],
 )  # fmt: skip
 def test_what_the_guard_calls_healthy(visible, shown, healthy):
-    guard = Guard({})
-    guard.expect("RGB", 0.5, 1.0, 1.2)
-    looks = [guard.healthy("RGB", 0.1, visible, shown) for _ in range(4)]
+    guard = DivergenceGuard({})
+    guard.observe("RGB", 0.5, 1.0, 1.2)
+    looks = [guard.is_healthy("RGB", 0.1, visible, shown) for _ in range(4)]
     assert looks == ([True] * 4 if healthy else [True, True, False, False])
-    assert guard.sure == healthy
-    guard.fall_back()
-    assert guard.healthy("RGB", 0.1, visible, shown)
+    assert guard.stable == healthy
+    guard.rollback()
+    assert guard.is_healthy("RGB", 0.1, visible, shown)
     for loss in (np.nan, np.inf, -np.inf):
-        assert not Guard({}).healthy("RGB", loss, 0.5, 1.0)
+        assert not DivergenceGuard({}).is_healthy("RGB", loss, 0.5, 1.0)
 
 
 @pytest.mark.parametrize(("loss", "healthy"), [(0.29, True), (0.31, False), (np.nan, False)])
 def test_after_falling_back_the_loss_has_to_fall(loss, healthy):
-    guard = Guard({})
-    guard.expect("RGB", 0.5, 1.0, 1.0)
-    assert all(guard.healthy("RGB", 0.6, 1.0, 1.0) for _ in range(50))  # never fell: no demands
-    guard.fall_back()
-    looks = [guard.healthy("RGB", loss, 1.0, 1.0) for _ in range(8)]
+    guard = DivergenceGuard({})
+    guard.observe("RGB", 0.5, 1.0, 1.0)
+    assert all(guard.is_healthy("RGB", 0.6, 1.0, 1.0) for _ in range(50))  # never fell: no demands
+    guard.rollback()
+    looks = [guard.is_healthy("RGB", loss, 1.0, 1.0) for _ in range(8)]
     assert looks[-1] == healthy
 
 

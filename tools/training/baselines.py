@@ -48,9 +48,10 @@ def main() -> int:
         for seconds, size, methods in plan(asked.seconds, asked.sizes, asked.methods):
             out = asked.out / folder.name / f"{seconds:g} s size {size:g}"
             out.mkdir(parents=True, exist_ok=True)
+            asked_of, of_splats = caps(size, asked)
             options = Options(
-                folder, out, seconds=seconds, methods=methods, vgg=asked.vgg,
-                downscale=asked.downscale, **caps(size, asked),
+                folder, out, asked_of, seconds=seconds, methods=methods, vgg=asked.vgg,
+                splats=of_splats,
             )  # fmt: skip
             if code := run(options):
                 return code
@@ -73,14 +74,13 @@ def plan(
     return [*whole, *rest]
 
 
-def caps(size: float, asked: argparse.Namespace) -> dict[str, int]:
-    """Caps of anchors and of plain splats and the start of these, at a share of what is asked."""
-    plain = PlainSettings()
-    numbers = {
-        "max_anchors": asked.max_anchors,
-        "splats": plain.splats, "max_splats": plain.max_splats,
-    }  # fmt: skip
-    return {name: max(round(size * number), 1) for name, number in numbers.items()}
+def caps(size: float, asked: argparse.Namespace) -> tuple[dict[str, int], dict[str, int]]:
+    """What is asked of anchors and of plain splats: caps at a share of the usual ones."""
+    most, most_splats = (
+        max(round(size * number), 1) for number in (asked.max_anchors, PlainSettings().max_splats)
+    )
+    smaller = {"downscale": asked.downscale} if asked.downscale else {}
+    return {"max_anchors": most} | smaller, {"max_splats": most_splats}
 
 
 def made(name: str, work: Path) -> Path:

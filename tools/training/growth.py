@@ -31,10 +31,9 @@ from shapeshift.training.train import Trainer  # noqa: E402
 WAYS = {
     "default": {},
     "no growth": {"grow": False},
-    "no frames": {"own": "color"},
-    "no base colours": {"own": "frame"},
-    "features alone": {"own": ""},
-    "coarse": {"coarse": 2},
+    "no frames": {"anchor_attributes": "color"},
+    "no base colours": {"anchor_attributes": "frame"},
+    "features alone": {"anchor_attributes": ""},
 }
 LOOKS = (0.25, 0.5, 0.75, 1.0)  # shares of the run
 COLUMNS = (

@@ -18,8 +18,8 @@ sys.path[:0] = [str(HERE.parents[1])]
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
-from shapeshift.training.fit.ablation import Measured  # noqa: E402
-from shapeshift.training.fit.fit import Fit, Need  # noqa: E402
+from shapeshift.training.fit.ablation import Trial  # noqa: E402
+from shapeshift.training.fit.fit import Fit, FitReport  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 
 COLUMNS = (
@@ -36,28 +36,28 @@ def show(row: list) -> str:
     return text
 
 
-def model_rows(name: str, word: str, found: Measured) -> list[str]:
+def model_rows(name: str, word: str, found: Trial) -> list[str]:
     facts = found.as_dict()
     costs = [found.bytes, found.decode_ms, found.train_s]
     psnr = facts["psnr_db"].items()
     return [show([name, word, "", m, None, None, db, None, *costs]) for m, db in psnr]
 
 
-def part_rows(name: str, need: Need) -> list[str]:
+def part_rows(name: str, need: FitReport) -> list[str]:
     return [
         show(
             [
-                name, verdict.part, verdict.word, modality, change.mean, change.error,
+                name, verdict.part, verdict.verdict, modality, change.mean, change.error,
                 verdict.total[modality].mean, verdict.total[modality].error, verdict.bytes,
                 verdict.decode_ms, verdict.train_s,
             ]
         )
-        for verdict in need.verdicts
+        for verdict in need.decisions
         for modality, change in verdict.change.items()
     ]  # fmt: skip
 
 
-def outline_rows(name: str, need: Need) -> list[str]:
+def outline_rows(name: str, need: FitReport) -> list[str]:
     return [
         show([name, "outlines in common", "", f"{a} and {b}", None, None, iou, *[None] * 4])
         for (a, b), iou in need.outlines.items()
@@ -82,12 +82,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--tolerance-db", type=float, default=0.1)
     parser.add_argument("--max-anchors", type=int, default=TrainSettings().max_anchors)
-    parser.add_argument("--layers", type=int, default=1)
     parser.add_argument("--downscale", type=int)
     options = parser.parse_args()
     settings = TrainSettings(
         iterations=options.iterations, max_anchors=options.max_anchors,
-        layers=options.layers, downscale=options.downscale,
+        downscale=options.downscale,
     )  # fmt: skip
     rows = []
     for folder in options.captures:

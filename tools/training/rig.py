@@ -21,8 +21,12 @@ sys.path[:0] = [str(HERE.parents[1])]
 from shapeshift.app.measure import processor  # noqa: E402
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
-from shapeshift.training.calibration.calibrate import STAGES, STEPS, search, shape_for  # noqa: E402
-from shapeshift.training.calibration.extrinsics import moved_by, offset_capture, told  # noqa: E402
+from shapeshift.training.calibration.calibrate import PYRAMID, STEPS, search, shape_for  # noqa: E402
+from shapeshift.training.calibration.extrinsics import (  # noqa: E402
+    moved_by,
+    offset_capture,
+    offset_of_matrix,
+)
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 from shapeshift.training.synthetic.workshop import make_workshop  # noqa: E402
 
@@ -55,8 +59,8 @@ def row_of(device, capture, settings: TrainSettings, shape: tuple, six: tuple) -
     start, (turn, shift) = time.process_time(), np.split(np.array(six, float), 2)
     true = moved_by(np.concatenate([np.deg2rad(turn), shift / 1e3]))
     wrong = offset_capture(capture, MODALITY, np.linalg.inv(true))
-    found = search(device, wrong, settings, MODALITY, shape, STAGES, quiet)
-    left = told(np.linalg.inv(true) @ found.offset)
+    found = search(device, wrong, settings, MODALITY, shape, PYRAMID, quiet)
+    left = offset_of_matrix(np.linalg.inv(true) @ found.offset)
     return show((
         *six, found.turn_deg, 1e3 * found.shift_m, left.turn_deg, *(1e3 * left.offset[:3, 3]),
         1e3 * left.shift_m, found.gain_db, time.process_time() - start,

@@ -249,6 +249,10 @@ def nan_into(group: str, trainer: Trainer) -> None:
     trainer.adam.load(state)
 
 
+def times_rates(factor: float, trainer: Trainer) -> None:
+    trainer.rate_scale *= factor
+
+
 @contextmanager
 def full_memory(share: float | None, iterations: int) -> Iterator[None]:
     """From that share of the run on the device has no memory left; None: from the beginning."""
@@ -324,7 +328,8 @@ CASES = (
     Case("forward-facing", "fern", "all cameras look one way"),
     Case("forward-facing, no points", "fern", "the same from `--points random`",
          options=("--points", "random")),
-    Case("divergence", "balls", "`--rate-scale 400`", options=("--rate-scale", "400")),
+    Case("divergence", "balls", "400 times the learning rates",
+         fault=partial(at_step, 0.0, partial(times_rates, 400.0))),
     Case("NaN in weights", "balls", "every 7th weight of the networks, in the middle of the run",
          fault=partial(at_step, 0.5, partial(nan_into, "weights"))),
     Case("NaN in anchors", "balls", "every 7th coordinate, in the middle of the run",

@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 
 from shapeshift.rasterizer.device import Device, open_device  # noqa: E402
 from shapeshift.scene.pose import View, look_at, perspective  # noqa: E402
-from shapeshift.training.density.density import Evidence  # noqa: E402
+from shapeshift.training.density.densification_stats import DensificationStats  # noqa: E402
 from shapeshift.training.heads.networks import HeadLayout, initial_weights, padded  # noqa: E402
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
@@ -71,7 +71,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})
     voxel = 2 * RADIUS * np.sqrt(np.pi / anchors)  # the mean distance of neighbours
     step, loss = Step(device, layout, voxel, adam), ImageLoss(device, size)
-    evidence = Evidence(device, layout, anchors, 1)
+    stats = DensificationStats(device, layout, anchors, 1)
     rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
     target = loss.target(device.upload(rgba), (0, 0, 0))
     lens = perspective(np.deg2rad(45), size)
@@ -82,7 +82,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
         step.ms = {} if number <= 1 else step.ms
         start = time.process_time()
         drawing = step.draw(View(eye, lens, 0.05, 100.0, size), rng.random(16), (0, 0, 0))
-        step.update(step.gradients(drawing, loss, target, 0.2, evidence=evidence), 1.0)
+        step.update(step.gradients(drawing, loss, target, stats=stats), 1.0)
         device.queue.finish()
         cpu += time.process_time() - start if number else 0.0
     if not np.isfinite(loss.value()):

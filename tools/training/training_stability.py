@@ -34,7 +34,7 @@ from shapeshift.scene.captures.capture import Capture  # noqa: E402
 from shapeshift.scene.captures.photo import load_photo  # noqa: E402
 from shapeshift.scene.captures.read_capture import read_capture  # noqa: E402
 from shapeshift.scene.captures.write_capture import write_capture  # noqa: E402
-from shapeshift.training.evaluation.evaluate import Painter, stop_for  # noqa: E402
+from shapeshift.training.evaluation.evaluate import ModelRenderer, stop_for  # noqa: E402
 from shapeshift.training.evaluation.metrics import psnr  # noqa: E402
 from shapeshift.training.photos import BLACK, load_photos  # noqa: E402
 from shapeshift.training.supervision.backgrounds import choose_background  # noqa: E402
@@ -113,7 +113,7 @@ class Bench:
         some; None where nothing was written."""
         if not out.exists():
             return None
-        painter, found = Painter(open_device(), read_model(out)), {}
+        painter, found = ModelRenderer(open_device(), read_model(out)), {}
         behind = choose_background("auto", capture.background) or BLACK
         photos = load_photos(capture, "test", 1, "valid")
         for stop in capture.stops:

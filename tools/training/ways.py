@@ -1,6 +1,6 @@
 """What tables of ways to train share: options, captures by name, and runs of which ways take turns.
 
-Imported by growth.py and between.py, which have put the project's folder on the path.
+Imported by growth.py and blended_shapes.py, which have put the project's folder on the path.
 """
 
 import argparse

@@ -13,18 +13,18 @@ from shapeshift.runtime_models.rotation import normalize
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.baselines.plain_density import (
-    changed_splats,
-    decide,
+    apply_densification,
+    choose_densification,
     extent_of,
     reset_opacity,
 )
 from shapeshift.training.baselines.plain_settings import PlainRates, PlainSettings
-from shapeshift.training.baselines.plain_step import REST, PlainEvidence, PlainStep
+from shapeshift.training.baselines.plain_step import REST, PlainDensificationStats, PlainStep
+from shapeshift.training.divergence_guard import EVERY as GUARD_EVERY
+from shapeshift.training.divergence_guard import SNAPSHOT_EVERY, DivergenceGuard
 from shapeshift.training.drawing import Color
-from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
+from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
 from shapeshift.training.first_anchors.initial import choose_voxel, initial_points, voxel_centres
-from shapeshift.training.guard import EVERY as GUARD_EVERY
-from shapeshift.training.guard import SNAPSHOT_EVERY, Guard
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.photos import BLACK, LoadedPhoto, choose_downscale, load_photos
 from shapeshift.training.run import SETTLE, Run
@@ -59,7 +59,8 @@ def group_rates(rates: PlainRates, extent: float) -> dict[str, np.ndarray]:
 class PlainTrainer(Run):
     """One run over a capture of one modality.  `steps` trains; `splats` gives what there is."""
 
-    unit, counted = "splats", "means"
+    primitive, param_group = "splats", "means"
+    settings: PlainSettings
 
     def __init__(self, device, capture: Capture, settings: PlainSettings) -> None:
         self.device, self.capture, self.settings = device, capture, settings
@@ -75,12 +76,12 @@ class PlainTrainer(Run):
         self.extent = extent_of([p.view for p in photos])
         self.targets = Targets(device)
         self.exposures = Exposures(device, self.schedule.photos)
-        self.iteration, self.elapsed, self.grown_at = 0, 0.0, -SETTLE
-        self.run_length, self.rate_scale = settings.iterations, settings.rate_scale
+        self.iteration, self.elapsed, self.densified_at = 0, 0.0, -SETTLE
+        self.run_length, self.rate_scale = settings.iterations, 1.0
         self.adam = Adam(device, self.first_values(photos), self.all_rates())
         self.step = PlainStep(device, self.adam, settings.sh_degree)
-        self.evidence = PlainEvidence(device, self.count)
-        self.guard, self.next_snapshot = Guard(self.adam.state()), SNAPSHOT_EVERY
+        self.stats = PlainDensificationStats(device, self.count)
+        self.guard, self.next_snapshot = DivergenceGuard(self.adam.state()), SNAPSHOT_EVERY
 
     def first_values(self, photos: list[LoadedPhoto]) -> dict[str, np.ndarray]:
         """Round, faint splats at the first points, in the colours of the photos."""
@@ -92,7 +93,7 @@ class PlainTrainer(Run):
         self.voxel = settings.voxel or choose_voxel(points, most, rng)
         means = voxel_centres(points, self.voxel)
         count = len(means)
-        colors = seen_colors(means, photos, self.schedule.background or BLACK)
+        colors = photo_colors(means, photos, self.schedule.background or BLACK)
         values = {
             "means": means,
             "scales": np.log(neighbour_distance(means))[:, None].repeat(3, axis=1),
@@ -111,36 +112,39 @@ class PlainTrainer(Run):
     def splat_count(self) -> int:
         return self.count
 
+    def rates(self) -> PlainRates:
+        """The settings' learning rates for a run of this length."""
+        return self.settings.rates(self.run_length or 0)
+
     def all_rates(self) -> dict[str, np.ndarray]:
         return group_rates(self.rates(), self.extent)
 
-    def warm_up(self) -> None:
+    def compile_kernels(self) -> None:
         """Compile every kernel for every photo size, outside of the time that is counted."""
         before = self.adam.state()
         background = self.schedule.background or BLACK
         photos = self.schedule.photos[self.stop.name]
         for photo in {(p.view.size, p.depth is None): p for p in photos}.values():
-            self.adam.step(self.learn(photo, background), 0.0)
+            self.adam.step(self.photo_gradients(photo, background), 0.0)
             loss, visible = self.empty_loss(photo, background), self.visible()
-            self.guard.expect(self.stop.name, loss, visible, 1.0)
+            self.guard.observe(self.stop.name, loss, visible, 1.0)
         self.adam.load(before)
-        self.evidence = PlainEvidence(self.device, self.count)
+        self.stats = PlainDensificationStats(self.device, self.count)
 
     def empty_loss(self, photo: LoadedPhoto, background: Color) -> float:
         """The loss of a picture without splats; the first splats, coloured, are better already."""
         loss, (width, height) = self.targets.loss(photo), photo.view.size
-        image = np.broadcast_to(np.float32(background)[:, None, None], (3, height, width))
+        image = np.broadcast_to(np.array(background, np.float32)[:, None, None], (3, height, width))
         target = self.targets.target(photo, background)
-        loss.compare(self.device.upload(image), target, self.settings.ssim_share)
+        loss.compare(self.device.upload(image), target)
         return loss.value()
 
-    def learn(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
-        depth = self.targets.wish(photo, self.settings.depth_share)
+    def photo_gradients(self, photo: LoadedPhoto, background: Color) -> dict[str, object]:
+        depth = self.targets.depth_term(photo, self.settings.depth_share)
         self.drawing = self.step.draw(photo.view, background, depth is not None)
         target = self.target(photo, background)
         loss = self.targets.loss(photo)
-        share = self.settings.ssim_share
-        return self.step.gradients(self.drawing, loss, target, share, self.evidence, depth)
+        return self.step.gradients(self.drawing, loss, target, self.stats, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
         """(loss or None, whether the guard turned back)."""
@@ -148,55 +152,55 @@ class PlainTrainer(Run):
         background = self.schedule.background_of(self.iteration, photo)
         fraction = self.budget.fraction(self.iteration, self.elapsed)
         self.step.used = REST[min(self.settings.sh_degree, int(DEGREES * fraction))]
-        grads = self.learn(photo, background)
+        grads = self.photo_gradients(photo, background)
         self.adam.step(grads, self.rate_scale * self.rates().decay ** fraction)
         self.iteration += 1
-        loss, fell_back = None, False
+        loss, rolled_back = None, False
         if self.iteration % GUARD_EVERY == 0:
             loss = self.targets.loss(photo).value()
-            fell_back = self.look_after(loss)
-        self.find_pace()
+            rolled_back = self.check_divergence(loss)
+        self.fix_run_length()
         if self.settings.grow and GROW_FROM <= fraction <= GROW_UNTIL:
-            if self.steps_to_go() >= SETTLE:
-                self.change()
-        return loss, fell_back
+            if self.remaining_steps() >= SETTLE:
+                self.densify()
+        return loss, rolled_back
 
-    def steps_to_go(self) -> float:
+    def remaining_steps(self) -> float:
         """How many more the budget allows, as fast as they have been."""
         done = self.budget.fraction(self.iteration, self.elapsed)
         return self.iteration * (1 - done) / max(done, 1e-9)
 
-    def look_after(self, loss: float) -> bool:
+    def check_divergence(self, loss: float) -> bool:
         """The guard's look at the last step; True when it turned the run back."""
-        if self.guard.healthy(self.stop.name, loss, self.visible(), 1.0):
-            if self.iteration >= self.next_snapshot and self.guard.sure and self.settled:
-                self.guard.remember(self.adam.state())
+        if self.guard.is_healthy(self.stop.name, loss, self.visible(), 1.0):
+            if self.iteration >= self.next_snapshot and self.guard.stable and self.settled:
+                self.guard.save_snapshot(self.adam.state())
                 self.next_snapshot = self.iteration + SNAPSHOT_EVERY
             return False
-        self.adam.load(self.guard.fall_back())
-        self.evidence = PlainEvidence(self.device, self.count)
+        self.adam.load(self.guard.rollback())
+        self.stats = PlainDensificationStats(self.device, self.count)
         self.rate_scale /= 2
-        self.exposures.forget(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
+        self.exposures.reset(self.budget.fraction(self.iteration, self.elapsed), self.iteration)
         return True
 
-    def change(self) -> None:
+    def densify(self) -> None:
         """Clones, halves and farewells every so many steps; opacities are set back more rarely.
 
         What is drawn by chance follows from the seed and the step alone.
         """
         settings = self.settings
         if self.iteration % settings.interval(self.run_length or 0) == 0:
-            evidence = self.device.download(self.evidence.sums)
+            stats = self.device.download(self.stats.sums)
             after_reset = self.iteration > settings.reset_every
             state = self.adam.state()
-            change = decide(state, evidence, settings, self.extent, after_reset)
+            change = choose_densification(state, stats, settings, self.extent, after_reset)
             rng = np.random.default_rng([settings.seed, 3, self.iteration])
-            self.adam.load(changed_splats(state, change, rng))
-            self.evidence = PlainEvidence(self.device, self.count)
-            self.grown_at = self.iteration
+            self.adam.load(apply_densification(state, change, rng))
+            self.stats = PlainDensificationStats(self.device, self.count)
+            self.densified_at = self.iteration
         if self.iteration % settings.reset_every == 0:
             self.adam.load(reset_opacity(self.adam.state()))
-            self.grown_at = self.iteration
+            self.densified_at = self.iteration
 
     def held_out_psnr(self, most: int = 2) -> dict[str, float]:
         """Mean PSNR in dB over the first held-out photos, as they are trained."""

@@ -1,6 +1,6 @@
 """Growing and pruning of plain splats by the rules of 3DGS (Kerbl et al., 2023, section 5.2).
 
-Where a splat pulls at the picture it is cloned if it is small and split in two if it is large; what
+Where the screen gradient is large, a small splat is cloned and a large one is split in two; what
 has become transparent goes.  As gsplat's default strategy, and unlike INRIA's program, nothing is
 removed for being large on the screen.
 """
@@ -21,8 +21,8 @@ AFTER_RESET = 0.01  # opacity that all are cut to
 
 
 @dataclass(frozen=True)
-class Change:
-    """What a look at the evidence decided, of N splats."""
+class Densification:
+    """What a look at the stats decided, of N splats."""
 
     gone: np.ndarray  # (N,) bool, transparent or too large
     cloned: np.ndarray  # (C,) indices
@@ -35,13 +35,13 @@ def extent_of(views: list[View]) -> float:
     return max(1.1 * float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-6)
 
 
-def decide(
+def choose_densification(
     state: dict[str, np.ndarray],
-    evidence: np.ndarray,  # (N, 2) of PlainEvidence
+    stats: np.ndarray,  # (N, 2) of PlainDensificationStats
     settings: PlainSettings,
     extent: float,
     after_reset: bool,
-) -> Change:
+) -> Densification:
     """Which splats go, are cloned or are split; where room is short, the strongest first."""
     largest = np.exp(state["scales.value"].astype(np.float64)).max(axis=1)
     opacity = 1 / (1 + np.exp(-state["opacity.value"].astype(np.float64)))
@@ -50,15 +50,15 @@ def decide(
         gone |= ~(largest <= TOO_LARGE * extent)
     if gone.all():
         gone[:] = False
-    pull = evidence[:, 0] / np.maximum(evidence[:, 1], 1)
-    chosen = np.flatnonzero((pull >= settings.grow_threshold) & ~gone)
+    grad2d = stats[:, 0] / np.maximum(stats[:, 1], 1)
+    chosen = np.flatnonzero((grad2d >= settings.grow_threshold) & ~gone)
     room = max(settings.max_splats - int((~gone).sum()), 0)
-    chosen = chosen[np.argsort(-pull[chosen], kind="stable")][:room]
+    chosen = chosen[np.argsort(-grad2d[chosen], kind="stable")][:room]
     small = largest[chosen] <= LARGE * extent
-    return Change(gone, np.sort(chosen[small]), np.sort(chosen[~small]))
+    return Densification(gone, np.sort(chosen[small]), np.sort(chosen[~small]))
 
 
-def halves(values: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
+def split_splats(values: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Two splats for each one: drawn from it as from a distribution, SMALLER times smaller."""
     two = {name: np.repeat(rows, 2, axis=0) for name, rows in values.items()}
     sigma = np.exp(two["scales"].astype(np.float64))
@@ -68,15 +68,15 @@ def halves(values: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str,
     return two
 
 
-def changed_splats(
-    state: dict[str, np.ndarray], change: Change, rng: np.random.Generator
+def apply_densification(
+    state: dict[str, np.ndarray], change: Densification, rng: np.random.Generator
 ) -> dict[str, np.ndarray]:
-    """An optimiser's state after a Change: who stays keeps its moments, who is new is at rest."""
+    """An optimiser's state afterwards: splats that stay keep their moments, new ones have none."""
     values = {name: state[f"{name}.value"] for name in GROUPS}
     keep = ~change.gone
     keep[change.split] = False
     clones = {name: rows[change.cloned] for name, rows in values.items()}
-    split = halves({name: rows[change.split] for name, rows in values.items()}, rng)
+    split = split_splats({name: rows[change.split] for name, rows in values.items()}, rng)
     out = dict(state)
     for name in GROUPS:
         fresh = np.concatenate([clones[name], split[name]]).astype(np.float32)

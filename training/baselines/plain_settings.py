@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass
 
-from shapeshift.training.settings import refuse_numbers
+from shapeshift.training.settings import Background, Masks, check_numbers
 
 SHORT_RUN = 1000  # iterations
 
@@ -29,37 +29,37 @@ LONG = PlainRates(0.001, 0.04, 0.01, 0.05, 0.05, 0.0025, decay=0.03)
 
 @dataclass(frozen=True)
 class PlainSettings:
-    """One run, of one modality.  Budget, photos and loss are as in TrainSettings."""
+    """One run, of one modality.  What TrainSettings has too is meant as there."""
 
     iterations: int | None = 2000
     seconds: float | None = None
     seed: int = 0
-    sh_degree: int = 3  # of the colours: 0 to 3
-    voxel: float | None = None  # metres between the first splats; None: from points and `splats`
-    points: str = "auto"  # as in TrainSettings
-    splats: int = 10000  # to start with at most, where voxel is None
-    max_splats: int = 60000  # cap of growing; what an anchor model draws at most by default
+    sh_degree: int = 3
+    """With --model splats: degree of the spherical harmonics of the colours, 0 to 3."""
+    voxel: float | None = None
+    """Metres between the first splats.  Default: by the points and `splats`."""
+    points: str = "auto"
+    splats: int = 10000
+    """Most splats to start with, where voxel does not say."""
+    max_splats: int = 60000  # what an anchor model draws at most by default
+    """With --model splats: most splats that growing may reach, for each modality."""
     grow: bool = True
     grow_every: int | None = None  # iterations; None: a tenth of the run, 20 to 100 (3DGS: 100)
     grow_threshold: float = 2e-4  # screen gradient in half image widths, as 3DGS
     prune_opacity: float = 0.005  # a splat below it goes, as 3DGS
     reset_every: int = 3000  # iterations until opacities are set back, as 3DGS
-    ssim_share: float = 0.2
-    depth_share: float = 0.3  # as in TrainSettings
+    depth_share: float = 0.3
     downscale: int | None = None
-    masks: str = "object"
-    background: str = "auto"
-    rate_scale: float = 1.0
+    masks: Masks = "object"
+    background: Background = "auto"
 
     def __post_init__(self) -> None:
         """Raises ValueError naming the first number that cannot be."""
         least = {
             "iterations": 1, "seconds": 0.1, "seed": 0, "sh_degree": 0, "voxel": 1e-6, "splats": 1,
-            "max_splats": 1, "grow_every": 1, "reset_every": 1, "downscale": 1, "ssim_share": 0,
-            "depth_share": 0,
-            "rate_scale": 0,
+            "max_splats": 1, "grow_every": 1, "reset_every": 1, "downscale": 1, "depth_share": 0,
         }  # fmt: skip
-        refuse_numbers(self, least, ("ssim_share",))
+        check_numbers(self, least, ())
         if not self.sh_degree <= 3:
             raise ValueError(f"sh_degree is {self.sh_degree}; harmonics go up to degree 3.")
         if self.iterations is None and self.seconds is None:

@@ -9,7 +9,7 @@ from shapeshift.training.drawing import Color, Drawing, draw_splats, splats_back
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.depth_loss import DepthWish
+from shapeshift.training.losses.depth_loss import DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
 
 # What the optimiser holds of N splats of degree n: means (N, 3) metres, scales (N, 3) logarithms of
@@ -19,8 +19,8 @@ GROUPS = ("means", "scales", "wxyz", "opacity", "base", "rest")
 REST = (0, 3, 8, 15)  # coefficients beside the first, of degree 0 to 3
 
 
-class PlainEvidence:
-    """Sums over the steps since the last change: each splat's pull at the picture, and visits."""
+class PlainDensificationStats:
+    """Sums over the steps since the last change: each splat's screen gradient, and visits."""
 
     def __init__(self, device, count: int) -> None:
         self.device, self.count = device, count
@@ -76,16 +76,15 @@ class PlainStep:
         drawing: Drawing,
         loss: ImageLoss,
         target: Target,
-        ssim_share: float,
-        evidence: PlainEvidence | None = None,
-        depth: DepthWish | None = None,
+        stats: PlainDensificationStats | None = None,
+        depth: DepthTerm | None = None,
     ) -> dict[str, Any]:
         """Gradients of the loss by what the optimiser holds, under its names."""
         device, splats = self.device, drawing.splats
-        grad_image = loss.compare(drawing.frame.image, target, ssim_share)
+        grad_image = loss.compare(drawing.frame.image, target)
         grad, grad_record = splats_backward(device, drawing, grad_image, depth, absolute=False)
-        if evidence is not None:
-            evidence.add(drawing.projected.record, grad_record, drawing.camera.size[0])
+        if stats is not None:
+            stats.add(drawing.projected.record, grad_record, drawing.camera.size[0])
         grad_rest = self.grad_rest if self.rest else grad.color
         device.launch(
             self.kernels["activate_backward"], self.count, 64, self.count, self.used, *self.eye,

@@ -14,8 +14,8 @@ from shapeshift.runtime_models.model import BadFile, Stop
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View
 from shapeshift.training.baselines.plain import one_modality
-from shapeshift.training.calibration.extrinsics import Found, rigid, told
-from shapeshift.training.calibration.residuals import Frozen, Shape
+from shapeshift.training.calibration.extrinsics import ExtrinsicOffset, offset_of_matrix, rigid
+from shapeshift.training.calibration.residuals import Shape, ShapeResiduals
 from shapeshift.training.first_anchors.initial import common_box
 from shapeshift.training.photos import BLACK, read
 from shapeshift.training.settings import TrainSettings
@@ -24,25 +24,28 @@ from shapeshift.training.train import Trainer
 
 STEPS = 2000  # of training the shape
 MOST_SIDE = 400  # pixels of a photo that the offset is found from
-SOLVE, SOLVE_FIRST = 5, 13  # steps at each offset that is tried, and at a stage's first
+SOLVE, SOLVE_FIRST = 5, 13  # steps at each offset that is tried, and at a level's first
 PROBE = 0.004  # radians, and shares of the distance: 0.3 to 2 pixels
 MOST_STEP = 0.03  # of each of the six numbers, at once
-LEAST_STEP = 1e-5  # a step of less ends a stage
+LEAST_STEP = 1e-5  # a step of less ends a level
 LEAST_CURVE = 0.01  # of the largest: less curvature, or one downwards, counts as that
-Tell = Callable[[str, float], None]  # what is done now, and how far it is, 0..1
+ReportProgress = Callable[[str, float], None]  # what is done now, and how far it is, 0..1
 
 
 @dataclass(frozen=True)
-class Stage:
+class PyramidLevel:
     smaller: int  # sides of the photos are divided by this
     photos: int  # at most, spread evenly
     tries: int  # offsets at most
-    probe: bool  # whether the curvature is measured, or that of the stage before is used
+    probe: bool  # whether the curvature is measured, or that of the level before is used
 
 
-STAGES = (
-    Stage(4, 36, 12, True), Stage(2, 36, 10, True), Stage(1, 36, 8, True), Stage(1, 72, 3, False),
-)  # fmt: skip
+PYRAMID = (
+    PyramidLevel(4, 36, 12, True),
+    PyramidLevel(2, 36, 10, True),
+    PyramidLevel(1, 36, 8, True),
+    PyramidLevel(1, 72, 3, False),
+)
 
 
 def calibrate(
@@ -51,16 +54,21 @@ def calibrate(
     settings: TrainSettings,
     modality: str,
     steps: int = STEPS,
-    stages: tuple[Stage, ...] = STAGES,
-    tell: Tell = lambda what, done: None,
-) -> Found:
+    levels: tuple[PyramidLevel, ...] = PYRAMID,
+    report: ReportProgress = lambda what, done: None,
+) -> ExtrinsicOffset:
     """The offset of a modality's cameras.  Raises BadFile where there is nothing to hold it to."""
-    shape = shape_for(device, capture, settings, modality, steps, tell)
-    return search(device, capture, settings, modality, shape, stages, tell)
+    shape = shape_for(device, capture, settings, modality, steps, report)
+    return search(device, capture, settings, modality, shape, levels, report)
 
 
 def shape_for(
-    device, capture: Capture, settings: TrainSettings, modality: str, steps: int, tell: Tell
+    device,
+    capture: Capture,
+    settings: TrainSettings,
+    modality: str,
+    steps: int,
+    report: ReportProgress,
 ) -> Shape:
     """What another modality's photos show, as splats on the device.  Raises BadFile."""
     other = reference_of(capture, modality)
@@ -68,7 +76,7 @@ def shape_for(
         raise BadFile(f"{capture.folder}: modality '{modality}' has no training photos.")
     _, factor = factors_of(capture, modality, other.name, settings.downscale or 1)
     alone = one_modality(capture, other.name)
-    return shape_of(device, alone, shape_settings(settings, steps, factor), tell)
+    return shape_of(device, alone, shape_settings(settings, steps, factor), report)
 
 
 def search(
@@ -77,29 +85,32 @@ def search(
     settings: TrainSettings,
     modality: str,
     shape: Shape,
-    stages: tuple[Stage, ...],
-    tell: Tell,
-) -> Found:
+    levels: tuple[PyramidLevel, ...],
+    report: ReportProgress,
+) -> ExtrinsicOffset:
     """The offset of a modality's cameras with which a shape shows its photos best."""
     photos = capture.of(modality, "train")
     other = reference_of(capture, modality)
     factor, _ = factors_of(capture, modality, other.name, settings.downscale or 1)
     distance = distance_of([photo.view for photo in photos])
-    offset, inverse, frozen, first = np.eye(4), None, None, None
-    for number, stage in enumerate(stages):
-        tell(f"cameras of {modality}", number / len(stages))
+    offset, inverse = np.eye(4), None
+    residuals: ShapeResiduals | None = None
+    first: ShapeResiduals | None = None
+    for number, level in enumerate(levels):
+        report(f"cameras of {modality}", number / len(levels))
         chosen = [
-            read(photo, factor * stage.smaller, settings.masks)
-            for photo in photos[:: -(-len(photos) // stage.photos)]
+            read(photo, factor * level.smaller, settings.masks)
+            for photo in photos[:: -(-len(photos) // level.photos)]
         ]
         background = choose_background(settings.background, capture.background, chosen)
         behind = float(np.mean(background or BLACK))
-        before, frozen = frozen, Frozen(device, shape, chosen, behind, distance)
-        if before is not None:
-            frozen.gray = before.gray
-        first = first or frozen
-        offset, inverse = descend(frozen, offset, None if stage.probe else inverse, stage.tries)
-    return told(rigid(offset), gain_db(first, offset))
+        finer = ShapeResiduals(device, shape, chosen, behind, distance)
+        if residuals is not None:
+            finer.gray = residuals.gray
+        residuals = finer
+        first = first or residuals
+        offset, inverse = descend(residuals, offset, None if level.probe else inverse, level.tries)
+    return offset_of_matrix(rigid(offset), gain_db(first, offset) if first else 0.0)
 
 
 def reference_of(capture: Capture, modality: str) -> Stop:
@@ -135,17 +146,17 @@ def factors_of(capture: Capture, modality: str, other: str, downscale: int) -> t
 def shape_settings(settings: TrainSettings, steps: int, factor: int) -> TrainSettings:
     """Those of the run that makes the shape: as asked for, but of one modality, without growing."""
     return replace(
-        settings, iterations=steps, seconds=None, grow=False, coarse=1, between="none",
+        settings, iterations=steps, seconds=None, grow=False, blended_shapes=0.0,
         view_dependent=False, downscale=factor,
     )  # fmt: skip
 
 
-def shape_of(device, capture: Capture, settings: TrainSettings, tell: Tell) -> Shape:
+def shape_of(device, capture: Capture, settings: TrainSettings, report: ReportProgress) -> Shape:
     """Means, scales, wxyz and opacity on the device of what a capture of one modality shows."""
     (stop,) = capture.stops
     trainer = Trainer(device, capture, settings)
     for now in trainer.steps():
-        tell(f"shape from {stop.name}", now.fraction)
+        report(f"shape from {stop.name}", now.fraction)
     splats = trainer.step.decode(trainer.control(stop.name), np.zeros(3))
     arrays = [device.download(array) for array in splats.fields()[:4]]
     there = arrays[3] > LEAST_ALPHA
@@ -164,47 +175,47 @@ def distance_of(views: list[View]) -> float:
     return float(np.median(np.linalg.norm(eyes - common_box(views)[0], axis=1)))
 
 
-def curvature(frozen: Frozen, offset: np.ndarray, slope: np.ndarray) -> np.ndarray:
+def curvature(residuals: ShapeResiduals, offset: np.ndarray, slope: np.ndarray) -> np.ndarray:
     """(6, 6) how the slope changes with each of the six numbers; positive definite."""
-    gray, rows = frozen.gray, []
+    gray, rows = residuals.gray, []
     for way in PROBE * np.eye(6):
-        frozen.gray = gray
-        frozen.stand(offset @ frozen.step(way))
-        frozen.solve(SOLVE)
-        rows.append((frozen.slope()[1] - slope) / PROBE)
-    frozen.gray = gray
+        residuals.gray = gray
+        residuals.move_cameras(offset @ residuals.step(way))
+        residuals.solve_brightness(SOLVE)
+        rows.append((residuals.cost_and_gradient()[1] - slope) / PROBE)
+    residuals.gray = gray
     values, axes = np.linalg.eigh((np.array(rows) + np.array(rows).T) / 2)
     values = np.abs(values)
     return axes * np.maximum(values, LEAST_CURVE * values.max()) @ axes.T
 
 
 def descend(
-    frozen: Frozen, offset: np.ndarray, inverse: np.ndarray | None, tries: int
+    residuals: ShapeResiduals, offset: np.ndarray, inverse: np.ndarray | None, tries: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(offset, inverse curvature) after BFGS from those; None: the curvature is measured first."""
-    frozen.stand(offset)
-    frozen.solve(SOLVE_FIRST)
-    cost, slope = frozen.slope()
+    residuals.move_cameras(offset)
+    residuals.solve_brightness(SOLVE_FIRST)
+    cost, slope = residuals.cost_and_gradient()
     if inverse is None:
-        inverse = np.linalg.inv(curvature(frozen, offset, slope))
+        inverse = np.linalg.inv(curvature(residuals, offset, slope))
     for _ in range(tries):
         way = -inverse @ slope
         way *= min(1.0, MOST_STEP / np.abs(way).max()) if way.any() else 1.0
         if not np.abs(way).max() > LEAST_STEP:
             break
-        gray, tried = frozen.gray, offset @ frozen.step(way)
-        frozen.stand(tried)
-        frozen.solve(SOLVE)
-        cost_there, slope_there = frozen.slope()
-        inverse = learned(inverse, way, slope_there - slope)
+        gray, tried = residuals.gray, offset @ residuals.step(way)
+        residuals.move_cameras(tried)
+        residuals.solve_brightness(SOLVE)
+        cost_there, slope_there = residuals.cost_and_gradient()
+        inverse = bfgs_update(inverse, way, slope_there - slope)
         if cost_there < cost:
             offset, cost, slope = tried, cost_there, slope_there
         else:
-            frozen.gray = gray
+            residuals.gray = gray
     return offset, inverse
 
 
-def learned(inverse: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
+def bfgs_update(inverse: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndarray:
     """The inverse curvature with what a step showed of it; where it bends down, smaller steps."""
     along = way @ change
     if not along > 0:
@@ -213,13 +224,13 @@ def learned(inverse: np.ndarray, way: np.ndarray, change: np.ndarray) -> np.ndar
     return left @ inverse @ left.T + np.outer(way, way) / along
 
 
-def gain_db(frozen: Frozen, offset: np.ndarray) -> float:
+def gain_db(residuals: ShapeResiduals, offset: np.ndarray) -> float:
     """How much better the photos are shown from `offset` than from the stated poses."""
     costs = []
     for where in (np.eye(4), offset):
-        frozen.gray = np.zeros_like(frozen.gray)
-        frozen.stand(where)
-        frozen.solve(SOLVE_FIRST)
-        costs.append(frozen.slope()[0])
+        residuals.gray = np.zeros_like(residuals.gray)
+        residuals.move_cameras(where)
+        residuals.solve_brightness(SOLVE_FIRST)
+        costs.append(residuals.cost_and_gradient()[0])
     before, now = np.maximum(costs, 1e-30)
     return float(10 * np.log10(before / now))

@@ -1,7 +1,7 @@
 """How the second camera of a rig sits: one rigid offset for all cameras of a modality.
 
 Their stated poses are off by one and the same turn and shift in the camera's own axes.  What that
-does to views and captures, how a run keeps it, and gradients by it; training.rig_search finds it.
+does to views and captures, how a run keeps it, and gradients by it; calibrate.py finds it.
 """
 
 import json
@@ -54,16 +54,16 @@ def pose_gradient(
     world_from_eye = view.world_from_eye.matrix()
     axes, eye = world_from_eye[:3, :3], world_from_eye[:3, 3]
     place = (means - eye) @ axes  # (N, 3) in the eye's axes
-    pull = by_means @ axes
+    by_place = by_means @ axes
     w, v, by_w, by_v = wxyz[:, :1], wxyz[:, 1:], by_wxyz[:, :1], by_wxyz[:, 1:]
     spin = 0.5 * (w * by_v - by_w * v + np.cross(v, by_v))  # about the world's axes
-    turn = np.cross(place, pull).sum(0) + spin.sum(0) @ axes
-    return -np.concatenate([turn, pull.sum(0)])
+    turn = np.cross(place, by_place).sum(0) + spin.sum(0) @ axes
+    return -np.concatenate([turn, by_place.sum(0)])
 
 
 @dataclass(frozen=True)
-class Found:
-    """What training.rig_search found; a (4, 4) eye_from_found that is rigid."""
+class ExtrinsicOffset:
+    """What calibrate.py found; a (4, 4) eye_from_found that is rigid."""
 
     offset: np.ndarray
     turn_deg: float
@@ -71,18 +71,18 @@ class Found:
     gain_db: float = 0.0  # by how much smaller the error of the modality's photos is with it
 
 
-def told(offset: np.ndarray, gain_db: float = 0.0) -> Found:
+def offset_of_matrix(offset: np.ndarray, gain_db: float = 0.0) -> ExtrinsicOffset:
     cosine = np.clip((np.trace(offset[:3, :3]) - 1) / 2, -1, 1)
     turn_deg = float(np.rad2deg(np.arccos(cosine)))
-    return Found(offset, turn_deg, float(np.linalg.norm(offset[:3, 3])), gain_db)
+    return ExtrinsicOffset(offset, turn_deg, float(np.linalg.norm(offset[:3, 3])), gain_db)
 
 
-def noted(modality: str, found: Found) -> str:
+def rig_json(modality: str, found: ExtrinsicOffset) -> str:
     """What TrainSettings.rig keeps of it."""
     return json.dumps({modality: found.offset.ravel().round(9).tolist()})
 
 
-def with_found(capture: Capture, rig: str) -> Capture:
+def with_extrinsics(capture: Capture, rig: str) -> Capture:
     """The capture with the offsets that TrainSettings.rig keeps.  Raises BadFile."""
     if not rig:
         return capture

@@ -17,7 +17,7 @@ STEEP = (0.4, 2.5)  # contrast that another exposure or white balance may have
 
 
 @dataclass(frozen=True)
-class Suspect:
+class OutlierView:
     name: str  # of the file
     modality: str
     psnr_db: float
@@ -55,7 +55,7 @@ def recolored(image: np.ndarray, photo: np.ndarray, weight: np.ndarray | None) -
 
 def judge(
     modality: str, photos: list[LoadedPhoto], fits: list[tuple[float, float]]
-) -> list[Suspect]:
+) -> list[OutlierView]:
     """Those that stand out, worst first.  fits: (dB, dB after recoloring) of every photo."""
     if len(fits) < FEWEST:
         return []
@@ -64,11 +64,13 @@ def judge(
     spread = 1.4826 * float(np.median(np.abs(values - median)))
     limit = median - max(LEAST_DB, SPREADS * spread)
     out = [
-        Suspect(photo.name, modality, fit, median, bool(again >= limit and again - fit >= LEAST_DB))
+        OutlierView(
+            photo.name, modality, fit, median, bool(again >= limit and again - fit >= LEAST_DB)
+        )
         for photo, (fit, again) in zip(photos, fits, strict=True)
         if not fit >= limit
     ]
-    return sorted(out, key=lambda suspect: suspect.psnr_db)
+    return sorted(out, key=lambda outlier: outlier.psnr_db)
 
 
 def drawn(trainer: Trainer, photo: LoadedPhoto) -> tuple[np.ndarray, np.ndarray]:
@@ -79,7 +81,7 @@ def drawn(trainer: Trainer, photo: LoadedPhoto) -> tuple[np.ndarray, np.ndarray]
     return image, photo.over(background)
 
 
-def hopeless(trainer: Trainer) -> list[str]:
+def failed_modalities(trainer: Trainer) -> list[str]:
     """A sentence where pictures are no nearer to the photos than a sheet of one colour is."""
     lost = []
     for modality, photos in trainer.schedule.photos.items():
@@ -96,12 +98,12 @@ def hopeless(trainer: Trainer) -> list[str]:
         return []
     return [
         f"{', '.join(lost)}: the pictures are no nearer to the photos than one colour all over; "
-        "train longer, take other --points (hull where the background is known), or a smaller "
-        "--rate-scale, and check that photos and poses belong together."
+        "train longer, or take other --points (hull where the background is known), and check "
+        "that photos and poses belong together."
     ]
 
 
-def suspects(trainer: Trainer) -> list[Suspect]:
+def find_outlier_views(trainer: Trainer) -> list[OutlierView]:
     """Draws every training photo of a trained model once; those that stand out in their modality.
 
     A model that is far from trained fits all photos badly, so few stand out; but then close-ups,
@@ -118,9 +120,9 @@ def suspects(trainer: Trainer) -> list[Suspect]:
     return out
 
 
-def report(found: list[Suspect]) -> list[str]:
+def report(found: list[OutlierView]) -> list[str]:
     """A sentence for each of them, as far as anybody would read."""
-    lines = [suspect.sentence() for suspect in found[:SHOWN]]
+    lines = [outlier.sentence() for outlier in found[:SHOWN]]
     if len(found) > SHOWN:
         lines.append(f"... and {len(found) - SHOWN} more.")
     return lines

@@ -8,6 +8,7 @@ Photos count as grey.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -21,13 +22,14 @@ from shapeshift.training.photos import LoadedPhoto
 
 GRAY = 6  # of a record's numbers: the first of its colour's three
 FIRST_GRAY = 0.3
-SIDES = 4  # numbers of a splat's brightness: one from all sides, and how it changes with the side
+SIDES = 4  # numbers of a splat's brightness: one from all basis, and how it changes with the side
 LEAST_SEEN = 0.01  # pixels: splats that fill less in all photos change no faster than at this
-Shape = tuple  # means (N, 3), scales (N, 3), wxyz (N, 4), opacity (N,) on the device, metres
+# means (N, 3), scales (N, 3), wxyz (N, 4), opacity (N,) on the device, metres
+Shape = tuple[Any, Any, Any, Any]
 Answer = Callable[[int, np.ndarray], np.ndarray]  # of a photo and a picture (H, W): a gradient
 
 
-class Frozen:
+class ShapeResiduals:
     """Splats of one shape before the photos of one modality, at one offset of its cameras."""
 
     def __init__(
@@ -37,7 +39,7 @@ class Frozen:
         self.device, self.shape, self.photos = device, shape, photos
         self.behind, self.distance = behind, distance
         self.count = shape[0].shape[0]
-        self.gray = np.zeros((self.count, SIDES))  # see `sides`
+        self.gray = np.zeros((self.count, SIDES))  # see `basis`
         self.gray[:, 0] = FIRST_GRAY
         self.means = device.download(shape[0]).astype(np.float64)
         self.wanted = [p.over((behind,) * 3).mean(axis=2, dtype=np.float32) for p in photos]
@@ -57,7 +59,7 @@ class Frozen:
         moved[:3, 3] += self.pivot - moved[:3, :3] @ self.pivot
         return moved
 
-    def stand(self, eye_from_found: np.ndarray) -> None:
+    def move_cameras(self, eye_from_found: np.ndarray) -> None:
         """Put all cameras `eye_from_found` (4, 4) beside their stated poses."""
         self.views = [offset_view(photo.view, eye_from_found) for photo in self.photos]
         blank = self.device.zeros((self.count, 3))
@@ -67,9 +69,9 @@ class Frozen:
         if self.pace is None:  # what A^T A does to ones bounds its eigenvalues
             ones = np.zeros_like(self.gray)
             ones[:, 0] = 1
-            self.pace = np.maximum(self.seen(ones)[:, :1], LEAST_SEEN)
+            self.pace = np.maximum(self.normal_product(ones)[:, :1], LEAST_SEEN)
 
-    def sides(self, photo: LoadedPhoto) -> np.ndarray:
+    def view_basis(self, photo: LoadedPhoto) -> np.ndarray:
         """(N, 4) 1 and the direction to each splat from where the photo is said to be taken; by
         an offset that turns by next to nothing.  Times `gray` and summed: how bright it looks.
         """
@@ -78,17 +80,18 @@ class Frozen:
         return np.concatenate([np.ones((self.count, 1)), way], axis=1)
 
     def projected(self, view: View, color) -> Projected:
-        return project(self.device, *self.shape, color, camera_of(view))
+        means, scales, wxyz, opacity = self.shape
+        return project(self.device, means, scales, wxyz, opacity, color, camera_of(view))
 
-    def seen(self, gray: np.ndarray) -> np.ndarray:
+    def normal_product(self, gray: np.ndarray) -> np.ndarray:
         """(N, 4) A^T A gray, where A draws splats of that brightness in all photos."""
-        return self.answered(gray, 0.0, lambda i, picture: picture * self.weights[i])
+        return self.adjoint(gray, 0.0, lambda i, picture: picture * self.weights[i])
 
-    def missing(self, i: int, picture: np.ndarray) -> np.ndarray:
+    def residual(self, i: int, picture: np.ndarray) -> np.ndarray:
         """What a picture lacks of a photo, by how much that counts."""
         return (self.wanted[i] - picture) * self.weights[i]
 
-    def answered(
+    def adjoint(
         self, gray: np.ndarray, behind: float, answer: Answer, by_step: np.ndarray | None = None
     ) -> np.ndarray:
         """(N, 4) the gradient by `gray` of what `answer` says of every photo's picture, summed.
@@ -97,8 +100,8 @@ class Frozen:
         """
         device, by_gray = self.device, np.zeros_like(gray)
         for i, (view, tiles) in enumerate(zip(self.views, self.tiles, strict=True)):
-            sides = self.sides(self.photos[i])
-            bright = (sides * gray).sum(axis=1, keepdims=True).astype(np.float32)
+            basis = self.view_basis(self.photos[i])
+            bright = (basis * gray).sum(axis=1, keepdims=True).astype(np.float32)
             color = device.upload(bright.repeat(3, axis=1))
             projected = self.projected(view, color)
             frame = rasterize(device, projected, tiles, view.size, (behind,) * 3)
@@ -107,28 +110,29 @@ class Frozen:
             record = rasterize_backward(
                 device, projected, tiles, frame, device.upload(grad), absolute=False
             )
-            by_gray += device.view(record)[:, GRAY, None] * sides
+            by_gray += device.view(record)[:, GRAY, None] * basis
             if by_step is not None:
                 by_step += self.step_gradient(view, color, projected, record)
         return by_gray
 
     def step_gradient(self, view: View, color, projected: Projected, record) -> np.ndarray:
         """(6,) gradient by `step` of what the gradients of one view's records say."""
+        means, scales, wxyz, opacity = self.shape
         by_means, _, by_wxyz, *_ = project_backward(
-            self.device, *self.shape, color, camera_of(view), projected, record
+            self.device, means, scales, wxyz, opacity, color, camera_of(view), projected, record
         )
-        means, wxyz, *by = map(self.device.view, (self.shape[0], self.shape[2], by_means, by_wxyz))
+        means, wxyz, *by = map(self.device.view, (means, wxyz, by_means, by_wxyz))
         by_pose = pose_gradient(view, means, wxyz, *by)
         by_pose[:3] -= np.cross(self.pivot, by_pose[3:])
         return by_pose * np.repeat([1.0, self.distance], 3)
 
-    def solve(self, steps: int) -> None:
+    def solve_brightness(self, steps: int) -> None:
         """Brings `gray` nearer to what shows the photos best from where the cameras stand."""
-        gradient = self.answered(self.gray, self.behind, self.missing)
+        gradient = self.adjoint(self.gray, self.behind, self.residual)
         nearer = gradient / self.pace
         way, size = nearer.copy(), np.vdot(gradient, nearer)
         for _ in range(steps):
-            moved = self.seen(way)
+            moved = self.normal_product(way)
             curve = np.vdot(way, moved)
             if not curve > 0:  # nothing is left to explain
                 return
@@ -138,7 +142,7 @@ class Frozen:
             size = np.vdot(gradient, nearer)
             way = nearer + size / before * way
 
-    def slope(self) -> tuple[float, np.ndarray]:
+    def cost_and_gradient(self) -> tuple[float, np.ndarray]:
         """Half the mean square error from where the cameras stand, and its (6,) gradient by
         `step`; that of the best brightness, too, which has no gradient of its own.
         """
@@ -146,9 +150,9 @@ class Frozen:
 
         def over(i: int, picture: np.ndarray) -> np.ndarray:
             nonlocal cost
-            error = -self.missing(i, picture)
+            error = -self.residual(i, picture)
             cost += 0.5 * float((error * (picture - self.wanted[i])).sum(dtype=np.float64))
             return error
 
-        self.answered(self.gray, self.behind, over, by_step)
+        self.adjoint(self.gray, self.behind, over, by_step)
         return cost / self.values, by_step / self.values

@@ -1,8 +1,8 @@
-"""Densification: anchors that show nothing go, others come where the pictures ask for them.
+"""Densification: anchors that show nothing are removed, others come where the gradients are large.
 
-A splat asks by its screen gradient with every pixel's part taken absolutely (AbsGS): a large splat
-over fine texture pulls, though its pixels disagree about where to go.  At the cap the anchors that
-give least to the pictures move to where the pull is strongest, as dead splats do in 3DGS-MCMC.
+`grad2d` is a splat's screen gradient with every pixel's part taken absolutely (AbsGS): that of a
+large splat over fine texture is large, though its pixels disagree about where to go.  At the cap
+the anchors of the least contribution move to the largest gradients, as dead splats do in 3DGS-MCMC.
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ import numpy as np
 
 from shapeshift.rasterizer.project import LEAST_ALPHA
 
-THRESHOLD = 6e-4  # mean pull in half image widths; absolute gradients are some 3 times 3DGS's 2e-4
-SHRINK = 0.5  # size of a new anchor in that of the one whose splat pulled
+GRAD2D_THRESHOLD = 6e-4  # half image widths; absolute ones are some 3 times 3DGS's 2e-4
+SHRINK = 0.5  # size of a new anchor in that of its parent
 EXCHANGED = 0.05  # of all anchors, at most: those that make room once the cap is reached
 LEAST_OPACITY = 0.005  # mean of an anchor's splats below which it goes
 LEAST_VIEWS = 10  # steps that must have shown a splat, or an anchor, for its sums to count
@@ -22,20 +22,20 @@ AXIS_BITS = 21  # of a key of a grid cell
 
 
 @dataclass(frozen=True)
-class Newcomers:
+class NewAnchors:
     """New anchors, those that are wanted most first."""
 
     anchors: np.ndarray  # (M, 3) float32 metres
-    parents: np.ndarray  # (M,) anchor whose splat pulled: all else but the size is copied from it
+    parents: np.ndarray  # (M,) anchor of the splat: all else but the size is copied from it
 
-    def first(self, count: int) -> "Newcomers":
-        return Newcomers(self.anchors[:count], self.parents[:count])
+    def first(self, count: int) -> "NewAnchors":
+        return NewAnchors(self.anchors[:count], self.parents[:count])
 
 
-def transparent(opacity: np.ndarray, steps: int, splats_per_anchor: int) -> np.ndarray:
+def transparent_anchors(opacity: np.ndarray, steps: int, splats_per_anchor: int) -> np.ndarray:
     """(A,) bool: anchors whose splats have a mean opacity below LEAST_OPACITY.
 
-    opacity: (A, 2) of Evidence over `steps`.
+    opacity: (A, 2) of DensificationStats over `steps`.
     """
     if steps < LEAST_STEPS:
         return np.zeros(len(opacity), bool)
@@ -43,19 +43,20 @@ def transparent(opacity: np.ndarray, steps: int, splats_per_anchor: int) -> np.n
     return (ran >= LEAST_RUNS) & (total < LEAST_OPACITY * ran * splats_per_anchor)
 
 
-def contribution(given: np.ndarray) -> np.ndarray:
+def mean_contribution(contribution: np.ndarray) -> np.ndarray:
     """(A,) pixels that an anchor gives to a picture that shows it, at the stop where it gives most.
 
-    given: (stops, A, 2) of Evidence; fewer than LEAST_VIEWS pictures say nothing: infinite.
+    contribution: (stops, A, 2) of DensificationStats; infinite where fewer than LEAST_VIEWS
+    pictures showed the anchor.
     """
-    sums, views = given[..., 0], given[..., 1]
+    sums, views = contribution[..., 0], contribution[..., 1]
     each = sums / np.maximum(views, 1)
     return np.where(views.sum(0) < LEAST_VIEWS, np.inf, each.max(0))
 
 
-def weakest(given: np.ndarray, among: np.ndarray, count: int) -> np.ndarray:
+def least_contributing(contribution: np.ndarray, among: np.ndarray, count: int) -> np.ndarray:
     """Indices of at most `count` anchors `among` (A,) bool that give least to their pictures."""
-    gives = np.where(among, contribution(given), np.inf)
+    gives = np.where(among, mean_contribution(contribution), np.inf)
     order = np.argsort(gives, kind="stable")[:count]
     return order[np.isfinite(gives[order])]
 
@@ -67,24 +68,24 @@ def cell_keys(points: np.ndarray, cell: float, origin: np.ndarray) -> np.ndarray
     return (cells[:, 0] << 2 * AXIS_BITS) | (cells[:, 1] << AXIS_BITS) | cells[:, 2]
 
 
-def newcomers(
+def new_anchors(
     anchors: np.ndarray,  # (A, 3) metres
     sizes: np.ndarray,  # (A,) metres
     means: list[np.ndarray],  # (A * k, 3) metres at every stop; NaN where the splat is absent
-    pull: np.ndarray,  # (A * k, 2) of Evidence
-) -> Newcomers:
-    """New anchors under splats that pull, one in each free cube of the size it will have."""
-    views = pull[:, 1]
-    strength = np.where(views > LEAST_VIEWS, pull[:, 0] / np.maximum(views, 1), 0)
+    grad2d: np.ndarray,  # (A * k, 2) of DensificationStats
+) -> NewAnchors:
+    """New anchors at splats of a large gradient, one in each free cube of their size."""
+    views = grad2d[:, 1]
+    strength = np.where(views > LEAST_VIEWS, grad2d[:, 0] / np.maximum(views, 1), 0)
     strongest = np.argsort(-strength, kind="stable")
-    strongest = strongest[strength[strongest] > THRESHOLD]
+    strongest = strongest[strength[strongest] > GRAD2D_THRESHOLD]
     places = np.stack([mean[strongest] for mean in means], axis=1).reshape(-1, 3)
     splats = np.repeat(strongest, len(means))  # strongest first, its stops one after the other
     there = np.isfinite(places).all(axis=1)
     places, splats = places[there], splats[there]
-    parents = splats // (len(pull) // max(len(anchors), 1))
+    parents = splats // (len(grad2d) // max(len(anchors), 1))
     if not len(places):
-        return Newcomers(np.zeros((0, 3), np.float32), np.zeros(0, np.int64))
+        return NewAnchors(np.zeros((0, 3), np.float32), np.zeros(0, np.int64))
     # Sizes in steps of two, so that anchors of one step share a grid.
     level = np.round(np.log2(SHRINK * sizes[parents])).astype(int)
     origin = np.minimum(places.min(0), anchors.min(0))
@@ -96,28 +97,28 @@ def newcomers(
         taken = cell_keys(anchors, 2.0**step, origin)
         kept.append(mine[first[~np.isin(keys[first], taken)]])
     order = np.sort(np.concatenate(kept))
-    return Newcomers(places[order].astype(np.float32), parents[order])
+    return NewAnchors(places[order].astype(np.float32), parents[order])
 
 
-def change(
+def densify_and_prune(
     anchors: np.ndarray, sizes: np.ndarray, means: list[np.ndarray],
-    evidence: dict[str, np.ndarray], most: int,
-) -> tuple[np.ndarray, Newcomers]:  # fmt: skip
+    stats: dict[str, np.ndarray], most: int,
+) -> tuple[np.ndarray, NewAnchors]:  # fmt: skip
     """(A,) bool which anchors stay, and who comes, so that at most `most` are left.
 
-    anchors, sizes and means as of `newcomers`; evidence: the state of Evidence.
+    anchors, sizes and means as of `new_anchors`; stats: the state of DensificationStats.
     """
     splats = len(means[0]) // len(anchors)
-    gone = transparent(evidence["evidence.opacity"], int(evidence["evidence.steps"]), splats)
+    gone = transparent_anchors(stats["densify.opacity"], int(stats["densify.steps"]), splats)
     if gone.all():
         gone[:] = False
-    new = newcomers(anchors, sizes, means, evidence["evidence.pull"])
+    new = new_anchors(anchors, sizes, means, stats["densify.grad2d"])
     room = max(most - int((~gone).sum()), 0)
     if len(new.anchors) > room:
         swaps = min(len(new.anchors) - room, int(EXCHANGED * len(anchors)))
         among = ~gone
         among[new.parents[: room + swaps]] = False  # who is needed does not make room
-        freed = weakest(evidence["evidence.given"], among, swaps)
+        freed = least_contributing(stats["densify.contribution"], among, swaps)
         gone[freed] = True
         room += len(freed)
     return ~gone, new.first(room)
@@ -128,8 +129,8 @@ def absent_as_nan(means: np.ndarray, opacity: np.ndarray) -> np.ndarray:
     return np.where(opacity[:, None] > LEAST_ALPHA, means, np.nan)
 
 
-def changed_state(
-    state: dict[str, np.ndarray], groups: tuple[str, ...], keep: np.ndarray, new: Newcomers
+def resize_optimizer_state(
+    state: dict[str, np.ndarray], groups: tuple[str, ...], keep: np.ndarray, new: NewAnchors
 ) -> dict[str, np.ndarray]:
     """An optimiser's state with some anchors gone and others added at the end, at rest.
 

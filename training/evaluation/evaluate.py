@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.supervision.exposure import fitted_psnr
 
 MOST_LOOKED_AT, LOOKED_AT_PX = 12, 64  # held-out photos, for the colour behind them
-LIKENESS = ("psnr_db", "ssim", "vgg", "depth_error", "fitted_db")  # fields of Score: means
+SOME_HAVE = ("vgg", "depth_error", "fitted_db")  # fields of Score that not every photo has
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Score:
     alive: int  # splats of this stop that are not absent
     each: dict[str, float]  # PSNR of every photo, dB, by its path in the capture
     vgg: float | None = None  # training.vgg_distance; None: not measured
-    depth_error: float | None = None  # of photos with depth: Painter.depth_error
+    depth_error: float | None = None  # of photos with depth: ModelRenderer.depth_error
     fitted_db: float | None = None  # of right halves, colours fitted on left ones: fitted_psnr
 
     @property
@@ -43,12 +44,13 @@ class Score:
         return float(np.median(list(self.each.values())))
 
 
-class Painter:
+class ModelRenderer:
     """Draws a model as a package holds it, through onnxruntime and the rasterizer."""
 
     def __init__(self, device, model: Model) -> None:
         self.device, self.evaluator = device, Evaluator(model)
-        self.x: float | None = None
+        self.x = math.nan  # none yet
+        self.geometry: tuple[Any, Any, Any, Any]  # means, scales, wxyz, opacity on the device
 
     def set_control(self, x: float) -> int:
         """Decode the geometry for x; returns how many splats are not absent.
@@ -65,7 +67,10 @@ class Painter:
     def _decode(self, eye: np.ndarray | None) -> int:
         """Geometry at the last control value; returns how many splats are not absent."""
         geometry = self.evaluator.geometry(self.x, eye=eye)
-        self.geometry = [self.device.upload(np.asarray(a, np.float32)) for a in geometry]
+        means, scales, wxyz, opacity = (
+            self.device.upload(np.asarray(a, np.float32)) for a in geometry
+        )
+        self.geometry = means, scales, wxyz, opacity
         return int((geometry[3] >= LEAST_ALPHA).sum())
 
     def picture(self, view: View, background: tuple[float, float, float]) -> np.ndarray:
@@ -81,7 +86,9 @@ class Painter:
             self._decode(view.world_from_eye.position)
         color = self.evaluator.color(self.x, view.world_from_eye.position)
         color = self.device.upload(np.asarray(color, np.float32))
-        projected = project(self.device, *self.geometry, color, camera_of(view))
+        means, scales, wxyz, opacity = self.geometry
+        camera = camera_of(view)
+        projected = project(self.device, means, scales, wxyz, opacity, color, camera)
         tiles = bin_tiles(self.device, projected, view.size)
         frame = rasterize(self.device, projected, tiles, view.size, background)
         return projected, tiles, frame
@@ -91,12 +98,12 @@ class Painter:
 
         Where less than half of a pixel is covered there is no depth: that counts as 1.
         """
-        known = None if photo.depth is None else photo.depth > 0
-        if known is None or not known.any():
+        if photo.depth is None or not (known := photo.depth > 0).any():
             return None
         view, device = photo.view, self.device
         projected, tiles, _ = self.draw(view, BLACK)
-        surfaces = surface(device, *self.geometry[:3], camera_of(view), projected)
+        means, scales, wxyz, _ = self.geometry
+        surfaces = surface(device, means, scales, wxyz, camera_of(view), projected)
         drawn = rasterize_depth(device, projected, tiles, surfaces, view.size)
         coverage = 1 - device.download(drawn.frame.transmittance)
         depth = device.download(drawn.metres) / np.maximum(coverage, 1e-6)
@@ -142,18 +149,19 @@ def evaluate_model(
             smaller = math.ceil(max(photo.view.size) / LOOKED_AT_PX)
             shown.append(read(photo, max(factor, smaller), masks))
     behind = choose_background(background, known, shown) or BLACK
-    painter, scores = Painter(device, model), {}
+    renderer, scores = ModelRenderer(device, model), {}
     for stop in capture.stops:
-        alive = painter.set_control(stop_for(model, stop).x)
+        alive = renderer.set_control(stop_for(model, stop).x)
         names, found = [], []
         for photo in capture.of(stop.name, "test"):
             loaded = read(photo, factor, masks)  # one at a time is in memory
             names.append(name_in(capture, loaded))
-            found.append(likeness(painter, loaded, behind, distance))
+            found.append(photo_scores(renderer, loaded, behind, distance))
         if found:
             each = {name: of["psnr_db"] for name, of in zip(names, found, strict=True)}
-            means = {key: mean_of(found, key) for key in LIKENESS}
-            scores[stop.name] = Score(photos=len(found), alive=alive, each=each, **means)
+            psnr_db, ssim_mean = (mean_of(found, key) or 0.0 for key in ("psnr_db", "ssim"))
+            some = {key: mean_of(found, key) for key in SOME_HAVE}
+            scores[stop.name] = Score(psnr_db, ssim_mean, len(found), alive, each, **some)
     return scores
 
 
@@ -166,11 +174,14 @@ def known_background(model: Model, capture: Capture) -> tuple | None:
     return tuple(map(float, found)) if good else None
 
 
-def likeness(
-    painter: Painter, photo: LoadedPhoto, behind: Color, distance: Callable[..., float] | None
+def photo_scores(
+    renderer: ModelRenderer,
+    photo: LoadedPhoto,
+    behind: Color,
+    distance: Callable[..., float] | None,
 ) -> dict[str, float]:
     """What Score has the means of, of one photo; without what it has not."""
-    picture, wanted = painter.picture(photo.view, behind), photo.over(behind)
+    picture, wanted = renderer.picture(photo.view, behind), photo.over(behind)
     found = {
         "psnr_db": float(psnr(picture, wanted, photo.weight)),
         "ssim": float(ssim(picture, wanted, photo.weight)),
@@ -178,7 +189,7 @@ def likeness(
     }
     if distance is not None:
         found["vgg"] = float(distance(picture, wanted, photo.weight))
-    if (error := painter.depth_error(photo)) is not None:
+    if (error := renderer.depth_error(photo)) is not None:
         found["depth_error"] = error
     return found
 

@@ -49,7 +49,7 @@ class VggDistance:
 
         weight (H, W) 0..1: where it is 0 the picture is taken to be as the photo.
         """
-        refuse_small(photo.shape[1], photo.shape[0])
+        check_size(photo.shape[1], photo.shape[0])
         image = np.clip(image, 0, 1)
         if weight is not None:
             image = photo + weight[..., None] * (image - photo)
@@ -58,7 +58,7 @@ class VggDistance:
         return distance_of(self.session.run(list(LAYERS), {self.input: pair}))
 
 
-def refuse_small(width: int, height: int) -> None:
+def check_size(width: int, height: int) -> None:
     """Raises BadFile for photos of which three halvings leave nothing."""
     if not min(width, height) >= LEAST_SIDE:
         raise BadFile(

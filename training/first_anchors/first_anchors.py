@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapeshift.training.first_anchors.initial import (
-    First,
+    InitialPoints,
     median_neighbour,
     pixel_of,
     voxel_centres,
@@ -35,33 +35,34 @@ class FirstAnchors(NamedTuple):
 
 
 def first_anchors(
-    first: First, most: int, photos: list[LoadedPhoto], background: tuple | None
+    first: InitialPoints, most: int, photos: list[LoadedPhoto], background: tuple | None
 ) -> FirstAnchors:
     """At most `most` anchors at the points of a capture.
 
     background: of the photos where they are see-through; None: black.
     """
-    places = chosen(first, most)
+    places = choose_positions(first, most)
     size = neighbour_distance(places)
     voxel = max(float(np.median(size)), 1e-9)  # of places that float32 cannot tell apart: 0
     size = np.clip(size, voxel / SIZES, voxel * SIZES)
     axes, wxyz = surface_axes(places, np.concatenate([first.points, first.guesses]))
     frames = np.concatenate([np.log(size[:, None] / voxel * axes), wxyz], axis=1)
-    seen = np.clip(seen_colors(places, photos, background or BLACK), DARKEST, BRIGHTEST)
+    seen = np.clip(photo_colors(places, photos, background or BLACK), DARKEST, BRIGHTEST)
     colors = np.log(seen / (1 - seen))
-    return FirstAnchors(*(a.astype(np.float32) for a in (places, frames, colors)), voxel)
+    at, axes, logits = (a.astype(np.float32) for a in (places, frames, colors))
+    return FirstAnchors(at, axes, logits, voxel)
 
 
-def chosen(first: First, most: int) -> np.ndarray:
+def choose_positions(first: InitialPoints, most: int) -> np.ndarray:
     """(A, 3) at most so many places: of the points, and of the guesses beside them."""
-    guesses = spread(first.guesses, int(GUESSES * most))
+    guesses = subsample(first.guesses, int(GUESSES * most))
     points = np.unique(first.points, axis=0)  # scans have some of them twice
     if len(first.shapes) > 1:  # hulls lie over each other where stops have the same outlines
         points = voxel_centres(points, median_neighbour(points, np.random.default_rng(0)))
-    return np.concatenate([spread(points, most - len(guesses)), guesses])
+    return np.concatenate([subsample(points, most - len(guesses)), guesses])
 
 
-def spread(points: np.ndarray, most: int) -> np.ndarray:
+def subsample(points: np.ndarray, most: int) -> np.ndarray:
     """At most so many of the points, each standing for equally many: as dense as they are, evenly.
 
     The points are halved across their longest side until each part has one place, the point that is
@@ -118,7 +119,7 @@ def surface_axes(places: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np
     return np.clip(spread, *FLATNESS), xyzw[:, [3, 0, 1, 2]]
 
 
-def seen_colors(points: np.ndarray, photos: list[LoadedPhoto], background: tuple) -> np.ndarray:
+def photo_colors(points: np.ndarray, photos: list[LoadedPhoto], background: tuple) -> np.ndarray:
     """(P, 3) the mean colour of the pixels that points (P, 3) fall on; grey where on none."""
     total, times = np.zeros((len(points), 3)), np.zeros(len(points))
     for photo in photos[:: -(-len(photos) // COLOR_PHOTOS)]:

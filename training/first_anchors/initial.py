@@ -63,17 +63,17 @@ def pixel_of(view: View, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return pixel, inside
 
 
-def common_box(views: list[View]) -> tuple[np.ndarray, np.ndarray]:
+def common_box(views: list[View]) -> tuple[np.ndarray, float]:
     """(centre (3,), half side) metres of the place that the cameras look at together."""
     eyes = np.array([v.world_from_eye.position for v in views])
     ahead = np.array([-v.world_from_eye.matrix()[:3, 2] for v in views])
     # nearest point to all viewing axes, least squares; nearly parallel axes are held near the eyes
     away = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
     spread = max(float(np.linalg.norm(eyes - eyes.mean(0), axis=1).max()), 1e-3)
-    pull = 1e-3 * len(views)
+    weight = 1e-3 * len(views)  # of the guess
     guess = (eyes + spread * ahead).mean(0)
     centre = np.linalg.solve(
-        away.sum(0) + pull * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + pull * guess
+        away.sum(0) + weight * np.eye(3), (away @ eyes[:, :, None]).sum(0)[:, 0] + weight * guess
     )
     distance = np.median(np.linalg.norm(eyes - centre, axis=1))
     tangent = np.median([max(abs(t) for t in v.tangents) for v in views])
@@ -91,7 +91,7 @@ def silhouette(photo: LoadedPhoto, background: tuple | None) -> np.ndarray | Non
     return shape if photo.weight is None else shape | ~(photo.weight > 0)  # unknown: not carved
 
 
-def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
+def carve(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) -> np.ndarray:
     """(P, 3) centres of the surface cells of a box that no silhouette shows as background.
 
     photos: (view, silhouette).  The box from `low` to `high` has about side^3 cells, all cubes:
@@ -121,14 +121,14 @@ def carved(photos: list[tuple], low: np.ndarray, high: np.ndarray, side: int) ->
 def visual_hull(photos: list[tuple], centre: np.ndarray, half: float) -> np.ndarray:
     """(P, 3) surface of what all silhouettes allow, carved coarsely first, then in its own box."""
     photos = photos[:: -(-len(photos) // HULL_PHOTOS)]
-    coarse = carved(photos, centre - half, centre + half, COARSE_SIDE)
+    coarse = carve(photos, centre - half, centre + half, COARSE_SIDE)
     if not len(coarse):
         return coarse
     margin = 2 * half / COARSE_SIDE
-    return carved(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
+    return carve(photos, coarse.min(0) - margin, coarse.max(0) + margin, FINE_SIDE)
 
 
-def hull_points(photos: list[LoadedPhoto], background: tuple | None) -> list[np.ndarray]:
+def visual_hulls(photos: list[LoadedPhoto], background: tuple | None) -> list[np.ndarray]:
     """(P, 3) the hull of each modality, since one may hide what another shows.
 
     Empty where no photo tells object from background.
@@ -174,7 +174,7 @@ def filler_points(
     return np.concatenate(found) if found else np.zeros((0, 3))
 
 
-class First(NamedTuple):
+class InitialPoints(NamedTuple):
     """Where a run starts."""
 
     points: np.ndarray  # (P, 3) metres
@@ -185,7 +185,7 @@ class First(NamedTuple):
 
 def initial_points(
     capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator, source: str = "auto"
-) -> First:
+) -> InitialPoints:
     """The first points, from the best source that there is.  Raises BadFile.
 
     source: one of SOURCES, or the path of a cloud; auto takes the first of these that there is:
@@ -193,7 +193,7 @@ def initial_points(
     """
     hulls = []
     if source not in SOURCES:
-        return seen_cloud(Path(source), capture, photos, rng)
+        return visible_cloud(Path(source), capture, photos, rng)
     if source in ("auto", "capture") and capture.points is not None and len(capture.points):
         points = np.asarray(capture.points, np.float64)
         return with_guesses(points, "points", capture, photos, rng)
@@ -202,9 +202,9 @@ def initial_points(
         if len(points):
             return with_guesses(points, "depth photos", capture, photos, rng)
     if source in ("auto", "hull"):
-        hulls = hull_points(photos, capture.background)
+        hulls = visual_hulls(photos, capture.background)
     if shapes := tuple(hull for hull in hulls if len(hull)):
-        return First(np.concatenate(shapes), "hull", shapes)
+        return InitialPoints(np.concatenate(shapes), "hull", shapes)
     if hulls and any(p.see_through for p in photos):
         raise BadFile(
             f"{capture.folder}: the masks have no volume in common; check that masks and poses "
@@ -218,23 +218,23 @@ def initial_points(
         }[source]
         raise BadFile(f"{capture.folder} {lacking}; take other --points, or leave them out.")
     points = random_points(photos, rng)
-    return First(points, "random", (points,))
+    return InitialPoints(points, "random", (points,))
 
 
 def with_guesses(
     points: np.ndarray, origin: str, capture: Capture, photos: list[LoadedPhoto],
     rng: np.random.Generator,
-) -> First:  # fmt: skip
+) -> InitialPoints:  # fmt: skip
     """The points, and guesses beside them where the photos have no known background."""
     if capture.background is not None or any(p.see_through for p in photos):
-        return First(points, origin, (points,))
+        return InitialPoints(points, origin, (points,))
     guesses = filler_points(points, photos, rng)
-    return First(points, f"{origin} and guesses", (points,), guesses)
+    return InitialPoints(points, f"{origin} and guesses", (points,), guesses)
 
 
-def seen_cloud(
+def visible_cloud(
     path: Path, capture: Capture, photos: list[LoadedPhoto], rng: np.random.Generator
-) -> First:
+) -> InitialPoints:
     """What the photos see of a cloud file: scanners see farther than what was photographed."""
     if path.suffix.lower() not in CLOUDS:
         raise BadFile(
@@ -258,5 +258,6 @@ def random_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.nda
     """(P, 3) anywhere in the place that the cameras look at together."""
     centre, half = common_box([p.view for p in photos])
     cloud = centre + half * rng.uniform(-1, 1, (RANDOM_POINTS, 3))
-    watched = sum(pixel_of(p.view, cloud)[1] for p in photos) >= max(1, len(photos) // 3)
+    seen = np.sum([pixel_of(p.view, cloud)[1] for p in photos], axis=0)
+    watched = seen >= max(1, len(photos) // 3)
     return cloud[watched] if watched.any() else cloud

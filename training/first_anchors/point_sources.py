@@ -1,4 +1,4 @@
-"""First points out of clouds that somebody measured and out of depth photos."""
+"""InitialPoints points out of clouds that somebody measured and out of depth photos."""
 
 from pathlib import Path
 
@@ -29,11 +29,11 @@ def cloud_points(path: Path, capture: Capture, rng: np.random.Generator) -> tupl
     if not (len(points) and np.isfinite(points).all()):
         raise BadFile(f"{path}: holds no points, or some that are no numbers; export it again.")
     up = capture.notes.get("up_in_file", (0.0, 1.0, 0.0))
-    turned = thinned(points, rng) @ upright_rotation(up, str(path))[:3, :3].T
+    turned = subsampled(points, rng) @ upright_rotation(up, str(path))[:3, :3].T
     return turned, count
 
 
-def thinned(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def subsampled(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """MOST_POINTS of the points at random, in their order: dense places stay denser."""
     if len(points) <= MOST_POINTS:
         return points
@@ -42,15 +42,15 @@ def thinned(points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def depth_points(photos: list[LoadedPhoto], rng: np.random.Generator) -> np.ndarray:
     """(P, 3) metres where depth photos saw something, at most MOST_POINTS; (0, 3) without any."""
-    deep = [p for p in photos if p.depth is not None]
-    known = sum(int((p.depth > 0).sum()) for p in deep)
+    deep = [(p.view, p.depth) for p in photos if p.depth is not None]
+    known = sum(int(np.count_nonzero(depth > 0)) for _, depth in deep)
     share, found = min(1.0, MOST_POINTS / max(known, 1)), [np.zeros((0, 3))]
-    for photo in deep:
-        row, column = np.nonzero(photo.depth > 0)
+    for view, depth in deep:
+        row, column = np.nonzero(depth > 0)
         kept = rng.random(len(row)) < share
         row, column = row[kept], column[kept]
-        camera_from_world, fx, fy, cx, cy = photo.view.pinhole()
-        z = photo.depth[row, column].astype(np.float64)
+        camera_from_world, fx, fy, cx, cy = view.pinhole()
+        z = depth[row, column].astype(np.float64)
         x, y = (column + 0.5 - cx) / fx * z, (row + 0.5 - cy) / fy * z
         in_camera = np.stack([x, y, z, np.ones_like(z)])
         found.append((np.linalg.inv(camera_from_world) @ in_camera)[:3].T)

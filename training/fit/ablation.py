@@ -13,13 +13,14 @@ import numpy as np
 from shapeshift.runtime_models.model import AnchorModel, Stop
 from shapeshift.training.settings import TrainSettings
 
-SHAPE = ("offset", "scale", "rotation", "opacity")
+SHAPE_HEADS = ("offset", "scale", "rotation", "opacity")
+UNITS = 2  # of the control encoding: which parts there are does not depend on it
 LEAST_HIDDEN, LEAST_FEATURES, LEAST_ANCHORS = 8, 4, 50
 DROPPED, KEPT, UNSURE = "dropped", "kept", "kept: not sure"
 
 
 @dataclass(frozen=True)
-class Measured:
+class Trial:
     """One choice of settings, trained once a seed, or a stored form of such a model."""
 
     psnr: dict[str, np.ndarray]  # modality: (seeds, photos) dB
@@ -55,13 +56,13 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Decision:
     """What taking a part away did."""
 
     part: str
     change: dict[str, Change]  # to the model before, by modality
     total: dict[str, Change]  # to the largest model
-    word: str  # DROPPED | KEPT | UNSURE
+    verdict: str  # DROPPED | KEPT | UNSURE
     needed_by: tuple[str, ...]  # modalities that lose more than the tolerance, or may
     bytes: int  # saved
     decode_ms: float
@@ -72,7 +73,7 @@ class Verdict:
             return {n: {"db": round(c.mean, 3), "error": finite(c.error)} for n, c in found.items()}
 
         return {
-            "part": self.part, "verdict": self.word, "change": rows(self.change),
+            "part": self.part, "verdict": self.verdict, "change": rows(self.change),
             "total": rows(self.total), "needed_by": list(self.needed_by),
             "saves_bytes": self.bytes, "saves_decode_ms": round(self.decode_ms, 3),
             "saves_train_s": round(self.train_s, 2),
@@ -97,13 +98,11 @@ def change_of(before: np.ndarray, after: np.ndarray) -> Change:
     return Change(float(difference.mean()), error)
 
 
-def changes(before: Measured, after: Measured) -> dict[str, Change]:
+def changes(before: Trial, after: Trial) -> dict[str, Change]:
     return {n: change_of(before.psnr[n], after.psnr[n]) for n in before.psnr}
 
 
-def judge(
-    part: str, full: Measured, before: Measured, after: Measured, tolerance_db: float
-) -> Verdict:
+def decide(part: str, full: Trial, before: Trial, after: Trial, tolerance_db: float) -> Decision:
     """Whether the part may go: `after` is the model without it, `full` the largest."""
     change, total = changes(before, after), changes(full, after)
     both = {n: (change[n], total[n]) for n in total}
@@ -111,21 +110,21 @@ def judge(
         n for n, two in both.items() if not all(c.mean - c.error >= -tolerance_db for c in two)
     )
     likely = all(c.mean >= -tolerance_db for two in both.values() for c in two)
-    word = DROPPED if not needed_by else UNSURE if likely else KEPT
-    return Verdict(
-        part, change, total, word, needed_by,
+    verdict = DROPPED if not needed_by else UNSURE if likely else KEPT
+    return Decision(
+        part, change, total, verdict, needed_by,
         before.bytes - after.bytes, before.decode_ms - after.decode_ms,
         before.train_s - after.train_s,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Part:
+class Component:
     """Something that settings may do without."""
 
     name: str
     kind: str
-    heads: tuple[str, ...] = ()  # or what anchors have of their own
+    heads: tuple[str, ...] = ()  # or attributes of anchors
     again: bool = False  # whether there may be more of it
 
     def without(self, settings: TrainSettings, stops: tuple[Stop, ...]) -> TrainSettings | None:
@@ -133,64 +132,61 @@ class Part:
         return REDUCE[self.kind](self, settings, stops)
 
 
-def _fix(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    fixed = settings.layout().fixed
+def _fix(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    fixed = settings.layout(UNITS).fixed
     more = [name for name in part.heads if name not in fixed]
     if len(stops) < 2 or not more or (len(part.heads) > 1 and len(more) < len(part.heads)):
         return None
     return replace(settings, fixed=",".join([*fixed, *more]))
 
 
-def _no_view(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+def _no_view(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
     return replace(settings, view_dependent=False) if settings.view_dependent else None
 
 
-def _layer(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    return replace(settings, layers=settings.layers - 1) if settings.layers > 1 else None
-
-
-def _hidden(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+def _hidden(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
     half = settings.hidden // 2
     return replace(settings, hidden=half) if half >= LEAST_HIDDEN else None
 
 
-def _features(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+def _features(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
     half = settings.features // 2
     return replace(settings, features=half) if half >= LEAST_FEATURES else None
 
 
-def _slot(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+def _slot(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
     fewer = settings.splats_per_anchor - 1
     return replace(settings, splats_per_anchor=fewer) if fewer else None
 
 
-def _anchors(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+def _anchors(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
     """Two thirds of them at most."""
     most = 2 * settings.max_anchors // 3
     return replace(settings, max_anchors=most) if most >= LEAST_ANCHORS else None
 
 
-def _own(part: Part, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
-    own = settings.layout().own
-    fewer = [name for name in own if name not in part.heads]
-    return replace(settings, own=",".join(fewer)) if len(fewer) < len(own) else None
+def _attribute(part: Component, settings: TrainSettings, stops: tuple) -> TrainSettings | None:
+    attributes = settings.layout(UNITS).attributes
+    fewer = [name for name in attributes if name not in part.heads]
+    if len(fewer) == len(attributes):
+        return None
+    return replace(settings, anchor_attributes=",".join(fewer))
 
 
 REDUCE = {
-    "fix": _fix, "view": _no_view, "layer": _layer, "hidden": _hidden, "features": _features,
-    "slot": _slot, "anchors": _anchors, "own": _own,
+    "fix": _fix, "view": _no_view, "hidden": _hidden, "features": _features,
+    "slot": _slot, "anchors": _anchors, "attribute": _attribute,
 }  # fmt: skip
 # What costs most to run comes first; the shape as a whole before its networks one by one.
-PARTS = (
-    Part("shape that follows x", "fix", SHAPE),
-    *(Part(f"{name} that follows x", "fix", (name,)) for name in SHAPE),
-    Part("colour that follows x", "fix", ("color",)),
-    Part("colour that follows the eye", "view"),
-    Part("a hidden layer", "layer", again=True),
-    Part("half of the hidden units", "hidden", again=True),
-    Part("half of the features", "features", again=True),
-    Part("anchors' own axes and sizes", "own", ("frame",)),
-    Part("anchors' own base colours", "own", ("color",)),
-    Part("one splat of every anchor", "slot", again=True),
-    Part("a third of the anchors", "anchors", again=True),
+COMPONENTS = (
+    Component("shape that follows x", "fix", SHAPE_HEADS),
+    *(Component(f"{name} that follows x", "fix", (name,)) for name in SHAPE_HEADS),
+    Component("colour that follows x", "fix", ("color",)),
+    Component("colour that follows the eye", "view"),
+    Component("half of the hidden units", "hidden", again=True),
+    Component("half of the features", "features", again=True),
+    Component("anchors' own axes and sizes", "attribute", ("frame",)),
+    Component("anchors' own base colours", "attribute", ("color",)),
+    Component("one splat of every anchor", "slot", again=True),
+    Component("a third of the anchors", "anchors", again=True),
 )

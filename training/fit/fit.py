@@ -14,27 +14,27 @@ from shapeshift.runtime_models.package.feature_codes import FEATURES
 from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files, zip_files
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.fit.ablation import DROPPED, PARTS, Measured, Part, Verdict, judge
-from shapeshift.training.fit.view_metrics import likeness, most_pixels, shared_outlines
+from shapeshift.training.fit.ablation import COMPONENTS, DROPPED, Component, Decision, Trial, decide
+from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
 from shapeshift.training.photos import BLACK, choose_downscale, load_photos
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import choose_background
 from shapeshift.training.train import Trainer
 
-Tell = Callable[[str, float], None]  # what is tried now, and how far it is, 0..1
+ReportProgress = Callable[[str, float], None]  # what is tried now, and how far it is, 0..1
 PIXELS = (0.02, 0.1, 0.5, 2.0)  # anchors that make up less in every photo are tried without
 DECODES = 6  # the fastest counts
 
 
 @dataclass(frozen=True)
-class Need:
+class FitReport:
     """What a capture needs, and how that was found."""
 
     settings: TrainSettings  # that train it
-    full: Measured  # the largest
-    fitted: Measured
-    verdicts: tuple[Verdict, ...]
-    outlines: dict[tuple[str, str], float]  # of every two stops of the largest, see witness
+    full: Trial  # the largest
+    fitted: Trial
+    decisions: tuple[Decision, ...]
+    outlines: dict[tuple[str, str], float]  # of every two stops of the largest, see view_metrics.py
     photos: dict[str, int]  # held out, by modality
     seeds: int
     tolerance_db: float
@@ -45,7 +45,7 @@ class Need:
             "outlines": [{"stops": list(pair), "iou": round(v, 4)} for pair, v in
                          self.outlines.items()],
             "full": self.full.as_dict(), "fitted": self.fitted.as_dict(),
-            "parts": [verdict.as_dict() for verdict in self.verdicts],
+            "parts": [verdict.as_dict() for verdict in self.decisions],
             "settings": self.settings.as_dict(),
         }  # fmt: skip
 
@@ -60,16 +60,17 @@ class Fit:
         settings: TrainSettings,
         tolerance_db: float,
         seeds: int,
-        tell: Tell,
-        parts: tuple[Part, ...] = PARTS,
+        report: ReportProgress,
+        components: tuple[Component, ...] = COMPONENTS,
         last: TrainSettings | None = None,
     ) -> None:
         """last: settings whose iterations and seconds the chosen model is trained for once more.
 
-        Raises BadFile where the held-out photos could not tell how sure a difference is.
+        Raises BadFile where the held-out photos could not report how sure a difference is.
         """
-        self.device, self.capture, self.tell = device, capture, tell
-        self.tolerance_db, self.seeds, self.verdicts = tolerance_db, seeds, []
+        self.device, self.capture, self.report = device, capture, report
+        self.tolerance_db, self.seeds = tolerance_db, seeds
+        self.decisions: list[Decision] = []
         self.stops, factor = capture.stops, settings.downscale or choose_downscale(capture.photos)
         self.held_out = load_photos(capture, "test", factor, settings.masks)
         self.photos = load_photos(capture, "train", factor, settings.masks)
@@ -80,40 +81,40 @@ class Fit:
             if not count or count * seeds < 2:
                 raise BadFile(
                     f"{capture.folder}: {count} photos of '{name}' are held out, and a difference "
-                    "needs two to tell how sure it is; mark more with split 'test'"
+                    "needs two to report how sure it is; mark more with split 'test'"
                     + (" or give --seeds 2." if count else ".")
                 )
-        self.settings, self.parts, self.last = settings, parts, last
+        self.settings, self.components, self.last = settings, components, last
 
-    def run(self) -> Need:
+    def run(self) -> FitReport:
         full = self.full = self.current = self.trained(self.settings, "the largest")
-        outlines = shared_outlines(self.device, full.models[0], self.held_out, self.stops)
-        for part in self.parts:
+        outlines = outline_ious(self.device, full.models[0], self.held_out, self.stops)
+        for part in self.components:
             while (fewer := part.without(self.settings, self.stops)) is not None:
-                if not self.take(part.name, self.trained(fewer, f"without {part.name}")):
+                if not self.consider(part.name, self.trained(fewer, f"without {part.name}")):
                     break
                 self.settings = fewer
                 if not part.again:
                     break
         if self.last is not None:  # what is cleaned is held to the one that was trained last
-            budget = {"iterations": self.last.iterations, "seconds": self.last.seconds}
-            self.settings = replace(self.settings, **budget)
+            iterations, seconds = self.last.iterations, self.last.seconds
+            self.settings = replace(self.settings, iterations=iterations, seconds=seconds)
             self.full = self.current = self.trained(self.settings, "the chosen model")
-        self.clean()
-        return Need(
-            self.settings, full, self.current, tuple(self.verdicts), outlines, self.counts,
+        self.prune_models()
+        return FitReport(
+            self.settings, full, self.current, tuple(self.decisions), outlines, self.counts,
             self.seeds, self.tolerance_db,
         )  # fmt: skip
 
-    def take(self, part: str, tried: Measured) -> bool:
+    def consider(self, part: str, tried: Trial) -> bool:
         """Notes what the trial did; goes on from it, and says so, where the part may go."""
-        verdict = judge(part, self.full, self.current, tried, self.tolerance_db)
-        self.verdicts.append(verdict)
-        if verdict.word == DROPPED:
+        verdict = decide(part, self.full, self.current, tried, self.tolerance_db)
+        self.decisions.append(verdict)
+        if verdict.verdict == DROPPED:
             self.current = tried
-        return verdict.word == DROPPED
+        return verdict.verdict == DROPPED
 
-    def trained(self, settings: TrainSettings, name: str) -> Measured:
+    def trained(self, settings: TrainSettings, name: str) -> Trial:
         """A trial: settings trained once a seed.  Raises BadFile where a run ends unsettled."""
         models, seconds = [], []
         for seed in range(self.seeds):
@@ -123,53 +124,55 @@ class Fit:
                 loaded={"train": self.photos, "test": self.held_out},
             )  # fmt: skip
             for now in trainer.steps():
-                self.tell(what, min(now.fraction, 1.0))
+                self.report(what, min(now.fraction, 1.0))
             if not trainer.settled:
                 raise BadFile(
                     f"A trial of {trainer.iteration} steps ends while new anchors still settle; "
-                    "give more --iterations, or --no-grow."
+                    "give more --iterations."
                 )
             models.append(trainer.model())
             seconds.append(trainer.elapsed)
         return self.measured(models, FEATURES[0], float(np.mean(seconds)))
 
-    def measured(self, models: list[AnchorModel], storage: str, train_s: float) -> Measured:
+    def measured(self, models: list[AnchorModel], storage: str, train_s: float) -> Trial:
         """How alike the held-out photos are to what packages of the models show."""
         files = [package_files(model, storage) for model in models]
         back = [read_files(f.__getitem__, "the fitted scene") for f in files]
         found = [
-            likeness(self.device, model, self.held_out, self.stops, self.background)
+            view_psnr(self.device, model, self.held_out, self.stops, self.background)
             for model in back
         ]
         psnr = {s.name: np.stack([f[s.name] for f in found]) for s in self.stops}
         size = len(zip_files(files[0]))
-        return Measured(psnr, tuple(back), storage, size, shift_ms(back[0]), train_s)
+        return Trial(psnr, tuple(back), storage, size, shift_ms(back[0]), train_s)
 
-    def clean(self) -> None:
+    def prune_models(self) -> None:
         """What goes without another training: what nothing shows, and digits of the features."""
         now = self.current
         smaller = [drop_unused(model)[0] for model in now.models]
-        self.try_models("what no stop shows", smaller)
+        self.consider_models("what no stop shows", smaller)
         for pixels in PIXELS:
             smaller = [self.without_faint(model, pixels) for model in self.current.models]
-            if not self.try_models(f"anchors of under {pixels:g} pixels in every photo", smaller):
+            if not self.consider_models(
+                f"anchors of under {pixels:g} pixels in every photo", smaller
+            ):
                 break
         for more, storage in pairwise(FEATURES):
             now = self.current
             tried = self.measured(list(now.models), storage, now.train_s)
-            if not self.take(f"features as {more} instead of {storage}", tried):
+            if not self.consider(f"features as {more} instead of {storage}", tried):
                 break
 
-    def try_models(self, part: str, models: list[AnchorModel]) -> bool:
+    def consider_models(self, part: str, models: list[AnchorModel]) -> bool:
         """A trial of models made smaller; True, too, where there was nothing to take away."""
         now = self.current
-        self.tell(f"without {part}", 1.0)
+        self.report(f"without {part}", 1.0)
         same = all(weights_of(a) == weights_of(b) for a, b in zip(models, now.models, strict=True))
-        return same or self.take(part, self.measured(models, now.storage, now.train_s))
+        return same or self.consider(part, self.measured(models, now.storage, now.train_s))
 
     def without_faint(self, model: AnchorModel, pixels: float) -> AnchorModel:
         """The model without anchors that make up fewer pixels in every photo."""
-        most = most_pixels(self.device, model, [*self.photos, *self.held_out], self.stops)
+        most = largest_contribution(self.device, model, [*self.photos, *self.held_out], self.stops)
         return drop_unused(model, np.repeat(most[:, None] >= pixels, model.splats_per_anchor, 1))[0]
 
 

@@ -1,11 +1,11 @@
 """Raw outputs of the heads to Gaussians and back: bounded offsets, clipped scales."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shapeshift.training.heads.networks import KERNELS, OWN_WIDTH, HeadLayout
+from shapeshift.training.heads.networks import ATTRIBUTE_WIDTH, KERNELS, HeadLayout
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -47,33 +47,34 @@ class Activation:
         self.splats = Gaussians(*(device.empty(shape) for shape in shapes))
         self.grad_raw = device.empty((count, self.layout.raw_at[-1]))
         self.grad_anchors = device.empty((count, 3))
-        self.grad_own = {
-            name: device.empty((count, OWN_WIDTH[name])) for name in self.layout.per_anchor[2:]
+        self.grad_attributes = {
+            name: device.empty((count, ATTRIBUTE_WIDTH[name]))
+            for name in self.layout.per_anchor[2:]
         }
 
-    def own_of(self, rows: dict[str, object]) -> tuple:
+    def attributes_of(self, rows: dict[str, Any]) -> tuple:
         """Frames and base colours of a step's anchors, or what stands in their place."""
-        return tuple(rows.get(name, self.nothing) for name in OWN_WIDTH)
+        return tuple(rows.get(name, self.nothing) for name in ATTRIBUTE_WIDTH)
 
-    def forward(self, raw, rows: dict[str, object]) -> Gaussians:
+    def forward(self, raw, rows: dict[str, Any]) -> Gaussians:
         """`rows`: of the optimiser's groups that have a row an anchor, those of the step."""
         self.resize(len(rows["anchors"]))
         by_row = self.device.kind == "cpu"  # an anchor a work-item, else a splat
         items = self.count if by_row else self.count * self.layout.splats
         self.device.launch(
             self.kernels["activate_rows" if by_row else "activate"], items, 16 if by_row else 64,
-            items, self.reach, self.unit, raw, rows["anchors"], *self.own_of(rows),
+            items, self.reach, self.unit, raw, rows["anchors"], *self.attributes_of(rows),
             *self.splats.fields(),
         )  # fmt: skip
         return self.splats
 
-    def backward(self, raw, rows: dict[str, object], grad: Gaussians) -> tuple:
+    def backward(self, raw, rows: dict[str, Any], grad: Gaussians) -> tuple:
         """(grad_raw (A, RAW), by group those of `rows` but the features) of the last `forward`."""
         splats = self.splats
         self.device.launch(
             self.kernels["activate_backward"], self.count, 16,
-            self.count, self.reach, self.unit, raw, self.own_of(rows)[0],
+            self.count, self.reach, self.unit, raw, self.attributes_of(rows)[0],
             splats.scales, splats.opacity, splats.color, *grad.fields(), self.grad_raw,
-            self.grad_anchors, *self.own_of(self.grad_own),
+            self.grad_anchors, *self.attributes_of(self.grad_attributes),
         )  # fmt: skip
-        return self.grad_raw, {"anchors": self.grad_anchors} | self.grad_own
+        return self.grad_raw, {"anchors": self.grad_anchors} | self.grad_attributes

@@ -10,12 +10,12 @@ from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT
 
 KERNELS = Path(__file__).parents[1] / "kernels"
 DIRECTION = 3
-MOST_LAYERS = 3
 CHUNKS = {"cpu": 16, "gpu": 64}  # shares of the anchors whose weight gradients are summed apart
 SIDE = 16  # of a block of weights, as in heads_gpu.cl
-RATED = 32  # hidden units of the networks for which the learning rates were chosen
-OWN = {"frame": "frames", "color": "colors"}  # what anchors may have, and the optimiser's group
-OWN_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
+RATED_HIDDEN = 32  # hidden units of the networks for which the learning rates were chosen
+# What anchors may have beside their features, and the optimiser's group of it.
+ANCHOR_ATTRIBUTES = {"frame": "frames", "color": "colors"}
+ATTRIBUTE_WIDTH = {"frames": 7, "colors": 3}  # numbers an anchor, see gaussians.cl
 Layers = tuple[np.ndarray, ...]  # of each layer W (out, in) and b (out,), first to last
 
 
@@ -35,28 +35,24 @@ class HeadLayout:
     features: int = 16  # F
     hidden: int = 32
     control: int = 16  # d of Psi
-    layers: int = 1  # hidden ones, each of that width
     fixed: tuple[str, ...] = ()  # heads that do not see Psi: what they give is shared by all stops
     view_dependent: bool = True  # whether colour sees the direction from the eye
-    own: tuple[str, ...] = tuple(OWN)  # what anchors have of their own beside their features
+    attributes: tuple[str, ...] = tuple(ANCHOR_ATTRIBUTES)  # of anchors, beside their features
 
     def __post_init__(self) -> None:
-        if not 1 <= self.layers <= MOST_LAYERS:
-            raise ValueError(
-                f"layers is {self.layers}; networks have 1 to {MOST_LAYERS} hidden ones."
-            )
         for name in self.fixed:
             if name not in HEADS:
                 known = ", ".join(HEADS)
                 raise ValueError(f"There is no head '{name}' to fix; they are {known}.")
-        for name in self.own:
-            if name not in OWN:
-                raise ValueError(f"Anchors have no '{name}' of their own; use {', '.join(OWN)}.")
+        for name in self.attributes:
+            if name not in ANCHOR_ATTRIBUTES:
+                known = ", ".join(ANCHOR_ATTRIBUTES)
+                raise ValueError(f"Anchors have no attribute '{name}'; use {known}.")
 
     @property
     def per_anchor(self) -> tuple[str, ...]:
         """The optimiser's groups that have a row for each anchor."""
-        return ("anchors", "features", *(OWN[name] for name in self.own))
+        return ("anchors", "features", *(ANCHOR_ATTRIBUTES[name] for name in self.attributes))
 
     def parts_of(self, name: str) -> tuple[str, ...]:
         """What a head's network takes, in the order of the exported one (eq. 5)."""
@@ -82,8 +78,8 @@ class HeadLayout:
     def weights_at(self) -> list[int]:
         """Where each head begins in the flat weights; last, their number."""
         hidden = padded(self.hidden)
-        before = (self.inputs + 1) * hidden + (self.layers - 1) * (hidden + 1) * hidden
-        sizes = [before + (hidden + 1) * padded(n) for n in self.outs]
+        first = (self.inputs + 1) * hidden
+        sizes = [first + (hidden + 1) * padded(n) for n in self.outs]
         return np.cumsum([0, *sizes]).tolist()
 
     def defines(self) -> dict[str, int]:
@@ -92,9 +88,10 @@ class HeadLayout:
             "FEATURES": padded(self.features), "HIDDEN": padded(self.hidden),
             "CONTROL": self.control, "SPLATS": self.splats, "RAW": self.raw_at[-1],
             "WEIGHTS": self.weights_at[-1], "MAX_OUT": max(padded(n) for n in self.outs),
-            "LAYERS": self.layers, "VIEW_COLOR": self.view_dependent,
+            "VIEW_COLOR": self.view_dependent,
             "CONDITIONED": sum(1 << m for m, name in enumerate(HEADS) if name not in self.fixed),
-            "FRAMES": "frame" in self.own, "BASE_COLORS": "color" in self.own,
+            "FRAMES": "frame" in self.attributes,
+            "BASE_COLORS": "color" in self.attributes,
         }  # fmt: skip
         for m, out in enumerate(self.outs):
             numbers |= {
@@ -107,7 +104,7 @@ class HeadLayout:
     def parts(self, flat: np.ndarray, head: int) -> Layers:
         """Views into the flat weights: of each layer W (in, out) and b (out,), padded."""
         hidden = padded(self.hidden)
-        widths = [self.inputs, *[hidden] * self.layers, padded(self.outs[head])]
+        widths = [self.inputs, hidden, padded(self.outs[head])]
         at, views = self.weights_at[head], []
         for takes, gives in pairwise(widths):
             views.append(flat[at : at + takes * gives].reshape(takes, gives))
@@ -118,17 +115,13 @@ class HeadLayout:
     def rate_shares(self) -> np.ndarray:
         """(weights,) float32: what part of a head's learning rate each of its weights takes.
 
-        Rates are chosen for one hidden layer of RATED units.  Steps of Adam do not shrink where
-        more inputs add up, so weights behind wider layers take smaller ones; middle layers take
-        a half or a quarter, since a step moves all that lies between two others.
+        Rates are chosen for RATED_HIDDEN units.  Steps of Adam do not shrink where more inputs add
+        up, so weights behind wider layers take smaller ones.
         """
         shares = np.ones(self.weights_at[-1], np.float32)
         for head in range(len(HEADS)):
             views = self.parts(shares, head)
-            for weight in views[2::2]:
-                weight *= min(1.0, RATED / self.hidden)
-            for view in views[2:-2]:
-                view *= 0.5 ** (self.layers - 1)
+            views[2][:] *= min(1.0, RATED_HIDDEN / self.hidden)
         return shares
 
     def first_rows(self, name: str) -> list[int]:
@@ -143,14 +136,8 @@ class HeadLayout:
 
     def real(self, head: int) -> list[tuple]:
         """Of each view in `parts`, the index of what is no padding."""
-        rows, out = self.first_rows(HEADS[head]), self.outs[head]
-        takes = [rows, *[slice(self.hidden)] * self.layers]
-        gives = [*[self.hidden] * self.layers, out]
-        return [
-            index
-            for i, to in zip(takes, gives, strict=True)
-            for index in ((i, slice(to)), (slice(to),))
-        ]
+        rows, hidden, out = self.first_rows(HEADS[head]), slice(self.hidden), slice(self.outs[head])
+        return [(rows, hidden), (hidden,), (hidden, out), (out,)]
 
     def pack(self, networks: dict[str, Layers]) -> np.ndarray:
         """Flat float32 weights out of each head's layers, W (out, in) and b (out,) of each."""
@@ -181,7 +168,7 @@ def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
         "color": rng.uniform(-1, 1, 3 * k) / np.sqrt(layout.hidden),
     }
     gain = {"offset": 1.0, "scale": 0.5, "rotation": 0.5, "opacity": 0.5, "color": 1.0}
-    if "color" in layout.own:  # the base colours are known; the network begins beside them
+    if "color" in layout.attributes:  # the base colours are known; the network begins beside them
         last_bias["color"], gain["color"] = np.zeros(3 * k), 0.3
     everything = replace(layout, fixed=(), view_dependent=True)
     networks = {}
@@ -194,9 +181,6 @@ def initial_weights(layout: HeadLayout, rng: np.random.Generator) -> np.ndarray:
             (rng.uniform(-1, 1, (layout.hidden, inputs)) / np.sqrt(inputs))[:, seen],
             rng.uniform(-1, 1, layout.hidden) / np.sqrt(inputs),
         ]
-        for _ in range(layout.layers - 1):
-            middle = rng.uniform(-1, 1, (layout.hidden, layout.hidden))
-            arrays += [middle * np.sqrt(3 / layout.hidden), np.zeros(layout.hidden)]
         last = rng.uniform(-1, 1, (out, layout.hidden)) / np.sqrt(layout.hidden) * gain[name]
         networks[name] = (*arrays, last, last_bias[name])
     return layout.pack(networks)
@@ -210,7 +194,7 @@ def blocks_of_weights(layout: HeadLayout) -> np.ndarray:
     rows = []
     for head, out in enumerate(layout.outs):
         hidden = padded(layout.hidden)
-        widths = [layout.inputs, *[hidden] * layout.layers, padded(out)]
+        widths = [layout.inputs, hidden, padded(out)]
         for layer, (takes, gives) in enumerate(pairwise(widths)):
             rows += [
                 (head, layer, i, j)
@@ -242,7 +226,6 @@ class Heads:
         self.control = device.zeros((len(HEADS), layout.control))
         self.bias = device.empty(5 * hidden)
         self.first_t = device.empty(5 * hidden * features)
-        self.middle_t = device.empty(max(5 * (layout.layers - 1) * hidden * hidden, 1))
         self.second_t = device.empty(layout.raw_at[-1] * hidden)
         self.grad_chunks = device.empty((self.chunks, layout.weights_at[-1]))
         self.grad_weights = device.empty(layout.weights_at[-1])
@@ -252,7 +235,7 @@ class Heads:
         if count == self.count:
             return
         device, layout, self.count = self.device, self.layout, count
-        self.hidden = device.empty((count, 5, layout.layers, padded(layout.hidden)))
+        self.hidden = device.empty((count, 5, padded(layout.hidden)))
         self.grad_units = device.empty(self.hidden.shape) if self.form == "gpu" else None
         self.raw = device.empty((count, layout.raw_at[-1]))
         self.grad_features = device.empty((count, padded(layout.features)))
@@ -269,7 +252,7 @@ class Heads:
         layout = self.layout
         self.device.launch(
             self.kernels["prepare_weights"], 5 * padded(layout.hidden), 8,
-            weights, self.control, self.bias, self.first_t, self.middle_t, self.second_t,
+            weights, self.control, self.bias, self.first_t, self.second_t,
         )  # fmt: skip
         items, group = ((self.count + 3) // 4, 1) if self.form == "cpu" else (5 * self.count, 64)
         self.device.launch(
@@ -296,8 +279,8 @@ class Heads:
         """A work-item takes a chunk of anchors through everything."""
         self.device.launch(
             self.kernels["heads_backward"], self.chunks, 1,
-            self.count, self.chunks, *self.eye, weights, self.first_t, self.middle_t,
-            self.second_t, anchors, features, self.hidden, grad_raw, self.grad_chunks,
+            self.count, self.chunks, *self.eye, weights, self.first_t, self.second_t, anchors,
+            features, self.hidden, grad_raw, self.grad_chunks,
             self.grad_features, grad_anchors,
         )  # fmt: skip
 
@@ -306,7 +289,7 @@ class Heads:
         kernels, launch = self.kernels, self.device.launch
         launch(
             kernels["units_gradient"], 5 * self.count, 64,
-            self.count, *self.eye, weights, self.middle_t, self.second_t, anchors, self.hidden,
+            self.count, *self.eye, weights, self.second_t, anchors, self.hidden,
             grad_raw, self.grad_units, grad_anchors,
         )  # fmt: skip
         launch(

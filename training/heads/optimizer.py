@@ -1,20 +1,24 @@
 """Adam on the device over named groups of parameters."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shapeshift.training.heads.networks import KERNELS
+
+if TYPE_CHECKING:
+    from pyopencl.array import Array
 
 BETA1, BETA2 = 0.9, 0.999  # the same numbers stand in adam.cl
 
 
 @dataclass
 class Group:
-    value: object  # device array, any shape
-    mean: object
-    square: object
-    rates: object  # (1,) or one a parameter
+    value: "Array"  # any shape
+    mean: "Array"
+    square: "Array"
+    rates: "Array"  # (1,) or one a parameter
 
 
 class Adam:

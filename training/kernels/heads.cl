@@ -1,9 +1,9 @@
 // heads: the five heads, forward and backward: anchor features -> raw outputs (paper section 3.2,
 // eq. 5). CPU form: vectors of eight units, a few anchors at a time; heads_gpu.cl is the other.
-//  unit_1 = ReLU(W1^T (f, delta, Psi) + b1), unit_l = ReLU(W^T unit_l-1 + b), raw = W2^T unit + b2
+//  unit = ReLU(W1^T (f, delta, Psi) + b1), raw = W2^T unit + b2
 // Reads:   weights, bias, anchors (A, 3), features (A, FEATURES), the eye; backward hidden and
 //          grad_raw.
-// Writes:  raw (A, RAW), hidden (A, 5, LAYERS, HIDDEN); backward grad_features, grad_anchors and
+// Writes:  raw (A, RAW), hidden (A, 5, HIDDEN); backward grad_features, grad_anchors and
 //          grad_chunks, the weights' gradients of each chunk.
 // Units:   anchors and eye in metres; features, Psi and units have none.
 #include "heads_shared.cl"
@@ -31,32 +31,6 @@ inline void add_one(float8 sum[4][2], const float *in, int stride, int takes,
   }
 }
 
-// A middle layer of head m for four anchors, in place; l counts hidden layers, so it is 1 or more.
-inline void middle_forward(float unit[4][HIDDEN], const int a[4], int m, int l,
-                           __global const float *weights, __global float *hidden) {
-  // Four anchors' units; in place only when all of the layer is done.
-  float next[4][HIDDEN];
-  for (int j = 0; j < HIDDEN8; j += 2) {
-    int wide = min(2, HIDDEN8 - j);
-    float8 h[4][2];
-    for (int b = 0; b < 4; b++)
-      // Sums begin with the bias, which lies behind the layer's weights.
-      for (int v = 0; v < wide; v++) h[b][v] = vload8(j + v, weights + HIDDEN * HIDDEN);
-    // Two vectors of outputs at a time, and the last alone where their number is odd.
-    if (wide == 2) add_pair(h, unit[0], HIDDEN, HIDDEN, weights + 8 * j, HIDDEN);
-    else add_one(h, unit[0], HIDDEN, HIDDEN, weights + 8 * j, HIDDEN);
-    for (int b = 0; b < 4; b++)
-      for (int v = 0; v < wide; v++) {
-        // ReLU, kept for the backward pass.
-        float8 y = fmax(h[b][v], (float8)(0.0f));
-        vstore8(y, j + v, next[b]);
-        vstore8(y, j + v, hidden + UNITS_OF(a[b], m, l));
-      }
-  }
-  for (int b = 0; b < 4; b++)
-    for (int j = 0; j < HIDDEN8; j++) vstore8(vload8(j, next[b]), j, unit[b]);
-}
-
 // One work-item four anchors: every weight row is loaded once for the four.
 __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float eye_z,
                             __global const float *weights, __global const float *bias,
@@ -79,9 +53,9 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
   // are in the cache.
   for (int m = 0; m < 5; m++) {
     __global const float *first = weights + WEIGHTS_AT[m];
-    // A head's weights: W1, b1, the middle layers, W2, b2 (heads_shared.cl).
+    // A head's weights: W1, b1, W2, b2 (heads_shared.cl).
     __global const float *second = first + LAST_AT;
-    // Units of four anchors, layer after layer in place.
+    // Units of four anchors.
     float unit[4][HIDDEN];
     for (int j = 0; j < HIDDEN8; j += 2) {
       // Only the colour looks at the direction.
@@ -104,11 +78,9 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
         for (int v = 0; v < wide; v++) {
           float8 y = fmax(h[b][v], (float8)(0.0f));
           vstore8(y, j + v, unit[b]);
-          vstore8(y, j + v, hidden + UNITS_OF(a[b], m, 0));
+          vstore8(y, j + v, hidden + UNITS_OF(a[b], m));
         }
     }
-    for (int l = 1; l < LAYERS; l++)
-      middle_forward(unit, a, m, l, first + MIDDLE_AT + (l - 1) * MIDDLE_SIZE, hidden);
     // The last layer: linear, as wide as the head's outputs of k splats.
     int outs = OUT[m];
     for (int c = 0; c < outs / 8; c += 2) {
@@ -146,17 +118,8 @@ inline void load_anchors(Block *k, int base, int count, float3 eye, __global con
   }
 }
 
-// What a layer gave in the forward pass: the input of the next, and where its ReLU was open.
-inline void load_units(Block *k, int m, int l, int base, int count,
-                       __global const float *hidden) {
-  for (int b = 0; b < BLOCK; b++) {
-    int a = base + min(b, count - 1);
-    for (int j = 0; j < HIDDEN8; j++)
-      vstore8(vload8(j, hidden + UNITS_OF(a, m, l)), j, k->unit[b]);
-  }
-}
-
-// A head's block: dL / d raw as it comes from the Gaussians, and its last hidden units.
+// A head's block: dL / d raw as it comes from the Gaussians, and its hidden units, which are the
+// input of the last layer and say where the ReLU was open.
 inline void load_head(Block *k, int m, int base, int count, __global const float *hidden,
                       __global const float *grad_raw) {
   for (int b = 0; b < BLOCK; b++) {
@@ -165,8 +128,8 @@ inline void load_head(Block *k, int m, int base, int count, __global const float
     float live = b < count ? 1.0f : 0.0f;
     for (int c = 0; c < OUT[m] / 8; c++)
       vstore8(live * vload8(c, grad_raw + a * RAW + OUT_AT[m]), c, k->d_out[b]);
+    for (int j = 0; j < HIDDEN8; j++) vstore8(vload8(j, hidden + UNITS_OF(a, m)), j, k->unit[b]);
   }
-  load_units(k, m, MIDDLE, base, count, hidden);
 }
 
 // b2 and W2 of a head with `outs` outputs.
@@ -185,8 +148,8 @@ inline void second_layer_gradient(Block *k, int outs, __global float *grad) {
   }
 }
 
-// Through the last layer and the ReLU into the last hidden units.
-inline void last_units_gradient(Block *k, int m, __global const float *second_t) {
+// Through the last layer and the ReLU into the hidden units.
+inline void units_gradient(Block *k, int m, __global const float *second_t) {
   for (int j = 0; j < HIDDEN8; j++) {
     // Eight hidden units of every anchor in the block.
     float8 d[BLOCK];
@@ -203,36 +166,6 @@ inline void last_units_gradient(Block *k, int m, __global const float *second_t)
       vstore8(d[b], j, k->d_unit[b]);
     }
   }
-}
-
-// A middle layer: k->unit holds the units that go into it.  Adds to the gradients of its b and W,
-// then takes d_unit from what it gives to what it takes.
-inline void middle_layer_gradient(Block *k, __global const float *middle_t, __global float *grad) {
-  float8 before[BLOCK][HIDDEN8];
-  for (int j = 0; j < HIDDEN8; j++) {
-    // db = sum of d, dW = sum of unit d.
-    float8 d[BLOCK], sum = vload8(j, grad + HIDDEN * HIDDEN);
-    for (int b = 0; b < BLOCK; b++) { d[b] = vload8(j, k->d_unit[b]); sum += d[b]; }
-    vstore8(sum, j, grad + HIDDEN * HIDDEN);
-    for (int i = 0; i < HIDDEN; i++) {
-      float8 g = vload8(j, grad + i * HIDDEN);
-      for (int b = 0; b < BLOCK; b++) g += k->unit[b][i] * d[b];
-      vstore8(g, j, grad + i * HIDDEN);
-    }
-    // And on to the units below: W d, through their ReLU.
-    for (int b = 0; b < BLOCK; b++) d[b] = 0;
-    for (int i = 0; i < HIDDEN; i++) {
-      // W d by the transposed W: vectors of units below, no sums across lanes.
-      float8 w = vload8(j, middle_t + i * HIDDEN);
-      for (int b = 0; b < BLOCK; b++) d[b] += k->d_unit[b][i] * w;
-    }
-    for (int b = 0; b < BLOCK; b++)
-      // Kept aside until all of d_unit has been read.
-      before[b][j] =
-          select((float8)(0.0f), d[b], isgreater(vload8(j, k->unit[b]), (float8)(0.0f)));
-  }
-  for (int b = 0; b < BLOCK; b++)
-    for (int j = 0; j < HIDDEN8; j++) vstore8(before[b][j], j, k->d_unit[b]);
 }
 
 // b1 and W1 of the features (and of the direction).
@@ -297,8 +230,7 @@ inline void add_direction_gradient(Block *k, int base, int count, __global const
 // grad_anchors already holds the gradient through the means and gets that of the direction added.
 __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float eye_y, float eye_z,
                              __global const float *weights, __global const float *first_t,
-                             __global const float *middle_t, __global const float *second_t,
-                             __global const float *anchors,
+                             __global const float *second_t, __global const float *anchors,
                              __global const float *features, __global const float *hidden,
                              __global const float *grad_raw, __global float *grad_chunks,
                              __global float *grad_features, __global float *grad_anchors) {
@@ -320,13 +252,7 @@ __kernel void heads_backward(int anchors_count, int chunks, float eye_x, float e
       __global float *g_first = grad + WEIGHTS_AT[m];
       load_head(&k, m, base, count, hidden, grad_raw);
       second_layer_gradient(&k, OUT[m], g_first + LAST_AT);
-      last_units_gradient(&k, m, second_t + OUT_AT[m] * HIDDEN);
-      // Middle layers from the last to the first.
-      for (int l = MIDDLE - 1; l >= 0; l--) {
-        load_units(&k, m, l, base, count, hidden);
-        middle_layer_gradient(&k, middle_t + (m * MIDDLE + l) * HIDDEN * HIDDEN,
-                              g_first + MIDDLE_AT + l * MIDDLE_SIZE);
-      }
+      units_gradient(&k, m, second_t + OUT_AT[m] * HIDDEN);
       first_layer_gradient(&k, m, g_first);
       add_input_gradient(&k, first_t + m * HIDDEN * FEATURES);
       if (m == COLOR && VIEW_COLOR)

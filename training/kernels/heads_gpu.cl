@@ -5,13 +5,13 @@
 // in a fixed order. No atomics, no subgroups, the same bits for any number of compute units.
 // Reads:   weights, bias, anchors (A, 3), features (A, FEATURES), the eye; backward hidden and
 //          grad_raw.
-// Writes:  raw (A, RAW), hidden (A, 5, LAYERS, HIDDEN); backward gradients of units, features,
+// Writes:  raw (A, RAW), hidden (A, 5, HIDDEN); backward gradients of units, features,
 //          anchors and, a split each, of weights.
 // Units:   anchors and eye in metres; features, Psi and units have none.
 #include "heads_shared.cl"
 #define SIDE 16
 
-// One work-item a head of an anchor: F of (f, delta, Psi), paper eq. 5, layer after layer.
+// One work-item a head of an anchor: F of (f, delta, Psi), paper eq. 5.
 __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float eye_z,
                             __global const float *weights, __global const float *bias,
                             __global const float *anchors, __global const float *features,
@@ -19,7 +19,7 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
   const int m = get_global_id(0) / anchors_count, a = get_global_id(0) % anchors_count;
   if (!(m < 5)) return;
   __global const float *layer = weights + WEIGHTS_AT[m];
-  float unit[HIDDEN], next[HIDDEN];
+  float unit[HIDDEN];
   // From the bias, which Psi is folded into, on: one row of W1 an input.
   for (int j = 0; j < HIDDEN; j++) unit[j] = bias[m * HIDDEN + j];
   for (int i = 0; i < FEATURES; i++) {
@@ -34,20 +34,10 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
     for (int j = 0; j < HIDDEN; j++)
       unit[j] += d.x * rows[j] + d.y * rows[HIDDEN + j] + d.z * rows[2 * HIDDEN + j];
   }
-  for (int l = 0; l < LAYERS; l++) {
-    if (l > 0) {
-      // Middle layers follow W1 and b1, each with its bias behind its weights.
-      layer += l == 1 ? MIDDLE_AT : MIDDLE_SIZE;
-      for (int j = 0; j < HIDDEN; j++) next[j] = layer[HIDDEN * HIDDEN + j];
-      for (int i = 0; i < HIDDEN; i++)
-        for (int j = 0; j < HIDDEN; j++) next[j] += unit[i] * layer[i * HIDDEN + j];
-      for (int j = 0; j < HIDDEN; j++) unit[j] = next[j];
-    }
-    for (int j = 0; j < HIDDEN; j++) {
-      // ReLU; kept for the backward pass.
-      unit[j] = fmax(unit[j], 0.0f);
-      hidden[UNITS_OF(a, m, l) + j] = unit[j];
-    }
+  for (int j = 0; j < HIDDEN; j++) {
+    // ReLU; kept for the backward pass.
+    unit[j] = fmax(unit[j], 0.0f);
+    hidden[UNITS_OF(a, m) + j] = unit[j];
   }
   // The last layer is linear: activations are those of gaussians.cl.
   __global const float *last = weights + WEIGHTS_AT[m] + LAST_AT;
@@ -63,33 +53,24 @@ __kernel void heads_forward(int anchors_count, float eye_x, float eye_y, float e
 // Gradients by what goes into each ReLU, laid out as `hidden`.  grad_anchors already holds the
 // gradient through the means and gets that of the colour's view direction added.
 __kernel void units_gradient(int anchors_count, float eye_x, float eye_y, float eye_z,
-                             __global const float *weights, __global const float *middle_t,
-                             __global const float *second_t, __global const float *anchors,
+                             __global const float *weights, __global const float *second_t,
+                             __global const float *anchors,
                              __global const float *hidden, __global const float *grad_raw,
                              __global float *grad_units, __global float *grad_anchors) {
   const int m = get_global_id(0) / anchors_count, a = get_global_id(0) % anchors_count;
   if (!(m < 5)) return;
-  float d[HIDDEN], before[HIDDEN];
+  float d[HIDDEN];
   for (int j = 0; j < HIDDEN; j++) d[j] = 0;
   // dL / d unit = W2 dL / d raw, by the transposed W2.
   for (int c = 0; c < OUT[m]; c++) {
     const float by = grad_raw[(long)a * RAW + OUT_AT[m] + c];
     for (int j = 0; j < HIDDEN; j++) d[j] += by * second_t[(OUT_AT[m] + c) * HIDDEN + j];
   }
-  for (int l = MIDDLE; l >= 0; l--) {
-    for (int j = 0; j < HIDDEN; j++) {
-      // ReLU lets nothing back where it was 0.
-      if (!(hidden[UNITS_OF(a, m, l) + j] > 0)) d[j] = 0;
-      // What the weights' gradients are made of, and the features'.
-      grad_units[UNITS_OF(a, m, l) + j] = d[j];
-    }
-    if (l == 0) break;
-    // One layer down: dL / d unit below = W dL / d unit above.
-    __global const float *rows = middle_t + (m * MIDDLE + l - 1) * HIDDEN * HIDDEN;
-    for (int i = 0; i < HIDDEN; i++) before[i] = 0;
-    for (int j = 0; j < HIDDEN; j++)
-      for (int i = 0; i < HIDDEN; i++) before[i] += d[j] * rows[j * HIDDEN + i];
-    for (int j = 0; j < HIDDEN; j++) d[j] = before[j];
+  for (int j = 0; j < HIDDEN; j++) {
+    // ReLU lets nothing back where it was 0.
+    if (!(hidden[UNITS_OF(a, m) + j] > 0)) d[j] = 0;
+    // What the weights' gradients are made of, and the features'.
+    grad_units[UNITS_OF(a, m) + j] = d[j];
   }
   if (!(m == COLOR && VIEW_COLOR)) return;
   // The direction turns when its anchor moves: d direction / d anchor = (I - u u^T) / r.
@@ -110,20 +91,20 @@ __kernel void features_gradient(int anchors_count, __global const float *first_t
                                 __global float *grad_features) {
   const int a = get_global_id(0) / FEATURES, i = get_global_id(0) % FEATURES;
   if (!(a < anchors_count)) return;
-  // All five heads, all hidden units of the first layer: dL/df = sum of W1 d.
+  // All five heads, all hidden units: dL/df = sum of W1 d.
   float sum = 0;
   for (int m = 0; m < 5; m++)
     for (int j = 0; j < HIDDEN; j++)
-      sum += grad_units[UNITS_OF(a, m, 0) + j] * first_t[(m * HIDDEN + j) * FEATURES + i];
+      sum += grad_units[UNITS_OF(a, m) + j] * first_t[(m * HIDDEN + j) * FEATURES + i];
   grad_features[(long)a * FEATURES + i] = sum;
 }
 
-// Input i of layer l of head m, where the bias stands for a last input of 1.  Psi is left out:
-// control_gradient writes its rows.
+// Input i of layer l (0 or 1) of head m, where the bias stands for a last input of 1.  Psi is left
+// out: control_gradient writes its rows.
 inline float input_of(int m, int l, int a, int i, float3 eye, __global const float *anchors,
                       __global const float *features, __global const float *hidden) {
-  // A later layer takes the units of the layer before.
-  if (l > 0) return i < HIDDEN ? hidden[UNITS_OF(a, m, l - 1) + i] : i == HIDDEN ? 1.0f : 0.0f;
+  // The last layer takes the hidden units.
+  if (l > 0) return i < HIDDEN ? hidden[UNITS_OF(a, m) + i] : i == HIDDEN ? 1.0f : 0.0f;
   if (i < FEATURES) return features[(long)a * FEATURES + i];
   if (i == INPUTS) return 1.0f;
   if (i < DIRECTION_ROW || i > INPUTS || !(m == COLOR && VIEW_COLOR)) return 0.0f;
@@ -146,7 +127,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE *SIDE, 1, 1))) void weights_gr
   const int row = get_local_id(0) / SIDE, column = get_local_id(0) % SIDE;
   const int first_i = jobs[4 * job + 2], first_j = jobs[4 * job + 3];
   // What the layer takes and gives: the first takes the inputs, the last gives the raw outputs.
-  const int takes = l == 0 ? INPUTS : HIDDEN, gives = l == LAYERS ? OUT[m] : HIDDEN;
+  const int takes = l == 0 ? INPUTS : HIDDEN, gives = l == 1 ? OUT[m] : HIDDEN;
   const int from = (long)anchors_count * split / splits;
   const int to = (long)anchors_count * (split + 1) / splits;
   const float3 eye = (float3)(eye_x, eye_y, eye_z);
@@ -157,8 +138,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE *SIDE, 1, 1))) void weights_gr
     if (a < to) {
       input = input_of(m, l, a, first_i + column, eye, anchors, features, hidden);
       if (j < gives)
-        flow = l == LAYERS ? grad_raw[(long)a * RAW + OUT_AT[m] + j]
-                           : grad_units[UNITS_OF(a, m, l) + j];
+        flow = l == 1 ? grad_raw[(long)a * RAW + OUT_AT[m] + j] : grad_units[UNITS_OF(a, m) + j];
     }
     // Each item fetches one input and one flow, and uses sixteen of both.
     inputs[row * SIDE + column] = input;
@@ -172,6 +152,6 @@ __kernel __attribute__((reqd_work_group_size(SIDE *SIDE, 1, 1))) void weights_gr
   // i == takes is the bias, whose input is 1.
   if (!(i <= takes && j < gives)) return;
   // Where the layer lies in a head's weights (heads_shared.cl).
-  const int layer_at = l == 0 ? 0 : l == LAYERS ? LAST_AT : MIDDLE_AT + (l - 1) * MIDDLE_SIZE;
+  const int layer_at = l == 0 ? 0 : LAST_AT;
   grad_chunks[(long)split * WEIGHTS + WEIGHTS_AT[m] + layer_at + i * gives + j] = sum;
 }

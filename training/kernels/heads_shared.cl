@@ -1,15 +1,14 @@
 // heads_shared: what both forms of the heads share: sizes, the folded bias, the ends of the
 // backward pass.
 //
-// The weights of one head lie as W1 [FEATURES + CONTROL + 3][HIDDEN], b1 [HIDDEN], then for each of
-// LAYERS - 1 middle layers W [HIDDEN][HIDDEN], b [HIDDEN], then W2 [HIDDEN][OUT], b2 [OUT]; the
-// last three rows of W1 meet the view direction, which only the last head (colour) takes, and that
-// only with VIEW_COLOR.  CONDITIONED has a bit for each head that sees Psi.  Rows that nothing
-// meets and padding are zero, get zero gradients and so stay zero.
+// A head's weights lie as W1 [FEATURES + CONTROL + 3][HIDDEN], b1 [HIDDEN], W2 [HIDDEN][OUT],
+// b2 [OUT]; the last three rows of W1 meet the view direction, which only the last head (colour)
+// takes, and that only with VIEW_COLOR.  CONDITIONED has a bit for each head that sees Psi.  Rows
+// that nothing meets and padding are zero, get zero gradients and so stay zero.
 //
 // Psi is one vector a head for all anchors (paper eq. 6 and 7), so W1_control . Psi + b1 is folded
 // into one bias a step; that is exact and halves the first layer.
-// Needs:   of networks.py FEATURES, HIDDEN (padded to 8), CONTROL, LAYERS, RAW (row of all raw
+// Needs:   of networks.py FEATURES, HIDDEN (padded to 8), CONTROL, RAW (row of all raw
 //          outputs) and for each head m OUTm (padded width), OUT_ATm (its place in a raw row),
 //          WEIGHTS_ATm.
 // Reads:   weights, control (Psi a head); grad_chunks.
@@ -22,11 +21,8 @@
 #define FEATURES8 (FEATURES / 8)
 // The heads in their order: offset, scale, rotation, opacity, colour.
 #define COLOR 4
-#define MIDDLE (LAYERS - 1)
-#define MIDDLE_SIZE ((HIDDEN + 1) * HIDDEN)
-#define MIDDLE_AT ((INPUTS + 1) * HIDDEN)  // in a head's weights
-#define LAST_AT (MIDDLE_AT + MIDDLE * MIDDLE_SIZE)
-#define UNITS_OF(a, m, l) ((((long)(a) * 5 + (m)) * LAYERS + (l)) * HIDDEN)  // in `hidden`
+#define LAST_AT ((INPUTS + 1) * HIDDEN)  // W2 in a head's weights
+#define UNITS_OF(a, m) (((long)(a) * 5 + (m)) * HIDDEN)  // in `hidden`
 
 __constant int OUT[5] = {OUT0, OUT1, OUT2, OUT3, OUT4};
 __constant int OUT_AT[5] = {OUT_AT0, OUT_AT1, OUT_AT2, OUT_AT3, OUT_AT4};
@@ -44,7 +40,7 @@ inline float4 direction_and_inverse(float3 eye, __global const float *anchor) {
 // backward kernel never sums across a vector.
 __kernel void prepare_weights(__global const float *weights, __global const float *control,
                               __global float *bias, __global float *first_t,
-                              __global float *middle_t, __global float *second_t) {
+                              __global float *second_t) {
   int m = get_global_id(0) / HIDDEN, j = get_global_id(0) % HIDDEN;
   __global const float *first = weights + WEIGHTS_AT[m];
   __global const float *second = first + LAST_AT;
@@ -57,10 +53,6 @@ __kernel void prepare_weights(__global const float *weights, __global const floa
   // Transposed: neighbouring inputs of one unit lie side by side.
   for (int i = 0; i < FEATURES; i++)
     first_t[(m * HIDDEN + j) * FEATURES + i] = first[i * HIDDEN + j];
-  for (int l = 0; l < MIDDLE; l++)
-    for (int i = 0; i < HIDDEN; i++)
-      middle_t[((m * MIDDLE + l) * HIDDEN + j) * HIDDEN + i] =
-          first[MIDDLE_AT + l * MIDDLE_SIZE + i * HIDDEN + j];
   for (int c = 0; c < OUT[m]; c++)
     second_t[OUT_AT[m] * HIDDEN + c * HIDDEN + j] = second[j * OUT[m] + c];
 }

@@ -1,6 +1,6 @@
 // losses: image losses and their gradient: (1 - lambda) L1 + lambda (1 - SSIM), both fused (paper
-// eq. 8; lambda as in 3DGS, the share of D-SSIM), and the regularisation of eq. 9. CPU form: a
-// work-item walks a row in vectors of eight pixels; losses_gpu.cl is the other.
+// eq. 8; lambda as in 3DGS, the share of D-SSIM). CPU form: a work-item walks a row in vectors of
+// eight pixels; losses_gpu.cl is the other.
 //
 // Images are planar: the drawn image and its gradient [3][H][W] as the rasterizer has them, every
 // map of ours [3][H][STRIDE] with STRIDE = W padded to 8, so that whole vectors can be written for
@@ -11,10 +11,9 @@
 // weight map (a photo's mask) draws the pixel towards its target, a = t + w (p - t): what a mask
 // leaves out counts as right, in L1 and in every SSIM window that sees it.
 // Needs:   ROW, the longest padded row plus the window, as private memory for a row.
-// Reads:   image, target (photo bytes over a background), weight where masked; opacity and scales.
-// Writes:  grad_image; ssim_rows and l1_rows, sums a row; maps between; regularise adds to
-//          gradients.
-// Units:   display sRGB in 0..1; opacity 0..1; scales in metres.
+// Reads:   image, target (photo bytes over a background), weight where masked.
+// Writes:  grad_image; ssim_rows and l1_rows, sums a row; maps between.
+// Units:   display sRGB in 0..1.
 
 #include "losses_shared.cl"
 
@@ -216,17 +215,4 @@ __kernel void gradient_columns(int width, int height, int stride, int masked, fl
     }
   }
   l1_rows[row] = l1;
-}
-
-// Eq. 9: mean |opacity| and mean |scale| over all splats, added to their gradients.  Literal: an
-// absent splat (opacity below zero) is drawn towards zero as well.
-__kernel void regularise(int splats, float opacity_share, float scale_share,
-                         __global const float *opacity, __global const float *scales,
-                         __global float *grad_opacity, __global float *grad_scales) {
-  int i = get_global_id(0);
-  if (!(i < splats)) return;
-  float o = opacity[i];
-  // sign(o) / N, and 1 / (3 N) for each scale, which are positive.
-  grad_opacity[i] += opacity_share / splats * (o > 0 ? 1.0f : o < 0 ? -1.0f : 0.0f);
-  for (int c = 0; c < 3; c++) grad_scales[3 * i + c] += scale_share / (3.0f * splats);
 }

@@ -7,7 +7,7 @@
 //          of 0.
 // Reads:   means, log scales, logits, base and rest coefficients; backward the Gaussians and
 //          gradients.
-// Writes:  scales, opacity, color; backward the gradients in place; evidence (N, 2).
+// Writes:  scales, opacity, color; backward the gradients in place; stats (N, 2).
 // Units:   metres; opacity 0..1; display sRGB from 0 on.
 
 // Constants of the real spherical harmonics, by degree: C0 = 1 / (2 sqrt(pi)), C1 = sqrt(3 / (4
@@ -146,10 +146,10 @@ __kernel void activate_backward(int count, int used, float eye_x, float eye_y, f
 #endif
 }
 
-// evidence (N, 2): sum of a splat's screen gradient in half image widths, and the steps in which it
+// stats (N, 2): sum of a splat's screen gradient in half image widths, and the steps in which it
 // was on screen.
 __kernel void accumulate(int count, float half_width, __global const float *record,
-                         __global const float *grad_record, __global float *evidence) {
+                         __global const float *grad_record, __global float *stats) {
   int i = get_global_id(0);
   if (!(i < count)) return;
   // A splat that was not on the screen says nothing about itself.
@@ -157,7 +157,7 @@ __kernel void accumulate(int count, float half_width, __global const float *reco
   // 3DGS's criterion: the norm of the 2D mean's gradient, in units that do not depend on
   // resolution.
   float x = grad_record[12 * i], y = grad_record[12 * i + 1];
-  evidence[2 * i] += sqrt(x * x + y * y) * half_width;
+  stats[2 * i] += sqrt(x * x + y * y) * half_width;
   // The mean over the steps in which it was seen is what is compared with the threshold.
-  evidence[2 * i + 1] += 1;
+  stats[2 * i + 1] += 1;
 }

@@ -59,7 +59,7 @@ class DepthLoss:
 
 
 @dataclass(frozen=True)
-class DepthWish:
+class DepthTerm:
     """What a step learns from a depth photo, and how much of it."""
 
     loss: DepthLoss

@@ -38,18 +38,18 @@ def shared_color(photos: list[LoadedPhoto] | tuple) -> Background | None:
     """
     if not photos or any(photo.see_through for photo in photos):
         return None
-    rims = {}
+    rims: dict[str, list[np.ndarray]] = {}
     for photo in photos:
         rims.setdefault(photo.modality, []).append(rim_of(photo.rgba[..., :3]))
-    rims = {name: np.concatenate(parts) for name, parts in rims.items()}
-    color = np.median(next(iter(rims.values())), axis=0)
-    if not all(near(rim, color).mean() >= ALIKE for rim in rims.values()):
+    edges = [np.concatenate(parts) for parts in rims.values()]
+    color = np.median(edges[0], axis=0)
+    if not all(near(edge, color).mean() >= ALIKE for edge in edges):
         return None
     empty = [near(photo.rgba[..., :3], color).mean() for photo in photos]
     return tuple((color / 255).tolist()) if np.mean(empty) >= EMPTY else None
 
 
-def told_background(color: Background) -> str:
+def background_warning(color: Background) -> str:
     """What a person should know of a background that was found."""
     name = "#" + "".join(f"{round(255 * value):02x}" for value in color)
     return (

@@ -41,12 +41,12 @@ class Exposures:
         self.row = {name: row for row, name in enumerate(names)}
         self.rows = {m: [self.row[m, p.name] for p in each] for m, each in photos.items()}
         self.log_gain = np.full((len(names), 3), np.nan)  # NaN: not looked at yet
-        self.likeness = np.full(len(names), np.nan)  # squared correlation with what was drawn
+        self.correlation = np.full(len(names), np.nan)  # squared correlation with what was drawn
         self.begin = FROM  # share of the run from which on photos are looked at
         self.begin_step = VISITS * len(names)  # or this step, if it comes first
         self.nothing = device.zeros(1)
 
-    def look(self, photo: LoadedPhoto, image, rgba) -> None:
+    def update(self, photo: LoadedPhoto, image, rgba) -> None:
         """Learn from what is drawn (3, H, W) of a photo, and its bytes; both on the device."""
         width, height = photo.view.size
         masked, weight = int(photo.weight is not None), self.nothing
@@ -59,15 +59,15 @@ class Exposures:
         sums = self.device.download(rows).reshape(6, 3, height).sum(axis=2, dtype=np.float64)
         row = self.row[photo.modality, photo.name]
         self.log_gain[row] = log_gain(product=sums[4], square=sums[3])
-        self.likeness[row] = likeness(*sums)
+        self.correlation[row] = correlation(*sums)
 
     def has_begun(self, fraction: float, step: int) -> bool:
         """Whether photos are looked at, at this share of the run and after so many steps."""
         return fraction >= self.begin or step >= self.begin_step
 
-    def forget(self, fraction: float, step: int) -> None:
+    def reset(self, fraction: float, step: int) -> None:
         """The picture was lost here: begin anew, as late as from the start."""
-        self.log_gain[:], self.likeness[:] = np.nan, np.nan
+        self.log_gain[:], self.correlation[:] = np.nan, np.nan
         self.begin = fraction + FROM
         self.begin_step = step + VISITS * len(self.row)
 
@@ -76,7 +76,7 @@ class Exposures:
 
         0 while too few of them are known, or the model shows too little of its photos.
         """
-        known, like = (of[self.rows[modality]] for of in (self.log_gain, self.likeness))
+        known, like = (of[self.rows[modality]] for of in (self.log_gain, self.correlation))
         seen = np.isfinite(known).all(axis=1)
         if not (seen.sum() >= max(FEWEST, len(seen) / 2) and np.median(like[seen]) >= LIKE):
             return 0.0
@@ -93,7 +93,7 @@ class Exposures:
         share = 1 - (NOISE / spread) ** 2
         return tuple(np.exp(share * (own - middle)).tolist())
 
-    def remarks(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """A sentence for each modality whose photos were evened out."""
         return [
             f"{name}: its photos differ in brightness by {100 * spread:.0f} % (one standard "
@@ -104,7 +104,7 @@ class Exposures:
         ]
 
     def state(self) -> dict[str, np.ndarray]:
-        known = {"log_gain": self.log_gain.copy(), "likeness": self.likeness.copy()}
+        known = {"log_gain": self.log_gain.copy(), "correlation": self.correlation.copy()}
         known["begin"] = np.array([self.begin, self.begin_step])
         return {f"exposure.{n}": array for n, array in known.items()}
 
@@ -114,7 +114,7 @@ class Exposures:
         if kept is not None and kept.shape == self.log_gain.shape:
             self.log_gain = kept.copy()
             self.begin, self.begin_step = map(float, state["exposure.begin"])
-            self.likeness = state["exposure.likeness"].copy()
+            self.correlation = state["exposure.correlation"].copy()
 
 
 def log_gain(product: np.ndarray, square: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ def log_gain(product: np.ndarray, square: np.ndarray) -> np.ndarray:
     return np.log(np.clip(ratio, 1 / MOST, MOST))
 
 
-def likeness(count, drawn, photo, drawn2, product, photo2) -> float:
+def correlation(count, drawn, photo, drawn2, product, photo2) -> float:
     """Squared correlation, with its sign, by sums over pixels, each (3,) a channel.
 
     0 where either has no contrast.

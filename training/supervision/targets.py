@@ -1,7 +1,7 @@
 """Photos as targets of the losses, on the device; as many are kept as fit into memory."""
 
 from shapeshift.runtime_models.files.memory import Memory
-from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthWish
+from shapeshift.training.losses.depth_loss import DepthLoss, DepthTarget, DepthTerm
 from shapeshift.training.losses.losses import ImageLoss, Target
 from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.supervision.exposure import NONE, Exposures
@@ -16,7 +16,8 @@ class Targets:
     def __init__(self, device) -> None:
         self.device = device
         self.losses: dict[tuple[int, int], ImageLoss] = {}
-        self.kept: dict[tuple, Target | DepthTarget] = {}
+        self.kept: dict[tuple, Target] = {}
+        self.kept_depths: dict[tuple, DepthTarget] = {}
         self.depth_losses: dict[tuple[int, int], DepthLoss] = {}
         self.bytes, self.most = 0, min(CACHE_BYTES, int(CACHE * Memory().most))
 
@@ -41,7 +42,7 @@ class Targets:
         if exposures is not None:
             if image is not None:
                 rgba = self.device.upload(photo.rgba)
-                exposures.look(photo, image, rgba)
+                exposures.update(photo, image, rgba)
             gain = exposures.gain(photo)
         if gain == NONE and key in self.kept:
             return self.kept[key]
@@ -54,20 +55,16 @@ class Targets:
             self.bytes += target.bytes
         return target
 
-    def wish(self, photo: LoadedPhoto, share: float) -> DepthWish | None:
+    def depth_term(self, photo: LoadedPhoto, share: float) -> DepthTerm | None:
         """What is to be learned from the photo's depth; None where it has none or share is 0."""
         if photo.depth is None or not share > 0:
             return None
-        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size, "depth")
+        size, key = photo.view.size, (photo.modality, photo.name, photo.view.size)
         if size not in self.depth_losses:
             self.depth_losses[size] = DepthLoss(self.device, size)
         loss = self.depth_losses[size]
-        target = self.kept.get(key) or loss.target(photo.depth)
-        if key not in self.kept and self.bytes + target.bytes <= self.most:
-            self.kept[key] = target
+        target = self.kept_depths.get(key) or loss.target(photo.depth)
+        if key not in self.kept_depths and self.bytes + target.bytes <= self.most:
+            self.kept_depths[key] = target
             self.bytes += target.bytes
-        return DepthWish(loss, target, share) if target.known else None
-
-    def forget(self) -> None:
-        """Make all targets anew at their next use: the photos have another size now."""
-        self.kept, self.bytes = {}, 0
+        return DepthTerm(loss, target, share) if target.known else None

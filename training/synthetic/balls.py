@@ -6,6 +6,7 @@ not: the box hides a hot band, and one ball is nearly as cool as the floor.
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -40,7 +41,8 @@ GOLDEN = (5**0.5 + 1) / 2
 DEPTH_UNIT = 0.0001  # metres a step of depth photos
 
 
-def celsius(share: np.ndarray) -> np.ndarray:
+def celsius(share: Any) -> Any:
+    """Degrees of a share 0 to 1 of the range: a number, or an array of them."""
     return 20 + 80 * share
 
 
@@ -109,10 +111,12 @@ def dome_views(count: int, seed: int, size: int) -> list[View]:
         elevation = np.deg2rad(15 + 50 * ((0.618 * i + 0.1 * jitter[1]) % 1))
         away = 3 * (1 + 0.15 * (jitter[2] - 0.5))
         level = away * np.cos(elevation)
-        eye = (level * np.cos(azimuth), away * np.sin(elevation) + 0.2, -level * np.sin(azimuth))
+        eye = np.array(
+            [level * np.cos(azimuth), away * np.sin(elevation) + 0.2, -level * np.sin(azimuth)]
+        )
         half = 0.5 / FOCAL
         tangents = (-half, half, -half, half)
-        out.append(View(look_at(eye, TARGET), tangents, 0.05, 1000.0, (size, size)))
+        out.append(View(look_at(eye, np.array(TARGET)), tangents, 0.05, 1000.0, (size, size)))
     return out
 
 
@@ -123,7 +127,7 @@ def radiance(here: Place, modality: str):
 
     def thermal(o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         hits = look(here, o, d)
-        low, high = STOPS[1].value_range
+        low, high = STOPS[1].value_range or (0.0, 1.0)
         share = (pattern_at(here, hits, "celsius", 1) - low) / (high - low)
         return np.repeat(np.where(hits.index[:, None] >= 0, share, 0), 3, axis=1), hits.index
 

@@ -1,5 +1,7 @@
 """The workshop's electric motor, its axis along x: closed with cooling fins, or cut open."""
 
+from typing import Any
+
 import numpy as np
 
 from shapeshift.training.synthetic.placing import bar, box, disc, mix, noise, ring
@@ -35,7 +37,7 @@ def body_heat(p: np.ndarray) -> np.ndarray:
     return 60 + 90 * p[:, 1] + 5 * noise(p, 30)
 
 
-def painted(celsius, color: tuple = PAINT) -> Surface:
+def painted(celsius: Any, color: Any = PAINT) -> Surface:
     return Surface(color, celsius, 0.25, 25.0, 0.12)
 
 

@@ -30,23 +30,25 @@ class Clearance:
 
     @staticmethod
     def of(place: Place, low: tuple, high: tuple, cell: float = 0.01) -> "Clearance":
-        low = np.asarray(low, float)
-        shape = np.ceil((high - low) / cell).astype(int) + 1
+        corner = np.asarray(low, float)
+        shape = np.ceil((high - corner) / cell).astype(int) + 1
         grid = np.full(shape, FAR)
         for solid in place.solids:
             # Only cells that are nearer than FAR to the ball round the solid can change.
             around = solid.shape.reach + FAR
-            first = np.clip(np.floor((solid.centre - around - low) / cell), 0, shape).astype(int)
-            last = np.clip(np.ceil((solid.centre + around - low) / cell) + 1, 0, shape).astype(int)
+            first = np.clip(np.floor((solid.centre - around - corner) / cell), 0, shape).astype(int)
+            last = np.clip(np.ceil((solid.centre + around - corner) / cell) + 1, 0, shape).astype(
+                int
+            )
             block = grid[tuple(map(slice, first, last))]
             cells = np.stack(np.meshgrid(*map(np.arange, first, last), indexing="ij"), -1)
-            points = low + cell * cells.reshape(-1, 3)
+            points = corner + cell * cells.reshape(-1, 3)
             bound = length(points - solid.centre) - solid.shape.reach
             close = np.flatnonzero(bound < block.ravel())
             nearest = block.ravel()
             nearest[close] = np.minimum(nearest[close], solid.distance(points[close]))
             block[...] = nearest.reshape(block.shape)
-        return Clearance(low, cell, grid)
+        return Clearance(corner, cell, grid)
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(n,) metres, trilinear; outside the grid as at its border."""

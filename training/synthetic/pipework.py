@@ -135,11 +135,11 @@ def valve() -> list[Solid]:
         bar((x, top - 0.009, z), (x, top + 0.01, z), 0.019, red),
     ]
     for k in range(5):
-        spoke = ALONG["y"] @ np.array(
+        way = ALONG["y"] @ np.array(
             [np.cos(2 * np.pi * k / 5 + 0.3), 0, np.sin(2 * np.pi * k / 5 + 0.3)]
         )
-        hub = np.array((x, top, z))
-        out.append(bar(hub + 0.012 * spoke, hub + 0.072 * spoke, 0.006, red))
+        wheel = np.array((x, top, z))
+        out.append(bar(wheel + 0.012 * way, wheel + 0.072 * way, 0.006, red))
     return out
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from shapeshift.training.synthetic.openness import corner_weight
 from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring
 from shapeshift.training.synthetic.tracer import Solid, Surface
 
+Place3 = tuple[float, float, float] | np.ndarray  # (3,) metres
 # world_from_local rotations that lay a shape's own +Y along a world axis
 ALONG = {
     "x": np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
@@ -17,7 +19,7 @@ ALONG = {
 }
 
 
-def frame(position: tuple, rotation: np.ndarray | None = None) -> np.ndarray:
+def frame(position: Place3, rotation: np.ndarray | None = None) -> np.ndarray:
     """(4, 4) parent_from_local."""
     out = np.eye(4)
     out[:3, :3] = np.eye(3) if rotation is None else rotation
@@ -43,17 +45,17 @@ def box(centre: tuple, half: tuple, surface: Surface, bevel: float = 0.003, **mo
     return Solid(Box(half, bevel), surface, frame(centre, more.get("rotation")), more.get("keep"))
 
 
-def bar(start: tuple, end: tuple, radius: float, surface: Surface, **more) -> Solid:
+def bar(start: Place3, end: Place3, radius: float, surface: Surface, **more: Any) -> Solid:
     """A cylinder from one point to another; top_radius, bevel, capped, keep as in Cylinder."""
-    start, end = np.asarray(start, float), np.asarray(end, float)
-    length = float(np.linalg.norm(end - start))
-    up = (end - start) / length
+    first, last = np.asarray(start, float), np.asarray(end, float)
+    length = float(np.linalg.norm(last - first))
+    up = (last - first) / length
     side = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
     side /= np.linalg.norm(side)
     keep = more.pop("keep", None)
     shape = Cylinder(radius, length / 2, **({"bevel": 0.002} | more))
     rotation = np.stack([side, up, np.cross(side, up)], axis=1)
-    return Solid(shape, surface, frame((start + end) / 2, rotation), keep)
+    return Solid(shape, surface, frame((first + last) / 2, rotation), keep)
 
 
 def ball(centre: tuple, radius: float, surface: Surface) -> Solid:
@@ -68,13 +70,15 @@ def disc(centre: tuple, axis: str, radius: float, surface: Surface, **more) -> S
     return Solid(Disc(radius), surface, frame(centre, ALONG[axis]), more.get("keep"))
 
 
-def elbow(corner: tuple, first: tuple, second: tuple, bend: float, radius: float, surface) -> Solid:
+def elbow(
+    corner: Place3, first: Place3, second: Place3, bend: float, radius: float, surface: Surface
+) -> Solid:
     """The quarter bend of a pipe at `corner` between unit directions that leave the corner."""
-    first, second = np.asarray(first, float), np.asarray(second, float)
-    middle = -(first + second) / np.sqrt(2)  # local +X: from the bend's centre to the corner
-    normal = np.cross(first, second)
+    one, other = np.asarray(first, float), np.asarray(second, float)
+    middle = -(one + other) / np.sqrt(2)  # local +X: from the bend's centre to the corner
+    normal = np.cross(one, other)
     rotation = np.stack([middle, normal, np.cross(middle, normal)], axis=1)
-    centre = np.asarray(corner, float) + bend * (first + second)
+    centre = np.asarray(corner, float) + bend * (one + other)
     return Solid(Ring(bend, radius, np.pi / 4), surface, frame(centre, rotation))
 
 

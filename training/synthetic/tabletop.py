@@ -88,7 +88,8 @@ def splats(
     color = np.clip(paint(places, noise) * lit[:, None], 0, 1)
     arrays = (places + normals * out, scales, flat_on(normals), np.full(len(places), opacity))
     sh = ((color - 0.5) / SH0)[:, None]
-    return PlainSplats(*(a.astype(np.float32) for a in (*arrays, sh)))
+    means, sizes, wxyz, alphas, harmonics = (a.astype(np.float32) for a in (*arrays, sh))
+    return PlainSplats(means, sizes, wxyz, alphas, harmonics)
 
 
 def mix(a: tuple, b: tuple, part: np.ndarray) -> np.ndarray:
@@ -258,10 +259,11 @@ def write_colliders(folder: Path) -> None:
     What they are made of is looked at as it is in the scene at first.
     """
     for item in scene(folder).items:
-        path = folder / item.collider
+        path = folder / str(item.collider)
         if path.suffix == ".glb":
             model = read_model(folder / item.model, Reading(mode=item.mode, up=item.up))
-            made = collider_of_model(model, item.x, Making(kept=False))
+            x = item.x if isinstance(item.x, float | int) else 0.0
+            made = collider_of_model(model, x, Making(kept=False))
             write_collider(made.hulls, made.mesh, path)
 
 

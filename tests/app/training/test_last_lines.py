@@ -59,7 +59,6 @@ def test_a_short_training_says_so_and_how_to_go_on(tmp_path):
                      "--resume", "--iterations", "2000"]  # fmt: skip
     assert look.startswith("look: ")
     assert shlex.split(look)[1 + start :] == [str(tmp_path / "a b.shift")]
-    assert "30,000 are usual" in what_next(asked(tmp_path, preset="paper"), 35, 0.1, False)[0]
     assert "about 6 seconds more" in what_next(asked(tmp_path), 500, 0.004, False)[0]
 
 

@@ -15,11 +15,16 @@ from shapeshift.app.training.train import run as train
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.calibration import calibrate as rig_search
-from shapeshift.training.calibration.extrinsics import moved_by, offset_capture, rig_of, told
+from shapeshift.training.calibration.extrinsics import (
+    moved_by,
+    offset_capture,
+    offset_of_matrix,
+    rig_of,
+)
 from shapeshift.training.synthetic.balls import make_balls
 
 PLANTED = moved_by(np.array([0.1, -0.2, 0.05, 0.1, 0.05, -0.1]))
-SMALL = {"max_anchors": 300, "iterations": 20, "device": "cpu"}
+ASKED = {"max_anchors": 300, "iterations": 20}
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +45,7 @@ def asked(monkeypatch) -> list[str]:
 
     def calibrate(device, capture, settings, modality, **more):
         found.append(modality)
-        return told(PLANTED, 3.0)
+        return offset_of_matrix(PLANTED, 3.0)
 
     monkeypatch.setattr(rig_search, "calibrate", calibrate)
     return found
@@ -57,8 +62,8 @@ def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path):
     for folder, calibrate in zip(folders, (None, "Thermal"), strict=True):
         out = tmp_path / folder.name
         options = table.Options(
-            folder, out, methods=("joint", "separate", "splats"), splats=300, calibrate=calibrate,
-            **SMALL,
+            folder, out, {"max_anchors": 300}, methods=("joint", "separate", "splats"),
+            splats={"max_splats": 300}, calibrate=calibrate, iterations=20, device="cpu",
         )  # fmt: skip
         assert table.run(options) == 0
         lines = (out / "table.csv").read_text().splitlines()
@@ -73,7 +78,7 @@ def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path):
 
 def test_separate_models_keep_it(folders, asked, tmp_path):
     options = TrainOptions(
-        folders[1], tmp_path / "out", separate=True, calibrate="Thermal", grow=False, **SMALL
+        folders[1], tmp_path / "out", ASKED, separate=True, calibrate="Thermal", device="cpu"
     )
     assert train(options) == 0 and asked == ["Thermal"]
     files = sorted((tmp_path / "out").glob("*.shift"))
@@ -87,11 +92,14 @@ def test_separate_models_keep_it(folders, asked, tmp_path):
 def test_fit_keeps_it(folders, asked, tmp_path, monkeypatch):
     from shapeshift.training.fit.fit import Fit
 
-    monkeypatch.setattr("shapeshift.training.fit.fit.PARTS", ())
+    monkeypatch.setattr("shapeshift.training.fit.fit.COMPONENTS", ())
     monkeypatch.setattr(Fit.__init__, "__defaults__", ((), None))
-    monkeypatch.setattr(Fit, "clean", lambda self: None)
+    monkeypatch.setattr(Fit, "prune_models", lambda self: None)
     out = tmp_path / "fit.shift"
-    options = fit.Options(folders[1], out, calibrate="Thermal", seeds=1, grow=False, **SMALL)
+    options = fit.Options(
+        folders[1], out, {"max_anchors": 300}, calibrate="Thermal", seeds=1, iterations=20,
+        device="cpu",
+    )  # fmt: skip
     assert fit.run(options) == 0 and asked == ["Thermal"]
     kept = json.loads(rig_of(read_package(out).provenance))
     np.testing.assert_allclose(kept["Thermal"], PLANTED.ravel(), atol=1e-8)

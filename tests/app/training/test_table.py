@@ -19,7 +19,7 @@ from shapeshift.app.training.table import Options, command_line, run, train_opti
 from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
 from shapeshift.app.training.train import Options as TrainOptions
 from shapeshift.app.training.train import run as run_training
-from shapeshift.app.training.train_baselines import Run, plain_settings, share_of
+from shapeshift.app.training.train_baselines import TrainedFile, plain_settings, share_of
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.training.baselines.plain import PlainTrainer
@@ -29,7 +29,7 @@ from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
 from tests.support.training.vgg_files import write_small
 
-SMALL = {"max_anchors": 400, "splats": 800, "max_splats": 900, "sh_degree": 1}
+SMALL = {"asked": {"max_anchors": 400}, "splats": {"max_splats": 900, "sh_degree": 1}}
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_every_method_has_a_row_a_modality_and_a_mean(compared):
         assert int(row["steps"]) == (20 if method == "joint" or modality == MEAN else 10)
         assert int(row["photos"]) == (4 if modality == MEAN else 2)
     assert lines[0].startswith(
-        f"# python3 launch.py table {options.capture.name} --iterations 20 --vgg small.onnx"
+        f"# python3 launch.py table {options.capture.name} --device cpu --iterations 20 --vgg small"
     )
     assert "RGB 10 + 2 photos of 48x48" in lines[2] and "VGG distance by small.onnx" in lines[2]
 
@@ -137,8 +137,8 @@ def test_one_modality_is_evaluated_alone(compared, balls, tmp_path, capsys):
 
 def test_without_a_file_the_column_is_absent_and_the_reason_is_told(balls, tmp_path, capsys):
     options = Options(
-        balls.folder, tmp_path / "out", iterations=4, methods=("splats",), splats=200,
-        max_splats=200, device="cpu",
+        balls.folder, tmp_path / "out", iterations=4, methods=("splats",),
+        splats={"max_splats": 200}, device="cpu",
     )  # fmt: skip
     assert run(options) == 0
     lines = (tmp_path / "out" / "table.csv").read_text().splitlines()
@@ -170,7 +170,7 @@ def test_the_mean_counts_one_file_once(tmp_path):
         VggRow("splats", "RGB", 30.0, 31.0, 0.8, 2.0, 7.0, 70, 1000, 3, 0.1),
         VggRow("splats", "Thermal", 35.0, 34.0, 0.9, 0.5, 3.0, 30, 501, 5, 0.3),
     ]
-    runs = [Run(tmp_path / "a", 7.0, 70), Run(tmp_path / "b", 3.0, 30)]
+    runs = [TrainedFile(tmp_path / "a", 7.0, 70), TrainedFile(tmp_path / "b", 3.0, 30)]
     mean = mean_row(rows, runs)
     assert mean == VggRow("splats", MEAN, 32.5, 32.5, 0.85, 2.5, 10.0, 100, 750, 8, 0.2)
     assert mean_row(rows, runs[:1]).mb == 2.0
@@ -184,12 +184,16 @@ def test_a_model_of_all_modalities_tells_its_size_once():
 
 
 def test_options_go_to_the_methods_that_have_them(tmp_path):
-    options = Options(tmp_path / "c", tmp_path / "o", seconds=60, seed=3, **SMALL)
+    asked = {"max_anchors": 400, "seed": 3}
+    options = Options(tmp_path / "c", tmp_path / "o", asked, SMALL["splats"], seconds=60)
     splats, joint = train_options("splats", options), train_options("joint", options)
-    assert (splats.splats, splats.max_anchors, splats.model) == (800, None, "splats")
-    assert (joint.splats, joint.max_anchors, joint.model) == (None, 400, "anchors")
+    assert (splats.splats, splats.model) == ({"max_splats": 900, "sh_degree": 1}, "splats")
+    assert splats.asked == {"seconds": 60, "seed": 3}
+    assert (joint.splats, joint.model) == ({}, "anchors")
+    assert joint.asked == {"seconds": 60} | asked
     assert train_options("separate", options).separate
-    assert splats.seed == joint.seed == 3 and splats.seconds == 60
+    words = command_line(options)
+    assert "--seconds 60" in words and "--max-anchors 400 --seed 3 --max-splats 900" in words
     assert "--methods" not in command_line(replace(options, methods=("joint",)))
 
 
@@ -215,28 +219,27 @@ def test_what_cannot_be_compared_is_refused_before_training(balls, tmp_path):
         run(replace(good, vgg=tmp_path / "absent.onnx"))
     write_small(tmp_path / "small.onnx")
     with pytest.raises(BadFile, match="12x12 pixels are too small"):
-        run(replace(good, vgg=tmp_path / "small.onnx", downscale=4))
+        run(replace(good, vgg=tmp_path / "small.onnx", asked={"downscale": 4}))
     assert not (tmp_path / "out").exists()
 
 
 def test_options_of_another_kind_of_model_are_refused(balls, tmp_path):
-    asked = TrainOptions(balls.folder, tmp_path / "out", model="splats", iterations=2)
+    asked = TrainOptions(balls.folder, tmp_path / "out", {"iterations": 2}, model="splats")
     for wrong, words in (
-        ({"features": 8}, "--features is of anchor models"),
+        ({"asked": {"features": 8}}, "--features is of anchor models"),
         ({"resume": True}, "begin anew"),
         ({"separate": True}, "leave out --separate"),
-        ({"sh_degree": 4}, "up to degree 3"),
-        ({"model": "anchors", "sh_degree": 2}, "--sh-degree is of plain splats"),
+        ({"splats": {"sh_degree": 4}}, "up to degree 3"),
+        ({"model": "anchors", "splats": {"sh_degree": 2}}, "--sh-degree is of plain splats"),
     ):
         with pytest.raises(UsageError, match=words):
             run_training(replace(asked, **wrong))
     with pytest.raises(UsageError, match="name a folder"):
         out = tmp_path / "a.shift"
         run_training(replace(asked, model="anchors", separate=True, out=out, device="cpu"))
-    settings = plain_settings(replace(asked, iterations=None, preset="paper", sh_degree=0))
-    assert settings.iterations == 30000 and settings.sh_degree == 0
-    assert plain_settings(replace(asked, iterations=None, seconds=5.0)).iterations is None
-    assert plain_settings(replace(asked, seconds=5.0)).iterations == 2
+    assert plain_settings(replace(asked, splats={"sh_degree": 0})).sh_degree == 0
+    assert plain_settings(replace(asked, asked={"seconds": 5.0})).iterations is None
+    assert plain_settings(replace(asked, asked={"seconds": 5.0, "iterations": 2})).iterations == 2
 
 
 @pytest.mark.parametrize(("kind", "trainer"), [("splats", PlainTrainer), ("anchors", Trainer)])
@@ -249,15 +252,18 @@ def test_ctrl_c_keeps_what_was_trained(balls, tmp_path, monkeypatch, capsys, kin
         return step(self)
 
     monkeypatch.setattr(trainer, "one_step", interrupted)
+    small = {} if kind == "splats" else {"max_anchors": 100}
     asked = TrainOptions(
-        balls.folder, tmp_path / "out", model=kind, separate=kind == "anchors", iterations=4000,
-        grow=False, device="cpu", **({"splats": 300} if kind == "splats" else {"max_anchors": 100}),
+        balls.folder, tmp_path / "out", {"iterations": 4000} | small, model=kind,
+        splats={"max_splats": 300} if kind == "splats" else {}, separate=kind == "anchors",
+        device="cpu",
     )  # fmt: skip
     assert run_training(asked) == 130
     assert "interrupted" in (told := capsys.readouterr().err) and "not trained: Thermal" in told
     path = tmp_path / "out" if kind == "splats" else tmp_path / "out" / "0_RGB.shift"
     assert [stop.name for stop in read_model(path).stops] == ["RGB"]
-    table = Options(balls.folder, tmp_path / "t", iterations=4000, methods=("splats",), splats=300)
+    few = {"max_splats": 300}
+    table = Options(balls.folder, tmp_path / "t", iterations=4000, methods=("splats",), splats=few)
     if kind == "splats":
         assert run(table) == 130  # no row of half a method
         assert not (tmp_path / "t" / "table.csv").exists()
@@ -272,8 +278,9 @@ def test_the_program_of_the_measured_rows(balls, tmp_path, monkeypatch):
     words = [str(balls.folder), "--seconds", "0.3", "--sizes", "0.02", "--downscale", "2"]
     words += ["--out", str(tmp_path / "work"), "--csv", str(tmp_path / "rows.csv")]
     monkeypatch.setattr(
-        program, "caps", lambda size, asked: {"max_anchors": 60, "splats": round(99 * size)}
-    )
+        program, "caps",
+        lambda size, asked: ({"max_anchors": 60, "downscale": 2}, {"max_splats": round(99 * size)}),
+    )  # fmt: skip
     monkeypatch.setattr(sys, "argv", ["baselines.py", *words])
     assert program.main() == 0
     lines = (tmp_path / "rows.csv").read_text().splitlines()

@@ -20,16 +20,16 @@ from shapeshift.training.baselines.plain import PlainTrainer, one_modality
 from shapeshift.training.baselines.plain_density import (
     AFTER_RESET,
     SMALLER,
-    changed_splats,
-    decide,
+    apply_densification,
+    choose_densification,
     extent_of,
-    halves,
     reset_opacity,
+    split_splats,
 )
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.baselines.plain_step import GROUPS
 from shapeshift.training.evaluation.evaluate import evaluate_model
-from shapeshift.training.first_anchors.first_anchors import neighbour_distance, seen_colors
+from shapeshift.training.first_anchors.first_anchors import neighbour_distance, photo_colors
 from shapeshift.training.synthetic.balls import STOPS, make_balls
 from tests.support.training.training_runs import run
 
@@ -64,13 +64,13 @@ def state_of(count: int, scale: float = 0.01, seed: int = 0) -> dict[str, np.nda
 def test_small_splats_are_cloned_and_large_ones_split_the_strongest_first():
     state = state_of(6)
     state["scales.value"][[1, 3], 2] = np.log(0.2)  # one long axis is enough
-    evidence = np.array([[5, 1], [9, 3], [0, 0], [8, 2], [1, 1], [4, 1]], np.float32)
+    stats = np.array([[5, 1], [9, 3], [0, 0], [8, 2], [1, 1], [4, 1]], np.float32)
     settings = PlainSettings(grow_threshold=2.5, max_splats=9, splats=6)
-    change = decide(state, evidence, settings, extent=10.0, after_reset=False)
+    change = choose_densification(state, stats, settings, extent=10.0, after_reset=False)
     # pulls 5, 3, 0, 4, 1, 4: over the threshold 0, 3, 5 and 1; room for three
     assert not change.gone.any()
     assert change.cloned.tolist() == [0, 5] and change.split.tolist() == [3]
-    out = changed_splats(state, change, np.random.default_rng(0))
+    out = apply_densification(state, change, np.random.default_rng(0))
     assert {len(out[f"{name}.{part}"]) for name in GROUPS for part in ("value", "mean")} == {9}
     stay = [0, 1, 2, 4, 5]
     for name in GROUPS:
@@ -85,21 +85,21 @@ def test_small_splats_are_cloned_and_large_ones_split_the_strongest_first():
 
 
 def test_what_is_transparent_or_broken_goes_and_what_is_too_large_after_a_reset():
-    state, evidence = state_of(4), np.full((4, 2), 100.0)
+    state, stats = state_of(4), np.full((4, 2), 100.0)
     state["opacity.value"][:] = [-9, np.nan, 1, 1]
     state["scales.value"][3] = np.log(3.0)
     settings = PlainSettings()
     for after_reset, gone in ((False, [1, 1, 0, 0]), (True, [1, 1, 0, 1])):
-        change = decide(state, evidence, settings, extent=10.0, after_reset=after_reset)
+        change = choose_densification(state, stats, settings, extent=10.0, after_reset=after_reset)
         assert change.gone.tolist() == [bool(g) for g in gone]
         assert not set(np.flatnonzero(change.gone)) & {*change.cloned, *change.split}
     state["opacity.value"][:] = -9  # somebody has to stay
-    assert not decide(state, evidence, settings, 10.0, False).gone.any()
+    assert not choose_densification(state, stats, settings, 10.0, False).gone.any()
 
 
 def test_a_full_scene_does_not_grow():
     settings = PlainSettings(max_splats=5, splats=5)
-    change = decide(state_of(8), np.full((8, 2), 50.0), settings, 10.0, False)
+    change = choose_densification(state_of(8), np.full((8, 2), 50.0), settings, 10.0, False)
     assert not len(change.cloned) and not len(change.split)
 
 
@@ -111,7 +111,7 @@ def test_halves_are_drawn_from_the_splat():
         "means": np.tile([1.0, 2, 3], (count, 1)), "scales": np.tile(np.log(sigma), (count, 1)),
         "wxyz": np.tile(wxyz, (count, 1)), "opacity": np.zeros(count),
     }  # fmt: skip
-    means = halves(values, np.random.default_rng(0))["means"]
+    means = split_splats(values, np.random.default_rng(0))["means"]
     turn = rotations(wxyz[None])[0]
     local = (means - [1.0, 2, 3]) @ turn  # along the splat's own axes
     assert np.abs(local.mean(0) / sigma).max() < 5 / np.sqrt(2 * count)
@@ -154,7 +154,7 @@ def test_first_scales_are_the_distances_to_the_nearest():
 def test_first_colours_are_the_photos(device, balls):
     trainer = PlainTrainer(device, one_modality(balls, "Thermal"), SETTINGS)
     photos = trainer.schedule.photos["Thermal"]
-    colors = seen_colors(np.array([[0.0, 0, 0], [0, 500.0, 0]]), photos, (0.0, 0.0, 0.0))
+    colors = photo_colors(np.array([[0.0, 0, 0], [0, 500.0, 0]]), photos, (0.0, 0.0, 0.0))
     assert (colors[1] == 0.5).all()  # on no photo
     assert 0 < colors[0].max() < 1 and np.ptp(colors[0]) < 1e-6  # heat is grey
 
@@ -163,7 +163,7 @@ def test_a_hundred_steps_reach_a_picture(trained):
     psnr = trained[0].held_out_psnr(99) | trained[1].held_out_psnr(99)
     assert psnr["RGB"] > 26 and psnr["Thermal"] > 31, psnr
     for trainer in trained:
-        assert trainer.guard.trips == 0
+        assert trainer.guard.rollbacks == 0
         assert (
             len(trainer.first_values(trainer.schedule.photos[trainer.stop.name])["means"])
             < (trainer.count)
@@ -233,7 +233,7 @@ def test_a_broken_state_is_turned_back(device, balls):
             state = trainer.adam.state()
             state["means.value"][:] = np.nan
             trainer.adam.load(state)
-    assert trainer.guard.trips == 1 and trainer.rate_scale == 0.5
+    assert trainer.guard.rollbacks == 1 and trainer.rate_scale == 0.5
     assert np.isfinite(trainer.splats().means).all()
     assert trainer.held_out_psnr(99)["RGB"] > 26
 
@@ -257,7 +257,7 @@ def test_the_folder_draws_what_was_trained(trained, device, balls, tmp_path):
 def test_what_cannot_be_trained_is_refused(device, balls):
     with pytest.raises(BadFile, match="'Xray' has no training photos"):
         one_modality(balls, "Xray")
-    for wrong in ({"sh_degree": 4}, {"splats": 0}, {"iterations": None}, {"ssim_share": 1.5}):
+    for wrong in ({"sh_degree": 4}, {"splats": 0}, {"iterations": None}, {"depth_share": -1}):
         with pytest.raises(ValueError):
             PlainSettings(**wrong)
 

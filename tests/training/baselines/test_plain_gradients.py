@@ -5,15 +5,20 @@ import pytest
 
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.training.baselines.plain_reference import decode_plain_reference
-from shapeshift.training.baselines.plain_step import GROUPS, REST, PlainEvidence, PlainStep
+from shapeshift.training.baselines.plain_step import (
+    GROUPS,
+    REST,
+    PlainDensificationStats,
+    PlainStep,
+)
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.heads.optimizer import Adam
-from shapeshift.training.losses.losses import ImageLoss
+from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
 from shapeshift.training.reference import step_loss_reference
 from tests.support.training.plain_situations import SIZE, situation
 
 BACKGROUND = (0.2, 0.5, 0.9)
-SHARES = (0.2, 0.0, 0.0)
+SHARES = SSIM_SHARE, 0.0  # no loss of faint splats
 
 
 @pytest.mark.parametrize(
@@ -26,7 +31,7 @@ def test_every_gradient(device, degree, used, seed):
     loss = ImageLoss(device, SIZE)
     target = loss.target(device.upload(rgba), BACKGROUND)
     drawing = step.draw(view, BACKGROUND)
-    grads = step.gradients(drawing, loss, target, SHARES[0])
+    grads = step.gradients(drawing, loss, target)
     photo, camera, eye = rgba[..., :3] / 255, camera_of(view), view.world_from_eye.position
     assert (device.download(drawing.splats.color) == 0).any()  # colours that are cut are there
 
@@ -73,10 +78,10 @@ def test_evidence_is_the_mean_screen_gradient_of_what_was_seen(device):
     parameters, view, rgba = situation(0, 1)
     parameters["means"][4] = (0, 0, 50)  # behind the eye
     step = PlainStep(device, Adam(device, parameters, dict.fromkeys(GROUPS, np.ones(1))), 1)
-    loss, evidence = ImageLoss(device, SIZE), PlainEvidence(device, 7)
+    loss, stats = ImageLoss(device, SIZE), PlainDensificationStats(device, 7)
     target = loss.target(device.upload(rgba), BACKGROUND)
     for _ in range(3):
-        step.gradients(step.draw(view, BACKGROUND), loss, target, 0.2, evidence)
-    sums = device.download(evidence.sums)
+        step.gradients(step.draw(view, BACKGROUND), loss, target, stats)
+    sums = device.download(stats.sums)
     assert sums[4].tolist() == [0, 0] and (np.delete(sums[:, 1], 4) == 3).all()
     assert (np.delete(sums[:, 0], 4) > 0).all()

@@ -11,7 +11,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.calibration.calibrate import (
-    STAGES,
+    PYRAMID,
     calibrate,
     descend,
     factors_of,
@@ -19,13 +19,13 @@ from shapeshift.training.calibration.calibrate import (
 )
 from shapeshift.training.calibration.extrinsics import (
     moved_by,
+    offset_of_matrix,
     offset_view,
     pose_gradient,
     rig_of,
-    told,
-    with_found,
+    with_extrinsics,
 )
-from shapeshift.training.calibration.residuals import Frozen
+from shapeshift.training.calibration.residuals import ShapeResiduals
 from shapeshift.training.drawing import camera_of, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.photos import LoadedPhoto
@@ -92,7 +92,7 @@ def views_about(count: int, size: tuple[int, int]) -> list[View]:
     return [View(look_at(eye, (0, 0.02, 0)), pinhole, 0.05, 50.0, size) for eye in eyes]
 
 
-def some_frozen(count: int, photos: int, size: tuple[int, int]) -> tuple[Frozen, tuple]:
+def some_frozen(count: int, photos: int, size: tuple[int, int]) -> tuple[ShapeResiduals, tuple]:
     """Splats, and photos of noise that they are to show; one photo counts by halves."""
     random, device = RNG(4), open_device("cpu")
     splats = some_splats(random, count)
@@ -101,36 +101,38 @@ def some_frozen(count: int, photos: int, size: tuple[int, int]) -> tuple[Frozen,
         loaded(view, random.random(size[::-1]), random.random(size[::-1]) if i == 0 else None)
         for i, view in enumerate(views_about(photos, size))
     ]
-    return Frozen(device, shape, noise, 0.2, 1.9), splats
+    return ShapeResiduals(device, shape, noise, 0.2, 1.9), splats
 
 
-def error_of(frozen: Frozen, splats: tuple, gray: np.ndarray, step: np.ndarray) -> float:
+def error_of(residuals: ShapeResiduals, splats: tuple, gray: np.ndarray, step: np.ndarray) -> float:
     """Half the mean square error by the plain renderer, in float64."""
     error = 0.0
-    for photo, weight in zip(frozen.photos, frozen.weights, strict=True):
+    for photo, weight in zip(residuals.photos, residuals.weights, strict=True):
         camera = camera_of(offset_view(photo.view, step))
-        color = (frozen.sides(photo) * gray).sum(axis=1, keepdims=True).repeat(3, axis=1)
+        color = (residuals.view_basis(photo) * gray).sum(axis=1, keepdims=True).repeat(3, axis=1)
         picture, through = render_reference((*splats[:4], color), camera)[:2]
-        missing = picture[0] + frozen.behind * through - photo.rgba[..., 0] / 255
+        missing = picture[0] + residuals.behind * through - photo.rgba[..., 0] / 255
         error += 0.5 * (weight * missing**2).sum()
-    return error / frozen.values
+    return error / residuals.values
 
 
 def test_the_slope_by_the_offset_is_that_of_differences():
-    frozen, splats = some_frozen(25, 2, (26, 22))
-    frozen.gray = RNG(6).random((25, 4))
-    frozen.stand(np.eye(4))
-    cost, slope = frozen.slope()
+    residuals, splats = some_frozen(25, 2, (26, 22))
+    residuals.gray = RNG(6).random((25, 4))
+    residuals.move_cameras(np.eye(4))
+    cost, slope = residuals.cost_and_gradient()
     exact = finite_differences(
-        lambda six: error_of(frozen, splats, frozen.gray, frozen.step(six)), np.zeros(6), 1e-5
+        lambda six: error_of(residuals, splats, residuals.gray, residuals.step(six)),
+        np.zeros(6),
+        1e-5,
     ).ravel()
-    assert cost == pytest.approx(error_of(frozen, splats, frozen.gray, np.eye(4)), rel=1e-5)
+    assert cost == pytest.approx(error_of(residuals, splats, residuals.gray, np.eye(4)), rel=1e-5)
     np.testing.assert_allclose(slope, exact, atol=2e-4 * np.abs(exact).max())
 
 
 def test_the_brightness_is_that_of_least_squares():
-    frozen, _ = some_frozen(14, 3, (26, 22))
-    frozen.stand(moved_by(np.full(6, 0.02)))
+    residuals, _ = some_frozen(14, 3, (26, 22))
+    residuals.move_cameras(moved_by(np.full(6, 0.02)))
     pictures = []
 
     def keep(i: int, picture: np.ndarray) -> np.ndarray:
@@ -138,18 +140,18 @@ def test_the_brightness_is_that_of_least_squares():
         return picture * 0
 
     for one in np.eye(14 * 4):
-        frozen.answered(one.reshape(14, 4), 0.0, keep)
-    frozen.answered(np.zeros((14, 4)), frozen.behind, keep)
+        residuals.adjoint(one.reshape(14, 4), 0.0, keep)
+    residuals.adjoint(np.zeros((14, 4)), residuals.behind, keep)
     columns = np.reshape(pictures[:-3], (14 * 4, -1)).T
-    wanted = (np.array(frozen.wanted) - pictures[-3:]).ravel()
-    root = np.sqrt([np.broadcast_to(w, (22, 26)) for w in frozen.weights]).ravel()
+    wanted = (np.array(residuals.wanted) - pictures[-3:]).ravel()
+    root = np.sqrt([np.broadcast_to(w, (22, 26)) for w in residuals.weights]).ravel()
     # of the four numbers of a splat three photos tell three: the fourth is left at what it was
     best = np.linalg.lstsq(columns * root[:, None], wanted * root, rcond=1e-4)[0]
-    least = 0.5 * ((root * (wanted - columns @ best)) ** 2).sum() / frozen.values
-    before = frozen.slope()[0]
+    least = 0.5 * ((root * (wanted - columns @ best)) ** 2).sum() / residuals.values
+    before = residuals.cost_and_gradient()[0]
     for _ in range(8):
-        frozen.solve(40)
-    now = frozen.slope()[0]
+        residuals.solve_brightness(40)
+    now = residuals.cost_and_gradient()[0]
     assert before > 1.2 * least
     assert now == pytest.approx(least, rel=1e-5)
 
@@ -166,9 +168,9 @@ def test_where_the_shape_is_right_the_offset_is_found_exactly(seed):
     for view in views_about(12, size):
         camera = camera_of(offset_view(view, true))
         photos.append(loaded(view, render_reference((*splats[:4], gray), camera)[0][0]))
-    frozen = Frozen(device, shape, photos, 0.0, 1.9)
-    offset, _ = descend(frozen, np.eye(4), None, 25)
-    left = told(np.linalg.inv(true) @ offset)
+    residuals = ShapeResiduals(device, shape, photos, 0.0, 1.9)
+    offset, _ = descend(residuals, np.eye(4), None, 25)
+    left = offset_of_matrix(np.linalg.inv(true) @ offset)
     assert left.turn_deg < 0.02
     assert left.shift_m < 1e-3
 
@@ -181,8 +183,8 @@ def balls(tmp_path_factory) -> Capture:
 def test_the_same_seed_finds_the_same_offset(balls):
     small = replace(balls, photos=balls.photos[::4])
     settings = TrainSettings(max_anchors=500, downscale=2)
-    device, stages = open_device("cpu"), (replace(STAGES[1], tries=2),)
-    first, second = (calibrate(device, small, settings, "Thermal", 40, stages) for _ in range(2))
+    device, levels = open_device("cpu"), (replace(PYRAMID[1], tries=2),)
+    first, second = (calibrate(device, small, settings, "Thermal", 40, levels) for _ in range(2))
     np.testing.assert_array_equal(first.offset, second.offset)
     assert 0 < first.turn_deg < 10
     np.testing.assert_allclose(first.offset[:3, :3] @ first.offset[:3, :3].T, np.eye(3), atol=1e-9)
@@ -214,12 +216,12 @@ def test_a_modality_that_is_not_there_or_alone_is_refused(balls):
 )
 def test_offsets_that_are_none_are_refused(balls, rig):
     with pytest.raises(BadFile, match="is none"):
-        with_found(balls, rig)
+        with_extrinsics(balls, rig)
 
 
 def test_without_an_offset_nothing_moves(balls):
-    assert with_found(balls, rig_of({})) is balls
-    assert with_found(balls, rig_of({"settings": [1]})) is balls
+    assert with_extrinsics(balls, rig_of({})) is balls
+    assert with_extrinsics(balls, rig_of({"settings": [1]})) is balls
     assert rig_of({"settings": {"rig": "x"}}) == "x"
 
 

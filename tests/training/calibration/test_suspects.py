@@ -10,7 +10,12 @@ from shapeshift.rasterizer.device import open_device
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.pose import Pose
 from shapeshift.training.calibration.extrinsics import moved_by, offset_view
-from shapeshift.training.calibration.outlier_views import judge, recolored, report, suspects
+from shapeshift.training.calibration.outlier_views import (
+    find_outlier_views,
+    judge,
+    recolored,
+    report,
+)
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
@@ -27,7 +32,7 @@ def found_in(capture) -> list:
     trainer = Trainer(open_device("cpu"), capture, TrainSettings(iterations=400, max_anchors=2500))
     for _ in trainer.steps():
         pass
-    return suspects(trainer)
+    return find_outlier_views(trainer)
 
 
 @pytest.mark.slow
@@ -46,7 +51,7 @@ def test_wrong_poses_and_another_exposure_are_named(balls, tmp_path):
     photos[7] = replace(photos[7], path=tmp_path / "dark.png")
     assert all(isinstance(photos[at].view.world_from_eye, Pose) for at in wrong)
     found = found_in(replace(balls, photos=tuple(photos)))
-    by_name = {suspect.name: suspect for suspect in found}
+    by_name = {outlier.name: outlier for outlier in found}
     assert set(by_name) == {str(photos[at].path) for at in (*wrong, 7)}
     assert by_name[str(photos[7].path)].exposure
     assert not any(by_name[str(photos[at].path)].exposure for at in wrong)

@@ -8,27 +8,25 @@ import pytest
 from shapeshift.rasterizer.reference import render_reference
 from shapeshift.runtime_models.model import BadFile, ControlEncoding, Stop
 from shapeshift.runtime_models.package.write_package import write_package
-from shapeshift.training.coarse import Coarse, smaller
+from shapeshift.training.density.densification_stats import DensificationStats
 from shapeshift.training.density.densify import (
+    GRAD2D_THRESHOLD,
     LEAST_STEPS,
-    THRESHOLD,
-    Newcomers,
+    NewAnchors,
     absent_as_nan,
-    change,
-    changed_state,
-    contribution,
-    newcomers,
-    transparent,
-    weakest,
+    densify_and_prune,
+    least_contributing,
+    mean_contribution,
+    new_anchors,
+    resize_optimizer_state,
+    transparent_anchors,
 )
-from shapeshift.training.density.density import Evidence
-from shapeshift.training.density.density_budget import most_anchors
+from shapeshift.training.density.density_budget import anchor_cap
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.networks import HeadLayout
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.photos import LoadedPhoto
 from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.step import Step
@@ -44,18 +42,18 @@ def test_what_a_splat_gives_equals_the_float64_reference(device):
     adam = Adam(device, parameters, {name: np.ones(1) for name in parameters})
     step, loss = Step(device, LAYOUT, VOXEL, adam), ImageLoss(device, SIZE)
     target = loss.target(device.upload(rgba), BACKGROUND)
-    evidence = Evidence(device, LAYOUT, len(parameters["anchors"]), 2)
-    evidence.stop = 1
+    stats = DensificationStats(device, LAYOUT, len(parameters["anchors"]), 2)
+    stats.stop = 1
     drawing = step.draw(view, control, BACKGROUND)
-    step.gradients(drawing, loss, target, 0.2, evidence=evidence)
+    step.gradients(drawing, loss, target, stats=stats)
     eye = view.world_from_eye.position
     splats = decode_reference(LAYOUT, parameters, control, eye, VOXEL)
     weights = picture_weights(splats, camera_of(view)).sum(axis=(1, 2))
-    first, second = evidence.state()["evidence.given"]
+    first, second = stats.state()["densify.contribution"]
     assert not first.any() and weights.max() > 1
     wanted = weights.reshape(-1, LAYOUT.splats).sum(1)
     np.testing.assert_allclose(second[:, 0], wanted, rtol=1e-4, atol=1e-5)
-    views = evidence.state()["evidence.pull"][:, 1].reshape(-1, LAYOUT.splats)
+    views = stats.state()["densify.grad2d"][:, 1].reshape(-1, LAYOUT.splats)
     np.testing.assert_array_equal(second[:, 1], views.max(1))
 
 
@@ -74,127 +72,132 @@ def picture_weights(splats: tuple, camera) -> np.ndarray:
 def test_sums_over_the_steps(device, some):
     """All anchors, or another choice of them every step."""
     layout, anchors = HeadLayout(splats=3), 17
-    evidence = Evidence(device, layout, anchors, 2)
-    pull, opacity, given = np.zeros((17, 3, 2)), np.zeros((17, 2)), np.zeros((2, 17, 2))
+    stats = DensificationStats(device, layout, anchors, 2)
+    grad2d, opacity, contribution = np.zeros((17, 3, 2)), np.zeros((17, 2)), np.zeros((2, 17, 2))
     for turn in range(4):
         rng = RNG(turn)
         rows = np.sort(rng.choice(17, 9, replace=False)) if some else np.arange(17)
         n = 3 * len(rows)
         record, grad = rng.normal(size=(2, n, 12)).astype(np.float32)
         alpha = rng.uniform(-1, 1, n).astype(np.float32)
-        evidence.stop = turn % 2
+        stats.stop = turn % 2
         asked = device.upload(rows.astype(np.int32)) if some else None
-        evidence.add(*map(device.upload, (record, grad, alpha)), (40, 30), asked)
+        stats.add(*map(device.upload, (record, grad, alpha)), (40, 30), asked)
         on = (record[:, 9] > 0).reshape(-1, 3)
         screen = np.hypot(grad[:, 9], grad[:, 10]).reshape(-1, 3) * 20
-        pull[rows] += np.stack([np.where(on, screen, 0), on], axis=-1)
+        grad2d[rows] += np.stack([np.where(on, screen, 0), on], axis=-1)
         opacity[rows] += np.stack(
             [np.maximum(alpha, 0).reshape(-1, 3).sum(1), np.ones(len(rows))], axis=-1
         )
         gives = np.where(on, grad[:, 11].reshape(-1, 3), 0).sum(1)
-        given[turn % 2, rows] += np.stack([gives, on.any(1)], axis=-1)
-    state = evidence.state()
-    np.testing.assert_allclose(state["evidence.pull"], pull.reshape(-1, 2), rtol=1e-5, atol=1e-5)
-    np.testing.assert_allclose(state["evidence.opacity"], opacity, rtol=1e-5)
-    np.testing.assert_allclose(state["evidence.given"], given, rtol=1e-4, atol=1e-5)
-    assert state["evidence.steps"] == 4
-    copy = Evidence(device, layout, anchors, 2)
+        contribution[turn % 2, rows] += np.stack([gives, on.any(1)], axis=-1)
+    state = stats.state()
+    np.testing.assert_allclose(state["densify.grad2d"], grad2d.reshape(-1, 2), rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(state["densify.opacity"], opacity, rtol=1e-5)
+    np.testing.assert_allclose(state["densify.contribution"], contribution, rtol=1e-4, atol=1e-5)
+    assert state["densify.steps"] == 4
+    copy = DensificationStats(device, layout, anchors, 2)
     copy.load(state)
     for key, value in copy.state().items():
         np.testing.assert_array_equal(value, state[key])
 
 
-def pulls(*strengths: float, views: int = 30) -> np.ndarray:
-    """(N, 2) of Evidence; strengths in thresholds."""
-    return np.array([[views * THRESHOLD * s, views] for s in strengths])
+def grad2d_of(*strengths: float, views: int = 30) -> np.ndarray:
+    """(N, 2) of DensificationStats; strengths in thresholds."""
+    return np.array([[views * GRAD2D_THRESHOLD * s, views] for s in strengths])
 
 
 def test_new_anchors_stand_free_under_the_splats_that_pull():
     anchors = np.array([[0, 0, 0], [1, 0, 0]], np.float32)
     sizes = np.array([0.2, 0.2])
     means = np.array([[0.02, 0, 0], [0.6, 0, 0], [1.01, 0, 0], [1.3, 0.3, 0]])  # k = 2
-    new = newcomers(anchors, sizes, [means], pulls(3, 3, 3, 0.99))
+    new = new_anchors(anchors, sizes, [means], grad2d_of(3, 3, 3, 0.99))
     np.testing.assert_allclose(new.anchors, [[0.6, 0, 0]], atol=1e-6)  # the others' cubes are taken
     assert new.parents.tolist() == [0]
-    strong = newcomers(anchors, sizes, [means], pulls(3, 2, 3, 4))
+    strong = new_anchors(anchors, sizes, [means], grad2d_of(3, 2, 3, 4))
     assert strong.parents.tolist() == [1, 0]  # the strongest first
-    assert not len(newcomers(anchors, sizes, [means], pulls(3, 3, 3, 3, views=10)).anchors)
+    assert not len(new_anchors(anchors, sizes, [means], grad2d_of(3, 3, 3, 3, views=10)).anchors)
 
 
 def test_one_anchor_a_cube_of_the_size_that_it_will_have():
     far = np.array([[9.0, 0, 0]], np.float32)
     places = np.stack([np.linspace(0.01, 0.99, 50), np.zeros(50), np.zeros(50)], axis=1)
     for size, cubes in ((2.0, 1), (1.0, 2), (0.5, 4), (0.25, 8)):
-        new = newcomers(far, np.array([size]), [places], pulls(*[2] * 50))
+        new = new_anchors(far, np.array([size]), [places], grad2d_of(*[2] * 50))
         assert len(new.anchors) == cubes, size
 
 
 def test_an_anchor_comes_where_the_stop_is_that_shows_the_splat():
     anchors, sizes = np.array([[9.0, 0, 0]], np.float32), np.ones(1)
     here, there = np.array([[0.6, 0, 0]]), np.array([[-0.6, 0, 0]])
-    both = newcomers(anchors, sizes, [here, there], pulls(2))
+    both = new_anchors(anchors, sizes, [here, there], grad2d_of(2))
     np.testing.assert_allclose(sorted(both.anchors[:, 0]), [-0.6, 0.6], rtol=1e-6)
     absent = absent_as_nan(here, np.array([1 / 255]))
-    assert newcomers(anchors, sizes, [absent, there], pulls(2)).anchors[0, 0] < 0
-    assert not len(newcomers(anchors, sizes, [absent], pulls(2)).anchors)
+    assert new_anchors(anchors, sizes, [absent, there], grad2d_of(2)).anchors[0, 0] < 0
+    assert not len(new_anchors(anchors, sizes, [absent], grad2d_of(2)).anchors)
 
 
 def test_a_splat_very_far_away_breaks_nothing():
     anchors, sizes = np.array([[0.0, 0, 0]], np.float32), np.full(1, 1e-3)
     places = np.array([[1e9, 0, 0], [0.5, 0, 0], [-1e9, 0, 0]])
-    new = newcomers(anchors, sizes, [places], pulls(2, 3, 4))
+    new = new_anchors(anchors, sizes, [places], grad2d_of(2, 3, 4))
     assert np.isfinite(new.anchors).all() and new.parents.tolist() == [0] * len(new.anchors)
 
 
 def test_anchors_that_show_nothing_go():
     opacity = np.array([[0.0, 50], [100, 50], [0.4, 50], [0, 2], [0, 3]])
-    assert transparent(opacity, 100, 2).tolist() == [True, False, True, False, True]
-    assert not transparent(opacity, LEAST_STEPS - 1, 2).any()
+    assert transparent_anchors(opacity, 100, 2).tolist() == [True, False, True, False, True]
+    assert not transparent_anchors(opacity, LEAST_STEPS - 1, 2).any()
 
 
 def test_who_contributes_at_one_stop_stays():
-    given = np.array([
+    contribution = np.array([
         [[50.0, 50], [0, 50], [0.5, 50], [0, 0], [0, 2]],
         [[0.0, 50], [50, 50], [0.5, 50], [0, 0], [0, 1]],
     ])  # (stops, anchors, sum and pictures)  # fmt: skip
-    np.testing.assert_allclose(contribution(given), [1, 1, 0.01, np.inf, np.inf])
+    np.testing.assert_allclose(mean_contribution(contribution), [1, 1, 0.01, np.inf, np.inf])
 
 
 def test_the_weakest_make_room_and_the_needed_do_not():
-    given = np.array([[[5.0, 50], [1, 50], [9, 50], [0, 2]]])
-    assert weakest(given, np.ones(4, bool), 2).tolist() == [1, 0]
-    assert weakest(given, np.array([True, False, True, True]), 4).tolist() == [0, 2]
+    contribution = np.array([[[5.0, 50], [1, 50], [9, 50], [0, 2]]])
+    assert least_contributing(contribution, np.ones(4, bool), 2).tolist() == [1, 0]
+    assert least_contributing(contribution, np.array([True, False, True, True]), 4).tolist() == [
+        0,
+        2,
+    ]
 
 
 def forty(pulling: dict[int, float]) -> tuple:
-    """Forty anchors of one splat in a row: (anchors, sizes, means, evidence); 39 gives least."""
+    """Forty anchors of one splat in a row: (anchors, sizes, means, stats); 39 gives least."""
     anchors = np.array([[i, 0, 0] for i in range(40)], np.float32)
     strengths = np.full(40, 0.1)
     strengths[list(pulling)] = list(pulling.values())
-    evidence = {
-        "evidence.pull": pulls(*strengths, views=60), "evidence.steps": np.array(60),
-        "evidence.opacity": np.full((40, 2), 60.0),
-        "evidence.given": np.stack([np.arange(40, 0, -1), np.full(40, 60)], axis=1)[None],
+    stats = {
+        "densify.grad2d": grad2d_of(*strengths, views=60), "densify.steps": np.array(60),
+        "densify.opacity": np.full((40, 2), 60.0),
+        "densify.contribution": np.stack([np.arange(40, 0, -1), np.full(40, 60)], axis=1)[None],
     }  # fmt: skip
-    return anchors, np.full(40, 0.2), [anchors.astype(float) + np.array([0, 0.5, 0])], evidence
+    return anchors, np.full(40, 0.2), [anchors.astype(float) + np.array([0, 0.5, 0])], stats
 
 
 def test_a_change_keeps_the_cap_and_moves_the_least_given():
-    keep, new = change(*forty({4: 9.0}), 41)
+    keep, new = densify_and_prune(*forty({4: 9.0}), 41)
     assert keep.all() and new.parents.tolist() == [4]
     np.testing.assert_allclose(new.anchors, [[4, 0.5, 0]], atol=1e-6)
-    keep, new = change(*forty({4: 9.0}), 40)
+    keep, new = densify_and_prune(*forty({4: 9.0}), 40)
     assert np.flatnonzero(~keep).tolist() == [39] and new.parents.tolist() == [4]
-    keep, new = change(*forty(dict.fromkeys(range(30, 40), 2.0)), 40)  # a twentieth at most
+    keep, new = densify_and_prune(
+        *forty(dict.fromkeys(range(30, 40), 2.0)), 40
+    )  # a twentieth at most
     assert np.flatnonzero(~keep).tolist() == [38, 39] and new.parents.tolist() == [30, 31]
-    keep, new = change(*forty({}), 40)
+    keep, new = densify_and_prune(*forty({}), 40)
     assert keep.all() and not len(new.anchors)
 
 
 def test_a_model_of_which_nothing_shows_keeps_its_anchors():
-    anchors, sizes, means, evidence = forty({})
-    evidence["evidence.opacity"] = np.tile([0.0, 60], (40, 1))
-    assert change(anchors, sizes, means, evidence, 40)[0].all()
+    anchors, sizes, means, stats = forty({})
+    stats["densify.opacity"] = np.tile([0.0, 60], (40, 1))
+    assert densify_and_prune(anchors, sizes, means, stats, 40)[0].all()
 
 
 def test_a_change_of_the_state_keeps_the_others_moments():
@@ -203,9 +206,9 @@ def test_a_change_of_the_state_keeps_the_others_moments():
     for name, width in (("anchors", 3), ("features", 8), ("frames", 7), ("colors", 3)):
         for part in ("value", "mean", "square"):
             state[f"{name}.{part}"] = RNG(0).normal(size=(4, width)).astype(np.float32)
-    new = Newcomers(np.full((2, 3), 9, np.float32), np.array([3, 0]))
+    new = NewAnchors(np.full((2, 3), 9, np.float32), np.array([3, 0]))
     keep = np.array([True, False, True, True])
-    out = changed_state(state, layout.per_anchor, keep, new)
+    out = resize_optimizer_state(state, layout.per_anchor, keep, new)
     np.testing.assert_array_equal(out["features.mean"][:3], state["features.mean"][keep])
     for name in ("features", "colors"):
         value = out[f"{name}.value"][3:]
@@ -222,7 +225,7 @@ def test_a_change_of_the_state_keeps_the_others_moments():
 def test_a_package_within_its_megabytes(tmp_path, features, max_mb):
     layout, encoding = HeadLayout(5, features, 32, 16), ControlEncoding(16, 1 / 15, 0.04)
     settings = TrainSettings(max_mb=max_mb, max_anchors=10**9, features=features)
-    most = most_anchors(settings, layout, encoding, STOPS)
+    most = anchor_cap(settings, layout, encoding, STOPS)
     rng = RNG(0)
     state = {
         "weights.value": rng.normal(size=layout.weights_at[-1]).astype(np.float32),
@@ -236,64 +239,22 @@ def test_a_package_within_its_megabytes(tmp_path, features, max_mb):
     assert size <= max_mb * 1e6
     assert size > 0.8 * max_mb * 1e6  # and not much less than allowed
     capped = replace(settings, max_anchors=7)
-    assert most_anchors(capped, layout, encoding, STOPS) == 7
+    assert anchor_cap(capped, layout, encoding, STOPS) == 7
 
 
 def test_a_budget_that_holds_nothing_is_refused():
     layout, encoding = HeadLayout(), ControlEncoding(16, 1 / 15, 0.04)
     with pytest.raises(BadFile, match=r"--max-mb 0.001 leaves no room for anchors.*--hidden"):
-        most_anchors(TrainSettings(max_mb=0.001), layout, encoding, STOPS)
+        anchor_cap(TrainSettings(max_mb=0.001), layout, encoding, STOPS)
 
 
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"max_anchors": 0}, "max_anchors is 0"), ({"coarse": 3}, "power of two"),
-        ({"coarse": 0}, "coarse is 0"), ({"coarse_until": 1.1}, "coarse_until is 1.1"),
+        ({"max_anchors": 0}, "max_anchors is 0"),
         ({"max_mb": float("nan")}, "max_mb is nan"), ({"grow_every": 0}, "grow_every is 0"),
     ],
 )  # fmt: skip
 def test_settings_of_growing_that_cannot_be_are_refused(changes, sentence):
     with pytest.raises(ValueError, match=sentence):
         TrainSettings(**changes)
-
-
-def test_sizes_of_photos_over_a_run():
-    coarse = Coarse(4, 0.4, {})
-    at = [coarse.factor(f) for f in (0, 0.19, 0.2, 0.39, 0.4, 0.7, 1.0)]
-    assert at == [4, 4, 2, 2, 1, 1, 1] and coarse.factors == [1, 2, 4]
-    assert {Coarse(1).factor(f) for f in (0, 0.1, 0.9)} == {1}
-    assert {Coarse(8, 0.0, {}).factor(f) for f in (0, 0.1)} == {1}
-
-
-def photo_of(rgba: np.ndarray, weight=None) -> LoadedPhoto:
-    _, _, view, _ = situation(0)
-    return LoadedPhoto(view.resized(rgba.shape[1::-1]), "RGB", rgba, weight, "p")
-
-
-def test_a_smaller_photo_has_the_mean_colours():
-    rgba = RNG(0).integers(0, 256, (64, 48, 4)).astype(np.uint8)
-    weight = RNG(1).random((64, 48)).astype(np.float32)
-    half = smaller(photo_of(rgba, weight), 2)
-    assert half.view.size == (24, 32) and half.rgba.shape == (32, 24, 4)
-    blocks = rgba.reshape(32, 2, 24, 2, 4).astype(float)
-    alpha = blocks[..., 3:] / 255
-    laid = (blocks[..., :3] * alpha).mean(axis=(1, 3))
-    for background in ((0, 0, 0), (1, 1, 1)):  # laid over anything it looks like the large one
-        over = laid / 255 + (1 - alpha.mean(axis=(1, 3))) * np.array(background)
-        np.testing.assert_allclose(half.over(background), over, atol=0.006)
-    np.testing.assert_allclose(half.weight, weight.reshape(32, 2, 24, 2).mean((1, 3)), rtol=1e-5)
-    odd = smaller(photo_of(rgba[:33, :35]), 2)
-    assert odd.view.size == (18, 16)
-    tiny = photo_of(rgba[:20, :20])
-    assert smaller(tiny, 2) is tiny  # 10 pixels would say nothing
-
-
-def test_small_photos_are_made_once_and_dropped_when_their_time_is_over():
-    photo = photo_of(np.full((64, 64, 4), 255, np.uint8))
-    coarse = Coarse(4, 0.4, {})
-    assert coarse.photo(photo, 4) is coarse.photo(photo, 4)
-    coarse.photo(photo, 2)
-    coarse.drop(2)
-    assert [key[2] for key in coarse.made] == [2]
-    assert coarse.photo(photo, 1) is photo

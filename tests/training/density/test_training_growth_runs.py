@@ -1,4 +1,4 @@
-"""Runs that grow in each of the ways, on a small capture: caps, bits, resuming, small photos."""
+"""Runs that grow in each of the ways, on a small capture: caps, bits, resuming."""
 
 import csv
 import subprocess
@@ -22,8 +22,7 @@ FIRST = 600  # points that the capture is left with
 WAYS = {
     "to the cap": {},
     "at the cap": {"max_anchors": FIRST},
-    "nothing of their own": {"own": ""},
-    "coarse": {"coarse": 4, "coarse_until": 0.5},
+    "no attributes": {"anchor_attributes": ""},
 }
 
 
@@ -35,7 +34,7 @@ def balls(tmp_path_factory) -> Capture:
 
 def run(trainer: Trainer, steps: int | None = None) -> Trainer:
     for now in trainer.steps():
-        assert now.anchors <= trainer.most_anchors
+        assert now.anchors <= trainer.anchor_cap
         if steps is not None and now.iteration >= steps:
             break
     return trainer
@@ -47,8 +46,8 @@ def test_a_way_to_grow_gives_the_same_bits_whole_and_resumed(device, balls, way,
     whole = run(Trainer(device, balls, settings))
     cap = settings.max_anchors
     assert (cap == FIRST or whole.anchors_count > FIRST) and whole.anchors_count <= cap
-    assert whole.grown_at > 0 and whole.guard.trips == 0
-    part = run(Trainer(device, balls, settings), steps=33)  # with some evidence, on small photos
+    assert whole.densified_at > 0 and whole.guard.rollbacks == 0
+    part = run(Trainer(device, balls, settings), steps=33)  # with some statistics
     write_checkpoint(tmp_path / "c.npz", *part.checkpoint())
     resumed = run(Trainer(device, balls, settings, read_checkpoint(tmp_path / "c.npz")))
     assert bits(resumed) == bits(whole)
@@ -62,25 +61,13 @@ def test_nothing_changes_within_the_steps_that_a_picture_needs_to_settle(device,
     for steps in (SETTLE + 19, SETTLE + 20, 100):
         trainer = run(Trainer(device, balls, replace(BASE, iterations=steps, grow_every=20)))
         assert trainer.settled, steps
-        assert (trainer.grown_at > 0) == (steps >= SETTLE + 20)
-
-
-def test_coarse_runs_draw_small_pictures_first_and_whole_ones_last(device, balls):
-    trainer = Trainer(device, balls, replace(BASE, grow=False, iterations=40, coarse=4))
-    sizes = []
-    for _ in trainer.steps():
-        sizes.append(trainer.drawing.camera.size)
-    assert list(dict.fromkeys(sizes)) == [(25, 25), (50, 50), (100, 100)]
-    assert [sizes.count((s, s)) for s in (25, 50, 100)] == [7, 7, 26]
-    assert not trainer.coarse.made and {key[2] for key in trainer.targets.kept} == {(100, 100)}
-    picture = trainer.step.draw(trainer.held_out[0].view, trainer.control("RGB"), (0.0, 0.0, 0.0))
-    assert picture.camera.size == (100, 100)
+        assert (trainer.densified_at > 0) == (steps >= SETTLE + 20)
 
 
 def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
     settings = replace(BASE, max_mb=0.085, max_anchors=12000)
     trainer = run(Trainer(device, balls, settings))
-    assert FIRST < trainer.anchors_count <= trainer.most_anchors < 12000
+    assert FIRST < trainer.anchors_count <= trainer.anchor_cap < 12000
     assert write_package(trainer.model(), tmp_path / "a.shift") <= 0.085e6
     finite = all(np.isfinite(a).all() for a in trainer.adam.state().values())
     assert finite
@@ -88,7 +75,7 @@ def test_a_run_keeps_within_its_megabytes(device, balls, tmp_path):
 
 def test_the_table_of_ways_has_a_row_for_each(balls, tmp_path):
     root, out = Path(__file__).resolve().parents[3], tmp_path / "growth.csv"
-    ways = ["no growth", "default", "coarse"]
+    ways = ["no growth", "default"]
     program = [sys.executable, "tools/training/growth.py", str(balls.folder), "--out", str(out)]
     program += ["--iterations", "90", "--grow-every", "30", "--max-anchors", "400", "--ways", *ways]
     subprocess.run(program, cwd=root, check=True, timeout=120, capture_output=True)

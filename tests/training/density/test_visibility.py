@@ -144,7 +144,7 @@ def test_a_step_of_some_anchors_has_their_gradients_and_moves_nothing_else(devic
         target = loss.target(device.upload(rgba), BACKGROUND)
         drawing = step.draw(view, control, BACKGROUND, rows=asked)
         image = device.download(drawing.frame.image)
-        grads = step.gradients(drawing, loss, target, 0.2)
+        grads = step.gradients(drawing, loss, target, min_opacity_share=0.0)
         by_group = {name: device.download(array).copy() for name, array in grads.items()}
         step.update(grads, 1.0)
         found[some] = image, by_group, adam.state()

@@ -9,23 +9,23 @@ from shapeshift.training.first_anchors.first_anchors import (
     FLATNESS,
     GUESSES,
     SIZES,
-    chosen,
+    choose_positions,
     first_anchors,
     neighbour_distance,
-    seen_colors,
-    spread,
+    photo_colors,
+    subsample,
     surface_axes,
 )
-from shapeshift.training.first_anchors.initial import First
+from shapeshift.training.first_anchors.initial import InitialPoints
 from shapeshift.training.photos import LoadedPhoto
 
 RNG = np.random.default_rng
 GRID = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1).reshape(-1, 3)
 
 
-def first_of(points: np.ndarray, guesses: np.ndarray | None = None) -> First:
+def first_of(points: np.ndarray, guesses: np.ndarray | None = None) -> InitialPoints:
     guesses = np.zeros((0, 3)) if guesses is None else guesses
-    return First(points, "points", (points,), guesses)
+    return InitialPoints(points, "points", (points,), guesses)
 
 
 def rows_of(found: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -36,20 +36,20 @@ def rows_of(found: np.ndarray, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("most", [1, 2, 3, 99, 100, 101, 999, 1000, 1001])
 def test_as_many_different_points_as_asked_for_or_all(most):
     points = RNG(0).normal(size=(1000, 3))
-    found = rows_of(spread(points, most), points)
+    found = rows_of(subsample(points, most), points)
     assert len(np.unique(found)) == len(found) == min(most, 1000)
 
 
 def test_places_are_as_dense_as_points():
     dense, thin = RNG(0).random((9000, 3)), 5 + RNG(1).random((1000, 3))
-    found = spread(np.concatenate([thin, dense]), 200)
+    found = subsample(np.concatenate([thin, dense]), 200)
     assert (found[:, 0] > 3).sum() == 20
 
 
 def test_places_are_even_where_points_are():
     """Each stands for as many points: nearest neighbours of places differ less than by chance."""
     points = RNG(0).random((8000, 3))
-    even, chance = spread(points, 500), points[RNG(1).choice(8000, 500, replace=False)]
+    even, chance = subsample(points, 500), points[RNG(1).choice(8000, 500, replace=False)]
     kept, drawn = (neighbour_distance(p) for p in (even, chance))
     assert kept.std() / kept.mean() < 0.7 * drawn.std() / drawn.mean()
 
@@ -93,18 +93,18 @@ def photo_of(rgb: tuple[int, int, int], alpha: int = 255) -> LoadedPhoto:
 def test_colours_are_the_mean_of_what_photos_show():
     places = np.array([[0.0, 0, 0], [0, 0, 9]])  # the second stands behind the eye
     photos = [photo_of((255, 0, 51)), photo_of((0, 0, 51))]
-    np.testing.assert_allclose(seen_colors(places, photos, (0, 0, 0))[0], [0.5, 0, 0.2])
-    np.testing.assert_allclose(seen_colors(places, photos, (0, 0, 0))[1], 0.5)
-    through = seen_colors(places, [photo_of((255, 0, 51), 0)], (0, 1, 0))
+    np.testing.assert_allclose(photo_colors(places, photos, (0, 0, 0))[0], [0.5, 0, 0.2])
+    np.testing.assert_allclose(photo_colors(places, photos, (0, 0, 0))[1], 0.5)
+    through = photo_colors(places, [photo_of((255, 0, 51), 0)], (0, 1, 0))
     np.testing.assert_allclose(through[0], [0, 1, 0])
 
 
 def test_guesses_get_their_share_at_most():
     points, guesses = RNG(0).random((3000, 3)), RNG(1).random((2000, 3)) + 10
-    places = chosen(first_of(points, guesses), 1000)
+    places = choose_positions(first_of(points, guesses), 1000)
     assert len(places) == 1000
     assert (places[:, 0] > 5).sum() == GUESSES * 1000
-    assert len(chosen(first_of(points, guesses[:7]), 10_000)) == 3007
+    assert len(choose_positions(first_of(points, guesses[:7]), 10_000)) == 3007
 
 
 def test_what_the_optimiser_starts_with():

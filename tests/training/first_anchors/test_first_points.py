@@ -16,10 +16,10 @@ from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.first_anchors import point_sources
 from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import (
-    carved,
+    carve,
     choose_voxel,
-    hull_points,
     initial_points,
+    visual_hulls,
     voxel_centres,
 )
 from shapeshift.training.photos import LoadedPhoto, load_photos
@@ -78,7 +78,7 @@ def test_shapes_of_their_own_get_as_many_anchors_as_alone():
 
 def test_cells_of_a_long_thin_hull_are_cubes():
     half = np.array([0.07, 0.8, 0.06])
-    (points,) = hull_points(rod_photos(half), None)
+    (points,) = visual_hulls(rod_photos(half), None)
     gaps = [np.diff(np.unique(points[:, axis].round(9))) for axis in range(3)]
     np.testing.assert_allclose(np.concatenate(gaps), gaps[0][0], rtol=1e-6)
     voxel = choose_voxel(points, 10**6, RNG(0))
@@ -91,7 +91,7 @@ def test_cells_of_a_long_thin_hull_are_cubes():
 def test_a_cube_is_carved_into_as_many_cells_as_before():
     view = View(look_at((0, 0, 9), (0, 0, 0)), perspective(0.5, (9, 9)), 0.05, 100.0, (9, 9))
     everything = [(view, np.ones((9, 9), bool))] * 2
-    cells = carved(everything, np.full(3, -1.0), np.full(3, 1.0), 8)
+    cells = carve(everything, np.full(3, -1.0), np.full(3, 1.0), 8)
     axis = (np.arange(8) + 0.5) / 4 - 1
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
     surface = (np.abs(grid) > 0.8).any(axis=1)

@@ -11,15 +11,13 @@ from shapeshift.app.training import fit as command
 from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.model import HEADS, BadFile
 from shapeshift.runtime_models.package.read_package import read_package
-from shapeshift.training.fit.ablation import DROPPED, KEPT, PARTS, SHAPE
+from shapeshift.training.fit.ablation import COMPONENTS, DROPPED, KEPT, SHAPE_HEADS
 from shapeshift.training.fit.fit import Fit
 from shapeshift.training.settings import TrainSettings
 from tests.support.training.fit_scenes import make_shapes
 
 SMALL = TrainSettings(
     iterations=250,
-    encoding="even",  # tells two stops apart within fewer steps than one unit a stop does
-    rate_scale=0.5,
     grow=False,
     max_anchors=400,
     splats_per_anchor=3,
@@ -33,37 +31,37 @@ def captures(tmp_path_factory) -> dict:
     return {n: make_shapes(tmp_path_factory.mktemp(n), n) for n in ("shared", "apart")}
 
 
-def needs(capture, parts, settings=SMALL, tolerance=1.0):
+def needs(capture, components, settings=SMALL, tolerance=1.0):
     return Fit(
-        open_device("cpu"), capture, settings, tolerance, 1, lambda what, done: None, parts
+        open_device("cpu"), capture, settings, tolerance, 1, lambda what, done: None, components
     ).run()
 
 
 def test_stops_of_one_shape_share_it(captures):
-    need = needs(captures["shared"], PARTS[:5])
-    first = need.verdicts[0]
-    assert (first.part, first.word) == ("shape that follows x", DROPPED)
-    assert need.settings.layout().fixed == SHAPE
+    need = needs(captures["shared"], COMPONENTS[:5])
+    first = need.decisions[0]
+    assert (first.part, first.verdict) == ("shape that follows x", DROPPED)
+    assert need.settings.layout(2).fixed == SHAPE_HEADS
     model = need.fitted.models[0]
     assert all(("control" in model.networks[n].inputs) == (n == "color") for n in HEADS)
-    assert "rotation that follows x" not in [v.part for v in need.verdicts]  # went with the shape
+    assert "rotation that follows x" not in [v.part for v in need.decisions]  # went with the shape
     assert set(need.outlines) == {("RGB", "Thermal")}
 
 
 def test_stops_of_two_shapes_do_not(captures):
-    need = needs(captures["apart"], PARTS[:1])
-    first = need.verdicts[0]
-    assert first.word == KEPT and first.needed_by == ("Ball", "Cube")
+    need = needs(captures["apart"], COMPONENTS[:1])
+    first = need.decisions[0]
+    assert first.verdict == KEPT and first.needed_by == ("Ball", "Cube")
     assert all(c.mean < -2 and c.error < -c.mean / 2 for c in first.change.values())
     assert need.settings.fixed == ""
 
 
 def test_what_goes_without_training_changes_next_to_nothing(captures):
     need = needs(captures["apart"], (), tolerance=0.05)
-    words = {verdict.part: verdict.word for verdict in need.verdicts}
+    words = {verdict.part: verdict.verdict for verdict in need.decisions}
     assert words["features as float32 instead of float16"] == DROPPED
     assert need.fitted.bytes < need.full.bytes
-    saved = sum(v.bytes for v in need.verdicts if v.word == DROPPED)
+    saved = sum(v.bytes for v in need.decisions if v.verdict == DROPPED)
     assert need.full.bytes - need.fitted.bytes == saved
     for name, before in need.full.psnr.items():
         change = need.fitted.psnr[name] - before
@@ -71,11 +69,13 @@ def test_what_goes_without_training_changes_next_to_nothing(captures):
 
 
 def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("shapeshift.training.fit.fit.Fit.__init__.__defaults__", (PARTS[-2:], None))
+    monkeypatch.setattr(
+        "shapeshift.training.fit.fit.Fit.__init__.__defaults__", (COMPONENTS[-2:], None)
+    )
     options = command.Options(
         captures["shared"].folder, tmp_path / "fit.shift", tolerance_db=5.0, seeds=2,
-        json=tmp_path / "fit.json", iterations=20, grow=False, max_anchors=90, splats_per_anchor=2,
-        features=4, hidden=8,
+        json=tmp_path / "fit.json", iterations=20,
+        asked={"max_anchors": 90, "splats_per_anchor": 2, "features": 4, "hidden": 8},
     )  # fmt: skip
     assert command.run(options) == 0
     result = json.loads((tmp_path / "fit.json").read_text())

@@ -5,26 +5,26 @@ import pytest
 
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.fit.ablation import (
+    COMPONENTS,
     DROPPED,
     KEPT,
-    PARTS,
-    SHAPE,
+    SHAPE_HEADS,
     UNSURE,
     Change,
-    Measured,
+    Trial,
     change_of,
-    judge,
+    decide,
 )
 from shapeshift.training.settings import TrainSettings
 from tests.support.models import STOPS, make_random_model
 
-BY_NAME = {part.name: part for part in PARTS}
+BY_NAME = {part.name: part for part in COMPONENTS}
 RNG = np.random.default_rng
 
 
-def measured(rgb, thermal, size=1000, ms=1.0, seconds=10.0) -> Measured:
+def measured(rgb, thermal, size=1000, ms=1.0, seconds=10.0) -> Trial:
     psnr = {"RGB": np.atleast_2d(rgb), "Thermal": np.atleast_2d(thermal)}
-    return Measured(psnr, (make_random_model(3, k=1),), "float16", size, ms, seconds)
+    return Trial(psnr, (make_random_model(3, k=1),), "float16", size, ms, seconds)
 
 
 def test_what_photos_have_in_common_falls_out():
@@ -52,7 +52,7 @@ def test_the_error_is_that_of_photos_and_of_seeds(seeds):
 def test_one_photo_of_one_seed_tells_no_spread():
     assert np.isnan(change_of(np.zeros((1, 1)), np.ones((1, 1))).error)
     one = measured([30.0], [30.0])
-    assert judge("a part", one, one, one, 0.1).word == UNSURE  # NaN never lets a part go
+    assert decide("a part", one, one, one, 0.1).verdict == UNSURE  # NaN never lets a part go
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,8 @@ def test_one_photo_of_one_seed_tells_no_spread():
 def test_every_modality_has_a_say(thermal, word, needed_by):
     full = measured([30, 31, 32], [25, 26, 27], 1000, 1.0, 10.0)
     after = measured([30.5, 31.5, 32.5], np.add([25, 26, 27], thermal), 900, 0.75, 8.0)
-    verdict = judge("a part", full, full, after, 0.1)
-    assert (verdict.word, verdict.needed_by) == (word, needed_by)
+    verdict = decide("a part", full, full, after, 0.1)
+    assert (verdict.verdict, verdict.needed_by) == (word, needed_by)
     assert (verdict.bytes, verdict.decode_ms, verdict.train_s) == (100, 0.25, 2.0)
     assert verdict.change["RGB"].mean == pytest.approx(0.5)
     row = verdict.as_dict()
@@ -81,8 +81,8 @@ def test_small_losses_do_not_add_up_to_more_than_the_tolerance():
     full = measured([30, 30.001], [30, 30.001])
     before = measured([29.93, 29.931], [30, 30.001])
     after = measured([29.86, 29.861], [30, 30.001])
-    verdict = judge("a part", full, before, after, 0.1)
-    assert verdict.word == KEPT and verdict.needed_by == ("RGB",)
+    verdict = decide("a part", full, before, after, 0.1)
+    assert verdict.verdict == KEPT and verdict.needed_by == ("RGB",)
     assert verdict.change["RGB"].mean == pytest.approx(-0.07)
     assert verdict.total["RGB"].mean == pytest.approx(-0.14)
 
@@ -91,35 +91,34 @@ def test_what_another_part_won_is_not_used_up():
     full = measured([30, 30.001], [30, 30.001])
     before = measured([31, 31.001], [30, 30.001])
     after = measured([30.5, 30.501], [30, 30.001])
-    verdict = judge("a part", full, before, after, 0.1)
+    verdict = decide("a part", full, before, after, 0.1)
     assert verdict.total["RGB"].mean == pytest.approx(0.5)
-    assert verdict.word == KEPT and verdict.needed_by == ("RGB",)
+    assert verdict.verdict == KEPT and verdict.needed_by == ("RGB",)
 
 
 def test_settings_without_each_part():
-    settings = TrainSettings(layers=2)
+    settings = TrainSettings()
     found = {name: part.without(settings, STOPS) for name, part in BY_NAME.items()}
-    assert found["shape that follows x"].layout().fixed == SHAPE
+    assert found["shape that follows x"].layout(2).fixed == SHAPE_HEADS
     assert found["scale that follows x"].fixed == "scale"
     assert found["colour that follows x"].fixed == "color"
     assert not found["colour that follows the eye"].view_dependent
-    assert found["a hidden layer"].layers == 1
     assert found["half of the hidden units"].hidden == 16
     assert found["half of the features"].features == 8
     assert found["one splat of every anchor"].splats_per_anchor == 4
     assert found["a third of the anchors"].max_anchors == 8000
-    assert found["anchors' own axes and sizes"].own == "color"
-    assert found["anchors' own base colours"].own == "frame"
+    assert found["anchors' own axes and sizes"].anchor_attributes == "color"
+    assert found["anchors' own base colours"].anchor_attributes == "frame"
 
 
 def test_parts_that_are_not_there_are_not_tried():
     small = TrainSettings(
         fixed="offset, color", view_dependent=False, hidden=8, features=4, splats_per_anchor=1,
-        max_anchors=60, own="",
+        max_anchors=60, anchor_attributes="",
     )  # fmt: skip
     left = [name for name, part in BY_NAME.items() if part.without(small, STOPS)]
     assert left == ["scale that follows x", "rotation that follows x", "opacity that follows x"]
-    assert BY_NAME["scale that follows x"].without(small, STOPS).layout().fixed == (
+    assert BY_NAME["scale that follows x"].without(small, STOPS).layout(2).fixed == (
         "offset", "color", "scale",
     )  # fmt: skip
     one_stop = (Stop("RGB", 0.0),)
@@ -128,8 +127,8 @@ def test_parts_that_are_not_there_are_not_tried():
 
 def test_settings_can_be_taken_down_to_nothing():
     """Every part ends: the search does."""
-    for part in PARTS:
-        settings, steps = TrainSettings(layers=3), 0
+    for part in COMPONENTS:
+        settings, steps = TrainSettings(), 0
         while settings is not None:
             settings, steps = part.without(settings, STOPS), steps + 1
         assert steps < 30

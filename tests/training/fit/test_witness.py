@@ -1,4 +1,4 @@
-"""What photos say of a model, beside plain numpy: likeness, the pixels of an anchor, outlines."""
+"""What photos say of a model, beside plain numpy: view_psnr, the pixels of an anchor, outlines."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,12 +11,12 @@ from shapeshift.runtime_models.model import Mlp
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.training.drawing import camera_of
 from shapeshift.training.evaluation.metrics import psnr
-from shapeshift.training.fit.view_metrics import likeness, most_pixels, shared_outlines
+from shapeshift.training.fit.view_metrics import largest_contribution, outline_ious, view_psnr
 from shapeshift.training.photos import LoadedPhoto
 from tests.support.models import make_random_model, without_control
 
 SIZE = (40, 30)
-SHAPE = ("offset", "scale", "rotation", "opacity")
+SHAPE_HEADS = ("offset", "scale", "rotation", "opacity")
 
 
 def photo_of(modality: str, azimuth: float, seed: int) -> LoadedPhoto:
@@ -41,7 +41,7 @@ def drawn(model, stop, photo, background, color=None):
 
 def test_likeness_is_that_of_every_photo(device):
     model, background = make_random_model(30, k=2), (0.3, 0.2, 0.9)
-    found = likeness(device, model, PHOTOS, model.stops, background)
+    found = view_psnr(device, model, PHOTOS, model.stops, background)
     for stop in model.stops:
         mine = [p for p in PHOTOS if p.modality == stop.name]
         wanted = [psnr(drawn(model, stop, p, background), p.over(background)) for p in mine]
@@ -50,7 +50,7 @@ def test_likeness_is_that_of_every_photo(device):
 
 def test_the_pixels_of_an_anchor_are_what_its_colour_adds(device):
     model = make_random_model(12, k=2)
-    found = most_pixels(device, model, PHOTOS, model.stops)
+    found = largest_contribution(device, model, PHOTOS, model.stops)
     wanted = np.zeros(12)
     for stop in model.stops:
         for photo in PHOTOS:
@@ -66,9 +66,9 @@ def test_the_pixels_of_an_anchor_are_what_its_colour_adds(device):
 
 
 def test_outlines_of_a_shape_that_does_not_follow_x_are_one(device):
-    model = without_control(make_random_model(60, k=3), *SHAPE)
-    assert shared_outlines(device, model, PHOTOS, model.stops) == {("RGB", "Thermal"): 1.0}
-    other = shared_outlines(device, make_random_model(60, k=3), PHOTOS, model.stops)
+    model = without_control(make_random_model(60, k=3), *SHAPE_HEADS)
+    assert outline_ious(device, model, PHOTOS, model.stops) == {("RGB", "Thermal"): 1.0}
+    other = outline_ious(device, make_random_model(60, k=3), PHOTOS, model.stops)
     assert 0 < other["RGB", "Thermal"] < 1
 
 
@@ -90,7 +90,7 @@ def test_outlines_of_two_places_have_nothing_in_common(device):
     big = replace(model.networks["scale"], gain=0.1)
     networks = model.networks | {"opacity": opacity, "scale": big}
     model = replace(model, anchors=anchors, features=features, networks=networks)
-    assert shared_outlines(device, model, PHOTOS, model.stops) == {("RGB", "Thermal"): 0.0}
+    assert outline_ious(device, model, PHOTOS, model.stops) == {("RGB", "Thermal"): 0.0}
     hidden = replace(opacity, biases=(opacity.biases[0] - 9, opacity.biases[1]))
     empty = replace(model, networks=networks | {"opacity": hidden})
-    assert shared_outlines(device, empty, PHOTOS, model.stops) == {("RGB", "Thermal"): 1.0}
+    assert outline_ious(device, empty, PHOTOS, model.stops) == {("RGB", "Thermal"): 1.0}

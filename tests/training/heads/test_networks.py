@@ -12,7 +12,13 @@ from shapeshift.runtime_models.package.read_package import read_files
 from shapeshift.runtime_models.package.write_package import package_files
 from shapeshift.training.export import model_of
 from shapeshift.training.heads.gaussians import Activation, Gaussians
-from shapeshift.training.heads.networks import OWN_WIDTH, HeadLayout, Heads, initial_weights, padded
+from shapeshift.training.heads.networks import (
+    ATTRIBUTE_WIDTH,
+    HeadLayout,
+    Heads,
+    initial_weights,
+    padded,
+)
 from shapeshift.training.reference import (
     activate_reference,
     directions,
@@ -58,16 +64,14 @@ LAYOUTS = [
     HeadLayout(splats=1, features=1, hidden=1, control=1),
     HeadLayout(splats=3, features=7, hidden=9, control=5),
     HeadLayout(splats=4, features=32, hidden=64, control=16),
-    HeadLayout(splats=2, features=8, hidden=16, layers=2),
-    HeadLayout(splats=3, features=7, hidden=9, control=5, layers=3),
-    HeadLayout(splats=1, features=1, hidden=1, control=1, layers=3),
-    HeadLayout(splats=2, features=5, hidden=130, layers=2),
+    HeadLayout(splats=2, features=8, hidden=16),
+    HeadLayout(splats=2, features=5, hidden=130),
     HeadLayout(splats=3, features=7, hidden=9, control=5, view_dependent=False),
-    HeadLayout(splats=3, features=7, hidden=9, control=5, own=()),
-    HeadLayout(splats=3, features=7, hidden=9, control=5, own=("frame",)),
-    HeadLayout(splats=3, features=7, hidden=9, layers=2, own=("color",)),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=()),
+    HeadLayout(splats=3, features=7, hidden=9, control=5, attributes=("frame",)),
+    HeadLayout(splats=3, features=7, hidden=9, attributes=("color",)),
     HeadLayout(splats=3, features=7, hidden=9, control=5, fixed=("offset", "scale", "rotation")),
-    HeadLayout(splats=2, hidden=12, layers=2, fixed=HEADS, view_dependent=False),
+    HeadLayout(splats=2, hidden=12, fixed=HEADS, view_dependent=False),
 ]
 
 
@@ -77,7 +81,7 @@ def test_pack_then_unpack_is_the_identity(layout):
     networks = {}
     for name in HEADS:
         out = layout.splats * SIZE_PER_SPLAT[name]
-        widths = [len(layout.first_rows(name)), *[layout.hidden] * layout.layers, out]
+        widths = [len(layout.first_rows(name)), layout.hidden, out]
         shapes = [s for i, o in pairwise(widths) for s in ((o, i), o)]
         networks[name] = tuple(rng.normal(size=s).astype(np.float32) for s in shapes)
     flat = layout.pack(networks)
@@ -128,7 +132,7 @@ def test_backward_equals_plain_numpy(device, layout, count, form):
         )
         flowing = raw_of(grad_raw, layout, name).astype(np.float64)
         takes, wanted = [inputs, *plain[name][0]], []
-        for layer in reversed(range(layout.layers + 1)):
+        for layer in (1, 0):
             wanted = [flowing.T @ takes[layer], flowing.sum(0), *wanted]
             if layer:
                 weight = networks[name][2 * layer].astype(np.float64)
@@ -232,29 +236,29 @@ def test_activations_and_their_gradient(device, spread):
 
 
 @pytest.mark.parametrize(
-    ("layers", "fixed", "sentence"),
+    ("wrong", "sentence"),
     [
-        (0, (), "layers is 0"), (4, (), "layers is 4"), (1, ("colour",), "no head 'colour' to fix"),
+        ({"fixed": ("colour",)}, "no head 'colour' to fix"),
+        ({"attributes": ("size",)}, "no attribute 'size'"),
     ],
 )  # fmt: skip
-def test_networks_that_cannot_be_are_refused(layers, fixed, sentence):
+def test_networks_that_cannot_be_are_refused(wrong, sentence):
     with pytest.raises(ValueError, match=sentence):
-        HeadLayout(layers=layers, fixed=fixed)
+        HeadLayout(**wrong)
 
 
-def test_rates_shrink_behind_wide_layers_and_between_layers():
+def test_rates_shrink_behind_wide_layers():
     for plain in (HeadLayout(), HeadLayout(hidden=8), HeadLayout(fixed=HEADS)):
         assert (plain.rate_shares() == 1).all()
-    layout = HeadLayout(splats=2, hidden=64, layers=3)
+    layout = HeadLayout(splats=2, hidden=64)
     shares = layout.unpack(layout.rate_shares())
     for name in HEADS:
         found = [np.unique(array).tolist() for array in shares[name]]
-        assert found == [[1], [1], [0.125], [0.25], [0.125], [0.25], [0.5], [1]]
+        assert found == [[1], [1], [0.5], [1]]
 
 
-@pytest.mark.parametrize("layers", [1, 3])
-def test_what_a_head_does_not_see_changes_no_other_first_weight(layers):
-    whole = HeadLayout(splats=3, layers=layers)
+def test_what_a_head_does_not_see_changes_no_other_first_weight():
+    whole = HeadLayout(splats=3)
     less = replace(whole, fixed=("offset", "color"), view_dependent=False)
     mine, theirs = (
         layout.unpack(initial_weights(layout, np.random.default_rng(4))) for layout in (less, whole)
@@ -272,7 +276,8 @@ def test_a_package_of_every_layout_decodes_as_the_kernels_do(device, layout):
     encoding, stops = ControlEncoding(layout.control), (Stop("RGB", 0.0), Stop("Heat", 1.0))
     state = {"weights.value": weights, "anchors.value": anchors, "features.value": features}
     rng = np.random.default_rng(5)
-    own = {n: rng.normal(size=(21, OWN_WIDTH[n])).astype(np.float32) for n in layout.per_anchor[2:]}
+    widths = {n: ATTRIBUTE_WIDTH[n] for n in layout.per_anchor[2:]}
+    own = {n: rng.normal(size=(21, w)).astype(np.float32) for n, w in widths.items()}
     state |= {f"{n}.value": array for n, array in own.items()}
     exported = model_of(state, layout, VOXEL, encoding, stops, {})
     files = package_files(exported, "float32")

@@ -24,8 +24,8 @@ from tests.support.training.plain_situations import situation as plain_situation
 from tests.support.training.situations import (
     BACKGROUND,
     LAYOUT,
+    MIN_OPACITY_SHARE,
     OTHERS,
-    SHARES,
     SIZE,
     VOXEL,
     compare_gradients,
@@ -62,7 +62,7 @@ def test_a_step_of_both_forms(device, as_gpu, seed):
         loss = ImageLoss(where, SIZE)
         target = loss.target(where.upload(rgba), BACKGROUND)
         drawing = step.draw(view, control, BACKGROUND)
-        grads = step.gradients(drawing, loss, target, *SHARES)
+        grads = step.gradients(drawing, loss, target, min_opacity_share=MIN_OPACITY_SHARE)
         found.append({name: where.download(grad) for name, grad in grads.items()})
         found[-1] |= {"loss": np.array(loss.value()), "image": where.download(drawing.frame.image)}
     for name, one in found[0].items():
@@ -78,7 +78,7 @@ def test_a_step_of_plain_splats_of_both_forms(device, as_gpu, degree):
         adam = Adam(where, parameters, dict.fromkeys(GROUPS, np.ones(1)))
         step, loss = PlainStep(where, adam, degree), ImageLoss(where, SIZE)
         target = loss.target(where.upload(rgba), BACKGROUND)
-        grads = step.gradients(step.draw(view, BACKGROUND), loss, target, 0.2)
+        grads = step.gradients(step.draw(view, BACKGROUND), loss, target)
         found.append({name: where.download(grad) for name, grad in grads.items()})
     for name, one in found[0].items():
         if one.size:
@@ -88,7 +88,7 @@ def test_a_step_of_plain_splats_of_both_forms(device, as_gpu, degree):
 @pytest.mark.parametrize("count", [63, 64, 65, 1023, 1025, 3000])
 def test_shares_of_any_number_of_anchors(device, count):
     """Fewer anchors than shares, as many, whole blocks of them and not."""
-    layout = HeadLayout(splats=3, features=7, hidden=9, control=5, layers=2)
+    layout = HeadLayout(splats=3, features=7, hidden=9, control=5)
     rng = np.random.default_rng(count)
     arrays = [
         initial_weights(layout, rng),
@@ -111,7 +111,7 @@ def test_shares_of_any_number_of_anchors(device, count):
 
 
 def test_blocks_cover_every_weight_once():
-    layout = HeadLayout(splats=10, features=7, hidden=20, layers=3)
+    layout = HeadLayout(splats=10, features=7, hidden=20)
     seen = np.zeros(layout.weights_at[-1], int)
     number = np.arange(seen.size)
     for head, layer, i, j in blocks_of_weights(layout):
@@ -136,7 +136,7 @@ def test_runs_of_both_forms_learn_alike_and_each_keeps_its_bits(device, as_gpu, 
 
 
 def test_growing_works_in_the_gpu_forms(as_gpu, balls):
-    changes = {"grow": True, "grow_every": 20, "iterations": 120, "coarse": 2}
+    changes = {"grow": True, "grow_every": 20, "iterations": 120}
     few = replace(balls, points=balls.points[::100])  # which leaves room
     trainer = Trainer(as_gpu, few, replace(SETTINGS, **changes, max_anchors=400))
     first = trainer.anchors_count

@@ -14,10 +14,10 @@ from shapeshift.training.photos import LoadedPhoto, load_photos
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.supervision.backgrounds import (
     EMPTY,
+    background_warning,
     choose_background,
     rim_of,
     shared_color,
-    told_background,
 )
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
@@ -80,8 +80,8 @@ def test_the_rim_is_the_edge_and_each_pixel_once():
 
 
 def test_what_is_said_of_it():
-    assert "#ff8000" in told_background((1.0, 0.5, 0.0))
-    assert "--background random" in told_background((0.0, 0.0, 0.0))
+    assert "#ff8000" in background_warning((1.0, 0.5, 0.0))
+    assert "--background random" in background_warning((0.0, 0.0, 0.0))
 
 
 def test_a_capture_of_which_nothing_is_known_starts_from_its_hull(tmp_path):
@@ -93,7 +93,7 @@ def test_a_capture_of_which_nothing_is_known_starts_from_its_hull(tmp_path):
     settings = TrainSettings(iterations=9, max_anchors=300)
     trainer = Trainer(open_device("cpu"), bare, settings, loaded=photos)
     assert trainer.origin == "hull" and trainer.schedule.background == (0.0, 0.0, 0.0)
-    assert [doubt for doubt in trainer.doubts if "#000000" in doubt]
+    assert [doubt for doubt in trainer.warnings if "#000000" in doubt]
     assert trainer.model().provenance["background"] == (0.0, 0.0, 0.0)
     left_open = Trainer(
         open_device("cpu"), bare, replace(settings, background="random"), loaded=photos

@@ -60,7 +60,7 @@ def test_the_gain_of_a_look_is_least_squares_over_what_counts(device, size, mask
     weight = rng.random((height, width)).astype(np.float32) if masked else None
     photo = photo_of(rgba, weight)
     exposures = Exposures(device, {"RGB": [photo]})
-    exposures.look(photo, device.upload(image), device.upload(rgba))
+    exposures.update(photo, device.upload(image), device.upload(rgba))
     counts = rgba[..., 3] / 255 * (rgba[..., :3] < 254).all(axis=2)
     counts = counts * (1 if weight is None else weight)
     drawn, wanted = np.clip(image, 0, 1), rgba[..., :3].transpose(2, 0, 1) / 255
@@ -72,7 +72,7 @@ def test_the_gain_of_a_look_is_least_squares_over_what_counts(device, size, mask
     a, b = (v - (weights * v).sum(axis=(1, 2), keepdims=True) for v in (drawn, wanted))
     both, ours, own = ((weights * v).sum() for v in (a * b, a * a, b * b))
     like = both * abs(both) / (ours * own) if min(ours, own) > 1e-5 else 0.0
-    assert exposures.likeness[0] == pytest.approx(like, abs=1e-4)
+    assert exposures.correlation[0] == pytest.approx(like, abs=1e-4)
 
 
 def test_nothing_drawn_or_shown_is_no_gain():
@@ -87,7 +87,7 @@ def known(device, logs: np.ndarray) -> tuple[Exposures, list[LoadedPhoto]]:
     rgba = opaque(np.full((4, 4, 3), 128, np.uint8))
     photos = [photo_of(rgba, name=str(i)) for i in range(len(logs))]
     exposures = Exposures(device, {"RGB": photos})
-    exposures.log_gain[:], exposures.likeness[:] = logs, LIKE
+    exposures.log_gain[:], exposures.correlation[:] = logs, LIKE
     return exposures, photos
 
 
@@ -98,11 +98,11 @@ def test_gains_count_from_the_noise_on(device, spread):
     exposures, photos = known(device, logs)
     gains = np.array([exposures.gain(photo) for photo in photos])
     if spread < NOISE:
-        assert (gains == 1).all() and exposures.remarks() == []
+        assert (gains == 1).all() and exposures.warnings() == []
         return
     share = 1 - (NOISE / spread) ** 2
     np.testing.assert_allclose(np.log(gains), share * (logs - 0.3), atol=1e-9)
-    assert f"differ in brightness by {100 * spread:.0f} %" in exposures.remarks()[0]
+    assert f"differ in brightness by {100 * spread:.0f} %" in exposures.warnings()[0]
 
 
 def test_single_photos_change_no_others(device):
@@ -110,7 +110,7 @@ def test_single_photos_change_no_others(device):
     logs = np.repeat(np.linspace(-0.02, 0.02, 20)[:, None], 3, axis=1)
     logs[:4] = -0.8
     exposures, photos = known(device, logs)
-    assert all(exposures.gain(photo) == NONE for photo in photos) and exposures.remarks() == []
+    assert all(exposures.gain(photo) == NONE for photo in photos) and exposures.warnings() == []
 
 
 @pytest.mark.parametrize(("sign", "like"), [(1, 1.0), (-1, -1.0), (0, 0.0)])
@@ -120,16 +120,16 @@ def test_likeness_has_a_sign_and_knows_no_gain(device, sign, like):
     photo = photo_of(opaque(rgb))
     image = 0.5 + sign * 0.5 * (rgb.transpose(2, 0, 1) / np.float32(255) - 0.5)
     exposures = Exposures(device, {"RGB": [photo]})
-    exposures.look(photo, device.upload(image.astype(np.float32)), device.upload(photo.rgba))
-    assert exposures.likeness[0] == pytest.approx(like, abs=1e-4)
+    exposures.update(photo, device.upload(image.astype(np.float32)), device.upload(photo.rgba))
+    assert exposures.correlation[0] == pytest.approx(like, abs=1e-4)
 
 
 @pytest.mark.parametrize(("like", "counts"), [(LIKE, True), (LIKE - 1e-9, False), (-1.0, False)])
 def test_a_model_that_does_not_show_the_photos_says_nothing_of_them(device, like, counts):
     logs = 0.2 * np.array([-1.0, 1] * 5)[:, None] * np.ones(3)
     exposures, photos = known(device, logs)
-    exposures.likeness[4:] = like  # the median of ten, four of which are at the bound
-    assert (exposures.gain(photos[0]) != NONE) == counts == bool(exposures.remarks())
+    exposures.correlation[4:] = like  # the median of ten, four of which are at the bound
+    assert (exposures.gain(photos[0]) != NONE) == counts == bool(exposures.warnings())
 
 
 def test_few_or_unknown_photos_are_left_as_they_are(device):
@@ -146,7 +146,7 @@ def test_few_or_unknown_photos_are_left_as_they_are(device):
     again.load(other.state())
     np.testing.assert_array_equal(again.log_gain, exposures.log_gain)
     assert again.begin == FROM
-    again.forget(0.25, 100)
+    again.reset(0.25, 100)
     assert np.isnan(again.log_gain).all() and again.begin == 0.25 + FROM
     last, _ = known(device, logs)
     last.load(again.state())
@@ -229,5 +229,5 @@ def test_a_training_finds_the_brightness_of_its_photos(device, balls, tmp_path):
     away = (got - got.mean()) - (want - want.mean())
     assert np.std(away) < np.std(want) / 2.5, np.round(away, 3)
     assert trainer.exposures.spread("Thermal") < NOISE
-    (remark,) = trainer.exposures.remarks()
+    (remark,) = trainer.exposures.warnings()
     assert remark.startswith("RGB: its photos differ in brightness by")

@@ -21,9 +21,9 @@ from shapeshift.training.photos import (
     bytes_a_pixel,
     choose_downscale,
     load_photos,
-    memory_doubts,
+    memory_excess,
     memory_of,
-    too_much,
+    memory_warnings,
 )
 from shapeshift.training.supervision.targets import CACHE_BYTES, Targets
 from shapeshift.training.synthetic.balls import make_balls
@@ -71,7 +71,7 @@ def test_photos_become_as_small_as_memory_needs_them(tmp_path, monkeypatch, byte
     capture = capture_of(tmp_path, 40)
     allow(monkeypatch, memory_of(capture.photos, 1) + bytes_over)
     assert choose_downscale(capture.photos) == factor
-    said = memory_doubts(capture.photos, factor)
+    said = memory_warnings(capture.photos, factor)
     assert len(said) == factor - 1
     if said:
         assert said[0].startswith("40 photos of 64x48 pixels would take 1 MB of memory, photos may")
@@ -84,7 +84,7 @@ def test_a_size_that_was_asked_for_is_refused_before_anything_is_read(tmp_path, 
     allow(monkeypatch, memory_of(capture.photos, 3) + 1)
     with pytest.raises(BadFile, match=r"would take .*; --downscale 3 fits, --memory GB"):
         load_photos(capture, "train", 2, "object")
-    assert not too_much(capture.photos, 3)
+    assert not memory_excess(capture.photos, 3)
     assert load_photos(capture, "test", 2, "object") == []
 
 

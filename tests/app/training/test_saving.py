@@ -9,17 +9,17 @@ import pytest
 
 from shapeshift.app.cli import main
 from shapeshift.app.errors import UsageError
-from shapeshift.app.training.keeping import last_of, refuse_place
+from shapeshift.app.training.saving import check_writable, resume_hint
 from shapeshift.rasterizer.device import open_device
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.captures.capture import Capture
-from shapeshift.training.calibration.outlier_views import hopeless
+from shapeshift.training.calibration.outlier_views import failed_modalities
 from shapeshift.training.checkpoint import checkpoint_path, read_checkpoint, write_checkpoint
-from shapeshift.training.doubts import FEW, usable
 from shapeshift.training.photos import load_photos
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
+from shapeshift.training.view_checks import FEW, validate_views
 
 STEPS = 12
 
@@ -125,16 +125,16 @@ def test_a_disk_that_is_gone_leaves_the_scene_elsewhere(
 def test_a_place_where_nothing_can_be_written_is_refused_at_once(tmp_path):
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(UsageError, match="name another place"):
-        refuse_place(tmp_path / "file" / "deeper" / "a.shift")
-    refuse_place(tmp_path / "new" / "a.shift")
+        check_writable(tmp_path / "file" / "deeper" / "a.shift")
+    check_writable(tmp_path / "new" / "a.shift")
     assert not (tmp_path / "new").exists()
 
 
 def test_what_a_full_disk_can_go_on_from(tmp_path):
     path = tmp_path / "a.checkpoint.npz"
-    assert last_of(path) == "make room and train again"
+    assert resume_hint(path) == "make room and train again"
     write_checkpoint(path, {"a": np.zeros(3)}, {"iteration": 40})
-    assert last_of(path) == "make room, and --resume goes on from step 40"
+    assert resume_hint(path) == "make room, and --resume goes on from step 40"
 
 
 def test_a_checkpoint_that_does_not_fit_leaves_no_part(tmp_path, monkeypatch):
@@ -150,28 +150,29 @@ def test_a_checkpoint_that_does_not_fit_leaves_no_part(tmp_path, monkeypatch):
 
 def test_few_photos_and_missing_masks_are_spoken_of(balls):
     photos = load_photos(balls, "train", 1, "object")
-    kept, doubts = usable(photos, "object")
+    kept, doubts = validate_views(photos, "object")
     assert kept == photos and len(doubts) == 2 and "RGB has 6 training photos only" in doubts[0]
     many = [replace(p, modality="RGB", masked=True) for p in photos * 3]
-    assert usable(many, "object") == (many, []) and len(many) > FEW
+    assert validate_views(many, "object") == (many, []) and len(many) > FEW
     some = [replace(p, masked=i % 4 > 0) for i, p in enumerate(many)]
-    kept, doubts = usable(some, "object")
+    kept, doubts = validate_views(some, "object")
     assert len(kept) == 27 and all(p.masked for p in kept) and "9 photos" in doubts[0]
     fewer = [p for p in photos if p.modality == "Thermal"]
-    assert usable(many + fewer, "ignore")[1][0].endswith(
+    assert validate_views(many + fewer, "ignore")[1][0].endswith(
         "of RGB, it can share them: --fixed offset,scale,rotation,opacity."
     )
     most = [replace(p, masked=i % 4 == 0) for i, p in enumerate(many)]
-    kept, doubts = usable(most, "object")
+    kept, doubts = validate_views(most, "object")
     assert len(kept) == len(most) and "count as a whole" in doubts[0]
-    assert usable(some, "valid") == (some, []) and usable(some, "ignore") == (some, [])
+    for masks in ("valid", "ignore"):
+        assert validate_views(some, masks) == (some, [])
 
 
 def test_a_scene_that_shows_nothing_is_called_that(balls):
     trainer = Trainer(open_device(), balls, TrainSettings(iterations=150, max_anchors=600))
     for _ in trainer.steps():
         pass
-    assert hopeless(trainer) == []
+    assert failed_modalities(trainer) == []
     state = trainer.adam.state()
     trainer.adam.load(state | {"anchors.value": state["anchors.value"] + np.float32(1000)})
-    assert "RGB, Thermal: the pictures are no nearer" in hopeless(trainer)[0]
+    assert "RGB, Thermal: the pictures are no nearer" in failed_modalities(trainer)[0]

@@ -1,19 +1,19 @@
-"""What is known of every splat and anchor since the last densification, summed up step by step."""
+"""Densification statistics: sums over the steps since the last change of the anchors."""
 
 import numpy as np
 
 from shapeshift.training.heads.networks import KERNELS, HeadLayout
 
 
-class Evidence:
+class DensificationStats:
     """Sums over the steps since the last change.  `stop` says whose step the next one is."""
 
     def __init__(self, device, layout: HeadLayout, anchors_count: int, stops: int) -> None:
         self.device, self.stop = device, 0
         self.kernel = device.program(KERNELS / "density.cl", SPLATS=layout.splats)["accumulate"]
-        self.pull = device.zeros((anchors_count * layout.splats, 2))
+        self.grad2d = device.zeros((anchors_count * layout.splats, 2))
         self.opacity = device.zeros((anchors_count, 2))
-        self.given = [device.zeros((anchors_count, 2)) for _ in range(stops)]
+        self.contribution = [device.zeros((anchors_count, 2)) for _ in range(stops)]
         self.everything = device.upload(np.arange(anchors_count, dtype=np.int32))
         self.steps = 0
 
@@ -27,25 +27,26 @@ class Evidence:
         rows = self.everything if rows is None else rows
         self.device.launch(
             self.kernel, len(rows), 16, len(rows), size[0] / 2, rows, record, grad_record,
-            opacity, self.pull, self.opacity, self.given[self.stop],
+            opacity, self.grad2d, self.opacity, self.contribution[self.stop],
         )  # fmt: skip
 
     def state(self) -> dict[str, np.ndarray]:
-        """Sums and how many steps make each: pull (N, 2), opacity (A, 2), given (stops, A, 2).
+        """Sums and how many steps make each.
 
-        pull: absolute gradient by the mean on the screen, in half image widths, over the steps that
-        showed the splat.  opacity: of an anchor's splats, over the steps that ran it.  given: alpha
-        times transmittance in pixels, over the pictures of a stop that showed any of its splats.
+        grad2d (N, 2): absolute gradient by the mean on the screen, in half image widths, over the
+        steps that showed the splat.  opacity (A, 2): of an anchor's splats, over the steps that ran
+        it.  contribution (stops, A, 2): alpha times transmittance in pixels, over the pictures of a
+        stop that showed any of its splats.
         """
         return {
-            "evidence.pull": self.device.download(self.pull),
-            "evidence.opacity": self.device.download(self.opacity),
-            "evidence.given": np.stack([self.device.download(g) for g in self.given]),
-            "evidence.steps": np.array(self.steps),
+            "densify.grad2d": self.device.download(self.grad2d),
+            "densify.opacity": self.device.download(self.opacity),
+            "densify.contribution": np.stack([self.device.download(g) for g in self.contribution]),
+            "densify.steps": np.array(self.steps),
         }
 
     def load(self, state: dict[str, np.ndarray]) -> None:
-        self.pull = self.device.upload(state["evidence.pull"])
-        self.opacity = self.device.upload(state["evidence.opacity"])
-        self.given = [self.device.upload(given) for given in state["evidence.given"]]
-        self.steps = int(state["evidence.steps"])
+        self.grad2d = self.device.upload(state["densify.grad2d"])
+        self.opacity = self.device.upload(state["densify.opacity"])
+        self.contribution = [self.device.upload(c) for c in state["densify.contribution"]]
+        self.steps = int(state["densify.steps"])

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LESS = "fewer --max-anchors, or a larger --downscale, need less"
 
 
-def refuse_place(out: Path) -> None:
+def check_writable(out: Path) -> None:
     """Raises UsageError where nothing can be written: before the training, not after it."""
     there = next(folder for folder in out.absolute().parents if folder.exists())
     try:
@@ -48,7 +48,7 @@ def memory_for_training() -> Iterator[None]:
 
 
 @contextmanager
-def kept_when_memory_ends(trainer: "Trainer", out: Path, checkpoint: Path) -> Iterator[None]:
+def saved_when_memory_ends(trainer: "Trainer", out: Path, checkpoint: Path) -> Iterator[None]:
     """Writes what there is when memory ends, and raises UsageError that says so."""
     try:
         yield
@@ -69,7 +69,7 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
     from shapeshift.runtime_models.package.write_package import write_package
     from shapeshift.training.checkpoint import write_checkpoint
 
-    if trainer.mend():
+    if trainer.restore_last_good():
         say("the picture was lost in the last steps; what is kept is the last good state")
     model, state = trainer.model(), trainer.checkpoint()
     try:
@@ -84,11 +84,11 @@ def save(trainer: "Trainer", out: Path, checkpoint: Path) -> None:
         write_package(model, elsewhere / out.name)
         write_checkpoint(elsewhere / checkpoint.name, *state)
     except OSError:
-        raise UsageError(f"{why}, nor anywhere else; {last_of(checkpoint)}.") from None
+        raise UsageError(f"{why}, nor anywhere else; {resume_hint(checkpoint)}.") from None
     raise UsageError(f"{why}; the scene and its checkpoint are in {elsewhere} instead.")
 
 
-def last_of(checkpoint: Path) -> str:
+def resume_hint(checkpoint: Path) -> str:
     """What a run that could not be saved can go on from, in words."""
     from shapeshift.runtime_models.model import BadFile
     from shapeshift.training.checkpoint import read_checkpoint
@@ -100,7 +100,7 @@ def last_of(checkpoint: Path) -> str:
     return f"make room, and --resume goes on from step {notes['iteration']}"
 
 
-def save_on_the_way(trainer: "Trainer", checkpoint: Path) -> str:
+def save_checkpoint(trainer: "Trainer", checkpoint: Path) -> str:
     """Writes the checkpoint; in words why not, where the disk is full: training goes on."""
     from shapeshift.training.checkpoint import write_checkpoint
 
