@@ -262,3 +262,14 @@ def test_no_function_is_over_60_lines():
                     if lines > 60:
                         long.append(f"{path.relative_to(ROOT)}:{node.name} has {lines} lines")
     assert not long, "\n".join(long)
+
+
+def test_what_tests_share_lies_in_support():
+    """A test file that imports from another one breaks when that is renamed or split."""
+    wrong = []
+    for path in files("tests"):
+        for node in nodes_of(path):
+            module = node.module if isinstance(node, ast.ImportFrom) else ""
+            if module.split(".")[-1].startswith(("test_", "conftest")):
+                wrong.append(f"{path.relative_to(ROOT)}: from {module}")
+    assert not wrong, "\n".join(wrong)
