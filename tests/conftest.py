@@ -50,17 +50,39 @@ def data() -> Path:
     return folder
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """A module with RENDERERS has its tests of the fixture `renderer` once for each of them."""
+    kinds = getattr(metafunc.module, "RENDERERS", None)
+    if kinds and "renderer" in metafunc.fixturenames:
+        metafunc.parametrize("renderer", kinds.values(), ids=kinds, indirect=True, scope="module")
+
+
 @pytest.fixture(scope="module")
-def renderer():
-    """One that draws tiles, for all tests of a module; skips where there is no OpenCL device."""
+def renderer(request):
+    """One that draws tiles, or as the module's RENDERERS say; for all tests of a module.
+
+    Skips where there is no OpenCL device, or no OpenGL.
+    """
     from shapeshift.rasterizer.device import NoDevice
     from shapeshift.renderer.renderer import Renderer
 
-    try:
-        with Renderer(None) as made:
-            yield made
-    except NoDevice as reason:
-        pytest.skip(str(reason))
+    keywords = dict(getattr(request, "param", {}))
+    if not keywords:
+        try:
+            with Renderer(None) as made:
+                yield made
+        except NoDevice as reason:
+            pytest.skip(str(reason))
+        return
+    pair = keywords.pop("pair", None)
+    session_gpu = request.getfixturevalue("session_gpu")
+    with session_gpu.ctx as ctx, Renderer(ctx, **keywords) as made:
+        if pair and made.drawing.stereo_pair is None:
+            pytest.skip("a GPU draws the views one after the other")
+        if pair is False:
+            made.drawing.stereo_pair = None
+        yield made
+        assert ctx.error == "GL_NO_ERROR", "a test of this module left a GL error"
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import ast
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -31,14 +32,25 @@ NEVER = {
 }
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
+
+
+@cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """All of a file, once for all tests."""
+    return tuple(ast.walk(parsed(path)))
+
+
+@cache
 def imported(path: Path, everywhere: bool = True) -> set[str]:
     """First names of the modules a file imports; of shapeshift.scene.pose `scene`.
 
     At its top level alone when not everywhere.
     """
-    tree = ast.parse(path.read_text())
     names = set()
-    for node in ast.walk(tree) if everywhere else tree.body:
+    for node in nodes_of(path) if everywhere else parsed(path).body:
         if isinstance(node, ast.Import):
             names |= {folder_of(a.name) for a in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -129,11 +141,13 @@ def modules() -> dict[str, Path]:
     return {module_of(p): p for folder in ("shapeshift", *MAY_IMPORT) for p in files(folder)}
 
 
-def import_graph(known: dict[str, Path]) -> dict[str, set[str]]:
+@cache
+def import_graph() -> dict[str, set[str]]:
     """What each module imports of ours, also inside functions and for types alone."""
+    known = modules()
     graph = {name: set() for name in known}
     for name, path in known.items():
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes_of(path):
             if isinstance(node, ast.Import):
                 graph[name] |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
@@ -166,7 +180,7 @@ def test_a_circle_is_found():
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    graph = import_graph(modules())
+    graph = import_graph()
     assert sum(map(len, graph.values())) > 1000  # 2,300 now: it sees what there is
     assert not circle_in(graph)
 
@@ -179,7 +193,7 @@ OVERLAYS = {"imgui_bundle", "glfw", "moderngl_window"}  # what draws and listens
 @pytest.mark.parametrize("shelf", EDITOR_MAY_IMPORT)
 def test_the_editors_state_lies_under_its_panels_and_both_under_its_window(shelf):
     others = EDITOR_MAY_IMPORT.keys() - EDITOR_MAY_IMPORT[shelf] - {shelf}
-    graph = import_graph(modules())
+    graph = import_graph()
     wrong = [
         f"{name} imports {imported}"
         for name in sorted(graph)
@@ -206,7 +220,7 @@ def test_no_part_of_the_editor_is_handed_the_whole_viewer():
     for path in files("app/editor"):
         if path.name in ("viewer.py", "desktop.py"):
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in nodes_of(path):
             name = getattr(node, "id", None) or getattr(node, "arg", None)
             named = (name, getattr(node, "attr", None), getattr(node, "value", None))
             if "viewer" in named or "Viewer" in named:
@@ -242,9 +256,20 @@ def test_no_function_is_over_60_lines():
     long = []
     for folder in MAY_IMPORT:
         for path in files(folder):
-            for node in ast.walk(ast.parse(path.read_text())):
+            for node in nodes_of(path):
                 if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                     lines = node.end_lineno - node.lineno + 1
                     if lines > 60:
                         long.append(f"{path.relative_to(ROOT)}:{node.name} has {lines} lines")
     assert not long, "\n".join(long)
+
+
+def test_what_tests_share_lies_in_support():
+    """A test file that imports from another one breaks when that is renamed or split."""
+    wrong = []
+    for path in files("tests"):
+        for node in nodes_of(path):
+            module = node.module if isinstance(node, ast.ImportFrom) else ""
+            if module.split(".")[-1].startswith(("test_", "conftest")):
+                wrong.append(f"{path.relative_to(ROOT)}: from {module}")
+    assert not wrong, "\n".join(wrong)

@@ -11,6 +11,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.frames import draw_told
+from tests.support.renderer.renderers import TILES, quads
 from tests.support.scene.object_scenes import (
     CYCLE,
     UPRIGHT,
@@ -22,6 +23,8 @@ from tests.support.scene.object_scenes import (
     straight_view,
 )
 from tests.support.splat_scenes import alone, front_view, psnr_db, random_layers, stereo_views
+
+RENDERERS = {"tiles": TILES, "gl": quads(sort="gl"), "numpy": quads(sort="numpy")}
 
 VIEW = front_view((128, 96))
 SIZES = (8, 127, 128, 129, 255, 256, 257)  # of the first object: where blocks of kernels end

@@ -18,7 +18,15 @@ from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import without_direction
 from tests.support.renderer.eye_scenes import APART, SCENES, TURNED, eyes
 from tests.support.renderer.frames import draw_told
+from tests.support.renderer.renderers import TILES, quads
 from tests.support.splat_scenes import alone, psnr_db, random_layers, random_model
+
+RENDERERS = {
+    "tiles": TILES,
+    "gl": quads(mlps="gl", pair=False),
+    "onnxruntime": quads(mlps="onnxruntime", pair=False),
+    "pair": quads(mlps="onnxruntime", pair=True),
+}
 
 
 def by_itself(renderer: Renderer, scene: Scene, view: View) -> np.ndarray:

@@ -12,6 +12,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Sphere
 from tests.support.renderer.frames import draw
+from tests.support.renderer.renderers import TILES, quads
 from tests.support.scene.object_scenes import ODD, put, turned_view
 from tests.support.splat_scenes import (
     alone,
@@ -22,6 +23,12 @@ from tests.support.splat_scenes import (
     shell,
     stereo_views,
 )
+
+RENDERERS = {
+    "tiles": TILES,
+    "gl": quads(mlps="gl", sort="numpy"),
+    "onnxruntime": quads(mlps="onnxruntime", sort="numpy"),
+}
 
 VIEW = front_view((120, 90))
 HERE = Pose(np.array([0.2, -0.1, 0.3]), ODD)

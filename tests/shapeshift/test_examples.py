@@ -10,6 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from shapeshift.runtime_models.package.read_package import read_package
+from shapeshift.runtime_models.package.write_package import write_package
+
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "examples"
 SHORT = {"06_train.py": ["1"], "08_film_frames.py": ["4"]}  # seconds, frames
@@ -55,7 +58,18 @@ def test_it_runs_from_anywhere_and_leaves_what_it_says(name, tmp_path):
             assert np.asarray(Image.open(path)).std() > 5
 
 
-def test_the_notebook_runs_cell_by_cell(tmp_path, monkeypatch):
+@pytest.fixture(params=[False, pytest.param(True, marks=pytest.mark.slow)], ids=["thin", "whole"])
+def demo(request, tmp_path, monkeypatch) -> None:
+    """ss.DEMO, or every twentieth anchor of it: the float64 reference takes a splat at a time."""
+    import shapeshift as ss
+
+    if not request.param:
+        thin = read_package(ss.DEMO).with_anchors(slice(None, None, 20))
+        write_package(thin, tmp_path / "demo.shift")
+        monkeypatch.setattr(ss, "DEMO", tmp_path / "demo.shift")
+
+
+def test_the_notebook_runs_cell_by_cell(demo, tmp_path, monkeypatch):
     """Without Jupyter: what a cell ends with is shown, and pictures show themselves."""
     import ast
 

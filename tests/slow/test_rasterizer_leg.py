@@ -1,13 +1,10 @@
 """The tiles on a real scene (136,605 splats) against float64, and where a frame's time goes."""
 
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shapeshift.rasterizer.bin import bin_tiles
 from shapeshift.rasterizer.project import Camera
 from shapeshift.rasterizer.project_arena import project_arena

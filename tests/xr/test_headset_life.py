@@ -7,14 +7,11 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
+from tests.support.xr.person import WHOLE_LIFE
 from tests.support.xr.remote import EYE_DEGREES, EYES_APART_M
 from tests.support.xr.validation import complaints, switched_on
 from tests.support.xr.xr_stand import start_program
 
-WHOLE_LIFE = [
-    "IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED",
-    "VISIBLE", "SYNCHRONIZED", "STOPPING", "IDLE", "EXITING",
-]  # fmt: skip
 NO_HEADSET, INTERRUPTED = 4, 130  # exit codes
 PERIOD_S = 0.05  # of the null compositor
 

@@ -3,15 +3,22 @@
 import numpy as np
 import pytest
 from PIL import Image
-from test_headset_life import WHOLE_LIFE
-from test_headset_pictures import SIZE, pixel_of
 
 from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import SIDES
-from tests.support.xr.person import Person, pose_of
+from tests.support.xr.person import (
+    CARRIES,
+    FREE,
+    SIZE,
+    WHOLE_LIFE,
+    Person,
+    direction,
+    in_front,
+    open_panel,
+    pixel_of,
+    pose_of,
+)
 
-BEFORE = 0.03  # metres from the panel, where a finger is close and does not press
-CARRIES, FREE = (-0.05, 1.2, -0.45), (0.25, 1.25, -0.25)  # metres of the room
 STOPS = {"normal": 0.0, "ice": 0.25, "fire": 0.5, "charcoal": 0.75}  # of the cube
 
 
@@ -29,27 +36,10 @@ def reader(person: Person) -> Person:
     return person
 
 
-def open_panel(person: Person) -> None:
-    with person.pressing("left", "secondary"):  # an Index controller has no other for a menu
-        pass
-
-
 def on_slider(line: dict, x: float) -> np.ndarray:
     """(3,) metres of the room."""
     first, last = map(np.array, line["panel"]["slider"])
     return first + x * (last - first)
-
-
-def direction(line: dict) -> np.ndarray:
-    """(3,) of length 1: along the slider."""
-    first, last = map(np.array, line["panel"]["slider"])
-    return (last - first) / np.linalg.norm(last - first)
-
-
-def in_front(line: dict, room: np.ndarray) -> np.ndarray:
-    """A little towards who reads."""
-    way = np.array(line["head"]["position"]) - room
-    return room + BEFORE * way / np.linalg.norm(way)
 
 
 def test_the_knob_is_grabbed_and_slides_the_modality(reader):

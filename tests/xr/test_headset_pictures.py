@@ -15,9 +15,9 @@ from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from shapeshift.vr.frame import SIDES
 from shapeshift.vr.locomotion.play_space import Standing
+from tests.support.xr.person import SIZE, pixel_of
 
 SCENE = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
-SIZE = (320, 240)  # of an eye, as the null compositor recommends
 ROUNDING = 1 / 255  # of eight bits, and of six decimals in the lines
 BEHIND = (0.0, 1.4, 1.5)  # where hands are not seen
 
@@ -54,15 +54,6 @@ def drawn(scene: Scene, view: View) -> np.ndarray:
     """(H, W, 3) over the background."""
     image = reference_image(scene, view)
     return np.clip(image[..., :3] + (1 - image[..., 3:]) * DARK, 0, 1)
-
-
-def pixel_of(view: View, world: np.ndarray) -> tuple[int, int]:
-    """Column and row, row 0 on top."""
-    x, y, z = (np.linalg.inv(view.world_from_eye.matrix()) @ np.append(world, 1))[:3]
-    left, right, down, up = view.tangents
-    column = (x / -z - left) / (right - left) * view.size[0]
-    row = (up - y / -z) / (up - down) * view.size[1]
-    return int(column), int(row)
 
 
 @pytest.fixture

@@ -4,11 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from test_headset_panel import CARRIES, FREE, direction, in_front, open_panel
-from test_headset_touch import CUBE_TOP_M, events, heading_deg
 
 from shapeshift.scene.pose import Pose
-from tests.support.xr.person import Person, place
+from tests.support.xr.person import (
+    CARRIES,
+    CUBE_TOP_M,
+    FREE,
+    Person,
+    direction,
+    events,
+    heading_deg,
+    in_front,
+    open_panel,
+    place,
+)
 from tests.support.xr.xr_stand import Stand
 
 NO_HEADSET = 4  # exit code

@@ -1,29 +1,14 @@
 """Hands in a real session: reach, take, carry, throw, strike, shoot, lose, turn."""
 
-import math
-
 import numpy as np
 import pytest
 
-from tests.support.xr.person import place, pose_of
+from tests.support.xr.person import CUBE_TOP_M, RING_TOP_M, events, heading_deg, place, pose_of
 
-CUBE_TOP_M, RING_TOP_M = 0.05, 0.03  # above their middles
 HOLD_LAG_M = 0.005  # of what is held behind its hand, at rest
 G_M_S2 = 9.81
 HZ = 90  # steps of the physics a second
 STEP = np.array([0.05, 0.06, 0.0])  # of a hand in a frame of 50 ms: 1.0 m/s aside, 1.2 m/s up
-
-
-def events(lines: list[dict], name: str) -> list[tuple[str, str, str]]:
-    """(on, from, to) of an object's reactions, in order."""
-    told = [event for line in lines for event in line["events"] if event["object"] == name]
-    return [(event["on"], event["from"], event["to"]) for event in told]
-
-
-def heading_deg(line: dict) -> float:
-    """Of the room in the world, to the left."""
-    w, _, y, _ = line["standing"]["wxyz"]
-    return math.degrees(2 * math.atan2(y, w))
 
 
 def test_reach_squeeze_carry_and_let_go(person):

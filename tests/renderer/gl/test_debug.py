@@ -22,6 +22,7 @@ from shapeshift.runtime_models.rotation import covariance
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.cull_scenes import FRONT, LIMITS, SCENES, row_of
+from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import (
     alone,
     front_view,
@@ -31,6 +32,8 @@ from tests.support.splat_scenes import (
     stereo_views,
     two_objects,
 )
+
+RENDERERS = EITHER_ON_GL
 
 pytestmark = pytest.mark.usefixtures("ctx")
 NAMES = ("drawn", *CULL_REASONS)

@@ -9,7 +9,10 @@ from shapeshift.renderer.gl.sort import Sorter
 from shapeshift.renderer.gl.sort_check import FAILED, checked_sorter, first_wrong
 from shapeshift.renderer.renderer import Renderer
 from tests.support.renderer.gl_models import make_layers, make_view
+from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import alone
+
+RENDERERS = EITHER_ON_GL
 
 BREAKAGES = {  # what a driver could do to a shader: (file, text, wrong text)
     "a key is lost at the end": ("count", "if (i < count)", "if (i + 1u < count)"),

@@ -12,6 +12,7 @@ from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
+from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import (
     alone,
     front_view,
@@ -23,6 +24,8 @@ from tests.support.splat_scenes import (
     two_objects,
 )
 from tests.support.splats.scaffold_scenes import random_raw, write_run
+
+RENDERERS = EITHER_ON_GL
 
 pytestmark = pytest.mark.usefixtures("ctx")
 

@@ -16,6 +16,7 @@ from shapeshift.runtime_models.colors.spherical_harmonics import C0
 from shapeshift.runtime_models.model import SplatLayers, Stop
 from shapeshift.scene.scene import Scene, SceneObject
 from tests.support.renderer.frames import draw
+from tests.support.renderer.renderers import EITHER_ON_GL
 from tests.support.splat_scenes import (
     alone,
     front_view,
@@ -25,6 +26,8 @@ from tests.support.splat_scenes import (
     random_model,
     stereo_views,
 )
+
+RENDERERS = EITHER_ON_GL
 
 VIEW = front_view((96, 72))
 

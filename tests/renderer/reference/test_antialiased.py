@@ -45,9 +45,6 @@ STRAIGHT = View(
 )  # fmt: skip
 
 
-CASES.remove(("flat ones", "no low-pass"))  # whether they have any area float32's last digits say
-
-
 def test_the_opacity_of_one_splat_is_what_the_formula_says():
     """A disc of s pixels: det is s^4, with 0.3 px^2 it is (s^2 + 0.3)^2."""
     for scale in (1e-4, 0.003, 0.01, 0.05, 0.2):

@@ -14,7 +14,10 @@ from shapeshift.renderer.reference.reference import reference_image, reference_r
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from tests.support.renderer.frames import draw
+from tests.support.renderer.renderers import TILES, quads
 from tests.support.splat_scenes import alone, one_splat, psnr_db, random_layers, random_model
+
+RENDERERS = {"tiles": TILES, "quads": quads()}
 
 SIZE = (256, 128)
 HERE = Pose(np.zeros(3), np.array([1.0, 0, 0, 0]))

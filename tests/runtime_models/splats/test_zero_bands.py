@@ -17,7 +17,10 @@ from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.runtime_models.splats.spz.write_spz import write_spz
 from tests.support.program import launch
 from tests.support.renderer.frames import draw
+from tests.support.renderer.renderers import TILES, quads
 from tests.support.splat_scenes import alone, front_view, random_layers, stereo_views
+
+RENDERERS = {"tiles": TILES, "quads": quads(target=None)}
 
 WRITERS = {
     "a.ply": write_ply,

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from functools import partial
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -80,10 +80,17 @@ def test_a_known_shape_with_edges_is_found(name):
     check_shape(name)
 
 
+def newly_made(name: str) -> Collider:
+    return collider_of_splats(*splatted(shapes()[name], floaters=0.01).columns, FRESH)
+
+
+made_once = cache(newly_made)
+
+
 def check_shape(name: str) -> None:
     shape = shapes()[name]
     larger, euler, most, hull_volume = EXPECTED[name]
-    made = collider_of_splats(*splatted(shape, floaters=0.01).columns, FRESH)
+    made = made_once(name)
     mesh = solid(made)
     assert mesh.is_volume and mesh.euler_number == euler
     assert 2000 <= len(mesh.faces) <= 2800
@@ -98,8 +105,7 @@ def check_shape(name: str) -> None:
 
 
 def test_the_same_splats_give_the_same_collider():
-    cloud = splatted(shapes()["torus"], 4000)
-    one, two = (collider_of_splats(*cloud.columns, FRESH) for _ in range(2))
+    one, two = made_once("torus"), newly_made("torus")
     assert one.mesh.vertices.tobytes() == two.mesh.vertices.tobytes()
     assert one.mesh.faces.tobytes() == two.mesh.faces.tobytes()
     assert [h.tobytes() for h in one.hulls] == [h.tobytes() for h in two.hulls]

@@ -9,6 +9,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.grab import jumped
 from shapeshift.scene.world.physics import Physics
 from tests.support.scene.physics_things import at, box
+from tests.support.scene.world_scenes import item, real
 
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 
@@ -80,9 +81,6 @@ def test_who_holds_nothing_cannot_jump():
 
 
 def test_a_world_carries_the_object_and_all_its_hands():
-    from tests.scene.world.test_world import item
-    from tests.support.scene.world_scenes import real
-
     world = real(item(position=(0, 0.5, 0)))
     for side, x in (("left", -0.06), ("right", 0.06)):
         world.move_hand(side, at(x, 0.5, 0))

@@ -1,10 +1,11 @@
 """Somebody in the headset: a head and two hands in the room, told in metres of the world."""
 
+import math
 from contextlib import contextmanager
 
 import numpy as np
 
-from shapeshift.scene.pose import Pose
+from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import Hand
 from shapeshift.vr.glove import fingertip
 from shapeshift.vr.locomotion.play_space import Standing
@@ -160,3 +161,57 @@ def turn_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     axis, cosine = np.cross(before, after), float(np.dot(before, after))
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.eye(3) + cross + cross @ cross / (1 + cosine)
+
+
+WHOLE_LIFE = [
+    "IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED",
+    "VISIBLE", "SYNCHRONIZED", "STOPPING", "IDLE", "EXITING",
+]  # fmt: skip
+
+
+SIZE = (320, 240)  # of an eye, as the null compositor recommends
+
+
+def pixel_of(view: View, world: np.ndarray) -> tuple[int, int]:
+    """Column and row, row 0 on top."""
+    x, y, z = (np.linalg.inv(view.world_from_eye.matrix()) @ np.append(world, 1))[:3]
+    left, right, down, up = view.tangents
+    column = (x / -z - left) / (right - left) * view.size[0]
+    row = (up - y / -z) / (up - down) * view.size[1]
+    return int(column), int(row)
+
+
+BEFORE = 0.03  # metres from the panel, where a finger is close and does not press
+CARRIES, FREE = (-0.05, 1.2, -0.45), (0.25, 1.25, -0.25)  # metres of the room
+
+
+def open_panel(person: Person) -> None:
+    with person.pressing("left", "secondary"):  # an Index controller has no other for a menu
+        pass
+
+
+def direction(line: dict) -> np.ndarray:
+    """(3,) of length 1: along the slider."""
+    first, last = map(np.array, line["panel"]["slider"])
+    return (last - first) / np.linalg.norm(last - first)
+
+
+def in_front(line: dict, room: np.ndarray) -> np.ndarray:
+    """A little towards who reads."""
+    way = np.array(line["head"]["position"]) - room
+    return room + BEFORE * way / np.linalg.norm(way)
+
+
+CUBE_TOP_M, RING_TOP_M = 0.05, 0.03  # above their middles
+
+
+def events(lines: list[dict], name: str) -> list[tuple[str, str, str]]:
+    """(on, from, to) of an object's reactions, in order."""
+    told = [event for line in lines for event in line["events"] if event["object"] == name]
+    return [(event["on"], event["from"], event["to"]) for event in told]
+
+
+def heading_deg(line: dict) -> float:
+    """Of the room in the world, to the left."""
+    w, _, y, _ = line["standing"]["wxyz"]
+    return math.degrees(2 * math.atan2(y, w))

@@ -13,7 +13,7 @@ from shapeshift.scene.captures.las_run import las_points
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.read_las import read_las
 from shapeshift.scene.pose import View, look_at, perspective
-from shapeshift.training.first_anchors import point_sources
+from shapeshift.training.first_anchors import initial, point_sources
 from shapeshift.training.first_anchors.first_anchors import first_anchors
 from shapeshift.training.first_anchors.initial import (
     carve,
@@ -44,6 +44,12 @@ def photos(balls) -> list[LoadedPhoto]:
     return load_photos(balls, "train", 1, "object")
 
 
+@pytest.fixture
+def coarse(monkeypatch) -> None:
+    """Hulls of an eighth of the cells: enough where it does not matter how fine they are."""
+    monkeypatch.setattr(initial, "FINE_SIDE", initial.FINE_SIDE // 2)
+
+
 def rod_photos(half: np.ndarray) -> list[LoadedPhoto]:
     """Sixteen pictures of a box of half sides `half` metres, by rays that meet it."""
     size, out = (80, 80), []
@@ -63,7 +69,7 @@ def rod_photos(half: np.ndarray) -> list[LoadedPhoto]:
     return out
 
 
-def test_shapes_of_their_own_get_as_many_anchors_as_alone():
+def test_shapes_of_their_own_get_as_many_anchors_as_alone(coarse):
     thick = rod_photos(np.array([0.3, 0.5, 0.3]))
     thin = [replace(p, modality="bone") for p in rod_photos(np.array([0.07, 0.4, 0.06]))]
     capture = Capture(Path("rods"), (), ())
@@ -113,7 +119,7 @@ def test_depth_photos_give_points_on_the_surfaces(balls, photos):
     assert off_surface(points).max() < 2e-4  # metres: two steps of the depth photos
 
 
-def test_without_points_depth_comes_before_the_hull(balls, photos):
+def test_without_points_depth_comes_before_the_hull(balls, photos, coarse):
     bare = replace(balls, points=None)
     assert initial_points(bare, photos, RNG(0))[1] == "depth photos"
     flat = [replace(p, depth=None) for p in photos]
@@ -226,7 +232,7 @@ def test_a_cloud_of_another_place_is_refused(tmp_path, balls, photos):
         initial_points(balls, photos, RNG(0), str(tmp_path / "scan.las"))
 
 
-def test_the_same_seed_gives_the_same_points(balls, photos):
+def test_the_same_seed_gives_the_same_points(balls, photos, coarse):
     for source in ("depth", "random", "hull"):
         first, second = (initial_points(balls, photos, RNG(7), source)[0] for _ in range(2))
         np.testing.assert_array_equal(first, second)

@@ -2,14 +2,10 @@
 
 import pytest
 
-from shapeshift.renderer.renderer import Renderer
 from tests.support.renderer.antialiased_scenes import CASES, check_eyes, check_frame
+from tests.support.renderer.renderers import quads
 
-
-@pytest.fixture(scope="module")
-def renderer(session_gpu):
-    with session_gpu.ctx as ctx, Renderer(ctx, "quads") as made:
-        yield made
+RENDERERS = {"quads": quads(target=None)}
 
 
 @pytest.mark.parametrize("name, limits", CASES)

@@ -14,10 +14,9 @@ from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.stereo import stereo_pair
-from tests.renderer.colors.test_heat import random_layers
 from tests.support.renderer.gl_models import read
 from tests.support.renderer.heat_scenes import BEHIND, CASES, STOPS, VIEW, decoded, model, scene_of
-from tests.support.splat_scenes import psnr_db
+from tests.support.splat_scenes import psnr_db, random_layers
 
 
 @pytest.mark.parametrize("at_once", [False, True])

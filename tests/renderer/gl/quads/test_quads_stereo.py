@@ -1,4 +1,4 @@
-"""Two eyes by quads: the cases of the tiles, and what one projection of both must not change."""
+"""Two eyes by quads: what one projection of both, and one draw of both, must not change."""
 
 from dataclasses import replace
 
@@ -9,17 +9,11 @@ from shapeshift.renderer.reference.reference import reference_image
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View
-from tests.renderer.test_tiles_stereo import (  # noqa: F401  collected here with this module's renderer
-    eyes,
-    test_a_shared_order_is_a_sort_for_each_eye_bit_for_bit,
-    test_a_view_of_nothing_beside_one_of_something,
-    test_canted_eyes_are_the_reference,
-    test_canted_eyes_sort_each_for_itself,
-    test_disparity_is_the_baseline_times_the_focal_length_over_depth,
-    test_eyes_of_different_sizes_and_more_than_two,
-    test_fields_of_view_that_differ_from_eye_to_eye_put_things_where_they_are,
-)
-from tests.support.renderer.frames import draw
+from tests.support.renderer.eye_scenes import SCENES as COLOURED
+from tests.support.renderer.eye_scenes import eyes as coloured_eyes
+from tests.support.renderer.eye_views import eyes
+from tests.support.renderer.frames import draw, draw_told
+from tests.support.renderer.renderers import quads
 from tests.support.splat_scenes import (
     alone,
     front_view,
@@ -29,24 +23,11 @@ from tests.support.splat_scenes import (
     two_objects,
 )
 
-
-@pytest.fixture(scope="module", params=["gl", "numpy", "pair"])
-def renderer(request, session_gpu):
-    """Both sorts with a draw a view, and both views in one draw."""
-    sort = request.param.replace("pair", "numpy")
-    with session_gpu.ctx, Renderer(session_gpu.ctx, "quads", "auto", sort, "rgba32f") as made:
-        if request.param != "pair":
-            made.drawing.stereo_pair = None
-        elif made.drawing.stereo_pair is None:
-            pytest.skip("a GPU draws the views one after the other")
-        yield made
-
-
-@pytest.fixture(autouse=True)
-def current(request, ctx):
-    if "renderer" in request.fixturenames and "[pair" in request.node.name:
-        if "bit_for_bit" in request.node.name or "each_for_itself" in request.node.name:
-            pytest.skip("two views in one draw are rounded otherwise: see test_one_draw_is_two")
+RENDERERS = {
+    "gl": quads(sort="gl", pair=False),
+    "numpy": quads(sort="numpy", pair=False),
+    "pair": quads(sort="numpy", pair=True),
+}
 
 
 SETTINGS = {
@@ -202,3 +183,16 @@ def test_a_kept_order_still_holds_what_was_outside(renderer):
     both = stereo_views((96, 80))
     assert [renderer.draw(both).sorts for _ in range(3)] == [1, 0, 0]
     assert [renderer.draw(eyes((-0.9, 0.6, -0.5, 0.5), cant=4.0)).sorts for _ in range(2)] == [2, 2]
+
+
+def test_memory_of_a_second_eye_comes_and_goes(ctx):
+    with Renderer(ctx, "quads") as renderer:
+        scene, pair = COLOURED["both"](), coloured_eyes()
+        draw_told(renderer, scene, pair)
+        arena, made = renderer.drawing._arena, renderer.drawing.allocations
+        assert len(arena.colors) == 2
+        for _ in range(3):
+            draw_told(renderer, scene, pair)
+        assert renderer.drawing.allocations == made, "nothing is made anew in a frame"
+        draw_told(renderer, scene, pair[:1])
+        assert len(arena.colors) == 1
