@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import tests.support.fit_scenes as fit_scenes
-from tests.support.training_runs import bits, run
 
+import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.app import cli
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.model import AnchorModel, ControlEncoding, Stop
@@ -18,6 +17,7 @@ from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
+from tests.support.training.training_runs import bits, run
 
 STOPS = (Stop("A", 0.0), Stop("C", 1.0), Stop("B", 0.4))
 SETTINGS = TrainSettings(iterations=300, grow=False, max_anchors=500)

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-import tests.support.fit_scenes as fit_scenes
-from tests.support.training_runs import run
 
+import tests.support.training.fit_scenes as fit_scenes
 from shapeshift.rasterizer.reference import finite_differences
 from shapeshift.runtime_models.model import Stop
 from shapeshift.training.checkpoint import read_checkpoint, write_checkpoint
@@ -13,6 +12,7 @@ from shapeshift.training.losses.min_opacity import MIN_OPACITY, add_min_opacity_
 from shapeshift.training.schedule import LEAST_RATE, WARM_UP_STEPS, LrWarmup
 from shapeshift.training.settings import TrainSettings
 from shapeshift.training.train import Trainer
+from tests.support.training.training_runs import run
 
 SETTINGS = TrainSettings(iterations=450, grow=False, max_anchors=600)
 
