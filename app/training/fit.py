@@ -79,11 +79,12 @@ def run(options: Options) -> int:
     with progress_bar() as bar:
         task = bar.add_task("compiling kernels", total=1.0)
 
-        def report(what: str, done: float) -> None:
+        def show_progress(what: str, done: float) -> None:
             bar.update(task, description=what, completed=done)
 
         fit = Fit(
-            device, capture, settings, options.tolerance_db, options.seeds, report, last=last,
+            device, capture, settings, options.tolerance_db, options.seeds, show_progress,
+            last=last,
         )  # fmt: skip
         need = fit.run()
     result, model = need.as_dict(), need.fitted.models[0]

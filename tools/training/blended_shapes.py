@@ -1,6 +1,6 @@
 """What a viewer draws between two stops, by the share of steps with blended shapes.
 
-    python3 docs/bench/blended_shapes.py CAPTURE ... --iterations 1200 --out FILE
+    python3 tools/training/blended_shapes.py CAPTURE ... --iterations 1200 --out FILE
 
 CAPTURE is as of growth.py.  A way is a share of TrainSettings.blended_shapes.  A row whose `where`
 is a stop has the mean PSNR over its held-out photos, `mean` that of the stops; a row "A to B" has
@@ -21,6 +21,7 @@ from ways import asked, parser_of, settings_of, table, turns  # noqa: E402
 
 from shapeshift.rasterizer.device import open_device  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
+from shapeshift.scene.metrics import psnr  # noqa: E402
 from shapeshift.scene.pose import View  # noqa: E402
 from shapeshift.scene.scene import Scene, SceneObject  # noqa: E402
 from shapeshift.training.train import Trainer  # noqa: E402
@@ -45,9 +46,9 @@ def main() -> None:
 
 def measured(trainer: Trainer, views: int) -> list[dict]:
     """The rows of a run."""
-    psnr = trainer.held_out_psnr(most=len(trainer.held_out))
-    psnr["mean"] = float(np.mean(list(psnr.values())))
-    rows = [{"where": name, "psnr_db": f"{db:.2f}"} for name, db in psnr.items()]
+    at_stops = trainer.held_out_psnr(most=len(trainer.held_out))
+    at_stops["mean"] = float(np.mean(list(at_stops.values())))
+    rows = [{"where": name, "psnr_db": f"{db:.2f}"} for name, db in at_stops.items()]
     seen = [photo.view for photo in trainer.held_out][:views]
     stops, model = sorted(trainer.stops, key=lambda stop: stop.x), trainer.model()
     with Renderer(None) as renderer:
