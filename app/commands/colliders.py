@@ -34,7 +34,8 @@ class Options:
 def run(options: Options) -> int:
     from shapeshift.app.opening import ReadingOptions
     from shapeshift.app.scene_files import open_scene_file
-    from shapeshift.scene.document.scene_file import BACKGROUND, HULLS
+    from shapeshift.scene.colliders.collider_files import collider_key
+    from shapeshift.scene.document.scene_file import HULLS
     from shapeshift.scene.document.write_scene_file import write_scene_file
 
     file, models, _ = open_scene_file(options.scene, ReadingOptions())
@@ -44,7 +45,7 @@ def run(options: Options) -> int:
     for item in file.all_items:
         if item.collider != HULLS:
             continue
-        key = (id(models[item.name]), item.x, item.name == BACKGROUND)
+        key = collider_key(item, models[item.name])
         if key not in made:
             made[key] = paths[item.name]
             told = write_one(make_one(file, item, models[item.name]), made[key])

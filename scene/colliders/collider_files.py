@@ -23,15 +23,22 @@ def colliders_of(
 
     Raises BadFile that names the object.
     """
-    making, made, out = Making(progress=progress), {}, {}
+    making = Making(progress=progress)
+    made: dict[tuple, Collider] = {}
+    out: dict[str, Collider] = {}
     for item in file.all_items:
         if item.collider is not None:
-            x = item.x if item.collider == HULLS else 0
-            key = (item.collider, id(models[item.name]), x, item.name == BACKGROUND)
+            key = collider_key(item, models[item.name])
             if key not in made:
                 made[key] = one_collider(file, item, models[item.name], making)
             out[item.name] = made[key]
     return out
+
+
+def collider_key(item: SceneItem, model: Model) -> tuple:
+    """Equal of items that have one collider: of one model at one x, or one mesh file."""
+    made_of = (id(model), item.x) if item.collider == HULLS else ()
+    return (item.collider, item.name == BACKGROUND, *made_of)
 
 
 def one_collider(file: SceneFile, item: SceneItem, model: Model, making: Making) -> Collider:

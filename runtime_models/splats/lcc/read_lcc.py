@@ -76,11 +76,12 @@ def find_meta(path: Path, ending: str) -> Path | None:
     return path if path.name.lower().endswith(ending) and path.is_file() else None
 
 
-def meta_of(path: Path, ending: str) -> Path:
-    """The same; BadFile where there is none, or are several."""
+def open_meta(path: Path, ending: str, reading: Reading) -> tuple[Path, Reading]:
+    """That file, and the reading of its folder.  Raises BadFile where there is none, or several."""
+    check_mode(reading.mode)
     if (file := find_meta(path, ending)) is None:
         raise BadFile(f"{path} is no {ending} and no folder with one; copy the whole folder.")
-    return file
+    return file, reading.within(file.parent)
 
 
 def is_lcc(path: Path) -> bool:
@@ -90,9 +91,7 @@ def is_lcc(path: Path) -> bool:
 
 def read_lcc(path: Path, reading: Reading) -> SplatLayers:
     """The finest level within reading.most_splats, else the coarsest.  Raises BadFile."""
-    check_mode(reading.mode)
-    file = meta_of(path, ENDING)
-    reading = reading.within(file.parent)
+    file, reading = open_meta(path, ENDING, reading)
     lcc = read_meta(file, reading.account)
     number = finest_within(lcc.counts, reading.most_splats)
     parts = [read_level(lcc, number, reading)]

@@ -13,13 +13,12 @@ from pathlib import Path
 from shapeshift.runtime_models.files.json_fields import Fields, parse_json
 from shapeshift.runtime_models.files.memory import JSON_A_BYTE, Account
 from shapeshift.runtime_models.model import BadFile, SplatLayers
-from shapeshift.runtime_models.splats.layers.read_layers import check_mode
 from shapeshift.runtime_models.splats.lcc.read_lcc import (
     MOST_LEVELS,
     UP,
     find_meta,
     level_as_layers,
-    meta_of,
+    open_meta,
 )
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading
 from shapeshift.runtime_models.splats.sog.read_sog import open_sog, read_raw_sog
@@ -50,9 +49,7 @@ def is_lcc2(path: Path) -> bool:
 
 def read_lcc2(path: Path, reading: Reading) -> SplatLayers:
     """The finest level within reading.most_splats, else the coarsest.  Raises BadFile."""
-    check_mode(reading.mode)
-    file = meta_of(path, ENDING)
-    reading = reading.within(file.parent)
+    file, reading = open_meta(path, ENDING, reading)
     lcc = read_meta(file, reading.account)
     number = finest_within(lcc.counts, reading.most_splats)
     files = list(lcc.levels[number]) + ([lcc.environment] if lcc.environment else [])

@@ -148,6 +148,32 @@ def test_faces_of_a_hull_look_outwards():
     assert volume(points, faces) == pytest.approx(trimesh.Trimesh(points).convex_hull.volume)
 
 
+def test_what_is_made_of_one_thing_is_made_once(monkeypatch, tmp_path):
+    """One mesh file whatever the models, one model at one x; another x is another collider."""
+    from shapeshift.scene.colliders import collider_files
+    from shapeshift.scene.document.scene_file import HULLS, SceneFile, SceneItem
+
+    made = []
+    monkeypatch.setattr(
+        collider_files, "one_collider", lambda file, item, *_: made.append(item.name) or item.name
+    )
+    model, other = object(), object()
+    of_mesh = [SceneItem(name=f"mesh {i}", model=f"{i}.ply", collider="a.glb") for i in range(2)]
+    of_hulls = [
+        SceneItem(name=f"hulls {i}", model="0.ply", collider=HULLS, x=x)
+        for i, x in enumerate((0.5, 0.5, 0.6))
+    ]
+    bare = SceneItem(name="bare", model="0.ply")
+    file = SceneFile(folder=tmp_path, items=(*of_mesh, *of_hulls, bare))
+    models = {item.name: model for item in file.items} | {"mesh 1": other}
+    found = collider_files.colliders_of(file, models)
+    assert made == ["mesh 0", "hulls 0", "hulls 2"]
+    assert found == {
+        "mesh 0": "mesh 0", "mesh 1": "mesh 0", "hulls 0": "hulls 0", "hulls 1": "hulls 0",
+        "hulls 2": "hulls 2",
+    }  # fmt: skip
+
+
 # What is shipped
 
 
