@@ -196,9 +196,9 @@ class Renderer:
 
     def _own_colors(self, views: list[View]) -> bool:
         """Whether each of the views gets colours of its own: settings.stereo_colors."""
-        wish = "shared" if self.settings.debug or len(views) == 1 else self.settings.stereo_colors
-        if wish != "auto":
-            return wish == "each"
+        choice = "shared" if self.settings.debug or len(views) == 1 else self.settings.stereo_colors
+        if choice != "auto":
+            return choice == "each"
         for decoded in self._decoded:
             decoded.look = decoded.look or Look.of(decoded.model)
         looks = [decoded.look for decoded in self._decoded if decoded.look is not None]

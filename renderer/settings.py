@@ -58,11 +58,11 @@ class RenderSettings:
             ("stereo_colors", STEREO_COLORS), ("target", TARGETS), ("debug", DEBUG_VIEWS),
         ):  # fmt: skip
             if getattr(self, name) not in choices:
-                told = ", ".join(repr(c) for c in choices)
-                raise ValueError(f"{name} is {getattr(self, name)!r}; choose one of {told}.")
+                text = ", ".join(repr(c) for c in choices)
+                raise ValueError(f"{name} is {getattr(self, name)!r}; choose one of {text}.")
         if not (len(self.background) == 3 and all(0 <= c <= 1 for c in self.background)):
-            told = f"background is {self.background}"
-            raise ValueError(f"{told}, expected three values of display sRGB from 0 to 1.")
+            text = f"background is {self.background}"
+            raise ValueError(f"{text}, expected three values of display sRGB from 0 to 1.")
         for name, least, most in (
             ("min_alpha", 1e-6, 1.0), ("low_pass", 0.0, 1e6), ("render_scale", 1 / 16, 2.0),
             ("min_transmittance", 1e-6, 0.1),

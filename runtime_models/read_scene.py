@@ -184,8 +184,8 @@ def describe(model: Model, path: str | Path) -> dict:
 
 def describe_findings(model: Model) -> dict:
     """What is worth knowing of a package, where there is anything."""
-    told = [f"{finding.what}: {finding.done}" for finding in model.findings]
-    return {"findings": told} if told else {}
+    sentences = [f"{finding.what}: {finding.done}" for finding in model.findings]
+    return {"findings": sentences} if sentences else {}
 
 
 def describe_labels(model: SplatLayers) -> dict:

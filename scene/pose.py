@@ -69,9 +69,9 @@ class View:
     def __post_init__(self) -> None:
         """Refuses what has no picture: ValueError with a sentence."""
         pose = (*self.world_from_eye.position, *self.world_from_eye.wxyz)
-        told = " ".join(f"{number:.6g}" for number in pose)
+        text = " ".join(f"{number:.6g}" for number in pose)
         if not all(map(math.isfinite, pose)):
-            raise ValueError(f"a view has the pose {told}; every number of it must be finite.")
+            raise ValueError(f"a view has the pose {text}; every number of it must be finite.")
         for tangents in (self.tangents, self.whole or self.tangents):
             left, right, down, up = tangents
             if not (-math.inf < left < right < math.inf and -math.inf < down < up < math.inf):
@@ -88,7 +88,7 @@ class View:
                 f"a view has the size {self.size}; whole pixels, 1 to {MOST_SIDE}, are wanted."
             )
         if abs(math.hypot(*self.world_from_eye.wxyz) - 1) > UNIT_SLACK:
-            raise ValueError(f"a view has the pose {told}; its quaternion must have length 1.")
+            raise ValueError(f"a view has the pose {text}; its quaternion must have length 1.")
 
     def clip_from_eye(self) -> np.ndarray:
         """(4, 4) OpenGL projection: eye metres to clip, depth -1..1, off-centre allowed."""

@@ -132,11 +132,11 @@ def visible_anchors(
         deepest = np.maximum(depth + reach, 0)
         inside = depth + reach > view.near
         aside_x, aside_y = (math.hypot(1, JACOBIAN_MARGIN * t) for t in view.widest_tangents())
-        for across, tangent, aside, blurred in (
+        for across, tangent, stretch, blurred in (
             (x, right, aside_x, blur_x), (-x, -left, aside_x, blur_x),
             (y, up, aside_y, blur_y), (-y, -down, aside_y, blur_y),
         ):  # fmt: skip
-            room = aside * reach + blurred * deepest
+            room = stretch * reach + blurred * deepest
             inside &= across - tangent * depth <= room
         seen |= inside
     return seen | (np.count_nonzero(seen) > len(seen) // 2)

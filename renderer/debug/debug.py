@@ -99,7 +99,7 @@ def debug_image(
     drawing: Drawing, i: int, view: View, scene: Scene, settings: RenderSettings
 ) -> tuple[np.ndarray, dict[str, float]]:
     """After the draw: (H, W, 3) float32 display sRGB, row 0 on top, of view i as it was drawn;
-    and what its legend tells: counts, metres, the largest number.
+    and what its legend says: counts, metres, the largest number.
     """
     rgba = drawing.image(i)
     if not scene.splat_count:
@@ -116,18 +116,18 @@ def debug_image(
     antialiased = tuple(is_antialiased(thing.model) for thing in scene.objects)
     reason, pixel, depth = classify(points, poses, view, settings, antialiased)
     numbers = np.bincount(reason, minlength=len(CULL_REASONS) + 1)
-    told = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
+    facts = dict(zip(("drawn", *CULL_REASONS), map(float, numbers), strict=True))
     colors = np.asarray([REASON_COLORS[name] for name in ("drawn", *CULL_REASONS)], np.float32)
     if settings.debug == "birdseye":
         picture, metres = birdseye(points, poses, reason, colors, view, settings)
-        return picture, told | {"metres": metres}
+        return picture, facts | {"metres": metres}
     picture = dim(rgba[..., :3])
     seen = (depth > view.near) & np.isfinite(pixel).all(axis=0)
     unit = dot_size(view.size)
     # What is too large or too small lies on top: it is why somebody looks.
     for names, dot in (((3, 1), unit), ((0, 2), unit), ((5, 6), unit + 1), ((4,), unit + 1)):
         paint_points(picture, pixel, depth, reason, colors, seen & np.isin(reason, names), dot)
-    return picture, told
+    return picture, facts
 
 
 def depth_picture(rgba: np.ndarray, depth: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
@@ -146,26 +146,26 @@ def debug_legend(
     name: str, stats: FrameStats | None = None
 ) -> list[tuple[str, tuple[float, float, float]]]:
     """Rows (text, display sRGB) for the legend of a debug picture; stats add the numbers."""
-    told = stats.debug if stats is not None else {}
+    facts = stats.debug if stats is not None else {}
     if name in ("culls", "birdseye"):
         rows = [
-            (f"{text}: {int(told[reason]):,}" if reason in told else text, REASON_COLORS[reason])
+            (f"{text}: {int(facts[reason]):,}" if reason in facts else text, REASON_COLORS[reason])
             for reason, text in REASON_TEXTS.items()
         ]
-        across = [(f"{told['metres']:.3g} m across", (1.0, 1.0, 1.0))] if "metres" in told else []
+        across = [(f"{facts['metres']:.3g} m across", (1.0, 1.0, 1.0))] if "metres" in facts else []
         return rows + across
     if name == "object":
-        texts = [f"{key}: {int(n):,}" for key, n in told.items()]
+        texts = [f"{key}: {int(n):,}" for key, n in facts.items()]
         return [(text, object_color(i)) for i, text in enumerate(texts)]
     if name not in ("depth", "overdraw"):
         return []
     steps = np.linspace(0, 1, LEGEND_STEPS)
     if name == "depth":
-        near, far = told.get("nearest", 0.0), told.get("farthest", 1.0)
+        near, far = facts.get("nearest", 0.0), facts.get("farthest", 1.0)
         texts = [f"{near + s * (far - near):.3g} m" for s in steps]
         colors = ramp(DISTANT, 1 - steps)
     else:
-        largest = told.get("largest", 0.0)
+        largest = facts.get("largest", 0.0)
         texts = [f"{s * s * largest:,.0f} splats" for s in steps]
         texts[-1] += " (largest)"
         colors = ramp(HEAT, steps)

@@ -49,8 +49,8 @@ def open_context(kind: str = "auto") -> moderngl.Context:
             return _moderngl(opener())
         except NoContext as reason:
             kinds_of_reason.setdefault(str(reason).rstrip("."), []).append(name)
-    told = "; ".join(f"{', '.join(kinds)}: {why}" for why, kinds in kinds_of_reason.items())
-    raise NoContext(f"no GL context without a window ({told}).")
+    reasons = "; ".join(f"{', '.join(kinds)}: {why}" for why, kinds in kinds_of_reason.items())
+    raise NoContext(f"no GL context without a window ({reasons}).")
 
 
 def describe(ctx: moderngl.Context) -> dict[str, str]:

@@ -19,8 +19,8 @@ class Gpu:
     def __init__(self, ctx: moderngl.Context) -> None:
         self.ctx = ctx
         self.allocations = 0
-        told = ctx.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
-        self.max_block = told if 0 < told <= LARGEST_INT else LARGEST_INT  # bytes
+        stated = ctx.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
+        self.max_block = stated if 0 < stated <= LARGEST_INT else LARGEST_INT  # bytes
         self.max_groups = ctx.info["GL_MAX_COMPUTE_WORK_GROUP_COUNT"][0]
         self.max_uniforms = ctx.info["GL_MAX_UNIFORM_BLOCK_SIZE"]  # bytes
         self.max_side = min(ctx.info["GL_MAX_TEXTURE_SIZE"], *ctx.info["GL_MAX_VIEWPORT_DIMS"])

@@ -74,12 +74,12 @@ def explain(log: str, stages: list[Lines]) -> str:
     `#line N FILE` would be shorter, but Mesa 22 drops FILE inside expressions.
     """
     lines = stages[0]
-    told = []
+    explained = []
     for message in log.splitlines():
         found = ERROR_AT.match(message)
         if found and 0 < int(found[1]) <= len(lines):
             path, number, text = lines[int(found[1]) - 1]
-            told += [f"{path}:{number}: {message[found.end() :]}", f"    {text.strip()}"]
+            explained += [f"{path}:{number}: {message[found.end() :]}", f"    {text.strip()}"]
         elif message.strip():
-            told.append(message)
-    return "\n".join(told)
+            explained.append(message)
+    return "\n".join(explained)

@@ -32,13 +32,13 @@ def brightest(models: list[Model]) -> float:
     return max((most for _, most in ranges), default=1.0)
 
 
-def choose_target(gpu: Gpu, wish: str, most: float) -> tuple[str, float]:
+def choose_target(gpu: Gpu, asked: str, most: float) -> tuple[str, float]:
     """(name in DTYPES, unit) for a settings.target and the brightest colour.
 
     "auto": rgba16 where all colours fit, else half floats, which hold any.
     """
-    if wish not in ("auto", "rgba16"):
-        return wish, 1.0
+    if asked not in ("auto", "rgba16"):
+        return asked, 1.0
     if not draws_into(gpu, "rgba16"):
         warn_once(
             f"this driver ({gpu.ctx.info['GL_RENDERER']}) does not draw into GL_RGBA16, which GL "
@@ -46,7 +46,7 @@ def choose_target(gpu: Gpu, wish: str, most: float) -> tuple[str, float]:
         )
         return "rgba16f", 1.0
     fits = most <= MOST_UNIT
-    if wish == "auto" and not fits:
+    if asked == "auto" and not fits:
         return "rgba16f", 1.0
     return "rgba16", max(most, 1.0) if fits else 1.0
 

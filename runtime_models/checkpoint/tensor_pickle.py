@@ -165,9 +165,9 @@ class _Machine:
     def _named(self, module: str, name: str) -> Name:
         inert = (module == MODULE or module.startswith(MODULE + ".")) and name.isidentifier()
         if not inert and (module, name) not in TAKEN:
-            told = f"{module}.{name}"[:80]
+            label = f"{module}.{name}"[:80]
             raise BadFile(
-                f"{self.file} names {told!r}, and only tensors are read, nothing is ever run; "
+                f"{self.file} names {label!r}, and only tensors are read, nothing is ever run; "
                 "save the networks alone (torch.jit.save, or a state dict by torch.save)."
             )
         return Name(module, name)

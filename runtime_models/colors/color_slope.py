@@ -47,8 +47,8 @@ def _of_networks(evaluator: Evaluator, x: float) -> float:
     assert isinstance(evaluator.model, AnchorModel)
     count = len(evaluator.model.anchors)
     direction = unit(rng.normal(size=(count, 3)))
-    aside = unit(np.cross(direction, rng.normal(size=(count, 3))))
-    turned = np.cos(STEP) * direction + np.sin(STEP) * aside
+    across = unit(np.cross(direction, rng.normal(size=(count, 3))))
+    turned = np.cos(STEP) * direction + np.sin(STEP) * across
     opacity = shown(evaluator.geometry(x)[3])
     colors = [evaluator.color_along(x, d.astype(np.float32)) for d in (direction, turned)]
     with np.errstate(all="ignore"):

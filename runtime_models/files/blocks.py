@@ -15,24 +15,24 @@ WORTH_A_THREAD = 4  # blocks
 def each_block(
     count: int,
     work: Callable[..., None],
-    tell: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | None = None,
     tool: Callable[[], AbstractContextManager] = nullcontext,
     block: int = BLOCK,
 ) -> None:
     """Calls work(rows, own) for slices of range(count), several at once and in no set order.
 
     own: what the context `tool()` gives, entered once a thread (an open file, a buffer).
-    tell(part done 0..1) is called by the calling thread alone.  The first error ends it all.
+    progress(part done 0..1) is called by the calling thread alone.  The first error ends it all.
     """
     blocks = iter(range(0, count, block))  # next() of it is atomic
     errors: list[BaseException] = []
 
-    def run(tell: Callable[[float], None] | None = None) -> None:
+    def run(progress: Callable[[float], None] | None = None) -> None:
         with tool() as own:
             for first in blocks_left(blocks, errors):
                 work(slice(first, min(first + block, count)), own)
-                if tell:
-                    tell(min(first + block, count) / count)
+                if progress:
+                    progress(min(first + block, count) / count)
 
     def run_beside() -> None:
         try:
@@ -47,15 +47,15 @@ def each_block(
     for thread in threads:
         thread.start()
     try:
-        run(tell)
+        run(progress)
     except BaseException as error:  # Ctrl-C, too: the others stop at their next block
         errors.insert(0, error)
     for thread in threads:
         thread.join()
     if errors:
         raise errors[0]
-    if tell and threads:
-        tell(1.0)  # another one may have done the last block
+    if progress and threads:
+        progress(1.0)  # another one may have done the last block
 
 
 def block_of(bytes_a_row: int) -> int:

@@ -59,14 +59,14 @@ def directory_size(source: Path | bytes) -> int:
             file.seek(max(size - TAIL, 0))
             tail = file.read(TAIL)
     elsewhere = LOCATOR_MARK in tail and END_64_MARK not in tail
-    told = [size if elsewhere else 0]
+    stated = [size if elsewhere else 0]
     for mark, form, place in ((END_MARK, END, 5), (END_64_MARK, END_64, 8)):
         at = tail.find(mark)
         while at >= 0:  # which of them counts is for zipfile to say
             if at + form.size <= len(tail):
-                told.append(form.unpack_from(tail, at)[place])
+                stated.append(form.unpack_from(tail, at)[place])
             at = tail.find(mark, at + 1)
-    return max(min(count, size) for count in told if count != BIG)
+    return max(min(count, size) for count in stated if count != BIG)
 
 
 def read_member(

@@ -81,10 +81,10 @@ def read_cloud(path: Path, reading: Reading) -> Cloud:
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         fill(cloud, rows, table)
 
-    def tell(part: float) -> None:
+    def progress(part: float) -> None:
         reading.report(f"reading {path.name}", part)
 
-    each_block(count, work, tell, opened)
+    each_block(count, work, progress, opened)
     return cloud
 
 

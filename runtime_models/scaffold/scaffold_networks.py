@@ -67,8 +67,8 @@ def read_networks(folder: Path, shape: Shape, memory: Account) -> Networks:
     mlps, findings = with_inputs(mlps, 0 if table is None else table.shape[1], shape, folder)
     if table is not None:
         mlps["color"] = fold_inputs(mlps["color"], table[row])
-    told = "" if table is None else f"row {row} of {len(table)}"
-    return Networks(mlps, files, told, findings)
+    appearance_row = "" if table is None else f"row {row} of {len(table)}"
+    return Networks(mlps, files, appearance_row, findings)
 
 
 def gather(folder: Path, memory: Account) -> tuple[dict[str, Callable], tuple[str, ...]]:

@@ -1,4 +1,4 @@
-"""One file of plain splats: how it is wished, as it is written, and as the program takes it."""
+"""One file of plain splats: how it is asked for, as it is written, and as the program takes it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

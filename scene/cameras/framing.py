@@ -198,11 +198,11 @@ def default_view(model: Model, size: tuple[int, int]) -> View:
     provenance["view"] is {"eye": [x, y, z], "target": [x, y, z], "fov_y": radians}, metres in the
     object frame, fov_y optional.
     """
-    wished = model.provenance.get("view")
-    if wished:
+    stated = model.provenance.get("view")
+    if stated:
         _, radius = frame_points(*model_points(model))
-        eye, target = np.asarray(wished["eye"], float), np.asarray(wished["target"], float)
-        return view_from(eye, target, radius, size, float(wished.get("fov_y", FOV_Y)))
+        eye, target = np.asarray(stated["eye"], float), np.asarray(stated["target"], float)
+        return view_from(eye, target, radius, size, float(stated.get("fov_y", FOV_Y)))
     return framing_view(*model_points(model), size)
 
 

@@ -23,8 +23,8 @@ def unpack(data: bytes) -> tuple[dict, bytes]:
     """Books and engine of a snapshot whose every bit is as written.  Raises ValueError."""
     start = len(MARK) + HASH_BYTES
     rest = data[start:]
-    told = data[len(MARK) : start]
-    if not data.startswith(MARK) or hashlib.sha256(rest).digest() != told:
+    digest = data[len(MARK) : start]
+    if not data.startswith(MARK) or hashlib.sha256(rest).digest() != digest:
         raise ValueError(
             f"{len(data)} bytes are no whole snapshot of this program's physics; take a new one."
         )

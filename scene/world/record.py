@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from shapeshift.runtime_models.files.json_fields import control_row
 from shapeshift.scene.world.reactions import Fired
 
-DECIMALS = 6  # of what is told: micrometres
+DECIMALS = 6  # of what is written: micrometres
 
 
 @dataclass
@@ -37,5 +37,5 @@ def event_row(name: str, fired: Fired) -> dict:
 
 
 def rounded(number: float) -> float:
-    """As it is told; never -0."""
+    """As it is written; never -0."""
     return round(float(number), DECIMALS) + 0.0

@@ -87,11 +87,11 @@ class World:
         self.holds: dict[str, int] = {}  # hand -> grab of the physics
         self.impulses: dict[tuple[int, int], float] = {}  # N s of each pair in the step before
         self.steps = 0
-        self._told: dict[tuple, object] = {}  # (what, name) -> as it was told last
+        self._recorded: dict[tuple, object] = {}  # (what, name) -> as it was recorded last
         self._stirred: set[str] = set()  # came, were placed or controlled since the last step
         self._events: dict[str, list[Event]] = {}  # of hands and rays since the last step
-        self._hands_told: list[dict] = []
-        self._rays_told: list[dict] = []
+        self._hand_rows: list[dict] = []
+        self._ray_rows: list[dict] = []
         self._hands_before: dict[str, Pose] = {}  # at the end of the last `advance`
         self._behind_s = 0.0  # time that has passed and is no whole step yet
         self._part: float | None = None  # of the way from the step before to this one, in what is
@@ -132,8 +132,8 @@ class World:
             del self.names[thing.body]
         del self.objects[name]
         self._events.pop(name, None)
-        self._told.pop(("pose", name), None)
-        self._told.pop(("x", name), None)
+        self._recorded.pop(("pose", name), None)
+        self._recorded.pop(("x", name), None)
 
     def move_object(self, name: str, pose: Pose) -> None:
         """Puts an object somewhere else, at rest."""
@@ -189,12 +189,12 @@ class World:
     def _grab_object(self, hand: str, name: str | None, point: np.ndarray) -> str | None:
         self._release_hand(hand, "release")
         if name is None:
-            self._hands_told.append({"hand": hand, "did": "miss"})
+            self._hand_rows.append({"hand": hand, "did": "miss"})
             return None
         pose = self.hands[hand]
         self.holds[hand] = self.physics.grab(self.objects[name].body_id, pose, point)
         self._hands_before[hand] = pose
-        self._hands_told.append({"hand": hand, "did": "grab", "object": name})
+        self._hand_rows.append({"hand": hand, "did": "grab", "object": name})
         self._events.setdefault(name, []).append(Event("grab"))
         return name
 
@@ -211,7 +211,7 @@ class World:
             self.physics.move_hand(hold, None)
         else:
             self.physics.release(hold)
-        self._hands_told.append({"hand": hand, "did": did, "object": name})
+        self._hand_rows.append({"hand": hand, "did": did, "object": name})
 
     def carry(self, name: str, moved: np.ndarray) -> None:
         """What a hand holds jumps by a rigid (4, 4) of the world, as in a snap turn, and the hand.
@@ -261,7 +261,7 @@ class World:
             row |= {"object": hit.object, "distance_m": rounded(hit.distance_m)}
             if hit.object in self.objects:
                 self._events.setdefault(hit.object, []).append(Event("ray"))
-        self._rays_told.append(row)
+        self._ray_rows.append(row)
         return hit
 
     # ---- time
@@ -285,8 +285,8 @@ class World:
     def step(self) -> Record:
         """One step of 1/hz seconds, whether paused or not."""
         record = Record(self.steps + 1, rounded((self.steps + 1) / self.hz))
-        record.hands, self._hands_told = self._hands_told, []
-        record.rays, self._rays_told = self._rays_told, []
+        record.hands, self._hand_rows = self._hand_rows, []
+        record.rays, self._ray_rows = self._ray_rows, []
         events, self._events = self._events, {}
         contacts = sorted(self.physics.step(), key=lambda contact: (contact.a, contact.b))
         self.steps += 1
@@ -326,7 +326,7 @@ class World:
         return records
 
     def _collide(self, contacts: list, record: Record, events: dict[str, list[Event]]) -> None:
-        """Contacts to events of both sides; those that begin are told."""
+        """Contacts to events of both sides; those that begin are recorded."""
         now: dict = {}
         for contact in contacts:
             pair = (contact.a, contact.b)
@@ -343,7 +343,7 @@ class World:
         self.impulses = now
 
     def _react(self, name: str, record: Record, events: list[Event], held: bool) -> None:
-        """The object's new pose and x; what has changed is told."""
+        """The object's new pose and x; what has changed is recorded."""
         thing = self.objects[name]
         pose = self.physics.pose(thing.body_id) if thing.moves else thing.pose
         still = same_pose(pose, thing.pose)
@@ -354,13 +354,13 @@ class World:
         )
         self.objects[name] = after_step(thing, thing.pose if still else pose, reaction_state, held)
         record.events += [event_row(name, answer) for answer in fired]
-        told = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
+        row = tuple(rounded(n) for n in (*pose.position, *pose.wxyz))
         x = control_row(reaction_state.x, DECIMALS)
-        if self._told.get(("pose", name)) != told:
-            self._told["pose", name] = told
-            record.poses[name] = list(told)
-        if self._told.get(("x", name)) != x:
-            self._told["x", name] = x
+        if self._recorded.get(("pose", name)) != row:
+            self._recorded["pose", name] = row
+            record.poses[name] = list(row)
+        if self._recorded.get(("x", name)) != x:
+            self._recorded["x", name] = x
             record.x[name] = x
 
     # ---- what is seen of it
@@ -392,6 +392,6 @@ class World:
         self.objects, self.hands = dict(saved.objects), dict(saved.hands)
         self.holds, self.impulses, self.steps = dict(saved.holds), dict(saved.impulses), saved.steps
         self.names = {t.body: name for name, t in self.objects.items() if t.body is not None}
-        self._events, self._hands_told, self._rays_told, self._told = {}, [], [], {}
+        self._events, self._hand_rows, self._ray_rows, self._recorded = {}, [], [], {}
         self._stirred = set(self.objects)
         self._hands_before, self._behind_s, self._part = dict(saved.hands), 0.0, None

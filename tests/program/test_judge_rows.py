@@ -130,7 +130,7 @@ def test_errors_and_settings_cross_the_threads():
     with np.errstate(over="raise"), pytest.raises(FloatingPointError):
         each_block(count, lambda rows, own: np.exp(np.full(1, 1e4, np.float32)))
     with pytest.raises(KeyboardInterrupt):
-        each_block(3 * BLOCK, lambda rows, own: None, tell=interrupt)
+        each_block(3 * BLOCK, lambda rows, own: None, progress=interrupt)
 
 
 def interrupt(part: float) -> None:

@@ -11,7 +11,7 @@ from shapeshift.runtime_models.model import BadFile
 from shapeshift.runtime_models.shapes import column_names
 from shapeshift.runtime_models.splats.plain_splats import RawSplats, Reading, empty_splats
 from shapeshift.runtime_models.splats.ply.ply_file import PlyHeader, read_header
-from shapeshift.runtime_models.splats.ply.read_ply import teller
+from shapeshift.runtime_models.splats.ply.read_ply import progress_of
 
 CHUNK = 256  # splats that share one row of ranges
 POSITIONS = ("min_x", "min_y", "min_z", "max_x", "max_y", "max_z")
@@ -64,7 +64,7 @@ def read_raw_compressed_ply(path: Path, reading: Reading) -> RawSplats:
         raw.sh[rows, 1:] = harmonics(rest[rows])
 
     with np.errstate(invalid="ignore", over="ignore"):  # ranges of NaN or Inf are for the judge
-        each_block(len(packed), decode, teller(path, reading))
+        each_block(len(packed), decode, progress_of(path, reading))
     return raw
 
 

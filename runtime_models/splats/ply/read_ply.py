@@ -162,7 +162,7 @@ def read_records(path: Path, begins: int, splats: Columns, reading: Reading) -> 
             raise BadFile(f"{path.name} became shorter while it was read; is it still written?")
         splats.fill(rows, table)
 
-    each_block(splats.count, work, teller(path, reading), opened, block)
+    each_block(splats.count, work, progress_of(path, reading), opened, block)
 
 
 def read_fully(file: RawIOBase, into: memoryview) -> int:
@@ -176,7 +176,7 @@ def read_fully(file: RawIOBase, into: memoryview) -> int:
 def read_text(path: Path, begins: int, splats: Columns, reading: Reading) -> None:
     """Fills the columns from an ASCII file."""
     width, first, pending = len(column_names(splats.row)), 0, np.empty(0)
-    tell = teller(path, reading)
+    progress = progress_of(path, reading)
     with path.open("rb") as file:
         file.seek(begins)
         for values in numbers(file, path.name):
@@ -191,7 +191,7 @@ def read_text(path: Path, begins: int, splats: Columns, reading: Reading) -> Non
                     table[name] = part[:, i]
             splats.fill(slice(first, first + count), table)
             pending, first = pending[count * width :], first + count
-            tell(first / splats.count)
+            progress(first / splats.count)
             if first == splats.count:
                 return
     raise BadFile(
@@ -222,5 +222,5 @@ def parse(text: bytes, name: str) -> np.ndarray:
         raise BadFile(f"{name} is an ASCII PLY and has words that are no numbers.") from None
 
 
-def teller(path: Path, reading: Reading) -> Callable[[float], None]:
+def progress_of(path: Path, reading: Reading) -> Callable[[float], None]:
     return lambda part: reading.report(f"reading {path.name}", part)

@@ -134,12 +134,12 @@ def unpack_smallest_three(codes: np.ndarray, out: np.ndarray) -> None:
 
 def axis_up(extensions: dict[int, bytes], file: str, findings: list[Finding]) -> str:
     """The file's axis that points up.  Raises BadFile for axes that are a mirror image."""
-    told = extensions.get(AXES_EXTENSION, b"")
+    content = extensions.get(AXES_EXTENSION, b"")
     others = [kind for kind in extensions if kind != AXES_EXTENSION]
     if others:
         what = f"extensions {', '.join(f'{kind:#010x}' for kind in others)}"
         findings.append(Finding(what, 0, "not looked at", file=file, repaired=False))
-    number = int.from_bytes(told, "little") if len(told) == 4 else 0
+    number = int.from_bytes(content, "little") if len(content) == 4 else 0
     if not 1 <= number <= len(NAMED_AXES):
         return "+Y"
     axes = NAMED_AXES[number - 1]

@@ -71,16 +71,16 @@ def read_raw_usd(path: Path, reading: Reading) -> RawSplats:
             def read(name: str) -> np.ndarray | None:
                 return read_array(archive, name, path.name, memory)
 
-            facts = read("told")
-            assert facts is not None, "usd_run writes it always"
-            told = json.loads(facts.tobytes())
+            stored = read("facts")
+            assert stored is not None, "usd_run writes it always"
+            facts = json.loads(stored.tobytes())
             found = [
-                part_of(read, number, field, told, path, memory)
-                for number, field in enumerate(told["fields"])
+                part_of(read, number, field, facts, path, memory)
+                for number, field in enumerate(facts["fields"])
             ]
     parts = [part for part in found if part is not None]
     if not parts:
-        held = f" (it has {', '.join(told['others'])})" if told["others"] else ""
+        held = f" (it has {', '.join(facts['others'])})" if facts["others"] else ""
         raise BadFile(f"{path.name} has no visible {KIND}{held}; export splats of that kind.")
     return joined(parts, path.name)
 
@@ -113,7 +113,7 @@ def run(path: Path, made: Path, memory: Account) -> None:
 
 
 def part_of(
-    read: Read, number: int, field: dict, told: dict, path: Path, memory: Account
+    read: Read, number: int, field: dict, facts: dict, path: Path, memory: Account
 ) -> RawSplats | None:
     """The splats of one prim in the stage's world; None where it has none."""
     places = read(f"{number}/positions")
@@ -127,7 +127,7 @@ def part_of(
         format="USD",
         log_scales=False,
         logits=False,
-        up=told["up"],
+        up=facts["up"],
         memory=memory,
     )
     raw.means[:] = shaped(places, (count, 3), "positions", path)
@@ -145,8 +145,8 @@ def part_of(
             into[:] = shaped(array[:count], into.shape, name, path)
     raw.wxyz[:] = raw.wxyz[:, [3, 0, 1, 2]]  # a copy first: filed as x y z w
     raw.sh[:] = GRAY if sh is None else sh
-    raw.findings = (*findings, *unusual(field, told, count, path, first=number == 0))
-    metres = np.diag([told["metres"]] * 3 + [1.0])
+    raw.findings = (*findings, *unusual(field, facts, count, path, first=number == 0))
+    metres = np.diag([facts["metres"]] * 3 + [1.0])
     return moved(raw, metres @ read(f"{number}/matrix"))
 
 
@@ -178,7 +178,7 @@ def harmonics_of(
     return sh[:, : COEFFICIENTS[MOST_DEGREE]], [found]
 
 
-def unusual(field: dict, told: dict, count: int, path: Path, first: bool) -> list[Finding]:
+def unusual(field: dict, facts: dict, count: int, path: Path, first: bool) -> list[Finding]:
     """What the scene asks for beyond what is drawn."""
     found = []
     if field["moves"]:
@@ -188,7 +188,7 @@ def unusual(field: dict, told: dict, count: int, path: Path, first: bool) -> lis
     if field["projection"] != "perspective":
         what = f"projectionModeHint is {field['projection'][:40]!r}"
         found.append(Finding(what, 0, "drawn in perspective", file=path.name, repaired=False))
-    if first and not told["states metres"]:
+    if first and not facts["states metres"]:
         what = "it does not state metersPerUnit"
         done = f"a unit is {CENTIMETRE:g} m, as USD has it"
         found.append(Finding(what, 0, done, file=path.name, repaired=False))

@@ -15,7 +15,7 @@ import numpy as np
 
 REFUSED = 2  # exit code where the last line of standard error says what is wrong
 SECONDS, SECONDS_A_BYTE = 20, 2e-6  # of processor time
-UNKNOWN = 2 << 30  # bytes that a process has taken, where the system does not tell
+UNKNOWN = 2 << 30  # bytes that a process has taken, where the system does not say
 ENDINGS = (".usd", ".usda", ".usdc", ".usdz")
 MOST_LAYERS, MOST_PRIMS, MOST_FIELDS = 256, 100_000, 1000
 KIND = "ParticleField3DGaussianSplat"
@@ -88,7 +88,7 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
     stage = Usd.Stage.Open(str(root))
     if stage is None:
         raise Unreadable("no USD that can be composed")
-    told = {
+    facts = {
         "up": f"+{UsdGeom.GetStageUpAxis(stage)}",
         "metres": UsdGeom.GetStageMetersPerUnit(stage),
         "states metres": UsdGeom.StageHasAuthoredMetersPerUnit(stage),
@@ -107,16 +107,16 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
         imageable = UsdGeom.Imageable(prim)
         if imageable.ComputeVisibility() == "invisible" or imageable.ComputePurpose() == "guide":
             continue
-        number = len(told["fields"])
+        number = len(facts["fields"])
         if number >= MOST_FIELDS:
             raise Unreadable(f"it has over {MOST_FIELDS:,} fields of splats")
-        told["fields"].append(field_of(prim, number, arrays))
-    told["others"] = sorted(others)[:5]
-    return arrays, told
+        facts["fields"].append(field_of(prim, number, arrays))
+    facts["others"] = sorted(others)[:5]
+    return arrays, facts
 
 
 def field_of(prim, number: int, arrays: dict[str, np.ndarray]) -> dict:
-    """Puts the arrays of one field, and tells what else it says."""
+    """Puts the arrays of one field, and gives what else it says."""
     from pxr import Usd, UsdGeom
 
     attributes = {name: attribute_of(prim, name) for name in (*ATTRIBUTES, HARMONICS)}
@@ -171,13 +171,13 @@ def main(given: str, wanted: str, memory: str) -> None:
     limit(os.path.getsize(given), int(memory))
     try:
         refuse_outside(Path(given))
-        arrays, told = splats_of(Path(given))
+        arrays, facts = splats_of(Path(given))
     except Exception as error:  # OpenUSD's own errors are of many kinds
         text = str(error) if isinstance(error, Unreadable) else "no USD that can be read"
         sys.stderr.write(f"\n{' '.join(text.split())[:300]}\n")
         sys.exit(REFUSED)
     save: Callable[..., None] = np.savez  # numpy takes its keywords for one flag
-    save(wanted, told=np.frombuffer(json.dumps(told).encode(), np.uint8), **arrays)
+    save(wanted, facts=np.frombuffer(json.dumps(facts).encode(), np.uint8), **arrays)
 
 
 if __name__ == "__main__":
