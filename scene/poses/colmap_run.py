@@ -17,6 +17,7 @@ import os
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ MOST_ERROR_PX = 8.0  # a mean reprojection error beyond this is no model
 # What is tried where fewer than ENOUGH of the photos find their place: the least angle between the
 # two photos that a model begins with, the inliers that a photo needs, whether matches are guided
 # by the geometry found so far, and which mapper.  COLMAP's own first; each is dearer than the last.
-LADDER = (
+LADDER: tuple[dict[str, Any], ...] = (
     {"said": "as usual", "angle": 16.0, "inliers": 30, "guided": False, "mapper": "incremental"},
     {"said": "smaller angles", "angle": 8.0, "inliers": 20, "guided": False,
      "mapper": "incremental"},
@@ -76,14 +77,14 @@ def find(job: dict) -> None:
     tell(registered=best.num_reg_images())
 
 
-def rank(model: object) -> tuple[int, int]:
+def rank(model: Any) -> tuple[int, int]:
     """Photos, then points; a model whose points lie far beside their places counts for nothing."""
     if not model.compute_mean_reprojection_error() <= MOST_ERROR_PX:
         return 0, 0
     return model.num_reg_images(), model.num_points3D()
 
 
-def extract(pycolmap: object, database: Path, job: dict) -> None:
+def extract(pycolmap: Any, database: Path, job: dict) -> None:
     """Features of all photos; photos of a group share a camera, also with those done before."""
     options = pycolmap.FeatureExtractionOptions()
     options.max_image_size, options.num_threads = job["side"], job["threads"]
@@ -100,7 +101,7 @@ def extract(pycolmap: object, database: Path, job: dict) -> None:
         )  # fmt: skip
 
 
-def camera_of(pycolmap: object, database: Path, names: list[str]) -> int:
+def camera_of(pycolmap: Any, database: Path, names: list[str]) -> int:
     """The camera that photos of a group have in the database, from a run before; -1: none."""
     if not database.is_file():
         return -1
@@ -109,7 +110,7 @@ def camera_of(pycolmap: object, database: Path, names: list[str]) -> int:
     return next((cameras[name] for name in names if name in cameras), -1)
 
 
-def match(pycolmap: object, database: Path, job: dict, guided: bool) -> None:
+def match(pycolmap: Any, database: Path, job: dict, guided: bool) -> None:
     if guided:  # pairs that are known are left as they are, so these go
         with pycolmap.Database.open(str(database)) as base:
             base.clear_matches()
@@ -131,7 +132,7 @@ def match(pycolmap: object, database: Path, job: dict, guided: bool) -> None:
         )
 
 
-def solve(pycolmap: object, database: Path, job: dict, rung: dict, count: int) -> list:
+def solve(pycolmap: Any, database: Path, job: dict, rung: dict, count: int) -> list:
     """The models that one attempt finds, on the features and matches of the database."""
     folder = Path(job["work"]) / "models"
     folder.mkdir(exist_ok=True)
@@ -156,7 +157,7 @@ def solve(pycolmap: object, database: Path, job: dict, rung: dict, count: int) -
     return list(models.values())
 
 
-def keep_arrays(model: object, path: Path, measured: str, ends: list) -> None:
+def keep_arrays(model: Any, path: Path, measured: str, ends: list) -> None:
     """What the program wants to know of a model, without pycolmap's objects.
 
     names; world_from_camera (N, 4, 4) OpenCV axes; points (N,) that a photo sees; depth (N,) median

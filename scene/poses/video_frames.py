@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,8 +36,9 @@ def take_frames(
             if stream is None:
                 raise BadFile(f"{video} holds no pictures; give a video.")
             stream.thread_type = "AUTO"
-            times = [float(p.pts * stream.time_base) for p in container.demux(stream)
-                     if p.pts is not None]  # fmt: skip
+            second = stream.time_base
+            times = [float(p.pts * second) for p in container.demux(stream)
+                     if p.pts is not None and second is not None]  # fmt: skip
         if len(times) < 2:
             raise BadFile(f"{video} holds {len(times)} frames; a video of a walk is wanted.")
         return write_sharpest(av, video, folder, count, sorted(times), progress)
@@ -53,7 +55,7 @@ def write_sharpest(
     count = min(count, len(times))
     part_of = np.minimum(np.arange(len(times)) * count // len(times), count - 1)
     every = max(len(times) // (count * LOOKS_A_FRAME), 1)
-    best: tuple[float, object] | None = None
+    best: tuple[float, Any] | None = None
     part = written = 0
 
     def write() -> None:
