@@ -138,11 +138,11 @@ class Fields:
         self.where, self.advice = where, advice
         self.asked: list[str] = []
 
-    def error(self, key: str, wanted: str, verb: str = "is") -> BadFile:
+    def error(self, key: str, wanted: str) -> BadFile:
         """The sentence about a wrong value."""
         end = f"; {self.advice}" if self.advice else ""
         found = shown(self.data.get(key)) if key in self.data else "missing"
-        return BadFile(f"{self.where}: '{key}' is {found}; {wanted} {verb} wanted{end}.")
+        return BadFile(f"{self.where}: '{key}' is {found}; {wanted} is wanted{end}.")
 
     def has(self, key: str) -> bool:
         """Whether the key is there and not null."""

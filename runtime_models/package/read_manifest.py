@@ -156,4 +156,4 @@ def check_view(provenance: Fields) -> None:
     ):
         raise BadFile(f"{view.where}: eye and target are one point, expected two.")
     if not 0.01 < view.number("fov_y", 1.0) < 3.1:
-        raise view.error("fov_y", "radians above 0.01 and below 3.1")
+        raise view.error("fov_y", "an angle above 0.01 and below 3.1 radians")

@@ -21,7 +21,7 @@ from shapeshift.scene.cameras.camera_path import along, poses_between
 from shapeshift.scene.pose import MOST_SIDE, Pose, View, perspective
 
 MARKS = ("camera_path", "keyframes")
-DEGREES = "degrees between 0 and 180"
+DEGREES = "an angle between 0 and 180 degrees"
 FPS, SECONDS_A_KEY = 24.0, 2.0  # of a path through keyframes that does not say
 FLAT = ("equirectangular", "omnidirectional", "vr180")  # camera types without one field of view
 

@@ -54,12 +54,12 @@ def read_row(row: Fields, turn: np.ndarray, reading: CameraReading) -> View:
     matrix[:3, 3] = numbers(row.data["position"], (3,), f"{row.where}: 'position'")
     matrix = pose_matrix(matrix, f"{row.where}: 'rotation'")
     width, height, fx, fy = (
-        row.number(key, wanted="pixels above 0", low=LEAST, high=MOST)
+        row.number(key, wanted="a number of pixels above 0", low=LEAST, high=MOST)
         for key in ("width", "height", "fx", "fy")
     )
     centre = (
-        row.number("cx", width / 2, "pixels", -MOST, MOST),
-        row.number("cy", height / 2, "pixels", -MOST, MOST),
+        row.number("cx", width / 2, "a number of pixels", -MOST, MOST),
+        row.number("cy", height / 2, "a number of pixels", -MOST, MOST),
     )
     view = pinhole_view(turn @ matrix, (fx, fy), centre, (width, height), row.where)
     return view.resized(reading.size) if reading.size else view

@@ -17,7 +17,7 @@ from shapeshift.scene.cameras.camera_list import (
 from shapeshift.scene.pose import MOST_SIDE, View, perspective
 
 MOST_M = 1e30  # of near, far and tangents: any that a float holds well
-FOV_WANTED = "radians between 0 and pi"
+FOV_WANTED = "an angle between 0 and pi radians"
 NEAR, FAR = 0.01, 1000.0  # metres, where the file does not say
 
 
@@ -38,8 +38,8 @@ def read_row(row: Fields, reading: CameraReading) -> View:
     if not row.has("matrix"):
         raise BadFile(f"{row.where}: expected an object with 'matrix' and 'fov_y' or 'tangents'.")
     matrix = pose_matrix(row.data["matrix"], f"{row.where}: 'matrix'")
-    near = row.number("near", NEAR, "metres above 0", high=MOST_M)
-    far = row.number("far", FAR, f"metres beyond near, {near:g},", near, MOST_M)
+    near = row.number("near", NEAR, "a length above 0, in metres,", high=MOST_M)
+    far = row.number("far", FAR, f"a length above near, {near:g} metres,", near, MOST_M)
     if not 0 < near < far:
         raise BadFile(f"{row.where}: near {near:g} and far {far:g} must be 0 < near < far.")
     size = reading.size or read_size(row)

@@ -29,7 +29,7 @@ from shapeshift.scene.pose import View
 
 BLENDER_SIZE = (800, 800)  # of the synthetic NeRF scenes, whose files name no size
 LEAST, MOST = 1e-30, 1e30  # that a float holds well
-RADIANS = "radians between 0 and pi"
+RADIANS = "an angle between 0 and pi radians"
 LENS = ("k1", "k2", "k3", "k4", "p1", "p2")
 MARK = "frames"
 
@@ -107,7 +107,7 @@ def view_of(
 def focal_of(fields: Fields, pixels: str, angle: str, side: float) -> float:
     """Focal length in pixels, or 0 where neither it nor the angle of view is told."""
     if pixels in fields.data:
-        return fields.number(pixels, wanted="pixels above 0", low=LEAST, high=MOST)
+        return fields.number(pixels, wanted="a number of pixels above 0", low=LEAST, high=MOST)
     if angle in fields.data:
         radians = fields.number(angle, wanted=RADIANS, low=LEAST, high=math.pi)
         if not radians < math.pi:
@@ -121,8 +121,8 @@ def size_of(fields: Fields, folder: Path, notes: Notes) -> tuple[float, float]:
     entry = fields.data
     if "w" in entry and "h" in entry:
         return (
-            fields.number("w", wanted="pixels, 1 or more,", low=1, high=MOST),
-            fields.number("h", wanted="pixels, 1 or more,", low=1, high=MOST),
+            fields.number("w", wanted="a number of pixels, 1 or more,", low=1, high=MOST),
+            fields.number("h", wanted="a number of pixels, 1 or more,", low=1, high=MOST),
         )
     file = entry.get("file_path") or entry.get("file")
     if isinstance(file, str) and "\0" not in file:

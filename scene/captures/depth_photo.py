@@ -31,7 +31,7 @@ LOOKED_AT, FEW_POINTS = 3, 30  # photos, points: to tell whether a unit can be r
 OTHER_UNIT = 8  # times: more than this the points of a scene do not lie behind what is seen
 DEPTH = 12  # bytes of memory a number of a .npy
 FARTHEST = 1e6  # metres: beyond that nothing was measured
-METRES = f"metres above 0 and up to {FARTHEST:g}"
+METRES = f"a length above 0 and up to {FARTHEST:g} metres"
 
 
 def depth_of(

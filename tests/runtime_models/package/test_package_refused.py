@@ -166,7 +166,7 @@ BROKEN = {
     "view of another kind": (edit(provenance={"view": 3}), "'view' is 3; an object"),
     "view from nowhere": (edit(provenance={"view": LOOK | {"eye": [0, 1]}}), "a list of 3 finite"),
     "view of itself": (edit(provenance={"view": LOOK | {"eye": [0, 0, 0]}}), "are one point"),
-    "view of no width": (edit(provenance={"view": LOOK | {"fov_y": 0}}), "'fov_y' is 0; radians"),
+    "view of no width": (edit(provenance={"view": LOOK | {"fov_y": 0}}), "'fov_y' is 0; an angle"),
     # heads
     "no heads": (edit(heads={}), "'heads': 'offset' is missing"),
     "no file": (head("scale", file=None), "'scale': 'file' is missing"),
