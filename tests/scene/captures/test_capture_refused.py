@@ -203,7 +203,7 @@ def test_refused_folders_and_files(tmp_path):
     with pytest.raises(BadFile, match="neither photos nor poses"):
         read_capture(tmp_path)
     save_image(tmp_path / "images/a.png")
-    with pytest.raises(BadFile, match=r"without poses.*structure from motion"):
+    with pytest.raises(BadFile, match=r"without poses.*launch.py poses"):
         read_capture(tmp_path)
     with pytest.raises(BadFile, match="is no capture"):
         read_capture(tmp_path / "images/a.png")
