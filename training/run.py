@@ -72,7 +72,7 @@ class Run(ABC):
 
     @abstractmethod
     def one_step(self) -> tuple[float | None, bool]:
-        """(loss or None, whether the guard turned back)."""
+        """(loss or None, whether the guard rolled back)."""
 
     @abstractmethod
     def all_rates(self) -> dict[str, np.ndarray]:

@@ -218,18 +218,20 @@ class Trainer(Run):
         depth, rows = self.targets.depth_term(photo, self.settings.depth_share), None
         if shapes is None:
             control = self.control(photo.modality)
-            rows = self.visibility.rows(stop, camera_of(photo.view), self.adam["anchors"])
+            rows = self.visibility.visible_rows(stop, camera_of(photo.view), self.adam["anchors"])
         else:
             control = shapes.control(self.encoding)
         self.drawing = self.step.draw(photo.view, control, background, depth is not None, rows)
         if shapes is None:
-            self.visibility.note(stop, rows, self.step.gathered["anchors"], self.drawing.splats)
+            self.visibility.update_reach(
+                stop, rows, self.step.gathered["anchors"], self.drawing.splats
+            )
         target = self.target(photo, background, shapes is None)
         loss = self.targets.loss(photo)
         return self.step.gradients(self.drawing, loss, target, self.stats, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
-        """(loss or None, whether the guard turned back)."""
+        """(loss or None, whether the guard rolled back)."""
         photo = self.schedule.photo(self.iteration)
         background = self.schedule.background_of(self.iteration, photo)
         shapes = self.blending.sample(self.iteration, photo.modality)

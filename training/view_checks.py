@@ -1,4 +1,4 @@
-"""What is doubtful about the photos of a capture before they are trained on, in words."""
+"""What is doubtful about the photos of a capture, in words, before a training."""
 
 from shapeshift.training.photos import LoadedPhoto
 

@@ -28,7 +28,7 @@ class Visibility:
         self.visits = [0] * stops
         self.everything = device.upload(np.arange(anchors_count, dtype=np.int32))
 
-    def rows(self, stop: int, camera: Camera, anchors):
+    def visible_rows(self, stop: int, camera: Camera, anchors):
         """(R,) int32 on the device: which anchors (A, 3) a step at a stop has to run; None: all.
 
         At least one, so that there is something to launch.
@@ -48,7 +48,7 @@ class Visibility:
             return None
         return device.upload(rows if len(rows) else np.zeros(1, np.int32))
 
-    def note(self, stop: int, rows, anchors, splats: Gaussians) -> None:
+    def update_reach(self, stop: int, rows, anchors, splats: Gaussians) -> None:
         """What anchors (R, 3), the `rows` of a step at a stop, reach with their splats (R * k)."""
         rows = self.everything if rows is None else rows
         self.device.launch(

@@ -147,7 +147,7 @@ class PlainTrainer(Run):
         return self.step.gradients(self.drawing, loss, target, self.stats, depth)
 
     def one_step(self) -> tuple[float | None, bool]:
-        """(loss or None, whether the guard turned back)."""
+        """(loss or None, whether the guard rolled back)."""
         photo = self.schedule.photo(self.iteration)
         background = self.schedule.background_of(self.iteration, photo)
         fraction = self.budget.fraction(self.iteration, self.elapsed)

@@ -14,7 +14,7 @@ from shapeshift.app.training.train import Options as TrainOptions
 from shapeshift.app.training.train import run as train
 from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.scene.captures.write_capture import write_capture
-from shapeshift.training.calibration import calibrate as rig_search
+from shapeshift.training.calibration import calibrate as calibration
 from shapeshift.training.calibration.extrinsics import (
     moved_by,
     offset_capture,
@@ -47,7 +47,7 @@ def asked(monkeypatch) -> list[str]:
         found.append(modality)
         return offset_of_matrix(PLANTED, 3.0)
 
-    monkeypatch.setattr(rig_search, "calibrate", calibrate)
+    monkeypatch.setattr(calibration, "calibrate", calibrate)
     return found
 
 

@@ -43,12 +43,12 @@ def known(device, anchors: np.ndarray, splats: tuple) -> tuple[Visibility, objec
     found = Visibility(device, len(anchors), 2, K)
     there, drawn = device.upload(anchors), Gaussians(*map(device.upload, splats))
     found.visits[1] = 1
-    found.note(1, None, there, drawn)
+    found.update_reach(1, None, there, drawn)
     return found, there, drawn
 
 
 def chosen(device, found: Visibility, stop: int, view: View, anchors) -> np.ndarray:
-    rows = found.rows(stop, camera_of(view), anchors)
+    rows = found.visible_rows(stop, camera_of(view), anchors)
     return np.arange(found.count) if rows is None else device.download(rows)
 
 
@@ -88,9 +88,9 @@ def test_every_tenth_step_of_a_stop_runs_all_and_stops_count_apart(device):
     camera, ran = camera_of(view_from(1)), {0: [], 1: []}
     for turn in range(2 * LOOK + 1):
         for stop in (0, 1) if turn % 2 else (1,):
-            rows = found.rows(stop, camera, there)
+            rows = found.visible_rows(stop, camera, there)
             if rows is None:
-                found.note(stop, None, there, drawn)
+                found.update_reach(stop, None, there, drawn)
             ran[stop].append(rows is None)
     assert [i for i, everything in enumerate(ran[1]) if everything] == [0, LOOK, 2 * LOOK]
     assert [i for i, everything in enumerate(ran[0]) if everything] == [0]
@@ -100,7 +100,9 @@ def test_what_is_absent_at_a_stop_is_left_out_there_alone(device):
     anchors, splats = cloud(2)
     found, there, _ = known(device, anchors, splats)
     none = splats[3] * 0
-    found.note(0, None, there, Gaussians(*map(device.upload, (*splats[:3], none, splats[4]))))
+    found.update_reach(
+        0, None, there, Gaussians(*map(device.upload, (*splats[:3], none, splats[4])))
+    )
     found.visits[0] = 1
     view = view_from(2)
     assert chosen(device, found, 0, view, there).tolist() == [0]  # something has to be launched
