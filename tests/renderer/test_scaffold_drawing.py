@@ -18,7 +18,7 @@ from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted
 from shapeshift.scene.stereo import stereo_pair
-from shapeshift.training.evaluation.evaluate import Painter
+from shapeshift.training.evaluation.evaluate import ModelRenderer
 from tests.support.renderer.frames import draw_told
 from tests.support.splat_scenes import psnr_db, random_layers
 from tests.support.splats.scaffold_scenes import (
@@ -194,7 +194,7 @@ def test_a_packages_scene_as_a_run_shows_the_same(renderer, tmp_path):
 def test_held_out_photos_are_compared_from_their_own_eyes(tmp_path):
     """launch.py eval draws with the rasterizer alone."""
     try:
-        painter = Painter(open_device(), model := made(tmp_path, anchors=60))
+        painter = ModelRenderer(open_device(), model := made(tmp_path, anchors=60))
     except NoDevice as reason:
         pytest.skip(str(reason))
     assert painter.set_control(0.0) == 180

@@ -8,9 +8,9 @@ from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.calibration.calibrate import PYRAMID, STEPS, search, shape_for
 from shapeshift.training.calibration.extrinsics import (
     moved_by,
-    noted,
     offset_capture,
-    told,
+    offset_of_matrix,
+    rig_json,
     with_extrinsics,
 )
 from shapeshift.training.settings import TrainSettings
@@ -38,11 +38,11 @@ def test_a_planted_offset_is_found_to_a_tenth(held):
     true = planted()
     wrong = offset_capture(demo, "Thermal", np.linalg.inv(true))
     found = search(device, wrong, SETTINGS, "Thermal", shape, PYRAMID, lambda *_: None)
-    left = told(np.linalg.inv(true) @ found.offset)
+    left = offset_of_matrix(np.linalg.inv(true) @ found.offset)
     assert left.turn_deg < 0.2
     assert left.shift_m < 0.003
     assert found.gain_db > 2
-    check_views(with_extrinsics(wrong, noted("Thermal", found)), demo)
+    check_views(with_extrinsics(wrong, rig_json("Thermal", found)), demo)
 
 
 def check_views(right: Capture, stated: Capture) -> None:
