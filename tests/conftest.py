@@ -1,6 +1,9 @@
 """Options of the test run: --slow (long ones too), --regenerate (write the golden images anew)."""
 
+import os
+import shutil
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -33,9 +36,16 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session", autouse=True)
 def own_settings(tmp_path_factory):
-    """Settings of the program that tests start go into a folder of the run, never into a home."""
+    """Settings of the program that tests start go into a folder of the run, never into a home.
+
+    Compiled kernels stay where the program keeps them, whatever cache a test takes for its own:
+    compiling them takes 6 s of a core.
+    """
+    from shapeshift.runtime_models.files.user_cache import cache_folder
+
     folder = tmp_path_factory.mktemp("settings")
     with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("POCL_CACHE_DIR", os.environ.get("POCL_CACHE_DIR", str(cache_folder("pocl"))))
         for name in ("XDG_CONFIG_HOME", "APPDATA"):
             patch.setenv(name, str(folder))
         yield folder
@@ -119,3 +129,24 @@ def ctx(session_gpu):
 @pytest.fixture
 def gpu(ctx, session_gpu):
     return session_gpu
+
+
+@pytest.fixture(scope="module")
+def display():
+    """The name of an X display without a screen, 1280x720."""
+    if not shutil.which("Xvfb"):
+        pytest.skip("Xvfb is not installed (apt install xvfb)")
+    read_end, write_end = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1280x720x24", "-nolisten", "tcp"],
+        pass_fds=[write_end],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write_end)
+    with os.fdopen(read_end) as pipe:
+        number = pipe.readline().strip()
+    if not number:
+        pytest.skip("Xvfb did not start")
+    yield f":{number}"
+    server.terminate()
+    server.wait()

@@ -17,7 +17,7 @@ from tests.support.hostile.bombs import BOMBS
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="memory is told by /proc"
 )
-RUN = Path(__file__).parents[1] / "support" / "bomb_run.py"
+RUN = Path(__file__).parents[1] / "support" / "hostile" / "bomb_run.py"
 # Written out, and not what the program believes: docs/formats.md, "Memory".
 A_BYTE, FREE = 64, 64 << 20
 BESIDE = 48 << 20  # bytes: what the allocator rounds up, code that runs for the first time

@@ -115,6 +115,7 @@ HEAVY = [
      "--sweep", "2"),
     ("view", "a.ply", "--screenshot", "heavy/window.png", "--frames", "1"),
     ("vr", "--help"),  # without a runtime it only says so; tests/xr has one
+    ("poses", "--help"),  # tests/scene/poses finds some
     (),
 ]  # fmt: skip
 
@@ -206,4 +207,4 @@ def test_every_python_that_is_started_leaves_the_current_folder_out():
                     checked += 1
             if isinstance(node, ast.Attribute) and ast.unparse(node) in ("os.system", "os.popen"):
                 pytest.fail(f"{path}:{node.lineno} starts a shell")
-    assert checked == 5  # launch.py, first_start.py, CoACD, LAZ, USD
+    assert checked == 6  # launch.py, first_start.py, CoACD, LAZ, USD, COLMAP

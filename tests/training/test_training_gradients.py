@@ -10,6 +10,12 @@ def test_every_gradient(device, seed):
     compare_gradients(device, LAYOUT, seed)
 
 
-@pytest.mark.parametrize("name", OTHERS)
+# Seven seconds each, and what these change is changed in "3 layers" and "all at once", too.
+LONG = ("2 layers", "shape fixed", "colour alike from everywhere")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in OTHERS]
+)
 def test_every_gradient_of_other_networks(device, name):
     compare_gradients(device, OTHERS[name], seed=1)

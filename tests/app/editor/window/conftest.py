@@ -1,8 +1,6 @@
-"""Fixtures of the tests of the window: an X display in memory, a window on it, a viewer in that."""
+"""Fixtures of the tests of the window: one on a display in memory, and viewers in it."""
 
 import os
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -17,27 +15,6 @@ from shapeshift.runtime_models.splats.ply.write_ply import write_ply
 from shapeshift.scene.cameras.camera_list import CameraReading
 from tests.support.desktop.desktop_stand import PlainRenderer, ball, read_stub, run_frames
 from tests.support.desktop.objects_stand import TOUCH, release, viewer_of
-
-
-@pytest.fixture(scope="module")
-def display():
-    """The name of an X display without a screen, 1280x720."""
-    if not shutil.which("Xvfb"):
-        pytest.skip("Xvfb is not installed (apt install xvfb)")
-    read_end, write_end = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1280x720x24", "-nolisten", "tcp"],
-        pass_fds=[write_end],
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(write_end)
-    with os.fdopen(read_end) as pipe:
-        number = pipe.readline().strip()
-    if not number:
-        pytest.skip("Xvfb did not start")
-    yield f":{number}"
-    server.terminate()
-    server.wait()
 
 
 @pytest.fixture(scope="module")
