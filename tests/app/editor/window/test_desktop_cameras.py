@@ -179,7 +179,7 @@ def test_a_list_that_cannot_be_kept_is_said_once(viewer, tmp_path):
     blocked = tmp_path / "a file"
     blocked.write_bytes(b"")
     viewer.files.recent = RecentFiles.read(blocked)
-    viewer.files.save_snapshot(Path("a"))
+    viewer.files.remember(Path("a"))
     assert "cannot be kept" in viewer.state.problem and viewer.files.recent is None
 
 
