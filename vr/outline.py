@@ -39,7 +39,7 @@ class Outlines:
             return None
         key = id(collider)
         if key not in self._hulls:
-            self._hulls[key] = collider, hull_of(np.concatenate(collider.hulls))
+            self._hulls[key] = collider, hull_of(np.concatenate(collider.parts))
         return self._hulls[key][1]
 
 

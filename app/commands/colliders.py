@@ -102,8 +102,8 @@ def write_one(collider: "Collider", path: Path) -> str:
     from shapeshift.scene.colliders.collider_pieces import write_collider
 
     make_folders(path.parent.parent, path.parent.name)
-    write_collider(collider.hulls, collider.mesh, path)
-    count = len(collider.hulls)
+    write_collider(collider.parts, collider.mesh, path)
+    count = len(collider.parts)
     return f"{count} convex piece{'s' * (count > 1)}, {len(collider.mesh.faces):,} faces"
 
 

@@ -1,6 +1,6 @@
 """What the physics touches instead of splats: an invisible mesh and the convex pieces of it.
 
-A moving body is its hulls (a mesh of 2,500 faces takes an engine hundreds of times as long); the
+A moving body is its parts (a mesh of 2,500 faces takes an engine hundreds of times as long); the
 mesh serves a background that stays where it is, the mass and a debug view.
 """
 
@@ -17,13 +17,13 @@ from shapeshift.scene.colliders.collider_cache import content_key, read_cached, 
 from shapeshift.scene.colliders.collider_pieces import Pieces, hull_faces, read_pieces
 from shapeshift.scene.colliders.collider_points import fill_splats
 from shapeshift.scene.colliders.collider_wrap import join_meshes, volume, wrap
-from shapeshift.scene.colliders.convex_parts import cut_into_hulls, hull_volume, solid_hulls
+from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume, solid_parts
 from shapeshift.scene.colliders.read_mesh import read_mesh
 from shapeshift.scene.colliders.stitch_mesh import is_watertight
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh, sample_faces
 
 VERSION = 4  # of the rules that make colliders: another one makes all of them anew
-FACES, MOST_HULLS = 2500, 16
+FACES, MOST_PARTS = 2500, 16
 LEAST_SIDE_M = 0.002  # of the box of what is too small or too flat to be wrapped
 THINNEST = 0.01  # of the longest side, of such a box
 FEWEST_SPLATS = 30  # fewer get a box
@@ -34,7 +34,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Collider:
-    hulls: tuple[np.ndarray, ...]  # each (V, 3) float32 metres, object frame; 1 to 16 of them
+    parts: tuple[np.ndarray, ...]  # each (V, 3) float32 metres, object frame; 1 to 16 of them
     mesh: TriangleMesh  # watertight, the same frame
 
 
@@ -52,7 +52,7 @@ class Making:
     """How colliders are made."""
 
     faces: int = FACES  # of the mesh, about
-    most_hulls: int = MOST_HULLS
+    most_parts: int = MOST_PARTS
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from the user's cache or written to it
     progress: Progress | None = None  # (what is being done, part done 0..1); may raise to end it
@@ -111,31 +111,31 @@ def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:
 
 def collider_of_pieces(pieces: Pieces) -> Collider:
     """Somebody's own choice, which is not cut again; only what no engine can hold is mended."""
-    hulls = solid_hulls(pieces.points, pieces.skin, MOST_HULLS)
+    parts = solid_parts(pieces.points, pieces.skin, MOST_PARTS)
     skin = pieces.skin
     if not (is_watertight(skin.faces) and volume(skin.vertices, skin.faces) > 0):
-        skin = join_meshes([TriangleMesh(hull, hull_faces(hull)) for hull in hulls])
-    return Collider(hulls, skin)
+        skin = join_meshes([TriangleMesh(hull, hull_faces(hull)) for hull in parts])
+    return Collider(parts, skin)
 
 
 def cached_or_made(
     making: Making, columns: tuple[np.ndarray, ...], make: Callable[[], TriangleMesh]
 ) -> Collider:
     """From a cache if it was made before, else made now and kept."""
-    if not (making.faces >= 12 and 1 <= making.most_hulls <= 64):
+    if not (making.faces >= 12 and 1 <= making.most_parts <= 64):
         raise ValueError(
-            f"a collider of {making.faces} faces and {making.most_hulls} hulls is asked for; at "
-            "least 12 faces and 1 to 64 hulls are made."
+            f"a collider of {making.faces} faces and {making.most_parts} parts is asked for; at "
+            "least 12 faces and 1 to 64 parts are made."
         )
-    settings = f"{VERSION} {making.faces} {making.most_hulls} {making.hollow}"
+    settings = f"{VERSION} {making.faces} {making.most_parts} {making.hollow}"
     key = content_key(settings, *columns) if making.kept else ""
     made = read_cached(key) if making.kept else None
     if made is None:
         mesh = make()
-        hulls, finished = around(mesh), True
+        parts, finished = around(mesh), True
         if not making.hollow:
-            hulls, finished = cut_into_hulls(mesh, making.most_hulls, making.report)
-        made = hulls, mesh
+            parts, finished = cut_into_parts(mesh, making.most_parts, making.report)
+        made = parts, mesh
         if making.kept and finished:  # what a slow machine gave up on is tried again
             write_cached(key, made)
     making.report("making a collider", 1.0)
@@ -144,7 +144,7 @@ def cached_or_made(
 
 def around(mesh: TriangleMesh) -> tuple[np.ndarray, ...]:
     """One hull of all of it: of what is touched as a mesh and never cut into pieces."""
-    return solid_hulls([mesh.vertices], mesh, 1)
+    return solid_parts([mesh.vertices], mesh, 1)
 
 
 def mesh_of_splats(
@@ -217,6 +217,6 @@ def mass_properties(collider: Collider, mass_kg: float) -> MassProperties:
     )
 
 
-def hulls_volume(collider: Collider) -> float:
-    """Cubic metres of all hulls together; where two overlap, that counts twice."""
-    return sum(hull_volume(hull) for hull in collider.hulls)
+def parts_volume(collider: Collider) -> float:
+    """Cubic metres of all parts together; where two overlap, that counts twice."""
+    return sum(hull_volume(hull) for hull in collider.parts)

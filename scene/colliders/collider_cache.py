@@ -21,7 +21,7 @@ MARK = b"shapeshift collider 1\n"
 NAME = re.compile(r"[0-9a-f]{64}\.collider")
 MOST_BYTES = 16 << 20  # of one file: 2,500 faces and 16 hulls take 60 kB
 MOST_ALL = 256 << 20  # bytes of all files; the ones not used for longest go first
-MOST_HULLS, MOST_CORNERS = 64, 1 << 10  # of a collider, of a hull; more were never written
+MOST_PARTS, MOST_CORNERS = 64, 1 << 10  # of a collider, of a hull; more were never written
 BINARY = getattr(os, "O_BINARY", 0)  # of Windows
 Made = tuple[tuple[np.ndarray, ...], TriangleMesh]
 
@@ -102,7 +102,7 @@ def unpack(data: bytes) -> Made | None:
     if head != MARK or len(body) < 12 or hashlib.sha256(body).digest() != digest:
         return None
     count, vertices, faces = (int(n) for n in np.frombuffer(body, "<u4", 3))
-    if len(body) % 4 or not 1 <= count <= min(len(body) // 4 - 3, MOST_HULLS):
+    if len(body) % 4 or not 1 <= count <= min(len(body) // 4 - 3, MOST_PARTS):
         return None
     sizes = [3 * int(n) for n in np.frombuffer(body, "<u4", count, 12)]
     if not all(12 <= size <= 3 * MOST_CORNERS for size in sizes):  # a hull has four corners

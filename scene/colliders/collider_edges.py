@@ -10,7 +10,7 @@ FLAT = 0.9998  # cosine between two faces; flatter than that the edge between th
 
 def hull_edges(collider: Collider) -> np.ndarray:
     """(S, 2, 3) float32 metres, object frame: of every convex piece."""
-    faces = [hull_triangles(hull) for hull in collider.hulls]
+    faces = [hull_triangles(hull) for hull in collider.parts]
     edges = [edges_of(corners) for corners in faces if corners is not None]
     return np.concatenate([np.zeros((0, 2, 3), np.float32), *edges])
 

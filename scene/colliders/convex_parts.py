@@ -27,7 +27,7 @@ SKIN_SAMPLES, HULL_SAMPLES = 20_000, 600
 Progress = Callable[[str, float], None]
 
 
-def cut_into_hulls(
+def cut_into_parts(
     mesh: TriangleMesh, most: int, progress: Progress, limit_s: float = LIMIT_S
 ) -> tuple[tuple[np.ndarray, ...], bool]:
     """At most `most` hulls (V, 3) float32 that cover a closed mesh; whether CoACD did its part.
@@ -38,10 +38,10 @@ def cut_into_hulls(
     skin = Skin(mesh)
     whole = [part.vertices for part in parts]
     if len(parts) <= most and all(skin.reach(points) <= skin.slack for points in whole):
-        return solid_hulls(whole, mesh, most), True
+        return solid_parts(whole, mesh, most), True
     pieces = run_coacd(mesh, most, progress, limit_s)
-    hulls = solid_hulls(joined(pieces, skin), mesh, most)
-    return (hulls, True) if hulls else (solid_hulls(whole, mesh, most), False)
+    hulls = solid_parts(joined(pieces, skin), mesh, most)
+    return (hulls, True) if hulls else (solid_parts(whole, mesh, most), False)
 
 
 class Skin:
@@ -172,7 +172,7 @@ def run_coacd(
             return [file[name] * size + centre for name in file.files]
 
 
-def solid_hulls(pieces: list[np.ndarray], mesh: TriangleMesh, most: int) -> tuple[np.ndarray, ...]:
+def solid_parts(pieces: list[np.ndarray], mesh: TriangleMesh, most: int) -> tuple[np.ndarray, ...]:
     """Hulls (V, 3) float32, the largest `most`, none too flat for an engine, no splinters."""
     least = LEAST_THICKNESS * float(np.ptp(mesh.vertices, axis=0).max())
     hulls = [thick(np.asarray(piece, np.float64), least) for piece in pieces]

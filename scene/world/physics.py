@@ -34,7 +34,7 @@ from shapeshift.scene.world.physics_shapes import (
     checked_point,
     checked_pose,
     clamped_mass,
-    hulls_shape,
+    compound_shape,
     isometry,
     mesh_shape,
     pose_of,
@@ -106,7 +106,7 @@ class Physics:
             engine_shape, findings = mesh_shape(shape)
             self.findings += findings
         else:
-            engine_shape = hulls_shape(shape)
+            engine_shape = compound_shape(shape)
         return self._insert(
             self._new_id(), RigidBody.fixed(position=at), engine_shape, None, friction, restitution
         )
@@ -126,7 +126,7 @@ class Physics:
         from rapier3d import RigidBody
 
         at = isometry(checked_pose(pose, "a body"))
-        shape = hulls_shape(hulls)
+        shape = compound_shape(hulls)
         mass, finding = clamped_mass(mass_kg)
         body = RigidBody.dynamic(position=at, ccd_enabled=True)
         number = self._insert(self._new_id(), body, shape, mass, friction, restitution)

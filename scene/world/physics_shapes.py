@@ -71,7 +71,7 @@ def pose_of(isometry: Any) -> Pose:
     return Pose(np.array([p.x, p.y, p.z]), np.array([q.w, q.i, q.j, q.k]))
 
 
-def hulls_shape(hulls: Any) -> Any:
+def compound_shape(hulls: Any) -> Any:
     """The engine's shape of convex pieces, each (V, 3) metres, object frame.  Raises ValueError."""
     from rapier3d import Isometry3, MeshConversionError, SharedShape
 

@@ -60,7 +60,7 @@ def add_body(physics, item: SceneItem, collider) -> int | None:
         return None
     mass = () if item.static else (item.mass_kg,)
     add = physics.add_static if item.static else physics.add_body
-    shape = collider.mesh if item.name == BACKGROUND else collider.hulls
+    shape = collider.mesh if item.name == BACKGROUND else collider.parts
     try:
         return add(shape, item.pose, *mass, item.friction, item.restitution)
     except ValueError as error:
@@ -99,7 +99,7 @@ def drawn_object(thing: RigidObject, part: float | None) -> RigidObject:
 def middle_of(thing: RigidObject) -> np.ndarray:
     """(3,) metres, world: of the box around what can be touched of it."""
     assert thing.collider is not None, "asked of what can be touched"
-    corners = np.concatenate(thing.collider.hulls)
+    corners = np.concatenate(thing.collider.parts)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
     return (thing.pose.matrix() @ np.append(middle, 1.0))[:3]
 

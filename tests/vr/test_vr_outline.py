@@ -91,11 +91,11 @@ def test_what_has_no_volume_has_no_outline(points):
 
 
 def test_a_hull_is_made_once_a_collider():
-    outlines, body = Outlines(), SimpleNamespace(hulls=(CUBE, np.add(CUBE, (0.1, 0, 0))))
+    outlines, body = Outlines(), SimpleNamespace(parts=(CUBE, np.add(CUBE, (0.1, 0, 0))))
     first = outlines.hull(body)
     assert outlines.hull(body) is first and len(first.points) == 8
     assert (
-        outlines.hull(None) is None and outlines.hull(SimpleNamespace(hulls=(CUBE,))) is not first
+        outlines.hull(None) is None and outlines.hull(SimpleNamespace(parts=(CUBE,))) is not first
     )
 
 

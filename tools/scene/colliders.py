@@ -23,7 +23,7 @@ sys.path[:0] = [str(ROOT)]
 
 from shapeshift.runtime_models.evaluate import Evaluator  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
-from shapeshift.scene.colliders.collider import Collider, Making, collider_of_splats, hulls_volume  # noqa: E402
+from shapeshift.scene.colliders.collider import Collider, Making, collider_of_splats, parts_volume  # noqa: E402
 from shapeshift.scene.colliders.collider_wrap import volume  # noqa: E402
 from shapeshift.scene.colliders.stitch_mesh import is_watertight  # noqa: E402
 
@@ -45,7 +45,7 @@ def outside_percent(made: Collider, means: np.ndarray) -> float:
     from scipy.spatial import ConvexHull
 
     least = np.full(len(means), np.inf)
-    for hull in made.hulls:
+    for hull in made.parts:
         planes = ConvexHull(hull.astype(np.float64)).equations  # (F, 4), outward
         away = (means @ planes[:, :3].T + planes[:, 3]).max(1)
         least = np.minimum(least, away)
@@ -60,9 +60,9 @@ def measure(path: Path) -> tuple:
     after, after_children = cpu_s()
     known = np.isfinite(columns[0]).all(1) & (columns[3] >= 0.5)
     mesh = made.mesh
-    over = hulls_volume(made) / volume(mesh.vertices, mesh.faces)
+    over = parts_volume(made) / volume(mesh.vertices, mesh.faces)
     return (
-        path.stem.split(".")[0], len(columns[0]), len(made.hulls), len(mesh.faces),
+        path.stem.split(".")[0], len(columns[0]), len(made.parts), len(mesh.faces),
         "yes" if is_watertight(mesh.faces) else "NO", f"{after - own:.1f}",
         f"{after_children - children:.1f}", f"{outside_percent(made, columns[0][known]):.2f}",
         f"{over:.2f}",

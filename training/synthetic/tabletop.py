@@ -264,7 +264,7 @@ def write_colliders(folder: Path) -> None:
             model = read_model(folder / item.model, Reading(mode=item.mode, up=item.up))
             x = item.x if isinstance(item.x, float | int) else 0.0
             made = collider_of_model(model, x, Making(kept=False))
-            write_collider(made.hulls, made.mesh, path)
+            write_collider(made.parts, made.mesh, path)
 
 
 def write_example(folder: Path) -> None:

@@ -21,11 +21,11 @@ from shapeshift.scene.colliders.collider import (
     Making,
     collider_of_model,
     collider_of_splats,
-    hulls_volume,
     mass_properties,
     mesh_of_splats,
+    parts_volume,
 )
-from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_hulls
+from shapeshift.scene.colliders.convex_parts import MOST_VERTICES, SEARCH, cut_into_parts
 from shapeshift.scene.colliders.triangle_mesh import TriangleMesh
 from tests.support.models import make_random_model
 from tests.support.scene.collider_shapes import Cloud, distances, shapes, splatted
@@ -40,8 +40,8 @@ def solid(collider: Collider) -> trimesh.Trimesh:
 
 def check_hulls(collider: Collider, most: int = 16) -> None:
     """Each hull is convex (all of its vertices are corners), has a volume and few vertices."""
-    assert 1 <= len(collider.hulls) <= most
-    for hull in collider.hulls:
+    assert 1 <= len(collider.parts) <= most
+    for hull in collider.parts:
         assert hull.dtype == np.float32 and 4 <= len(hull) <= MOST_VERTICES
         found = ConvexHull(hull.astype(np.float64))
         assert found.volume > 0
@@ -52,7 +52,7 @@ def uncovered(collider: Collider, shape: trimesh.Trimesh) -> float:
     """Metres that nearly all of a shape's surface lies within the hulls or less far from them."""
     points, _ = trimesh.sample.sample_surface(shape, 4000, seed=5)
     out = np.full(len(points), np.inf)
-    for hull in collider.hulls:
+    for hull in collider.parts:
         planes = ConvexHull(hull.astype(np.float64)).equations
         out = np.minimum(out, (points @ planes[:, :3].T + planes[:, 3]).max(1))
     return float(np.percentile(out, 99))
@@ -100,7 +100,7 @@ def check_shape(name: str) -> None:
     assert chamfer - noise < 0.0005  # metres, of 0.2: the samples' own distance taken off
     assert hausdorff < 0.012
     check_hulls(made, most)
-    assert shape.volume * 0.95 <= hulls_volume(made) <= shape.volume * hull_volume
+    assert shape.volume * 0.95 <= parts_volume(made) <= shape.volume * hull_volume
     assert uncovered(made, shape) < 0.004
 
 
@@ -108,7 +108,7 @@ def test_the_same_splats_give_the_same_collider():
     one, two = made_once("torus"), newly_made("torus")
     assert one.mesh.vertices.tobytes() == two.mesh.vertices.tobytes()
     assert one.mesh.faces.tobytes() == two.mesh.faces.tobytes()
-    assert [h.tobytes() for h in one.hulls] == [h.tobytes() for h in two.hulls]
+    assert [h.tobytes() for h in one.parts] == [h.tobytes() for h in two.parts]
 
 
 def test_a_shell_open_below_is_filled():
@@ -174,7 +174,7 @@ def test_faint_splats_count_where_they_add_up():
 @pytest.fixture
 def soon(monkeypatch):
     """CoACD has a second; on clouds of nothing in particular it takes all the time there is."""
-    monkeypatch.setattr(collider, "cut_into_hulls", partial(cut_into_hulls, limit_s=1.0))
+    monkeypatch.setattr(collider, "cut_into_parts", partial(cut_into_parts, limit_s=1.0))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 29, 30, 31, 257])
@@ -238,7 +238,7 @@ def test_out_of_time_each_part_is_one_hull():
     other.apply_translation((0.3, 0, 0))
     both = trimesh.util.concatenate([torus, other])
     mesh = TriangleMesh(both.vertices.astype(np.float32), both.faces.astype(np.int32))
-    hulls, finished = cut_into_hulls(mesh, 16, lambda what, part: None, limit_s=0.0)
+    hulls, finished = cut_into_parts(mesh, 16, lambda what, part: None, limit_s=0.0)
     assert not finished and len(hulls) == 2
     assert {round(float(h[:, 0].mean()), 1) for h in hulls} == {0.0, 0.3}
 

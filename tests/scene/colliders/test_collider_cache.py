@@ -58,7 +58,7 @@ def test_nothing_is_written_beside_a_scene(tmp_path):
     before = set(tmp_path.iterdir())
     made = collider_of_splats(*cloud.columns)
     assert {path.name for path in set(tmp_path.iterdir()) - before} == {"own"}
-    assert same((made.hulls, made.mesh), read_cached(next(kept(tmp_path)).stem))
+    assert same((made.parts, made.mesh), read_cached(next(kept(tmp_path)).stem))
 
 
 def kept(tmp_path: Path):
@@ -153,7 +153,7 @@ def test_a_damaged_file_is_made_again(tmp_path):
     heard.clear()
     again = collider_of_splats(*cloud.columns, making)
     assert heard == ["making a collider"]  # nothing was made
-    assert same((again.hulls, again.mesh), (first.hulls, first.mesh))
+    assert same((again.parts, again.mesh), (first.parts, first.mesh))
     path.write_bytes(whole[:-5])
     collider_of_splats(*cloud.columns, making)
     assert "wrapping the splats" in heard and path.read_bytes() == whole

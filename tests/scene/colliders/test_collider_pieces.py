@@ -13,8 +13,8 @@ from shapeshift.scene.colliders.collider import (
     Collider,
     Making,
     collider_of_mesh,
-    hulls_volume,
     mass_properties,
+    parts_volume,
 )
 from shapeshift.scene.colliders.collider_pieces import hull_faces, read_pieces, write_collider
 from shapeshift.scene.colliders.collider_wrap import volume
@@ -44,7 +44,7 @@ def saved(path: Path, parts: dict[str, trimesh.Trimesh], node_names: bool = Fals
 
 
 def corners(collider: Collider) -> list[set]:
-    return [set(map(tuple, hull.tolist())) for hull in collider.hulls]
+    return [set(map(tuple, hull.tolist())) for hull in collider.parts]
 
 
 def test_a_collider_is_the_same_after_a_file(tmp_path):
@@ -66,10 +66,10 @@ def test_a_collider_is_the_same_after_a_file(tmp_path):
 @pytest.mark.parametrize("node_names", [True, False])
 def test_pieces_of_game_engines_are_taken_as_they_are(tmp_path, node_names, monkeypatch):
     """A torus that somebody cut in two convex pieces: they are kept though they fill its hole."""
-    monkeypatch.setattr("shapeshift.scene.colliders.collider.cut_into_hulls", None)  # never called
+    monkeypatch.setattr("shapeshift.scene.colliders.collider.cut_into_parts", None)  # never called
     parts = {"Torus": shapes()["torus"], "UCX_Torus_00": box(-0.05), "ucx_Torus_01": box(0.05)}
     found = collider_of_mesh(saved(tmp_path / "a.glb", parts, node_names))
-    assert sorted(hull[:, 0].mean().round(3) for hull in found.hulls) == [-0.05, 0.05]
+    assert sorted(hull[:, 0].mean().round(3) for hull in found.parts) == [-0.05, 0.05]
     torus = shapes()["torus"]
     assert volume(found.mesh.vertices, found.mesh.faces) == pytest.approx(torus.volume, rel=1e-4)
 
@@ -81,21 +81,21 @@ def test_without_a_closed_skin_the_pieces_are_the_mesh(tmp_path):
         {"a": sheet, "UCX_a": box(0), "UCX_b": box(1)},
     ):
         found = collider_of_mesh(saved(tmp_path / "a.glb", parts))
-        assert is_watertight(found.mesh.faces) and len(found.hulls) == 2
+        assert is_watertight(found.mesh.faces) and len(found.parts) == 2
         assert volume(found.mesh.vertices, found.mesh.faces) == pytest.approx(0.002, rel=1e-5)
 
 
 def test_a_background_is_met_as_its_skin(tmp_path):
     parts = {"room": box(0, (4, 3, 4)), "UCX_room": box(0, (4, 3, 4)), "UCX_chair": box(1)}
     found = collider_of_mesh(saved(tmp_path / "a.glb", parts), Making(hollow=True))
-    assert len(found.mesh.faces) == 12 and len(found.hulls) == 1
+    assert len(found.mesh.faces) == 12 and len(found.parts) == 1
 
 
 @pytest.mark.parametrize("count", [1, 16, 17, 400])
 def test_more_pieces_than_an_engine_can_hold_are_refused(tmp_path, count):
     path = saved(tmp_path / "a.glb", {f"UCX_{i:03}": box(i * 0.2) for i in range(count)})
     if count <= 16:
-        assert len(collider_of_mesh(path).hulls) == count
+        assert len(collider_of_mesh(path).parts) == count
         return
     with pytest.raises(BadFile, match=rf"a.glb has {count} convex pieces .* at most 16"):
         collider_of_mesh(path)
@@ -114,7 +114,7 @@ def test_pieces_that_no_engine_can_hold_are_mended_or_refused(tmp_path, kind):
     except BadFile as refused:
         assert "\n" not in str(refused)
         return
-    assert all(4 <= len(hull) <= 64 for hull in found.hulls) and hulls_volume(found) > 0
+    assert all(4 <= len(hull) <= 64 for hull in found.parts) and parts_volume(found) > 0
 
 
 def test_flat_pieces_without_a_skin_are_one_sentence(tmp_path):
@@ -138,7 +138,7 @@ def test_names_that_are_none(tmp_path, name):
         head + len(text).to_bytes(4, "little") + data[16:20] + text + data[20 + size :]
     )
     assert read_pieces(path) is None
-    assert len(collider_of_mesh(path, Making(kept=False)).hulls) == 1
+    assert len(collider_of_mesh(path, Making(kept=False)).parts) == 1
 
 
 def test_faces_of_a_hull_look_outwards():
@@ -188,7 +188,7 @@ def test_the_touch_scene_needs_no_collider_to_be_made(monkeypatch):
     models = read_models(file)
     made = {i.name: one_collider(file, i, models[i.name], Making(kept=False))
             for i in file.all_items}  # fmt: skip
-    assert {name: len(c.hulls) for name, c in made.items()} == {
+    assert {name: len(c.parts) for name, c in made.items()} == {
         "background": 1, "cube": 1, "ball": 1, "ring": 7, "plate": 1}  # fmt: skip
 
 
@@ -200,7 +200,7 @@ def test_the_shipped_colliders_are_what_the_program_makes(tmp_path):
     write_colliders(tmp_path)
     for name in ("ball", "ring"):
         made, kept = (collider_of_mesh(f / f"touch/{name}.glb") for f in (tmp_path, ASSETS))
-        assert hulls_volume(made) == pytest.approx(hulls_volume(kept), rel=0.05)
+        assert parts_volume(made) == pytest.approx(parts_volume(kept), rel=0.05)
         one, two = (mass_properties(c, 1.0) for c in (made, kept))
         assert one.volume_m3 == pytest.approx(two.volume_m3, rel=0.01)
         np.testing.assert_allclose(one.centre, two.centre, atol=1e-4)

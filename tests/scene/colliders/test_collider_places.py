@@ -41,7 +41,7 @@ def test_a_room_is_hollow_and_its_floor_walls_and_table_carry():
     made = collider_of_splats(*room().columns, ROOM)
     assert is_watertight(made.mesh.faces) and 5000 < len(made.mesh.faces) <= 11_000
     assert 0 < volume(made.mesh.vertices, made.mesh.faces) < 0.15 * 4 * 2.4 * 3  # walls alone
-    assert len(made.hulls) == 1
+    assert len(made.parts) == 1
     physics = Physics()
     physics.add_static(made.mesh, at(0, 0, 0))
     on_floor = physics.add_body([box(0.05, 0.05, 0.05)], at(-1, 0, 0.4), 0.3)
@@ -77,7 +77,7 @@ def test_a_mesh_file_of_a_place_stays_as_it_is(tmp_path):
     made = collider_of_mesh(tmp_path / "room.obj", ROOM)
     assert len(made.mesh.faces) == 10
     assert np.ptp(made.mesh.vertices, axis=0) == pytest.approx((4, 2.4, 3))
-    assert len(made.hulls) == 1
+    assert len(made.parts) == 1
 
 
 def test_without_the_packages_there_is_one_sentence(monkeypatch, tmp_path):

@@ -17,7 +17,7 @@ from shapeshift.scene.world.simulation import Simulation
 from shapeshift.scene.world.world import World
 from tests.support.scene.world_scenes import UP, Points, item, model, reaction
 
-SOLID = SimpleNamespace(hulls=(), mesh="mesh")
+SOLID = SimpleNamespace(parts=(), mesh="mesh")
 
 
 def simulation(*items: SceneItem, acts: tuple = (), solid: bool = True, **file) -> Simulation:
