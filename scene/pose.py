@@ -4,7 +4,6 @@ Name transforms by what they give and take:  p_world = world_from_object @ p_obj
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -187,15 +186,3 @@ def perspective(fov_y: float, size: tuple[int, int]) -> tuple[float, float, floa
     up = float(np.tan(fov_y / 2))
     right = up * size[0] / size[1]
     return (-right, right, -up, up)
-
-
-def triple(numbers: Iterable[float]) -> tuple[float, float, float]:
-    """Three numbers, such as a place (3,), as plain floats."""
-    first, second, third = map(float, numbers)
-    return first, second, third
-
-
-def quadruple(numbers: Iterable[float]) -> tuple[float, float, float, float]:
-    """Four numbers, such as a quaternion (4,), as plain floats."""
-    first, second, third, fourth = map(float, numbers)
-    return first, second, third, fourth

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from shapeshift.runtime_models.shapes import four, three
 from shapeshift.runtime_models.stop_weights import Control
 from shapeshift.scene.pick import anchor_places
-from shapeshift.scene.pose import View, quadruple, triple
+from shapeshift.scene.pose import View
 from shapeshift.scene.scene import SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Selector, Sphere
 
@@ -214,15 +215,15 @@ def selector_of(region: Region, view: View) -> Selector:
     """What the scene knows a region as; a lens looks along `view`."""
     inside: dict[str, Any] = {"x": region.x, "border": region.border}
     if region.kind == "box":
-        return Box(centre=triple(region.centre), half=triple(region.half), **inside)
+        return Box(centre=three(region.centre), half=three(region.half), **inside)
     if region.kind == "sphere":
-        return Sphere(centre=triple(region.centre), radius=float(region.half[0]), **inside)
+        return Sphere(centre=three(region.centre), radius=float(region.half[0]), **inside)
     if region.kind == "half-space":
-        normal = triple(-region.normal)
-        return HalfSpace(point=triple(region.centre), normal=normal, **inside)
+        normal = three(-region.normal)
+        return HalfSpace(point=three(region.centre), normal=normal, **inside)
     if region.kind == "lens":
         eye, angle = view.world_from_eye, float(np.arctan(region.tangent))
-        position, wxyz = triple(eye.position), quadruple(eye.wxyz)
+        position, wxyz = three(eye.position), four(eye.wxyz)
         return Lens(position=position, wxyz=wxyz, half_angle=angle, **inside)
     assert region.painted is not None  # a painted region has a mask from `add` on
     return Painted(region.painted, region.x)

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.app.editor.state.camera.camera import Box
+from shapeshift.runtime_models.shapes import four
 from shapeshift.scene.cameras.camera_list import CameraList
 from shapeshift.scene.cameras.camera_path import slerp
 from shapeshift.scene.control import ease
-from shapeshift.scene.pose import Pose, View, quadruple
+from shapeshift.scene.pose import Pose, View
 
 FLIGHT_S = 0.4  # from one camera to the next
 LONGEST_NAME = 40  # letters in the status line
@@ -116,7 +117,5 @@ def between(one: View, other: View, part: float) -> View:
     a, b = one.world_from_eye, other.world_from_eye
     turn = slerp(a.wxyz[None], b.wxyz[None], np.array([part]))[0]
     pose = Pose(a.position + (b.position - a.position) * part, turn)
-    tangents = quadruple(
-        s + (t - s) * part for s, t in zip(one.tangents, other.tangents, strict=True)
-    )
+    tangents = four(s + (t - s) * part for s, t in zip(one.tangents, other.tangents, strict=True))
     return replace(other, world_from_eye=pose, tangents=tangents)

@@ -8,11 +8,11 @@ from shapeshift.app.editor.state.files.opened import Source
 from shapeshift.app.editor.state.regions import Regions
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.model import Model, Stop
+from shapeshift.runtime_models.shapes import four, three
 from shapeshift.scene.document import edits
 from shapeshift.scene.document.edits import History
 from shapeshift.scene.document.scene_file import ENDING, HULLS, SceneFile, SceneItem
 from shapeshift.scene.document.write_scene_file import moved
-from shapeshift.scene.pose import quadruple, triple
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
 
@@ -129,8 +129,8 @@ def edited_from_scene(scene: Scene, sources: Sequence[Source]) -> EditedFile:
         item = replace(
             item_of(source),
             name=thing.name,
-            position=triple(thing.world_from_object.position),
-            wxyz=quadruple(thing.world_from_object.wxyz),
+            position=three(thing.world_from_object.position),
+            wxyz=four(thing.world_from_object.wxyz),
             x=thing.x,
         )
         items.append(item)

@@ -12,8 +12,8 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import file_name
 from shapeshift.runtime_models.evaluate import follows_eye
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.shapes import three
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats
-from shapeshift.scene.pose import triple
 
 EVERYTHING, REGIONS = -1, -2  # what is exported, beside one object by its index
 
@@ -69,8 +69,8 @@ class Exporting:
         """Begins to write; what is moved meanwhile does not show in the file."""
         parts, state = self.parts(), self._state
         seen = any(follows_eye(part.thing.model) for part in parts)
-        eye = triple(self._viewpoint.view().world_from_eye.position) if seen else None
-        look = Look(self.sh_degree, self.palette, eye, triple(state.origin))
+        eye = three(self._viewpoint.view().world_from_eye.position) if seen else None
+        look = Look(self.sh_degree, self.palette, eye, three(state.origin))
         try:
             self._path = claim_name(self._folder, parts, self.ending)
         except (OSError, UsageError) as error:
