@@ -86,7 +86,7 @@ def test_another_state_for_which_memory_lacks_changes_nothing(balls, no_memory):
              for n, a in trainer.adam.state().items()}  # fmt: skip
     no_memory()
     with pytest.raises(RuntimeError, match="no room"):
-        trainer.go_on_from(fewer)
+        trainer.load_state(fewer)
     after, _ = trainer.checkpoint()
     for name in before:  # of photos that were not looked at yet, NaN
         np.testing.assert_array_equal(before[name], after[name])
