@@ -102,3 +102,22 @@ def test_least_is_on_a_step_and_above_what_was_asked():
 def test_refused(target, least):
     with pytest.raises(ValueError, match="expected"):
         Resolution(target, least)
+
+
+def growths(lasts: int, frames: int = 900) -> list[int]:
+    """Frames after which it grows; the larger scale is fast enough for its first `lasts` alone."""
+    control, larger, grown = Resolution(10.0, 0.25, scale=0.5), 0, []
+    for frame in range(frames):
+        before = control.scale
+        larger = larger + 1 if before > 0.5 else 0
+        control.seen(7.0 if before == 0.5 else 9.0 if larger <= lasts else 12.0)
+        if control.scale > before:
+            grown.append(frame)
+    return grown
+
+
+def test_growth_that_is_taken_back_waits_twice_as_long_unless_it_has_lasted():
+    """Five slow frames of eight are a median that is; then so many frames until the next try."""
+    waits = [gap - 5 - 10 for gap in np.diff(growths(10))]
+    assert waits[:5] == [2 * SEEN, 4 * SEEN, 8 * SEEN, 16 * SEEN, 16 * SEEN]  # and no longer
+    assert {gap - 5 - 20 for gap in np.diff(growths(20))} == {SEEN}

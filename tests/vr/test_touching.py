@@ -343,6 +343,8 @@ def test_without_a_floor_there_is_the_level_one_stands_on():
     assert ground_of(world)(*ends) is None
     point, fine = ground_of(world, 0.25)(*ends)
     assert fine and np.allclose(point, [1, 0.25, 1])
+    point, fine = ground_of(world)(np.array([0.0, 5, 2]), np.array([0.0, 5, -2]))
+    assert not fine and np.allclose(point, [0, 5, 0.05], atol=1e-3)  # nothing under the box
 
 
 def test_a_jump_into_a_world_of_bodies():

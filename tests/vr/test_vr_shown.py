@@ -90,6 +90,20 @@ def test_a_part_is_what_the_mirror_shows(ctx, shown):
     np.testing.assert_allclose(read(target), display[:, 22:42], atol=1 / 255)
 
 
+def test_a_part_of_the_same_pixels_is_interpolated(ctx, shown):
+    """The middle at twice its size, into as many pixels as the whole has."""
+    texture, display = picture(ctx)
+    target = ctx.framebuffer([ctx.texture(SIZE, 4, dtype="f4")])
+    shown.draw(texture, target, (0.25, 0.25, 0.5, 0.5))
+    wanted = display
+    for axis, count in enumerate(display.shape[:2]):
+        place = (np.arange(count) + 0.5) / 2 + count / 4 - 0.5  # pixels of the texture, from 0
+        below = np.floor(place).astype(int)
+        part = (place - below).reshape([-1 if i == axis else 1 for i in range(3)])
+        wanted = (1 - part) * wanted.take(below, axis) + part * wanted.take(below + 1, axis)
+    np.testing.assert_allclose(read(target), wanted, atol=2 / 255)  # 8 bits of a weight
+
+
 def test_the_middle_has_the_shape_of_the_window():
     assert middle((64, 48), (64, 48)) == WHOLE
     for into in ((100, 10), (10, 100), (7, 7), (64, 47)):

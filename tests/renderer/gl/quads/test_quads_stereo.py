@@ -122,6 +122,12 @@ def test_a_moving_head_allocates_once_and_a_narrow_driver_draws_twice(ctx, monke
             renderer.draw(at(distance))
         assert renderer.drawing.allocations == made and pair._targets.width == widest > 320
         near = [renderer.image(i).copy() for i in range(2)]
+        with Renderer(ctx, "quads") as other:  # whose first grid is too narrow for the second frame
+            other.update(scene)
+            other.draw(at(9.0))
+            other.draw(at(0.6))
+            for i in range(2):
+                np.testing.assert_array_equal(other.image(i), near[i])
         monkeypatch.setattr(renderer._gpu, "max_side", 320)
         monkeypatch.setattr(pair, "draw", lambda *a: pytest.fail("the grid is too wide"))
         renderer.draw(at(0.6))
