@@ -25,9 +25,7 @@ def test_the_bundled_package_is_small_whole_and_of_these_stops():
     assert model.stops == STOPS
     settings = model.provenance["settings"]
     assert settings["max_anchors"] == demo.MOST_ANCHORS
-    # It was trained when the setting had another name; `demo` makes it anew with this one.
-    share = settings.get("blended_shapes", settings.get("between_share"))
-    assert share == demo.BLENDED_SHAPES and model.encoding.d == len(STOPS)
+    assert settings["blended_shapes"] == demo.BLENDED_SHAPES and model.encoding.d == len(STOPS)
     assert model.provenance["iterations"] == settings["iterations"] == demo.ITERATIONS
     alive = []
     for stop in STOPS:
