@@ -7,8 +7,9 @@ import numpy as np
 
 from shapeshift.renderer.debug.letters import drawable, letters
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.panel.panel_picture import MUTED, SURFACE, TEXT
 
+# Display sRGB, lighter than on a desk: a headset's lenses take contrast away
+TEXT, MUTED, SURFACE = (240, 240, 242), (172, 175, 182), (26, 27, 31)
 EM, LINE_PX, PAD_PX, CORNER_PX = 40, 58, 26, 26  # of its picture
 METRES_PER_PIXEL = 0.00026  # letters of 10 mm: ten pixels high in an eye of 1,000 at 0.45 m
 HALF_CLEAR = 0.86  # opacity of the ground
@@ -51,7 +52,7 @@ def card_picture(lines: tuple[str, ...]) -> np.ndarray:
     draw, ink = ImageDraw.Draw(image), ImageDraw.Draw(mask)
     for row, (name, text) in enumerate(zip(names, texts, strict=True)):
         middle = PAD_PX - 7 + LINE_PX * (row + 0.5)
-        pieces = [(PAD_PX, name, TEXT, bold if text else font)]
+        pieces: list[tuple] = [(PAD_PX, name, TEXT, bold if text else font)]
         pieces += [(PAD_PX + left + gap, text, MUTED, font)] if text else []
         for x, word, colour, face in pieces:
             draw.text((x, middle), word, fill=colour, font=face, anchor="lm")

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import moderngl
 import numpy as np
 
 from shapeshift.scene.pose import Pose
@@ -15,9 +16,6 @@ from shapeshift.vr.frame import SIDES, Hand
 from shapeshift.vr.glove import Capsule, glove
 from shapeshift.vr.locomotion.locomotion import Comfort
 from shapeshift.vr.panel.carried import Carried
-from shapeshift.vr.panel.panel_layout import lay_out
-from shapeshift.vr.panel.panel_place import play_point
-from shapeshift.vr.panel.panel_state import Panel
 from shapeshift.vr.touching import Beam, Touched
 
 FINE, WRONG, PALE = (0.96, 0.66, 0.30), (0.90, 0.32, 0.26), (0.92, 0.93, 0.96)  # display sRGB
@@ -30,13 +28,21 @@ CALM, NOTHING = Comfort(), Touched()
 
 
 @dataclass(frozen=True)
+class PanelQuad:
+    """The panel's picture, and where it hangs."""
+
+    texture: moderngl.Texture  # display sRGB, opaque, row 0 below; with its smaller levels
+    play_from_panel: Pose
+    size_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Drawn:
     """One frame's worth, the same for both eyes."""
 
     hands: tuple[Capsule, ...] = ()  # lit and solid
     lines: tuple[Capsule, ...] = ()  # they shine, and may fade out
-    panel: Panel | None = None
-    play_from_panel: Pose | None = None
+    panel: PanelQuad | None = None
     cards: tuple[Card, ...] = ()
     vignette: float = 0.0  # 0..1
     blink: float = 0.0  # 0..1
@@ -49,6 +55,7 @@ def drawn_of(
     touched: Touched = NOTHING,
     outlines: Sequence[Capsule] = (),
     cards: tuple[Card, ...] = (),
+    panel: moderngl.Texture | None = None,
 ) -> Drawn:
     """What a frame shows; `hands` as the runtime has them, before the panel takes its part."""
     lines: list[Capsule] = list(outlines)
@@ -61,25 +68,26 @@ def drawn_of(
     if comfort.arc is not None:
         lines += arc(comfort.arc.points, comfort.arc.landing, comfort.arc.fine)
     solid = [part for side in SIDES for part in glove(side, hands[side], side in holds)]
-    panel = carried.panel if carried.play_from_panel is not None else None
-    return Drawn(tuple(solid), tuple(lines), panel, carried.play_from_panel, cards,
-                 comfort.vignette, comfort.blink)  # fmt: skip
+    quad = None
+    if panel is not None and carried.play_from_panel is not None:
+        quad = PanelQuad(panel, carried.play_from_panel, carried.plane.size_m)
+    dark = comfort.vignette, comfort.blink
+    return Drawn(tuple(solid), tuple(lines), quad, cards, *dark)
 
 
 def ray(side: str, hand: Hand, carried: Carried, beam: Beam | None) -> list[Capsule]:
     """A thin ray along the aim: to the panel where it points at it, to what the trigger acts on,
     else it fades out.
     """
-    panel, pose = carried.panel, carried.play_from_panel
-    if hand.aim is None or side == panel.side:
+    pose, pointing = carried.play_from_panel, carried.pointing
+    if hand.aim is None or (carried.open and side == carried.home):
         return []
     along = -hand.aim.matrix()[:3, 2]
     start = hand.aim.position
-    at = carried.places.get(side)
-    if side in panel.hovers and at is not None and pose is not None:
-        dot = play_point(pose, lay_out(panel), at)
-        color = FINE if side in carried.pointing.down else PALE
-        if side in carried.pointing.near:
+    if carried.on_panel and pointing.at is not None and pose is not None:
+        dot = carried.plane.play_point(pose, pointing.at)
+        color = FINE if pointing.down else PALE
+        if pointing.near:
             return [Capsule(dot, dot, (FINGER_DOT_M, FINGER_DOT_M), (*color, 1.0))]
         return _beam(start, dot, along, color, RAY_THICK)
     if beam is not None:

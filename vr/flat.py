@@ -1,4 +1,4 @@
-"""Flat pictures in the room: the panel and cards, each a texture that is kept while it is right."""
+"""Flat pictures in the room: the panel's texture, and cards, kept while they are right."""
 
 from collections.abc import Callable, Hashable
 
@@ -33,10 +33,25 @@ class Flats:
         before = self._kept.get(slot)
         if before is None or before[0] != key:
             self._kept[slot] = key, self._upload(make(), before[1] if before else None)
+        self._render(self._kept[slot][1], clip_from_flat, size_m, opacity, 0.0, True)
+
+    def show(
+        self, texture: moderngl.Texture, clip_from_flat: np.ndarray, size_m: tuple[float, float],
+        corner_m: float,
+    ) -> None:  # fmt: skip
+        """Draws a texture of somebody else's, opaque, row 0 below, with round corners."""
+        self._render(texture, clip_from_flat, size_m, 1.0, corner_m, False)
+
+    def _render(
+        self, texture: moderngl.Texture, clip_from_flat: np.ndarray, size_m: tuple[float, float],
+        opacity: float, corner_m: float, top_first: bool,
+    ) -> None:  # fmt: skip
         program = self._program
-        self._kept[slot][1].use(0)
+        texture.use(0)
         program["picture"].value = 0
         program["opacity"].value = opacity
+        program["corner"].value = corner_m
+        program["top_first"].value = top_first
         program["clip_from_panel"].write(clip_from_flat.T.astype(np.float32).tobytes())
         program["half_size"].value = tuple(side / 2 for side in size_m)
         self._corners.render(moderngl.TRIANGLE_STRIP, vertices=4)

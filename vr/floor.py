@@ -76,7 +76,7 @@ class Floor:
         program["spacing_m"].value, program["finer"].value = spacing, finer
         program["clearness"].value = grid.clearness
         from_array = isinstance(coverage, np.ndarray)
-        texture = self._upload(coverage) if from_array else coverage
+        texture = self._upload(coverage) if isinstance(coverage, np.ndarray) else coverage
         texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         texture.use(0)
         program["coverage"].value, program["top_first"].value = 0, from_array

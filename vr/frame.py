@@ -34,6 +34,24 @@ class Hand:
 LOST = Hand()
 
 
+class HandLost(Exception):
+    """A pose was asked of a hand that has none: callers look first."""
+
+
+def grip_of(hand: Hand) -> Pose:
+    """play_from_grip of a hand that is there.  Raises HandLost."""
+    if hand.grip is None:
+        raise HandLost
+    return hand.grip
+
+
+def aim_of(hand: Hand) -> Pose:
+    """play_from_aim of a hand that points.  Raises HandLost."""
+    if hand.aim is None:
+        raise HandLost
+    return hand.aim
+
+
 @dataclass(frozen=True)
 class Pulse:
     """A buzz for a hand."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shapeshift.vr.frame import Hand
+from shapeshift.vr.frame import Hand, grip_of
 
 GLOVE, CUFF, LIT = (0.82, 0.83, 0.86), (0.30, 0.31, 0.35), (0.96, 0.66, 0.30)  # display sRGB
 WRIST = np.array([0.020, 0.058, 0.0])  # metres, right hand
@@ -40,9 +40,9 @@ def glove(side: str, hand: Hand, holds: bool = False) -> list[Capsule]:
     if hand.grip is None:
         return []
     to_play = hand.grip.matrix()[:3, :3] * MIRROR[side]  # columns: of the right hand's frame
+    at = hand.grip.position
 
     def put(a, b, radii, color) -> Capsule:
-        at = hand.grip.position
         return Capsule(to_play @ a + at, to_play @ b + at, radii, color)
 
     parts = []
@@ -72,7 +72,8 @@ def fingertip(side: str, hand: Hand) -> np.ndarray:
     joints = _finger(0, side, Hand(True, hand.grip, hand.aim))
     along = _unit(joints[3] - joints[2])
     tip = (joints[3] + along * THICK[3]) * MIRROR[side]
-    return hand.grip.matrix()[:3, :3] @ tip + hand.grip.position
+    grip = grip_of(hand)
+    return grip.matrix()[:3, :3] @ tip + grip.position
 
 
 def _knuckle(across: float) -> np.ndarray:
@@ -102,7 +103,7 @@ def _ahead(side: str, hand: Hand) -> np.ndarray:
     ahead = np.array([0.0, -1.0, 0.0])
     if hand.aim is None:
         return ahead
-    aim = hand.grip.matrix()[:3, :3].T @ -hand.aim.matrix()[:3, 2]
+    aim = grip_of(hand).matrix()[:3, :3].T @ -hand.aim.matrix()[:3, 2]
     if side == "left":
         aim[0] = -aim[0]
     angle = np.arccos(np.clip(aim @ ahead, -1, 1))

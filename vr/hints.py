@@ -8,7 +8,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.vr.card import Card
 from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.locomotion.locomotion import Rules
-from shapeshift.vr.panel.panel_place import facing
+from shapeshift.vr.panel.plane import facing
 
 SHOWN_S, FADES_S = 10.0, 1.0  # seconds of a session, and the last of them
 ASIDE_M, ABOVE_M = 0.15, 0.02  # from the grip to the middle of the card, outwards and up

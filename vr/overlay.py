@@ -13,8 +13,6 @@ from shapeshift.vr.card import card_picture
 from shapeshift.vr.drawn import Drawn
 from shapeshift.vr.flat import Flats
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.panel.panel_layout import lay_out
-from shapeshift.vr.panel.panel_picture import panel_picture, picture_key
 from shapeshift.vr.shown import SHADERS
 
 
@@ -35,13 +33,15 @@ NAMES = ("a", "b", "radii", "color_a", "color_b")
 ROOM = 256  # capsules that the buffer has room for at first
 CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])  # of a flat picture, halves of its sides
 SPARE = 3  # pixels around what is drawn: lines are widened to nearly one
+PANEL_CORNER_M = 0.011  # radius
 OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+
 
 PixelBox = tuple[int, int, int, int]  # left, bottom, width, height
 
 
 class Overlay:
-    """Programs, the capsule's mesh, pictures of the panel and cards; use it in a `with`.
+    """Programs, the capsule's mesh, pictures of cards; use it in a `with`.
 
     The context may be anybody's: nothing is enabled afterwards, and bound is what was bound.
     """
@@ -68,17 +68,18 @@ class Overlay:
         ctx = self._ctx
         before = ctx.fbo or ctx.detect_framebuffer(0)
         try:
-            if box is not None:
-                self._draw_things(framebuffer.size, play_view, drawn, box)
-            self._lay_over(framebuffer, play_view, drawn, box)
+            things = self._draw_things(framebuffer.size, play_view, drawn, box) if box else None
+            self._lay_over(framebuffer, play_view, drawn, box, things)
         finally:
             ctx.enable_only(moderngl.NOTHING)
             before.use()
 
-    def _draw_things(self, size: tuple[int, int], view: View, drawn: Drawn, box: PixelBox) -> None:
+    def _draw_things(
+        self, size: tuple[int, int], view: View, drawn: Drawn, box: PixelBox
+    ) -> moderngl.Texture:
         """Hands, the panel, then what may be seen through, each behind what is nearer."""
-        target, ctx = self._target_of(size), self._ctx
-        target.scissor = self._resolved.scissor = box
+        (target, resolved), ctx = self._targets_of(size), self._ctx
+        target.scissor = resolved.scissor = box
         target.use()
         target.depth_mask = True
         target.clear(viewport=box)
@@ -93,9 +94,10 @@ class Overlay:
         target.depth_mask = False
         self._draw_capsules(drawn.lines, view, clip_from_play, False)
         target.depth_mask = True
-        if self._resolved is not target:
-            self._resolved.use()  # its scissor bounds the copy
-            ctx.copy_framebuffer(self._resolved, target)
+        if resolved is not target:
+            resolved.use()  # its scissor bounds the copy
+            ctx.copy_framebuffer(resolved, target)
+        return resolved.color_attachments[0]
 
     def _draw_capsules(
         self, capsules: tuple[Capsule, ...], view: View, clip_from_play: np.ndarray, lit: bool
@@ -119,9 +121,8 @@ class Overlay:
         """The panel, then the cards, over what lies behind them."""
         panel = drawn.panel
         if panel is not None:
-            clip = clip_from_play @ drawn.play_from_panel.matrix()
-            key, picture = picture_key(panel), partial(panel_picture, panel)
-            self._flats.draw("panel", key, picture, clip, lay_out(panel).size_m)
+            clip = clip_from_play @ panel.play_from_panel.matrix()
+            self._flats.show(panel.texture, clip, panel.size_m, corner_m=PANEL_CORNER_M)
         for number, card in enumerate(drawn.cards):
             clip = clip_from_play @ card.play_from_card.matrix()
             picture = partial(card_picture, card.lines)
@@ -129,12 +130,13 @@ class Overlay:
             self._flats.draw(slot, card.lines, picture, clip, card.size_m, card.opacity)
 
     def _lay_over(
-        self, framebuffer: moderngl.Framebuffer, view: View, drawn: Drawn, box: PixelBox | None
-    ) -> None:
+        self, framebuffer: moderngl.Framebuffer, view: View, drawn: Drawn, box: PixelBox | None,
+        things: moderngl.Texture | None,
+    ) -> None:  # fmt: skip
         dark = drawn.vignette > 0 or drawn.blink > 0
         program = self._over
-        if box is not None:
-            self._resolved.color_attachments[0].use(0)
+        if things is not None:
+            things.use(0)
         program["drawn"].value = 0
         program["box"].value = box or (0, 0, 0, 0)
         program["tangents"].value = view.tangents
@@ -148,25 +150,30 @@ class Overlay:
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
         framebuffer.scissor = scissor
 
-    def _target_of(self, size: tuple[int, int]) -> moderngl.Framebuffer:
-        """Made anew only when the size of the eyes changes."""
-        if self._target is None or self._target.size != tuple(size):
+    def _targets_of(
+        self, size: tuple[int, int]
+    ) -> tuple[moderngl.Framebuffer, moderngl.Framebuffer]:
+        """With several samples a pixel, and with one; made anew when the eyes' size changes."""
+        if self._target is not None and self._resolved is not None:
+            if self._target.size == tuple(size):
+                return self._target, self._resolved
             self._release_targets()
-            ctx, samples = self._ctx, min(self.detail.samples, self._ctx.max_samples)
-            depth = ctx.depth_renderbuffer(size, samples=samples)
-            self._resolved = ctx.framebuffer([ctx.texture(size, 4)], None if samples else depth)
-            self._target = self._resolved
-            if samples:
-                colors = ctx.renderbuffer(size, 4, samples=samples)
-                self._target = ctx.framebuffer([colors], depth)
-        return self._target
+        ctx, samples = self._ctx, min(self.detail.samples, self._ctx.max_samples)
+        depth = ctx.depth_renderbuffer(size, samples=samples)
+        target = resolved = ctx.framebuffer([ctx.texture(size, 4)], None if samples else depth)
+        if samples:
+            target = ctx.framebuffer([ctx.renderbuffer(size, 4, samples=samples)], depth)
+        self._target, self._resolved = target, resolved
+        return target, resolved
 
     def _vertices(self) -> moderngl.VertexArray:
         parts = [(self._mesh, "3f 1f", "ball", "upper"), (self._instances, INSTANCE, *NAMES)]
         return self._ctx.vertex_array(self._capsule, parts, self._faces)
 
     def _release_targets(self) -> None:
-        for framebuffer in {self._target, self._resolved} - {None}:
+        for framebuffer in {self._target, self._resolved}:
+            if framebuffer is None:
+                continue
             for part in (*framebuffer.color_attachments, framebuffer.depth_attachment):
                 if part is not None:
                     part.release()
@@ -199,7 +206,7 @@ def box_of(drawn: Drawn, view: View, size: tuple[int, int]) -> PixelBox | None:
     radii = [c.radii[0] for c in capsules] + [c.radii[1] for c in capsules]
     flats = [(card.play_from_card, card.size_m) for card in drawn.cards]
     if drawn.panel is not None:
-        flats.append((drawn.play_from_panel, lay_out(drawn.panel).size_m))
+        flats.append((drawn.panel.play_from_panel, drawn.panel.size_m))
     for pose, (width_m, height_m) in flats:
         axes = pose.matrix()[:3, :2] * (width_m / 2, height_m / 2)
         places += [pose.position + axes @ corner for corner in CORNERS]
@@ -221,8 +228,8 @@ def box_of(drawn: Drawn, view: View, size: tuple[int, int]) -> PixelBox | None:
     per_tangent = np.array([width / (right - left), height / (up - down)])
     first = np.floor((low - (left, down)) * per_tangent).clip(SPARE, size) - SPARE
     last = np.ceil((high - (left, down)) * per_tangent + SPARE).clip(0, size)
-    box = (*map(int, first), *map(int, last - first))
-    return box if box[2] > 0 and box[3] > 0 else None
+    wide, high_px = map(int, last - first)
+    return (int(first[0]), int(first[1]), wide, high_px) if wide > 0 and high_px > 0 else None
 
 
 def columns(matrix: np.ndarray) -> bytes:

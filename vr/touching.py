@@ -10,7 +10,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.frame import SIDES, Frame, Hand, Pulse
+from shapeshift.scene.world.world import World
+from shapeshift.vr.frame import SIDES, Frame, Hand, Pulse, aim_of
 from shapeshift.vr.locomotion.locomotion import GRIPS_AT, LETS_GO_AT
 from shapeshift.vr.locomotion.play_space import Standing
 
@@ -65,7 +66,9 @@ class Touched:
     offers: tuple[Offer, ...] = ()
 
 
-def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[Touching, Touched]:
+def touch(
+    world: World, touching: Touching, frame: Frame, standing: Standing
+) -> tuple[Touching, Touched]:
     """Moves the hands in the world, takes, lets go and acts.
 
     A hand that comes back squeezing or pulling does nothing by that: it has to open first.
@@ -79,13 +82,14 @@ def touch(world, touching: Touching, frame: Frame, standing: Standing) -> tuple[
     # What begins in this frame; of hands that are back nothing does.
     squeezes = (now.squeezing - touching.squeezing) & touching.seen
     pulls = (now.pulling - touching.pulling) & touching.seen
-    pulls = {side for side in pulls if frame.hands[side].aim is not None}
+    pulls = frozenset(side for side in pulls if frame.hands[side].aim is not None)
     busy = now.squeezing & (touching.busy | (now.seen - touching.seen))
     palms = {s: place(world, s, frame.hands[s], standing, frame.recentred) for s in SIDES}
     let_go = [s for s in SIDES if s not in now.squeezing and world.held(s) is not None]
     for side in let_go:
         world.release(side)
-    taken = [s for s in SIDES if s in squeezes and take(world, s, palms[s], standing)]
+    grasps = [(s, palm) for s, palm in palms.items() if palm is not None and s in squeezes]
+    taken = [s for s, palm in grasps if take(world, s, palm, standing)]
     busy |= set(taken)
     # Of a controller with one button taking is all it does, and what it acted on is all it has.
     acting = pulls - set(taken)
@@ -114,7 +118,7 @@ def pressed(
     return frozenset(s for s, hand in hands if getattr(hand, what) >= at[1 if s in before else 0])
 
 
-def place(world, side: str, hand: Hand, standing: Standing, jumps: bool) -> Pose | None:
+def place(world: World, side: str, hand: Hand, standing: Standing, jumps: bool) -> Pose | None:
     """Where the palm is in the world, told to the world; None: lost, and it has let go."""
     if not hand.active or hand.grip is None:
         world.move_hand(side, None)
@@ -126,7 +130,7 @@ def place(world, side: str, hand: Hand, standing: Standing, jumps: bool) -> Pose
     return palm
 
 
-def jump(world, side: str, palm: Pose) -> None:
+def jump(world: World, side: str, palm: Pose) -> None:
     """What a hand holds goes there with it at once, through whatever lies between.
 
     Another hand that holds it too has gone along, and is there already when its turn comes.
@@ -136,19 +140,21 @@ def jump(world, side: str, palm: Pose) -> None:
         world.carry(side, moved)
 
 
-def take(world, side: str, palm: Pose, standing: Standing) -> bool:
+def take(world: World, side: str, palm: Pose, standing: Standing) -> bool:
     """Takes the nearest object within reach."""
     reach = REACH_M * standing.scale
     return world.nearest(palm.position, reach) is not None and bool(world.grab(side, reach))
 
 
-def touched(world, palm: Pose | None, standing: Standing) -> str | None:
+def touched(world: World, palm: Pose | None, standing: Standing) -> str | None:
     """The object at a palm."""
     found = world.nearest(palm.position, SKIN_M * standing.scale) if palm is not None else None
     return found[0] if found else None
 
 
-def offered(world, side: str, hand: Hand, palm: Pose | None, standing: Standing) -> Offer | None:
+def offered(
+    world: World, side: str, hand: Hand, palm: Pose | None, standing: Standing
+) -> Offer | None:
     """What a squeeze would take; else what a pull of the trigger would reach that answers to it."""
     if palm is None:
         return None
@@ -169,19 +175,20 @@ def shows(hand: Hand) -> bool:
     return hand.aim is not None and hand.trigger >= SHOWS_AT
 
 
-def beam(world, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam:
+def beam(world: World, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam:
     """Along the hand's aim; it acts on what it meets first."""
-    aim = standing.pose(hand.aim)
+    room = aim_of(hand)
+    aim = standing.pose(room)
     along = -aim.matrix()[:3, 2]
     hit = (world.ray if acts else world.aim)(aim.position, along)
     length = BEAM_M if hit is None else hit.distance_m / standing.scale  # metres of the room
-    start = hand.aim.position
-    end = start - hand.aim.matrix()[:3, 2] * min(length, BEAM_M)
+    start = room.position
+    end = start - room.matrix()[:3, 2] * min(length, BEAM_M)
     meets = hit.object if hit is not None and hit.object in world.objects else None
     return Beam(side, start, end, meets, acts)
 
 
-def answers(world, name: str | None) -> bool:
+def answers(world: World, name: str | None) -> bool:
     """Whether an object has something to do when a ray hits it."""
     return name is not None and any(r.on == "ray" for r in world.objects[name].machine.reactions)
 
@@ -195,13 +202,13 @@ def at_rest(frame: Frame, touching: Touching) -> Frame:
     return replace(frame, hands=hands)
 
 
-def follow(world, frame: Frame, standing: Standing, jumps: bool) -> None:
+def follow(world: World, frame: Frame, standing: Standing, jumps: bool) -> None:
     """The hands where the room has been moved to; at a jump, with what they hold."""
     for side in SIDES:
         place(world, side, frame.hands[side], standing, jumps)
 
 
-def feel(world, records: Iterable) -> tuple[Pulse, ...]:
+def feel(world: World, records: Iterable) -> tuple[Pulse, ...]:
     """What held objects struck or were struck by in these steps, one pulse a hand."""
     sides = {side: world.held(side) for side in SIDES}
     pulses = []

@@ -107,7 +107,8 @@ def asked_settings(
     settings = renderer.settings
     if options.settings:
         named = named_settings(options.settings, drawing)
-        distances = distances_of(subject.points(), orbit_path(8, *subject.bounds(), size))
+        centre, radius = subject.bounds()
+        distances = distances_of(subject.points(), orbit_path(8, centre, radius, size))
         settings = render_settings(named, settings.background, drawing, distances)
     if options.target and drawing != "quads":
         raise UsageError(f"--target is what quads blend into, and {drawing} are drawn here.")

@@ -122,7 +122,7 @@ def wear(options: Options) -> int:
     from shapeshift.vr.openxr.session import Session
 
     with Instance() as instance:
-        document, world = open_xr(options.scene or DEMO, options, options.x)
+        document, editor = open_xr(options.scene or DEMO, options, options.x)
         pacing = Pacing(
             document.background_or(DARK), options.quality, options.floor_db or FLOOR_DB,
             options.target_ms, options.stereo_colors,
@@ -135,12 +135,13 @@ def wear(options: Options) -> int:
             Session(instance, mirror.ctx, options.eye_part, options.pixels) as session,
             Renderer(mirror.ctx, options.drawing) as renderer,
             Eyes(mirror.ctx, session.sizes) as eyes,
+            editor.bodies,
         ):
             rules = Rules(options.walking_hand, options.turning, vignette=options.vignette)
             for profile in session.hands.refused:
                 say(f"{instance.runtime} does not know {profile}.")
             xr_app = XrApp(
-                session, renderer, eyes, mirror, document, world, pacing, report, rules,
+                session, renderer, eyes, mirror, document, editor, pacing, report, rules,
                 options.panel_hand, options.floor, options.hints,
             )  # fmt: skip
             try:

@@ -1,7 +1,7 @@
 """What a run in the headset leaves behind for tests and benchmarks: a report, lines, pictures."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -21,7 +21,6 @@ from shapeshift.vr.frame import SIDES, Frame, Hand
 from shapeshift.vr.openxr.life import Life
 from shapeshift.vr.openxr.swapchain import read
 from shapeshift.vr.pace import Pace
-from shapeshift.vr.panel.carried import Carried, panel_row
 
 DECIMALS = 6
 
@@ -32,7 +31,7 @@ class DoneFrame:
 
     frame: Frame
     state: XrState
-    carried: Carried  # the menu
+    panel: Callable[[], dict]  # what a line says of it
     pulses: Sequence[tuple[str, float, float]]  # side, strength, seconds
     records: Sequence[Record]
     life: Life
@@ -114,7 +113,7 @@ def frame_row(done: DoneFrame) -> dict:
             thing.name: {**pose_row(thing.world_from_object), "x": control_row(thing.x, DECIMALS)}
             for thing in world.drawn().objects
         },
-        "panel": panel_row(done.carried),
+        "panel": done.panel(),
         "events": [event for record in done.records for event in record.events],
         "pulses": [[side, rounded(strength), rounded(s)] for side, strength, s in done.pulses],
         "own_ms": rounded(times[-1]) if times else None,

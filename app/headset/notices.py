@@ -6,7 +6,7 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.card import Card
-from shapeshift.vr.panel.panel_place import facing
+from shapeshift.vr.panel.plane import facing
 
 WITHIN_S, LATE = 2.0, 3  # so many frames late in that time; fewer are nobody's business
 SHOWN_S, QUIET_S = 4.0, 30.0  # so long it is said, and then not for so long

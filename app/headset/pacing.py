@@ -18,7 +18,7 @@ from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 
 AUTO = "auto"
-FIXED = {  # quality of the panel -> row of the quick chart that it always is
+FIXED: dict[str, str] = {  # quality of the panel -> row of the quick chart that it always is
     "best": "",
     "balanced": "sort 4, colours 5°, 1 px",
     "fast": "the same at 50 %",
@@ -66,7 +66,7 @@ class Pacing:
         """Of the next frame."""
         if self.quality != AUTO:
             settings = replace(self._exact, **QUICK.get(FIXED[self.quality], {}))
-        elif self.choice is None:
+        elif self.choice is None or self._resolution is None:
             settings = self._exact
         else:
             scale, background = self._resolution.scale, self._exact.background

@@ -1,30 +1,41 @@
-"""The panel of a headset with its scene: what it tells of the world, and its wishes granted."""
+"""The panel of a headset with its scene: the editor's own sections, pointed at with a ray."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.panel import Section, draw_sections
+from shapeshift.app.editor.panels.scale_bar import has_scale
+from shapeshift.app.editor.panels.sections.look_panel import draw_look
+from shapeshift.app.editor.panels.sections.objects_panel import draw_object_list
+from shapeshift.app.editor.panels.sections.stops_panel import draw_stops
+from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
+from shapeshift.app.editor.panels.slider import track_ends
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.state.arrange import steer_by_hand
+from shapeshift.app.editor.state.object_edits import ObjectEdits
+from shapeshift.app.editor.state.track import ON_STOP, shown_stop
+from shapeshift.app.headset.panel_picture import PANEL, UI_SCALE, PanelPicture
+from shapeshift.app.headset.room_section import (
+    Foot,
+    RoomActions,
+    draw_head,
+    draw_help,
+    draw_room,
+    draw_scale,
+)
 from shapeshift.app.headset.xr_user import XrState
-from shapeshift.scene.document.scene_file import named_stops
-from shapeshift.scene.world.follow import reset_objects
-from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame
 from shapeshift.vr.locomotion.stance import resized
-from shapeshift.vr.panel.carried import Carried, carry
-from shapeshift.vr.panel.panel_state import (
-    Exit,
-    Facts,
-    Pulse,
-    PutBack,
-    Recentre,
-    SetFloor,
-    SetQuality,
-    SetScale,
-    SetX,
-    Slider,
-    Wish,
-)
+from shapeshift.vr.panel.carried import Carried, carry, left_over
+from shapeshift.vr.panel.plane import Place
+from shapeshift.vr.panel.stick import MIDDLE, scroll, slide
 
-HINT = "menu button or palm up: open, close    stick: slide"
+TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at
+CLICK = (0.6, 0.025)  # when it is pressed, and when the knob comes to a stop
+SETTLE_FRAMES = 4  # after a change: what it changes in turn, and ImGui's own fading
+Vec = imgui.ImVec2
 
 
 @dataclass(frozen=True)
@@ -37,65 +48,176 @@ class MenuActions:
 
 
 class WristMenu:
-    """Keeps the panel between frames; `carried` is what is drawn."""
+    """Keeps the panel between frames; `carried` is where it is, `picture` what is on it."""
 
-    def __init__(self, state: XrState, actions: MenuActions, hand: str = "left") -> None:
-        self._state, self._actions = state, actions
-        self.carried = Carried(home=hand)
+    def __init__(
+        self, state: XrState, actions: MenuActions, picture: PanelPicture, hand: str = "left"
+    ) -> None:
+        self._state, self._actions, self.picture = state, actions, picture
+        self.carried = Carried(PANEL, home=hand)
+        self._frame: Frame | None = None  # that is under way
+        self._seconds = 0.0
         self._held: dict[str, str | None] = {}
+        room = RoomActions(self._recentre, self._resize, lambda: actions.leave("from the panel"))
+        self._foot = Foot(room)
+        self._sections = self._make_sections(room)
+        self._key: tuple = ()  # what the picture was drawn of
+        self._unsettled = 0
+
+    def _make_sections(self, room: RoomActions) -> list[Section]:
+        """The headset's own, and those of the desktop's panel that need no keys and no window."""
+        state, editor = self._state, self._state.editor
+        objects = ObjectEdits(editor, None, lambda: None)
+        return [
+            Section("Room", lambda scale: draw_room(state, room), open_first=True),
+            Section(
+                "Scale",
+                lambda scale: draw_scale(editor, scale),
+                open_first=True,
+                shown=lambda: has_scale(editor.scene),
+            ),
+            Section("Touch", lambda scale: draw_touch(state.touch, scale, False), open_first=True),
+            Section("Stops", lambda scale: draw_stops(editor, scale)),
+            Section("Look", lambda scale: draw_look(editor, scale)),
+            Section("Objects", lambda scale: draw_object_list(objects, scale)),
+            Section("Help", lambda scale: draw_help()),
+        ]
 
     def act(self, frame: Frame, seconds: float) -> Frame:
-        """What hands do to the panel, and what it wishes; the frame with what it leaves of them."""
-        facts = facts_of(self._state, HINT)
-        self._follow_hands(facts)
-        self.carried, wishes, hands = carry(self.carried, facts, frame, seconds)
-        for wish in wishes:
-            grant(wish, self._state, self._actions, frame)
-        return replace(frame, hands=hands)
+        """What hands do to the panel; the frame with what it leaves of them."""
+        self._frame, self._seconds = frame, seconds
+        self._follow_hands()
+        carried = self.carried = carry(self.carried, frame, seconds)
+        if carried.open:
+            notches = self._push_sticks(frame, seconds)
+            self._draw(notches, seconds)
+        else:
+            self._foot.sure_s, self._key = 0.0, ()
+        return replace(frame, hands=left_over(self.carried, frame.hands))
 
-    def _follow_hands(self, facts: Facts) -> None:
+    def _push_sticks(self, frame: Frame, seconds: float) -> float:
+        """The carrying hand's stick slides; returns the notches that the other one scrolls."""
+        carried, editor = self.carried, self._state.editor
+        sticks = dict(carried.sticks)
+        home, other = carried.home, carried.pointer
+        before = sticks.get(home, MIDDLE)
+        if editor.sliders and not carried.pointing.pressing:
+            index = editor.sliders[0]
+            x = editor.scene.objects[index].slider_x
+            stick = frame.hands[home].stick
+            sticks[home], moved = slide(before, stick, x, editor.stops(index), seconds)
+            if moved != x:
+                steer_by_hand(editor, index, moved)
+                self._pulse_at_stop(home, index)
+        does, notches = scroll(
+            sticks.get(other, MIDDLE), frame.hands[other].stick, carried.on_panel, seconds
+        )
+        sticks[other] = does
+        self.carried = replace(carried, sticks=sticks)
+        return notches
+
+    def _draw(self, notches: float, seconds: float) -> None:
+        """Only while something changes, or a hand is on it."""
+        pointing, picture = self.carried.pointing, self.picture
+        key = self._shown()
+        if self.carried.on_panel or notches or key != self._key:
+            self._key, self._unsettled = key, SETTLE_FRAMES
+        if self._unsettled == 0:
+            return
+        self._unsettled -= 1
+        editor, side = self._state.editor, self.carried.pointer
+        before = picture.hovered, picture.active
+        xs = [thing.slider_x for thing in editor.scene.objects]
+        picture.draw(self._fill, pointing, notches, seconds)
+        if picture.active and not before[1] and before[0]:
+            self._actions.pulse(side, *CLICK)
+        elif picture.hovered not in (0, before[0]) and not picture.active:
+            self._actions.pulse(side, *TICK)
+        for index, (thing, x) in enumerate(zip(editor.scene.objects, xs, strict=False)):
+            if picture.active and thing.slider_x != x:
+                self._pulse_at_stop(side, index)
+
+    def _shown(self) -> tuple:
+        """What the panel tells; equal as long as its picture is right."""
+        state, editor = self._state, self._state.editor
+        things = tuple((t.name, t.visible, t.slider_x) for t in editor.scene.objects)
+        playing = tuple(sweep.playing for sweep in editor.sweeps)
+        return (
+            things, playing, editor.chosen, editor.palette, editor.settings.debug,
+            editor.settings.background, tuple(editor.messages.problems), tuple(state.touch.told),
+            state.world.paused, state.pacing.quality, state.standing.scale, state.floor_shown,
+            self._foot.sure_s > 0,
+        )  # fmt: skip
+
+    def _fill(self) -> None:
+        """All of the panel: its head and foot stay, the sections between them scroll."""
+        flags, style = imgui.WindowFlags_, imgui.get_style()
+        imgui.set_next_window_pos(Vec(0, 0))
+        imgui.set_next_window_size(Vec(*PANEL.size))
+        still = flags.no_decoration | flags.no_move | flags.no_saved_settings
+        imgui.begin("##panel", None, still | flags.no_scroll_with_mouse)
+        draw_head(self._state.editor, UI_SCALE)
+        foot = imgui.get_frame_height() + style.item_spacing.y
+        imgui.begin_child("sections", Vec(0, -foot))
+        draw_sections(self._sections, UI_SCALE)
+        imgui.end_child()
+        self._foot.draw(self._seconds)
+        imgui.end()
+
+    def _recentre(self) -> None:
+        if self._frame is not None:
+            self._actions.recentre(self._frame)
+
+    def _resize(self, scale: float) -> None:
+        state = self._state
+        if self._frame is not None:
+            state.standing = resized(state.standing, self._frame.head, scale)
+            state.user.jumped()
+
+    def _pulse_at_stop(self, side: str, index: int) -> None:
+        editor = self._state.editor
+        x = editor.scene.objects[index].slider_x
+        if any(abs(stop.x - x) <= ON_STOP for stop in editor.stops(index)):
+            self._actions.pulse(side, *CLICK)
+
+    def _follow_hands(self) -> None:
         """The slider of what a hand takes is the one that is shown."""
-        held = dict(self._state.user.touched.held)
-        names = {slider.name for slider in facts.sliders}
+        held, editor = dict(self._state.user.touched.held), self._state.editor
+        names = {editor.scene.objects[index].name for index in editor.movable}
         for side, name in held.items():
-            if name in names and self._held.get(side) != name:
-                panel = replace(self.carried.panel, chosen=name)
-                self.carried = replace(self.carried, panel=panel)
+            if name is not None and name in names and self._held.get(side) != name:
+                editor.chosen = name
         self._held = held
 
+    def row(self) -> dict:
+        """What a line of a report says of the panel: which stop is shown, and where in the room,
+        (3,) metres, its knob, the ends of its slider and the middles of its items are.
+        """
+        carried, editor = self.carried, self._state.editor
+        thing, shown = None, ""
+        for index in editor.sliders[:1]:
+            thing = editor.scene.objects[index]
+            shown = shown_stop(editor.stops(index), thing.slider_x)
+        side = carried.home if carried.open else ""
+        row: dict = {"open": carried.open, "hand": side, "shown": shown}
+        pose = carried.play_from_panel
+        if pose is None:
+            return row
 
-def facts_of(state: XrState, note: str = "") -> Facts:
-    """What the panel tells in this frame."""
-    scale, floor = state.standing.scale, state.floor_shown
-    return Facts(sliders_of(state.world), state.pacing.quality, scale, note, floor)
+        def place(at: Place) -> list[float]:
+            return [round(float(number), 6) for number in PANEL.play_point(pose, at)]
 
-
-def sliders_of(world: World) -> tuple[Slider, ...]:
-    """Of the objects that are seen and have somewhere to go, in the scene's order."""
-    return tuple(
-        Slider(name, stops, thing.drawn.model.blend.slider_x(thing.reaction_state.x))
-        for name, thing in world.objects.items()
-        if thing.drawn.visible and len(stops := named_stops(thing.item, thing.drawn.model)) > 1
-    )
-
-
-def grant(wish: Wish, state: XrState, actions: MenuActions, frame: Frame) -> None:
-    """One wish of the panel."""
-    match wish:
-        case SetX(name, x):
-            state.world.control(name, x)
-        case SetQuality(name):
-            state.pacing.quality = name
-        case SetScale(scale):
-            state.standing = resized(state.standing, frame.head, scale)
-            state.user.jumped()
-        case Recentre():
-            actions.recentre(frame)
-        case PutBack():
-            reset_objects(state.world)
-        case SetFloor(shown):
-            state.floor_shown = shown
-        case Exit():
-            actions.leave("from the panel")
-        case Pulse(side, strength, seconds):
-            actions.pulse(side, strength, seconds)
+        boxes = dict(self.picture.boxes)
+        row["object"] = thing.name if thing is not None else ""
+        row["taken"] = [carried.pointer] if carried.taken else []
+        box = boxes.pop("track", None)
+        if thing is not None and box is not None:
+            first, last = track_ends(box, theme.FONT_SIZE * UI_SCALE)
+            along = first[0] + thing.slider_x * (last[0] - first[0])
+            row["knob"] = place((along, first[1]))
+            row["slider"] = [place(first), place(last)]
+        row["buttons"] = {
+            name: place(((left + right) / 2, (top + bottom) / 2))
+            for name, (left, top, right, bottom) in boxes.items()
+        }
+        return row

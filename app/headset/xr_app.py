@@ -2,20 +2,25 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import moderngl
 
 from shapeshift.app.document import DARK, Document
+from shapeshift.app.editor.state.arrange import poll_bodies
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.headset_report import DoneFrame, Report
 from shapeshift.app.headset.mirror import Mirror, NoMirror
 from shapeshift.app.headset.notices import Late, late_card
 from shapeshift.app.headset.pacing import Pacing, StereoChart
+from shapeshift.app.headset.panel_picture import PanelPicture
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats
 from shapeshift.scene.pose import View
-from shapeshift.scene.world.world import World
+from shapeshift.scene.world.record import Record
 from shapeshift.vr.card import Card
 from shapeshift.vr.drawn import Drawn, drawn_of
 from shapeshift.vr.floor import REST, Floor, Grid, clearness
@@ -36,11 +41,11 @@ LONGEST_STEP_S = 0.25  # of time that passes at once: a headset may have lain on
 class Eyes:
     """Our own picture of each eye: RGBA8, display-encoded; use it in a `with`.
 
-    And what is drawn behind its splats and over them.
+    And what is drawn behind its splats and over them, the panel's picture too.
     """
 
     def __init__(self, ctx: moderngl.Context, sizes: Sequence[tuple[int, int]]) -> None:
-        self.floor, self.overlay = Floor(ctx), Overlay(ctx)
+        self.floor, self.overlay, self.panel = Floor(ctx), Overlay(ctx), PanelPicture(ctx)
         self.framebuffers = [ctx.framebuffer([ctx.texture(size, 4)]) for size in sizes]
 
     @property
@@ -53,6 +58,7 @@ class Eyes:
     def __exit__(self, *failure) -> None:
         self.floor.release()
         self.overlay.release()
+        self.panel.release()
         for framebuffer, texture in zip(self.framebuffers, self.textures, strict=True):
             framebuffer.release()
             texture.release()
@@ -68,7 +74,7 @@ class XrApp:
         eyes: Eyes,
         mirror: Mirror | NoMirror,
         document: Document,
-        world: World,
+        editor: EditorState,
         pacing: Pacing,
         report: Report,
         rules: Rules = RULES,
@@ -80,10 +86,12 @@ class XrApp:
         self.report, self._hints = report, hints
         self.background = document.background_or(DARK)
         eye = document.view(ANY_SIZE).world_from_eye
-        user = XrUser(world, eye, document.floor_y, rules)
-        self.state = XrState(world, pacing, user, floor_shown=floor)
+        editor.settings = replace(editor.settings, background=self.background)
+        user = XrUser(editor.bodies.living, eye, document.floor_y, rules)
+        touch = TouchState(editor, True)
+        self.state = XrState(editor, touch, pacing, user, floor_shown=floor)
         actions = MenuActions(self.recentre, self.leave, self.pulse)
-        self.menu = WristMenu(self.state, actions, panel_hand)
+        self.menu = WristMenu(self.state, actions, eyes.panel, panel_hand)
         self._level_m = 0.0  # of the floor in the world
         self._clearness = REST
         self._outlines, self._late = Outlines(), Late()
@@ -137,7 +145,7 @@ class XrApp:
         self._clearness = clearness(self._clearness, before, self.state.standing, seconds)
         if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
             self._worn_s += seconds
-        records = self.state.world.advance(seconds)
+        records = self._pass(seconds)
         for pulse in strongest(self.state.user.felt(records)):
             self.pulse(pulse.side, pulse.strength, pulse.seconds)
         if frame.drawn:
@@ -151,23 +159,34 @@ class XrApp:
             self.mirror.rest()
         session = self.session
         done = DoneFrame(
-            frame, self.state, self.menu.carried, self.pulses, records, session.life, session.pace
+            frame, self.state, self.menu.row, self.pulses, records, session.life, session.pace
         )
         self.report.note(done, self.eyes.framebuffers)
+
+    def _pass(self, seconds: float) -> list[Record]:
+        """Lets time pass: what plays, edits that the world has to follow, then the world."""
+        editor, touch = self.state.editor, self.state.touch
+        editor.advance(seconds)
+        poll_bodies(editor)
+        return touch.advance(seconds)
 
     def _over(self, frame: Frame) -> Drawn:
         """What is in the room over the splats."""
         person, carried = self.state.user, self.menu.carried
         outlines, cards = self._outlined(frame), self._cards(frame)
-        return drawn_of(frame.hands, carried, person.comfort, person.touched, outlines, cards)
+        panel = self.eyes.panel.texture
+        touched, hands = person.touched, frame.hands
+        return drawn_of(hands, carried, person.comfort, touched, outlines, cards, panel)
 
     def _outlined(self, frame: Frame) -> list[Capsule]:
         """Around what hands would take, or their rays act on, that do not point at the panel."""
         lines: list[Capsule] = []
+        carried = self.menu.carried
         for offer in self.state.user.touched.offers:
             thing = self.state.world.objects[offer.object]
             hull = self._outlines.hull(thing.collider)
-            if hull is None or offer.side in self.menu.carried.panel.hovers:
+            points = carried.on_panel and offer.side == carried.pointer
+            if hull is None or points:
                 continue
             pose, ink = thing.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
             lines += outline(hull, pose, self.state.standing, frame.head.position, ink)
@@ -185,9 +204,12 @@ class XrApp:
 
     def draw(self, views: list[View], play_views: Sequence[View], over: Drawn) -> None:
         """Splats with one sort for both eyes, the floor behind them, the room over them."""
-        self.renderer.settings = self.state.pacing.settings()
+        look = self.state.editor.settings
+        self.background = look.background
+        settings = replace(self.state.pacing.settings(), debug=look.debug)
+        self.renderer.settings = replace(settings, background=look.background)
         start = time.perf_counter()
-        self.renderer.update(self.state.world.drawn())
+        self.renderer.update(self.state.editor.scene)
         self.stats = self.renderer.draw(views)  # waits for what it timed, on a GPU too
         self._drawing_ms = (time.perf_counter() - start) * 1e3
         self.session.pace.drew(self._drawing_ms)
@@ -207,7 +229,7 @@ class XrApp:
         pace = self.session.pace
         if not (pace.settled and self.state.pacing.wants_measure(pace.period_s)):
             return
-        scene, finish = self.state.world.drawn(), self.mirror.ctx.finish
+        scene, finish = self.state.editor.scene, self.mirror.ctx.finish
         centre, _ = Document(scene).bounds()
         chart = StereoChart(self.renderer, scene, views, centre, finish)
         self.state.pacing.measure(chart, pace.period_s)

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.touch_state import TouchState
 from shapeshift.app.headset.pacing import Pacing
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
@@ -62,10 +64,19 @@ class XrUser:
 
 @dataclass
 class XrState:
-    """What changes from frame to frame, and what the parts of a session read of each other."""
+    """What changes from frame to frame, and what the parts of a session read of each other.
 
-    world: World
+    `editor` is the scene as the panel's sections have it, on a desk too; it follows the world.
+    """
+
+    editor: EditorState
+    touch: TouchState
     pacing: Pacing
     user: XrUser
     standing: Standing = field(default_factory=Standing)
     floor_shown: bool = True
+
+    @property
+    def world(self) -> World:
+        """What moves and answers to touch; there is one as long as the session lasts."""
+        return self.editor.bodies.living

@@ -15,13 +15,13 @@ PACKAGES = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setupto
 # Errors that are left, by folder.  A number may only become smaller; 0 is where all of them go.
 MOST = {
     "api": 0,
-    "app": 42,
+    "app": 0,
     "rasterizer": 0,
     "renderer": 0,
     "runtime_models": 0,
     "scene": 0,
     "training": 0,
-    "vr": 54,
+    "vr": 0,
 }
 
 

@@ -6,28 +6,25 @@ import moderngl
 import numpy as np
 import pytest
 
-from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.drawn import FINE as FINE_INK
-from shapeshift.vr.drawn import WRONG, Drawn, arc, drawn_of
+from shapeshift.vr.drawn import WRONG, Drawn, PanelQuad, arc, drawn_of
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.glove import LIT, Capsule
 from shapeshift.vr.locomotion.locomotion import Comfort
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.teleport import Arc
 from shapeshift.vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
-from shapeshift.vr.panel.carried import Carried, carry, panel_row
-from shapeshift.vr.panel.panel_layout import knob_place, lay_out
-from shapeshift.vr.panel.panel_picture import ACCENT, SURFACE, TEXT
-from shapeshift.vr.panel.panel_place import play_point
-from shapeshift.vr.panel.panel_state import Facts, Slider
+from shapeshift.vr.panel.carried import Carried, carry
 from shapeshift.vr.touching import Touched
-from tests.support.vr.vr_hands import HEAD, OPEN, a_frame, eyes, hand_at, pixel_of
+from tests.support.vr.vr_hands import HEAD, OPEN, PLANE, a_frame, eyes, hand_at, pixel_of
 
 SIZE = (500, 450)
 EYES = eyes(SIZE)
-FACTS = Facts((Slider("cube", (Stop("a", 0.0), Stop("b", 0.4), Stop("c", 1.0)), 0.6),))
+SURFACE, ACCENT, TEXT = (27, 28, 30), (242, 161, 69), (230, 230, 232)
+SPOT = (220.0, 100.0)  # units: the middle of the bright square on the panel below
 LEFT, RIGHT = hand_at((-0.10, 1.22, -0.45)), hand_at((0.2, 1.2, -0.5))
+CARRIES = hand_at((0.02, 1.2, -0.6))  # the panel, all of it in view of both eyes
 GROUND = (40, 90, 160)  # of the picture below
 
 
@@ -47,6 +44,25 @@ def target(ctx):
     texture.release()
 
 
+@pytest.fixture
+def panel(ctx):
+    """A dark panel with a square of the accent's colour right of its middle, above it."""
+    made = ctx.texture(PLANE.size, 4)
+    paint(made, ACCENT)
+    yield made
+    made.release()
+
+
+def paint(texture: moderngl.Texture, ink: tuple[int, int, int]) -> None:
+    """The square in another colour; row 0 is below, as in all that GL draws."""
+    pixels = np.full((PLANE.size[1], PLANE.size[0], 4), 255, np.uint8)
+    pixels[..., :3] = SURFACE
+    pixels[80:120, 200:240, :3] = ink
+    texture.write(np.ascontiguousarray(pixels[::-1]))
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+
+
 def picture(overlay: Overlay, target: moderngl.Framebuffer, drawn: Drawn, eye: int = 0):
     """(H, W, 3) uint8, row 0 on top."""
     target.clear(*(c / 255 for c in GROUND), 1.0)
@@ -58,43 +74,47 @@ def at(image: np.ndarray, eye: int, place) -> np.ndarray:
     return image[pixel_of(EYES[eye], np.asarray(place, float))].astype(int)
 
 
-def shown(left=LEFT, right=LOST, facts: Facts = FACTS) -> Carried:
+def shown(left=CARRIES, right=LOST) -> Carried:
     carried = OPEN
     for _ in range(2):
-        carried, _, _ = carry(carried, facts, a_frame(left, right), 1.0)
+        carried = carry(carried, a_frame(left, right), 1.0)
     return carried
 
 
-def only_panel(carried: Carried) -> Drawn:
-    return Drawn((), (), carried.panel, carried.play_from_panel)
+def place_on(carried: Carried, at) -> np.ndarray:
+    """(3,) metres of the room of a place on the panel, units."""
+    return PLANE.play_point(carried.play_from_panel, at)
+
+
+def only_panel(carried: Carried, texture: moderngl.Texture) -> Drawn:
+    return Drawn(panel=PanelQuad(texture, carried.play_from_panel, PLANE.size_m))
 
 
 @pytest.mark.parametrize("eye", [0, 1])
-def test_the_panel_is_where_it_hangs_in_both_eyes(overlay, target, eye):
+def test_the_panel_is_where_it_hangs_in_both_eyes(overlay, target, panel, eye):
     carried = shown()
-    image = picture(overlay, target, only_panel(carried), eye)
-    knob = knob_place(carried.panel)
-    layout = lay_out(carried.panel)
+    image = picture(overlay, target, only_panel(carried, panel), eye)
 
     def color(x: float, y: float) -> np.ndarray:
-        return at(image, eye, play_point(carried.play_from_panel, layout, (x, y)))
+        return at(image, eye, place_on(carried, (x, y)))
 
-    assert np.abs(color(*knob) - SURFACE).max() < 40  # its dark middle is two pixels wide here
-    assert np.abs(color(knob[0] + 24, knob[1]) - ACCENT).max() < 30
-    assert np.abs(color(500, knob[1] + 60) - SURFACE).max() <= 2
-    assert np.abs(color(120, knob[1]) - ACCENT).max() < 60
-    outside = color(-30, 300), color(layout.size[0] + 30, 300), color(500, layout.size[1] + 30)
-    for one in (*outside, color(3, 3)):  # beside it, and its round corner
+    assert np.abs(color(*SPOT) - ACCENT).max() < 4
+    mirrored = (SPOT[0], 360 - SPOT[1]), (320 - SPOT[0], SPOT[1])  # neither upside down nor turned
+    for place in (*mirrored, (160, 180), (10, 180), (160, 350)):
+        assert np.abs(color(*place) - SURFACE).max() <= 2
+    outside = color(-10, 180), color(330, 180), color(160, 370)
+    for one in (*outside, color(1, 1), color(319, 359)):  # beside it, and its round corners
         np.testing.assert_array_equal(one, GROUND)
 
 
-def test_the_eyes_see_it_from_two_sides(overlay, target):
-    drawn = only_panel(shown())
+def test_the_eyes_see_it_from_two_sides(overlay, target, panel):
+    carried = shown()
+    drawn = only_panel(carried, panel)
     columns = [
         np.nonzero((picture(overlay, target, drawn, eye) != GROUND).any(axis=(0, 2)))[0].mean()
         for eye in (0, 1)
     ]
-    middle = [pixel_of(view, drawn.play_from_panel.position)[1] for view in EYES]
+    middle = [pixel_of(view, carried.play_from_panel.position)[1] for view in EYES]
     assert columns[0] - columns[1] == pytest.approx(middle[0] - middle[1], abs=6)
     assert middle[0] - middle[1] > 15
 
@@ -107,17 +127,15 @@ def test_a_world_of_any_scale_has_the_same_panel(overlay, target):
     assert pixel_of(standing.view(EYES[0]), standing.point(place)) == pixel_of(EYES[0], place)
 
 
-def test_the_picture_follows_the_state(overlay, target):
+def test_the_picture_follows_the_texture(overlay, target, panel):
     carried = shown()
-    first = picture(overlay, target, only_panel(carried))
-    again = picture(overlay, target, only_panel(carried))
+    first = picture(overlay, target, only_panel(carried, panel))
+    again = picture(overlay, target, only_panel(carried, panel))
     np.testing.assert_array_equal(first, again)
-    held = replace(carried, panel=replace(carried.panel, held={"right": "track"}))
-    place = knob_place(carried.panel)
-    there = play_point(carried.play_from_panel, lay_out(carried.panel), (place[0] + 24, place[1]))
-    assert np.abs(at(picture(overlay, target, only_panel(held)), 0, there) - TEXT).max() < 40
-    other = shown(facts=Facts())  # another size of picture
-    assert (picture(overlay, target, only_panel(other)) != first).any()
+    paint(panel, TEXT)
+    there = place_on(carried, SPOT)
+    now = picture(overlay, target, only_panel(carried, panel))
+    assert np.abs(at(now, 0, there) - TEXT).max() < 4
 
 
 def test_nothing_to_draw_leaves_the_picture_and_the_context_alone(ctx, overlay, target):
@@ -133,8 +151,8 @@ def test_nothing_to_draw_leaves_the_picture_and_the_context_alone(ctx, overlay, 
     other.release()
 
 
-def test_two_sizes_of_eyes_in_turn(ctx, overlay, target):
-    drawn = only_panel(shown())
+def test_two_sizes_of_eyes_in_turn(ctx, overlay, target, panel):
+    drawn = only_panel(shown(), panel)
     first = picture(overlay, target, drawn)
     small = ctx.framebuffer([ctx.texture((64, 48), 4)])
     small.clear(0, 0, 0, 1)
@@ -146,7 +164,7 @@ def test_two_sizes_of_eyes_in_turn(ctx, overlay, target):
 
 
 def test_hands_are_where_they_are_and_a_lost_one_is_not(overlay, target):
-    carried = replace(shown(), panel=replace(shown().panel, side=""), play_from_panel=None)
+    carried = Carried(PLANE)
     drawn = drawn_of({"left": LEFT, "right": RIGHT}, carried)
     for eye in (0, 1):
         image = picture(overlay, target, replace(drawn, lines=()), eye)
@@ -159,24 +177,25 @@ def test_hands_are_where_they_are_and_a_lost_one_is_not(overlay, target):
     assert lost.hands == lost.lines == ()
 
 
-def test_a_hand_before_the_panel_hides_it_and_one_behind_is_hidden(overlay, target):
+def test_a_hand_before_the_panel_hides_it_and_one_behind_is_hidden(overlay, target, panel):
     carried = shown()
-    layout = lay_out(carried.panel)
     normal = carried.play_from_panel.matrix()[:3, 2]
-    place = play_point(carried.play_from_panel, layout, (500.0, 300.0))
+    place = place_on(carried, (160.0, 180.0))
     dot = Capsule(place, place, (0.02, 0.02), (1.0, 1.0, 1.0))
     for away, hidden in ((0.05, False), (-0.05, True)):
         ball = replace(dot, a=place + normal * away, b=place + normal * away)
-        image = picture(overlay, target, replace(only_panel(carried), hands=(ball,)))
+        image = picture(overlay, target, replace(only_panel(carried, panel), hands=(ball,)))
         bright = at(image, 0, ball.a).min() > 150
         assert bright != hidden
-        line = replace(only_panel(carried), lines=(replace(ball, color=(0.0, 1.0, 0.0, 1.0)),))
+        line = replace(
+            only_panel(carried, panel), lines=(replace(ball, color=(0.0, 1.0, 0.0, 1.0)),)
+        )
         green = at(picture(overlay, target, line), 0, ball.a)
         assert (green[1] > 250 and green[0] < 5) != hidden
 
 
 def test_what_holds_something_has_a_lit_cuff(overlay, target):
-    carried = replace(shown(), panel=replace(shown().panel, side=""), play_from_panel=None)
+    carried = Carried(PLANE)
     hands = {"left": LOST, "right": RIGHT}
     drawn = drawn_of(hands, carried, touched=Touched(held={"right": "cube"}))
     assert drawn.lines == ()  # its ray would be in the way
@@ -185,18 +204,18 @@ def test_what_holds_something_has_a_lit_cuff(overlay, target):
     assert color[0] > 1.3 * color[2] and cuff.color == LIT
 
 
-def test_a_ray_ends_in_a_dot_on_the_panel(overlay, target):
+def test_a_ray_ends_in_a_dot_on_the_panel(overlay, target, panel):
     carried = shown()
-    knob = np.array(panel_row(carried)["knob"])
-    right = hand_at((0.3, 1.0, -0.1), knob)
-    carried, _, _ = carry(carried, FACTS, a_frame(LEFT, right), 0.0)
-    assert carried.panel.hovers == {"right": "track"}
-    drawn = drawn_of({"left": LEFT, "right": right}, carried)
+    spot = place_on(carried, (160.0, 180.0))
+    right = hand_at((0.3, 1.0, -0.1), spot)
+    carried = carry(carried, a_frame(CARRIES, right), 0.0)
+    assert carried.on_panel
+    drawn = drawn_of({"left": CARRIES, "right": right}, carried, panel=panel)
     (beam, dot) = drawn.lines
-    np.testing.assert_allclose(beam.b, knob, atol=1e-4)
-    np.testing.assert_allclose(dot.a, knob, atol=1e-4)
+    np.testing.assert_allclose(beam.b, spot, atol=1e-4)
+    np.testing.assert_allclose(dot.a, spot, atol=1e-4)
     image = picture(overlay, target, replace(drawn, hands=()))
-    assert at(image, 0, knob).min() > 150  # was the knob's dark middle
+    assert at(image, 0, spot).min() > 150  # was the panel's dark surface
 
 
 @pytest.mark.parametrize("fine", [True, False])
@@ -205,7 +224,7 @@ def test_the_arc_has_a_ring_where_it_lands(overlay, target, fine):
     points = np.array([0.1, 1.2, -0.4]) + seconds * (0, 2.0, -3.0) - 4.9 * seconds**2 * (0, 1, 0)
     landing = np.array([0.1, 0.0, -3.4])
     comfort = Comfort(arc=Arc(points, landing, fine))
-    drawn = drawn_of({"left": LOST, "right": LOST}, Carried(), comfort)
+    drawn = drawn_of({"left": LOST, "right": LOST}, Carried(PLANE), comfort)
     color = np.array(FINE_INK if fine else WRONG) * 255
     for eye in (0, 1):
         image = picture(overlay, target, drawn, eye)
@@ -228,9 +247,8 @@ def test_the_vignette_darkens_from_the_edge_around_straight_ahead(overlay, targe
     assert (picture(overlay, target, Drawn(vignette=0.0)) == GROUND).all()
 
 
-def test_a_blink_is_dark_but_for_the_panel(overlay, target):
-    carried = shown()
-    image = picture(overlay, target, replace(only_panel(carried), blink=1.0))
+def test_a_blink_is_dark_but_for_the_panel(overlay, target, panel):
+    image = picture(overlay, target, replace(only_panel(shown(), panel), blink=1.0))
     assert (image[0] == 0).all() and image.max() > 200
     half = picture(overlay, target, Drawn(blink=0.5))
     assert np.abs(half.astype(int) - np.array(GROUND) / 2).max() <= 1
@@ -254,16 +272,20 @@ def test_many_capsules_grow_the_buffer(overlay, target):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_the_box_around_it_cuts_nothing_off(overlay, target, monkeypatch, seed):
+def test_the_box_around_it_cuts_nothing_off(overlay, target, panel, monkeypatch, seed):
     rng = np.random.default_rng(seed)
     ends = rng.normal(size=(9, 2, 3)) * (2.0, 1.0, 0.6 + 2 * (seed % 2)) + (0, 1.6, -2.2)
     radii = rng.uniform(0.0005, 0.2, size=(9, 2))
     parts = tuple(
         Capsule(a, b, tuple(r), (1.0, 0.9, 0.1)) for (a, b), r in zip(ends, radii, strict=True)
     )
+    dark = replace(only_panel(shown(), panel), vignette=0.5)
     cases = [Drawn(hands=(part,)) for part in parts]
     cases += [Drawn(lines=(part,), vignette=0.6) for part in parts]
-    cases += [Drawn(hands=parts[:4], lines=parts[4:]), replace(only_panel(shown()), vignette=0.5)]
+    cases += [
+        Drawn(hands=parts[:4], lines=parts[4:]),
+        dark,
+    ]
     boxed = [picture(overlay, target, drawn) for drawn in cases]
     monkeypatch.setattr("shapeshift.vr.overlay.box_of", lambda *_: (0, 0, *SIZE))
     for drawn, cut in zip(cases, boxed, strict=True):

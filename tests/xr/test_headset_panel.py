@@ -97,7 +97,7 @@ def test_a_pointed_at_button_recentres(reader):
     reader.until(lambda line: gone(line, before) > 0.3, "walked")
     reader.controller("left").stick = (0.0, 0.0)
     reader.frames(3)
-    press(reader, "recentre")
+    press(reader, "Recentre")
     line = reader.until(lambda line: gone(line, before) < 1e-3, "back")
     assert not line["recentred"], "it was the person, not the runtime"
 
@@ -109,10 +109,11 @@ def gone(line: dict, before: dict) -> float:
 
 @pytest.mark.slow
 def test_exit_asks_once_more_and_ends_the_session(reader):
-    press(reader, "exit")
-    reader.frames(5)
+    press(reader, "Exit")
+    line = reader.frames(5)
     assert reader.program.process.poll() is None
-    press(reader, "exit")
+    assert "Exit" not in line["panel"]["buttons"]
+    press(reader, "Really exit?")
     report = reader.program.end()
     assert (report["code"], report["ended"]) == (0, "from the panel")
     assert report["states"] == WHOLE_LIFE
@@ -151,7 +152,9 @@ def test_a_palm_that_is_turned_up_shows_it(person):
 def test_the_floor_is_seen_and_its_switch_takes_it_away(stand, start):
     """Over the shoulder, where the scene has nothing at all."""
     pictures = stand.folder / "pictures"
-    program = start(stand, "--quality", "best", "--pictures", str(pictures))
+    # No card may tell of late frames: a busy machine has them, and a card is seen behind, too.
+    quiet = ("--quality", "best", "--no-hints")
+    program = start(stand, *quiet, "--pictures", str(pictures))
     with program.headset(stand.port) as remote:
         person = Person(program, remote)
         remote.left.position, remote.right.position = CARRIES, FREE
@@ -159,7 +162,7 @@ def test_the_floor_is_seen_and_its_switch_takes_it_away(stand, start):
         open_panel(person)
         person.frames(8)
         before = person.line
-        press(person, "floor")
+        press(person, "grid on the floor")
         person.frames(4)
         open_panel(person)
         after = person.frames(2)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from shapeshift.vr.frame import Frame
+from shapeshift.vr.frame import Frame, grip_of
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import pinned, scaled, turned
 
@@ -19,12 +19,14 @@ Grips = tuple[tuple[str, np.ndarray], ...]  # side, (3,) metres of the world tha
 
 def take(standing: Standing, frame: Frame, sides: frozenset[str]) -> Grips:
     """What these hands hold now."""
-    return tuple((side, standing.point(frame.hands[side].grip.position)) for side in sorted(sides))
+    return tuple(
+        (side, standing.point(grip_of(frame.hands[side]).position)) for side in sorted(sides)
+    )
 
 
 def drawn_along(standing: Standing, frame: Frame, grips: Grips) -> Standing:
     """The standing in which the hands hold what they took."""
-    here = [frame.hands[side].grip.position for side, _ in grips]  # (3,) metres, room
+    here = [grip_of(frame.hands[side]).position for side, _ in grips]  # (3,) metres, room
     there = [world for _, world in grips]
     if len(grips) == 1:
         return pinned(standing, here[0], there[0])

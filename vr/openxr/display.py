@@ -13,7 +13,7 @@ def display_period(instance: Instance, session: Any) -> float:
     xr = instance.xr
     address = xr.get_instance_proc_addr(instance.handle, "xrGetDisplayRefreshRateFB")
     ask = ctypes.CFUNCTYPE(ctypes.c_int, xr.Session, ctypes.POINTER(ctypes.c_float))(
-        ctypes.cast(address, ctypes.c_void_p).value
+        ctypes.cast(address, ctypes.c_void_p).value or 0
     )
     hz = ctypes.c_float(0.0)
     if ask(session, ctypes.byref(hz)) != 0:  # XR_SUCCESS

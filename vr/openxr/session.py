@@ -216,10 +216,11 @@ class Session:
         asked = xr.ViewLocateInfo(stereo, now, self.play.handle)
         state, self._views = xr.locate_views(self._handle, asked)
         placed, turned = valid(xr.ViewStateFlags, state.view_state_flags)
-        self._eyes = tuple(
+        left, right = (
             known_part(pose_of(view.pose), old, placed, turned)
             for view, old in zip(self._views, self._eyes, strict=True)
         )
+        self._eyes = left, right
         views = [
             View(pose, tangents_of(view.fov), NEAR_M, FAR_M, chain.size)
             for pose, view, chain in zip(self._eyes, self._views, self._swapchains, strict=True)
@@ -236,6 +237,7 @@ class Session:
 
     def _end(self, layers: list) -> None:
         xr, state = self._xr, self._open
+        assert state is not None  # a frame is under way
         self._open = None
         self._finish()
         self._drain()
@@ -293,8 +295,8 @@ def choose_blend(xr, offered: Sequence) -> Any:
 
 def tangents_of(fov) -> tuple[float, float, float, float]:
     """Left, right, down, up of an XrFovf, whose angles are signed."""
-    angles = (fov.angle_left, fov.angle_right, fov.angle_down, fov.angle_up)
-    return tuple(math.tan(angle) for angle in angles)
+    left, right = math.tan(fov.angle_left), math.tan(fov.angle_right)
+    return left, right, math.tan(fov.angle_down), math.tan(fov.angle_up)
 
 
 def known_part(pose: Pose, old: Pose, placed: bool, turned: bool) -> Pose:

@@ -1,11 +1,14 @@
 // panel: TAPS samples a pixel on a turned grid, each from a level finer than its size asks for:
 // small letters stay crisp and, with four, do not crawl when the head moves.
-// Reads:   picture, premultiplied; opacity.
+// Reads:   picture, premultiplied; opacity; half_size, corner.
 // Writes:  shown, premultiplied.
-// Units:   display sRGB; place in 0..1 of the picture.
+// Units:   display sRGB; place in 0..1 of the picture; metres.
 in vec2 place;
+in vec2 aside;              // metres from the middle
 uniform sampler2D picture;  // display sRGB, premultiplied
 uniform float opacity;      // 0..1
+uniform vec2 half_size;     // metres
+uniform float corner;       // metres, radius; 0: the picture has its own
 out vec4 shown;
 
 const float FINER = TAPS > 1 ? -1.0 : -0.5;  // levels
@@ -20,4 +23,10 @@ void main() {
         shown += texture(picture, place + aside, FINER) / float(TAPS);
     }
     shown *= opacity;
+    if (corner > 0.0) {
+        // Signed distance to the rounded rectangle, negative inside; its edge is a pixel wide.
+        vec2 beyond = max(abs(aside) - half_size + corner, 0.0);
+        float outside = length(beyond) - corner;
+        shown *= clamp(0.5 - outside / max(fwidth(outside), 1e-6), 0.0, 1.0);
+    }
 }

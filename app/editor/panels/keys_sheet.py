@@ -1,6 +1,6 @@
 """The sheet of keys: everything that keys and mouse do, in groups; F1 opens and closes it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from imgui_bundle import imgui
 
@@ -121,7 +121,7 @@ def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> Non
     imgui.set_cursor_pos(Vec(left, imgui.get_cursor_pos_y() + gap / 2))
 
 
-def spread(groups: dict[str, Sequence[Row]], columns: int) -> list[list[str]]:
+def spread(groups: Mapping[str, Sequence[Row]], columns: int) -> list[list[str]]:
     """The groups' names by column, in their order, each to the column that is shortest so far."""
     out: list[list[str]] = [[] for _ in range(columns)]
     length = [0] * columns

@@ -29,7 +29,7 @@ def draw_messages(messages: Messages, free: Box, ui_scale: float) -> list[Box]:
     return boxes
 
 
-def _note(text: str, at: Vec, width: float) -> None:
+def _note(text: str, at: imgui.ImVec2, width: float) -> None:
     """`at` is the middle of its upper edge."""
     imgui.set_next_window_pos(at, 0, Vec(0.5, 0))
     flags = imgui.WindowFlags_
@@ -47,7 +47,7 @@ def _note(text: str, at: Vec, width: float) -> None:
 
 
 def _problem(
-    messages: Messages, number: int, sentence: str, at: Vec, width: float, ui_scale: float
+    messages: Messages, number: int, sentence: str, at: imgui.ImVec2, width: float, ui_scale: float
 ) -> Box:
     """A sentence with a cross at its right."""
     imgui.set_next_window_pos(at)

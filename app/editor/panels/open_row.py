@@ -32,7 +32,7 @@ class OpenRow:
         wants = imgui.button("Open\u2026", Vec((room - gap) / 2 if listed else -1, 0))
         tip("Ctrl+O, or drop files and folders anywhere on the window.", ui_scale)
         chosen = None
-        if listed:
+        if recent is not None and listed:
             imgui.same_line()
             chosen = self._recent(recent, ui_scale)
         for label, path in others.items():

@@ -13,7 +13,8 @@ from shapeshift.app.editor.state.layout import Layout
 Vec = imgui.ImVec2
 # What somebody who is here for the first time needs comes first; what is not named, last.
 ORDER = (
-    "Touch", "Stops", "Look", "Camera", "Objects", "Regions", "Export", "Performance",
+    "Scale", "Room", "Touch", "Stops", "Look", "Camera", "Objects", "Regions", "Export",
+    "Performance",
 )  # fmt: skip
 
 
@@ -26,7 +27,7 @@ class Section:
     open_first: bool = False
     opens: Callable[[], bool] | None = None  # True: unfold it now
     shown: Callable[[], bool] | None = None  # False: leave it out, there is nothing in it
-    early: Callable[[], bool] | None = None  # True: second from above now, whatever its name
+    early: Callable[[], bool] | None = None  # True: after Touch now, whatever its name
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,8 @@ def draw_panel(
 
     `top` is drawn under the title, before the sections.
     """
+    if layout.panel is None:
+        return (0.0, 0.0, 0.0, 0.0)
     left, up, right, low = layout.panel
     imgui.set_next_window_pos(Vec(left, up))
     flags = imgui.WindowFlags_
@@ -62,6 +65,15 @@ def draw_panel(
     _title(title, actions, ui_scale)
     for draw in top:
         draw(ui_scale)
+    draw_sections(sections, ui_scale)
+    _foot(actions, ui_scale)
+    box = theme.window_box()
+    imgui.end()
+    return box
+
+
+def draw_sections(sections: list[Section], ui_scale: float) -> None:
+    """Headings that fold, in their order, in the window that is being made."""
     for other in sorted(sections, key=_rank):
         if other.shown is not None and not other.shown():
             continue
@@ -70,16 +82,12 @@ def draw_panel(
             imgui.push_id(other.name)
             other.draw(ui_scale)
             imgui.pop_id()
-    _foot(actions, ui_scale)
-    box = theme.window_box()
-    imgui.end()
-    return box
 
 
 def _rank(other: Section) -> float:
     """Its place in the panel, smallest first."""
     if other.early is not None and other.early():
-        return 0.5
+        return ORDER.index("Touch") + 0.5
     return ORDER.index(other.name) if other.name in ORDER else len(ORDER)
 
 

@@ -35,7 +35,7 @@ def _draw_name(saving: Saving, ui_scale: float) -> None:
         imgui.text_unformatted(f"{Path(saving.name).name} is there already.")
         imgui.pop_text_wrap_pos()
     label, original = "Replace it" if saving.taken else "Save", saving.original
-    words = (label, "Cancel")
+    words: tuple[str, ...] = (label, "Cancel")
     if original is not None and not saving.taken:
         imgui.text_disabled(f"{original.name} was not written by you here.")
         words = (label, OVER, "Cancel")

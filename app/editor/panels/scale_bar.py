@@ -15,15 +15,19 @@ PAD = 12.0
 STRIPES = 128
 
 
-def draw_scale_bar(scene: Scene, box: Box, ui_scale: float) -> None:
-    """Draws the bar with its ticks into a box; it fades in with the thermal stop."""
+def draw_scale_bar(
+    scene: Scene, box: Box, ui_scale: float, draw: imgui.ImDrawList | None = None
+) -> None:
+    """Draws the bar with its ticks into a box, over the picture or into a list that is given; it
+    fades in with the thermal stop.
+    """
     palette, weight, stop = thermal_blend(scene)
     weight = legend_opacity(weight)
     if not palette or stop is None or stop.value_range is None or not weight > 0.01:
         return
     left, top, right, bottom = box
     width, pad, line = WIDTH * ui_scale, PAD * ui_scale, imgui.get_text_line_height()
-    draw = imgui.get_background_draw_list()
+    draw = draw or imgui.get_background_draw_list()
     ground = theme.color(theme.SURFACE, 0.80 * weight)
     draw.add_rect_filled(Vec(left, top), Vec(right, bottom), ground, 8 * ui_scale)
     ink = theme.color(theme.TEXT, weight)
@@ -31,7 +35,7 @@ def draw_scale_bar(scene: Scene, box: Box, ui_scale: float) -> None:
     draw.add_text(Vec(left + pad, top + pad / 2), ink, stop.unit or stop.name)
     first, last = top + line + 1.2 * pad, bottom - pad  # of the colours, top and bottom
     bar = left + pad + width
-    _stripes(palette, weight, Vec(left + pad, first), Vec(bar, last))
+    _stripes(draw, palette, weight, Vec(left + pad, first), Vec(bar, last))
     low, high = stop.value_range
     values = nice_ticks(low, high)
     for value, text in zip(values, tick_text(values), strict=True):
@@ -41,11 +45,20 @@ def draw_scale_bar(scene: Scene, box: Box, ui_scale: float) -> None:
     draw.pop_clip_rect()
 
 
-def _stripes(palette: str, weight: float, low: Vec, high: Vec) -> None:
+def has_scale(scene: Scene) -> bool:
+    """Whether there is something of it to be seen."""
+    palette, weight, stop = thermal_blend(scene)
+    known = bool(palette) and stop is not None and stop.value_range is not None
+    return known and legend_opacity(weight) > 0.01
+
+
+def _stripes(
+    draw: imgui.ImDrawList, palette: str, weight: float, low: imgui.ImVec2, high: imgui.ImVec2
+) -> None:
     """The palette from cold (bottom) to hot (top) as a smooth gradient."""
-    draw = imgui.get_background_draw_list()
     steps = np.linspace(255, 0, STRIPES + 1).astype(int)
-    inks = [theme.color(tuple(map(float, c)), weight) for c in palette_colors(palette)[steps]]
+    colors = palette_colors(palette)[steps].tolist()  # (STRIPES + 1, 3)
+    inks = [theme.color((red, green, blue), weight) for red, green, blue in colors]
     edges = np.linspace(low.y, high.y, STRIPES + 1)
     for i in range(STRIPES):
         draw.add_rect_filled_multi_color(

@@ -39,15 +39,15 @@ def draw_slider_bar(state: EditorState, bar: Box | None, ui_scale: float) -> Box
         imgui.push_id(index)
         if len(rows) > 1:
             imgui.text_disabled(state.scene.objects[index].name)
-        _row(state, index, ui_scale)
+        draw_slider(state, index, ui_scale)
         imgui.pop_id()
     box = theme.window_box()
     imgui.end()
     return box
 
 
-def _row(state: EditorState, index: int, ui_scale: float) -> None:
-    """Play button, seconds a way, track, value of one object."""
+def draw_slider(state: EditorState, index: int, ui_scale: float) -> None:
+    """Play button, seconds a way, track, value of one object; without keys no value to type."""
     thing, sweep = state.scene.objects[index], state.sweeps[index]
     height = ROW * ui_scale
     if _play_button(sweep.playing, height, ui_scale):
@@ -60,7 +60,8 @@ def _row(state: EditorState, index: int, ui_scale: float) -> None:
     name_width = min(imgui.calc_text_size(thing.name).x, WIDEST_NAME * ui_scale) if named else 0.0
     value_width = max(VALUE * ui_scale, name_width)
     after = SPLIT * ui_scale if state.split.possible else 0.0
-    room = imgui.get_content_region_avail().x - value_width - after - 12 * ui_scale
+    beside = value_width + after + 12 * ui_scale if theme.has_keys() else 0.0
+    room = imgui.get_content_region_avail().x - beside
     stops = state.stops(index)
     second = state.split.on and state.split.name == thing.name
     xs = (thing.slider_x, state.split.x) if second else (thing.slider_x,)
@@ -71,6 +72,8 @@ def _row(state: EditorState, index: int, ui_scale: float) -> None:
         state.split.x = moved.x
     elif moved.knob == 0:
         steer_by_hand(state, index, moved.x)
+    if not theme.has_keys():
+        return
     imgui.same_line(0, 0)
     origin = imgui.get_cursor_screen_pos()
     left = origin.x + 12 * ui_scale
@@ -168,6 +171,13 @@ class Moved:
     stop: int | None = None  # number of the stop whose name was clicked
 
 
+def track_ends(box: Box, line: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Where x = 0 and x = 1 lie of a track whose item fills a box, with type `line` high."""
+    left, top, right, bottom = box
+    reach, middle = (KNOB + SLACK) * line + 1.0, (top + bottom) / 2
+    return (left + reach, middle), (right - reach, middle)
+
+
 def track(
     stops: Sequence[Stop], xs: Sequence[float], grip: Grip, height: float, width: float = 0.0
 ) -> Moved:
@@ -231,7 +241,7 @@ def _knob(place: float, y: float, radius: float, ink: tuple[float, float, float]
 
 
 def _stop_names(
-    stops: Sequence[Stop], xs: Sequence[float], along: Track, corner: Vec
+    stops: Sequence[Stop], xs: Sequence[float], along: Track, corner: imgui.ImVec2
 ) -> int | None:
     """A name above each stop, lit where a knob is; returns the number of the one clicked."""
     draw = imgui.get_window_draw_list()

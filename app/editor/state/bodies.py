@@ -58,6 +58,25 @@ class Bodies:
         self._begin()
 
     @property
+    def living(self) -> "World":
+        """The world, for who has seen that there is one."""
+        if self.world is None:
+            raise RuntimeError("nothing can be touched: there is no world.")
+        return self.world
+
+    def take_over(self, world: "World", edited: EditedFile) -> None:
+        """A world that somebody else has made of the file; it follows its edits from now on."""
+        self.forget()
+        file, self.world, self._stale = edited.file, world, False
+        self._ground = (file.floor_y, file.gravity_m_s2)
+        for item in file.all_items:
+            made = world.objects[item.name].collider
+            if made is not None:
+                self._of[item.name] = (made_of(item), made)
+            elif item.collider is not None:
+                self._made[making_of(item)] = None
+
+    @property
     def busy(self) -> bool:
         return self._future is not None
 

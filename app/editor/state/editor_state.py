@@ -327,11 +327,11 @@ class EditorState:
     @property
     def sliders(self) -> list[int]:
         """Of those, the ones that there is room for: all of a few, else the chosen one."""
-        movable = self.movable
+        movable, chosen = self.movable, self.chosen_index
         if len(movable) <= self.most_sliders:
             return movable
-        chosen = self.chosen_index
-        return [chosen if chosen in movable else movable[0]]
+        seen = [index for index in movable if self.scene.objects[index].visible]
+        return [index for index in movable if index == chosen] or (seen or movable)[:1]
 
     @property
     def chosen_index(self) -> int | None:

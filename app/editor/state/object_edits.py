@@ -15,10 +15,12 @@ from shapeshift.scene.pose import Pose
 
 
 class ObjectEdits:
-    """`count_changed` hears that there are more or fewer objects."""
+    """`count_changed` hears that there are more or fewer objects; `viewpoint` is of the window,
+    None where there is none.
+    """
 
     def __init__(
-        self, state: EditorState, viewpoint: Viewpoint, count_changed: Callable[[], None]
+        self, state: EditorState, viewpoint: Viewpoint | None, count_changed: Callable[[], None]
     ) -> None:
         self.state, self._viewpoint, self.count_changed = state, viewpoint, count_changed
         self.typed: tuple[str, str] = ("", "")  # the chosen object, and its name as it is typed
@@ -92,6 +94,8 @@ class ObjectEdits:
 
     def look_from_here(self) -> None:
         """The view of now, about the point that it turns around, is where the scene opens."""
+        if self._viewpoint is None:
+            return
         view = self._viewpoint.plain_view()
         eye = view.world_from_eye.position
         ahead = -view.world_from_eye.matrix()[:3, 2]

@@ -60,6 +60,11 @@ class TouchState:
         return self._state.world
 
     @property
+    def living(self) -> World:
+        """The world, for who has seen that there is one."""
+        return self._state.bodies.living
+
+    @property
     def held(self) -> str | None:
         return self.world.held(HAND) if self.world and self.hand else None
 
@@ -153,9 +158,10 @@ class TouchState:
             self.hand = None  # what it held is gone
         return True
 
-    def advance(self, seconds: float) -> None:
-        """Lets time pass in the world, and for what fades over it."""
+    def advance(self, seconds: float) -> list[Record]:
+        """Lets time pass in the world, and for what fades over it; what happened."""
         world = self.world
+        records: list[Record] = []
         if world is not None:
             records = world.advance(seconds)
             if not world.paused:
@@ -165,6 +171,7 @@ class TouchState:
             mark.age_s += seconds
         self.labels = [label for label in self.labels if label.age_s < LABEL_S]
         self.flashes = [flash for flash in self.flashes if flash.age_s < FLASH_S]
+        return records
 
     @property
     def fading(self) -> bool:

@@ -11,6 +11,7 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.control import SNAP, snap
 
 STEP = 0.01  # of x: one press of an arrow key
+ON_STOP = 1e-3  # nearer than this to a stop is what it shows
 SAME_X = 1e-6  # nearer than this to a stop is on it
 
 
@@ -72,6 +73,21 @@ def next_stop(stops: Sequence[Stop], x: float, direction: int) -> float:
     """x of the nearest stop above (1) or below (-1); x itself where there is none."""
     beyond = [stop.x for stop in stops if (stop.x - x) * direction > SAME_X]
     return min(beyond, key=lambda stop_x: abs(stop_x - x), default=x)
+
+
+def shown_stop(stops: Sequence[Stop], x: float) -> str:
+    """What is seen at x, in words: a stop's name, or how far it is on the way between two."""
+    stops = sorted(stops, key=lambda stop: stop.x)
+    below = [stop for stop in stops if stop.x <= x + ON_STOP]
+    above = [stop for stop in stops if stop.x > x + ON_STOP]
+    if below and x - below[-1].x <= ON_STOP:
+        return below[-1].name
+    if below and above:
+        part = (x - below[-1].x) / (above[0].x - below[-1].x)
+        percent = min(max(round(100 * part), 1), 99)  # 0 and 100 are for the stops themselves
+        return f"{below[-1].name} to {above[0].name}, {percent} %"
+    end = (below[-1:] or above[:1])[0].name if stops else ""
+    return f"{end}  x {x:.2f}".strip()
 
 
 def stepped(x: float, steps: int) -> float:

@@ -116,7 +116,7 @@ class TwoPictures:
         self._resolve.release()
 
 
-def _draw_name(name: str, ink: Rgb, at: Vec, size: Vec, ui_scale: float) -> None:
+def _draw_name(name: str, ink: Rgb, at: imgui.ImVec2, size: imgui.ImVec2, ui_scale: float) -> None:
     pad, draw = 5 * ui_scale, imgui.get_background_draw_list()
     low, high = Vec(at.x - pad, at.y - pad), Vec(at.x + size.x + pad, at.y + size.y + pad)
     draw.add_rect_filled(low, high, theme.color(theme.SURFACE, 0.8), pad)

@@ -180,5 +180,6 @@ def test_the_viewer_and_the_headset_start_there(package, objects):
     assert shown(objects, x="0.25") == {"cube": 0.25, "cloud": 0.25}
     for path, x in ((package, {"random": 1.0}), (objects, {"cube": 1.0, "cloud": 0.0})):
         text = "Thermal" if path == package else "hot"
-        _, world = open_xr(path, ReadingOptions(), text)
-        assert {thing.name: thing.x for thing in world.drawn().objects} == x
+        _, editor = open_xr(path, ReadingOptions(), text)
+        assert {thing.name: thing.x for thing in editor.world.drawn().objects} == x
+        assert {thing.name: thing.x for thing in editor.scene.objects} == x

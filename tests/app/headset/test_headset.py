@@ -105,7 +105,8 @@ def test_a_second_ctrl_c_ends_at_once_and_none_changes_nothing():
 
 
 def test_a_scene_file_is_a_world_with_a_floor():
-    document, world = open_xr(DEMO, Options())
+    document, editor = open_xr(DEMO, Options())
+    world = editor.world
     assert document.floor_y == -0.7 and document.background_or(DARK) == DARK
     named = {thing.name for thing in document.scene.objects}
     assert named == set(world.objects) >= {"cube", "ball", "ring", "plate"}
@@ -116,7 +117,8 @@ def test_a_scene_file_is_a_world_with_a_floor():
 
 
 def test_a_package_alone_is_seen_and_not_touched():
-    document, world = open_xr(ROOT / "assets" / "workshop.shift", Options())
+    document, editor = open_xr(ROOT / "assets" / "workshop.shift", Options())
+    world = editor.world
     (thing,) = world.drawn().objects
     assert (thing.name, document.floor_y) == ("workshop", None)
     world.advance(0.05)

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import ClassVar, get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from shapeshift.app.charts.quick_chart import QUICK, QuickRow
+from shapeshift.app.headset.headset import Options
 from shapeshift.app.headset.pacing import (
     AUTO,
     FIXED,
@@ -21,7 +22,6 @@ from shapeshift.app.headset.pacing import (
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene
-from shapeshift.vr.panel.panel_state import QUALITIES as ON_THE_PANEL
 
 BACKGROUND = (0.1, 0.2, 0.3)
 PERIOD = 0.010  # seconds
@@ -197,4 +197,6 @@ def test_a_chart_ends_with_its_patience_and_draws_both_eyes(monkeypatch, each, m
 
 
 def test_the_panel_offers_what_there_is():
-    assert set(ON_THE_PANEL) == set(QUALITIES) and QUALITIES[0] == AUTO
+    """As many as the command line knows."""
+    assert set(get_args(get_type_hints(Options)["quality"])) == set(QUALITIES)
+    assert QUALITIES[0] == AUTO

@@ -40,6 +40,7 @@ class Played:
         self.settings = RenderSettings()
         self.overlay = SimpleNamespace(draw=lambda *given: self.asked.append("overlay"))
         self.floor = SimpleNamespace(draw=self.draw_floor)
+        self.panel = SimpleNamespace(texture=None, boxes={})
         self.grids, self.profiles = [], {}
         self.framebuffers, self.textures = ["left", "right"], ["left", "right"]
         self.ctx, self.scenes, self.views = None, [], []

@@ -1,154 +1,120 @@
-"""What the panel tells of a world, and what its wishes do to it: no runtime, no drawing."""
+"""What the panel tells of a world, and what is said over frames that are late: no drawing."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from shapeshift.app.editor.state.track import shown_stop
 from shapeshift.app.headset.notices import BEGINS_S, BELOW, QUIET_S, SHOWN_S, Late, late_card
-from shapeshift.app.headset.pacing import Pacing
-from shapeshift.app.headset.wrist_menu import (
-    HINT,
-    MenuActions,
-    WristMenu,
-    facts_of,
-    grant,
-    sliders_of,
-)
-from shapeshift.app.headset.xr_user import XrState, XrUser
+from shapeshift.app.headset.room_section import SIZES, next_scale, size_text
 from shapeshift.runtime_models.model import Stop
-from shapeshift.scene.document.scene_file import SceneFile, SceneItem, named_stops
+from shapeshift.scene.document.edits import hide
+from shapeshift.scene.document.scene_file import named_stops
 from shapeshift.scene.world.reactions import State
-from shapeshift.scene.world.world import World
-from shapeshift.vr.panel.carried import panel_row
-from shapeshift.vr.panel.panel_state import (
-    Exit,
-    Pulse,
-    PutBack,
-    Recentre,
-    SetFloor,
-    SetQuality,
-    SetScale,
-    SetX,
-)
-from shapeshift.vr.touching import Touched
-from tests.support.splat_scenes import random_layers
-from tests.support.vr.vr_hands import HEAD, OPEN, a_frame, hand_at
+from tests.support.vr.vr_hands import HEAD
+from tests.support.vr.vr_panel import HEAT, a_state, an_editor, item, some_things
 
-LEFT = hand_at((-0.15, 1.15, -0.45))
-HEAT = (Stop("seen", 0.0), Stop("half", 0.5), Stop("heat", 1.0, "thermal", "ironbow", (0, 9), "K"))
+STOPS = (Stop("normal", 0.0), Stop("ice", 0.25), Stop("fire", 0.5), Stop("charcoal", 1.0))
 
 
-def item(name: str, **fields) -> SceneItem:
-    return SceneItem(name=name, model=name, static=True, **fields)
-
-
-def a_world() -> World:
-    items = (
-        item("table"),
-        item("lamp"),
-        item("leg", states=(State("cold", 0.0), State("warm", 0.25))),
-        item("gone", visible=False),
-    )
-    layers = random_layers(20, layers=1)
-    models = {name: replace(layers, stops=HEAT) for name in ("leg", "gone")}
-    models["lamp"] = random_layers(20, layers=3)
-    models["table"] = layers
-    return World(SceneFile(folder=None, items=items, gravity_m_s2=0.0), models, {})
-
-
-def a_state() -> XrState:
-    world = a_world()
-    return XrState(world, Pacing((0, 0, 0)), XrUser(world, SimpleNamespace(), None))
-
-
-def noting(done: list) -> MenuActions:
-    """What the menu asks of its session goes into the list."""
-    return MenuActions(
-        lambda frame: done.append("recentre"), done.append, lambda *felt: done.append(felt)
-    )
+def names(editor, indices) -> list[str]:
+    return [editor.scene.objects[index].name for index in indices]
 
 
 def test_sliders_are_of_what_is_seen_and_goes_somewhere():
-    sliders = sliders_of(a_world())
-    assert [slider.name for slider in sliders] == ["lamp", "leg"]
-    assert [stop.name for stop in sliders[0].stops] == ["layer 0", "layer 1", "layer 2"]
-    assert [(stop.name, stop.x, stop.palette) for stop in sliders[1].stops] == [
+    editor = some_things()
+    assert names(editor, editor.movable) == ["lamp", "leg", "gone"]
+    assert names(editor, editor.sliders) == ["lamp"], "one at a time"
+    assert [stop.name for stop in editor.stops(1)] == ["layer 0", "layer 1", "layer 2"]
+    assert [(stop.name, stop.x, stop.palette) for stop in editor.stops(2)] == [
         ("cold", 0.0, ""), ("warm", 0.25, ""), ("half", 0.5, ""), ("heat", 1.0, "ironbow")
     ]  # fmt: skip
 
 
+def test_a_hidden_object_is_not_the_first_whose_slider_is_shown():
+    editor = an_editor(item("gone", visible=False), item("lamp"))
+    assert names(editor, editor.sliders) == ["lamp"]
+    alone = an_editor(item("gone", visible=False), item("hidden", visible=False))
+    assert names(alone, alone.sliders) == ["gone"]
+
+
 def test_a_ring_ends_where_it_begins():
     states = (State("normal", 0.0), State("fire", 0.5))
-    ring = replace(a_world().objects["leg"], item=item("leg", states=states, ring=True))
+    thing = some_things().world.objects["leg"]
+    ring = replace(thing, item=item("leg", states=states, ring=True))
     assert [(stop.name, stop.x) for stop in named_stops(ring.item, ring.drawn.model)] == [
         ("normal", 0.0), ("fire", 0.5), ("normal", 1.0)
     ]  # fmt: skip
 
 
-def test_wishes_are_granted():
-    state, frame, done = a_state(), a_frame(LEFT), []
-    actions = noting(done)
-    grant(SetX("leg", 0.7), state, actions, frame)
-    assert {s.name: s.x for s in sliders_of(state.world)} == {"lamp": 0.0, "leg": 0.7}
-    grant(PutBack(), state, actions, frame)
-    assert {s.name: s.x for s in sliders_of(state.world)} == {"lamp": 0.0, "leg": 0.0}
-    grant(SetQuality("fast"), state, actions, frame)
-    assert state.pacing.quality == "fast" and state.pacing.settings().render_scale == 0.5
-    under = state.standing.point(frame.head.position * (1, 0, 1))
-    grant(SetScale(4.0), state, actions, frame)
-    assert state.standing.scale == 4.0
-    np.testing.assert_allclose(state.standing.point(frame.head.position * (1, 0, 1)), under)
-    grant(SetFloor(False), state, actions, frame)
-    assert not state.floor_shown and not facts_of(state).floor
-    for wish in (Recentre(), Pulse("left", 0.5, 0.1), Exit()):
-        grant(wish, state, actions, frame)
-    assert done == ["recentre", ("left", 0.5, 0.1), "from the panel"]
+def test_the_editor_works_on_the_world_that_the_hands_are_in():
+    """A slider moves it, what moves there is seen, an edit is heard of and makes no other world."""
+    editor = some_things()
+    world = editor.world
+    editor.set_x(editor.movable[1], 0.7)
+    assert world.objects["leg"].reaction_state.x == 0.7
+    world.control("lamp", 0.3)
+    world.advance(0.05)
+    editor.follow_world()
+    assert editor.scene.objects[1].x == 0.3
+    editor.edited.history = editor.edited.history.record(
+        hide(editor.edited.file, "leg", True), "hide"
+    )
+    editor.bodies.follow(editor.edited)
+    assert editor.world is world and not world.objects["leg"].drawn.visible
+    assert world.objects["leg"].reaction_state.x == 0.7, "what was not edited goes on as it was"
 
 
-def an_open_panel(state: XrState) -> WristMenu:
-    panel = WristMenu(state, noting([]))
-    panel.carried = OPEN
-    return panel
+def test_a_palette_is_another_look_of_what_the_headset_draws():
+    state = a_state(an_editor(item("leg"), leg=HEAT))
+    state.editor.choose_palette("viridis")
+    state.world.control("leg", 0.6)
+    state.touch.advance(0.05)
+    (thing,) = state.editor.scene.objects
+    assert thing.x == 0.6 and thing.model.stops[2].palette == "viridis"
 
 
-def test_it_is_closed_at_first_and_tells_how_to_open_it():
-    panel = WristMenu(a_state(), noting([]), "right")
-    panel.act(a_frame(LEFT), 0.0)
-    assert not panel.carried.panel.open and panel.carried.home == "right"
-    assert panel.carried.panel.facts.note == HINT and "palm up" in HINT
+@pytest.mark.parametrize(
+    ("scale", "larger", "want"),
+    [
+        (1.0, True, 1 / 1.5),
+        (1.0, False, 1 / 0.75),
+        (1 / 0.6, True, 1 / 0.75),
+        (1 / 20, True, 1 / 20),
+        (100.0, False, 100.0),
+        (1e4, False, 1e4),
+    ],
+)
+def test_size_goes_in_steps(scale, larger, want):
+    assert next_scale(scale, larger) == pytest.approx(want)
 
 
-def test_a_frame_shows_the_world_and_moves_it():
-    state = a_state()
-    panel = an_open_panel(state)
-    panel.act(a_frame(LEFT), 0.0)
-    row = panel_row(panel.carried)
-    assert (row["object"], row["shown"], row["hand"]) == ("lamp", "layer 0", "left")
-    ends = np.array(row["slider"])
-    target = ends[0] + 0.3 * (ends[1] - ends[0])
-    for trigger in (0.0, 1.0):
-        right = hand_at((0.25, 1.1, -0.2), target, trigger=trigger)
-        frame = panel.act(a_frame(LEFT, right), 1 / 72)
-    assert frame.hands["right"].trigger == 0 and frame.hands["left"] == LEFT
-    assert state.world.objects["lamp"].reaction_state.x == pytest.approx(0.3, abs=0.01)
-    panel.act(a_frame(LEFT), 1 / 72)
-    assert panel_row(panel.carried)["shown"] == "layer 0 \u2192 layer 1  60 %"
+def test_larger_and_smaller_come_back():
+    scale = 1.0
+    for larger in (True,) * 4 + (False,) * 4:
+        scale = next_scale(scale, larger)
+    assert scale == pytest.approx(1.0) and sorted(SIZES) == list(SIZES)
 
 
-def test_what_is_taken_in_a_hand_is_what_the_slider_is_of():
-    state = a_state()
-    panel = an_open_panel(state)
-    state.user.touched = Touched(held={"left": None, "right": "leg"})
-    panel.act(a_frame(LEFT), 0.0)
-    assert panel.carried.panel.slider.name == "leg"
-    panel.carried = replace(panel.carried, panel=replace(panel.carried.panel, chosen="lamp"))
-    panel.act(a_frame(LEFT), 0.0)
-    assert panel.carried.panel.slider.name == "lamp"  # chosen since, while it is still held
-    state.user.touched = Touched(held={"left": "table", "right": None})
-    panel.act(a_frame(LEFT), 0.0)
-    assert panel.carried.panel.slider.name == "lamp"  # a table has none
+def test_sizes_are_told_in_percent():
+    assert [size_text(s) for s in (1.0, 2.0, 100.0, 0.05)] == ["100 %", "50 %", "1 %", "2000 %"]
+
+
+@pytest.mark.parametrize(
+    ("x", "want"),
+    [
+        (0.0, "normal"), (0.25, "ice"), (0.2505, "ice"), (0.35, "ice to fire, 40 %"),
+        (0.252, "ice to fire, 1 %"), (0.99, "fire to charcoal, 98 %"), (1.0, "charcoal"),
+    ],
+)  # fmt: skip
+def test_it_says_which_stop_is_shown(x, want):
+    assert shown_stop(STOPS, x) == want
+
+
+def test_beyond_the_last_stop_and_without_any():
+    assert shown_stop(STOPS[:3], 0.9) == "fire  x 0.90"
+    assert shown_stop((), 0.9) == "x 0.90"
 
 
 def test_late_frames_are_told_for_a_moment_and_not_again_at_once():

@@ -41,7 +41,7 @@ def draw_objects(
     """All of the section."""
     state = objects.state
     _history(objects, saving, ui_scale)
-    _list(objects, ui_scale)
+    draw_object_list(objects, ui_scale)
     clicked = button_row(DEEDS, ui_scale, 3)
     if clicked:
         deeds = {"Add": ask_to_add, "Copy": objects.duplicate, "Delete": objects.delete}
@@ -77,7 +77,7 @@ def _history(objects: ObjectEdits, saving: Saving, ui_scale: float) -> None:
     tip("Ctrl+S writes the scene file; Ctrl+Shift+S asks for another name.", ui_scale)
 
 
-def _list(objects: ObjectEdits, ui_scale: float) -> None:
+def draw_object_list(objects: ObjectEdits, ui_scale: float) -> None:
     """A line an object; of a long list those that are in sight."""
     count = len(objects.state.scene.objects)
     if count <= MOST_ROWS:
@@ -174,9 +174,10 @@ def _place(objects: ObjectEdits, ui_scale: float) -> None:
 
 def _body(objects: ObjectEdits, item: SceneItem, ui_scale: float) -> None:
     """Whether it can be touched, whether it moves, how heavy it is."""
-    item = edits.find(objects.state.edited.file, item.name)
-    if item is None:  # renamed just now
+    found = edits.find(objects.state.edited.file, item.name)
+    if found is None:  # renamed just now
         return
+    item = found
     mesh = item.collider if item.collider not in (None, HULLS) else None
     kinds = [NONE, HULLS] + [mesh] * (mesh is not None)
     names = ["cannot be touched", "touched: its splats", f"touched: {mesh}"][: len(kinds)]

@@ -154,7 +154,8 @@ def _cadence(settings: RenderSettings, ui_scale: float) -> tuple[int, float]:
     place = min(settings.resort_frames, BY_TURN - 1) or BY_TURN
     text = "sort every frame" if place == 1 else f"sort every {place} frames"
     text = "sort by turning alone" if place == BY_TURN else text
-    moved, place = labelled_slider("cadence", place, 1, BY_TURN, text)
+    moved, new = labelled_slider("cadence", place, 1, BY_TURN, text)
+    place = int(new)
     tip(
         "Keeps an order for some frames. Saves sorts while you move; edges shimmer where the "
         "order is old. At rest the picture is sorted anew.", ui_scale,

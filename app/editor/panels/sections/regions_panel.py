@@ -1,5 +1,7 @@
 """The panel's section "Regions": parts of an object with a control value of their own."""
 
+from typing import Any
+
 import numpy as np
 from imgui_bundle import imgui
 
@@ -178,9 +180,11 @@ def _brush(state: EditorState, region: Region, ui_scale: float) -> None:
     regions = state.regions
     regions.brush = slider("brush", regions.brush, 3.0, MOST_BRUSH, "brush: %.0f px")
     tip(KIND_TIPS["painted"], ui_scale)
+    if region.painted is None:
+        return
     count = int(region.painted.sum())
     imgui.text_disabled(f"{count:,} of {len(region.painted):,} painted")
     clicked = button_row(PAINTED, ui_scale, 3)
     if clicked:
-        new = {"None": np.zeros_like, "All": np.ones_like, "Invert": np.logical_not}[clicked]
+        new: Any = {"None": np.zeros_like, "All": np.ones_like, "Invert": np.logical_not}[clicked]
         regions.edit(regions.chosen, painted=new(region.painted))

@@ -1,5 +1,7 @@
 """The panel's section "Touch": play, step, put back, pads of two axes, what has answered."""
 
+from typing import cast
+
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.widgets import theme
@@ -13,9 +15,11 @@ Vec = imgui.ImVec2
 PAD, KNOB = 120.0, 9.0  # logical pixels: a pad's height, and half of its knob
 
 
-def draw_touch(touch: TouchState, ui_scale: float) -> None:
-    """Buttons for what the keys do, the pads, and the last reactions."""
-    world = touch.world
+def draw_touch(touch: TouchState, ui_scale: float, colliders: bool = True) -> None:
+    """Buttons for what the keys do, the pads, and the last reactions; `colliders`: who shows the
+    picture can draw them.
+    """
+    world = touch.living
     play = "Play" if world.paused else "Pause"
     tips = {
         f"{play}###play": "Key T. While things move, drag one to carry it.",
@@ -26,25 +30,27 @@ def draw_touch(touch: TouchState, ui_scale: float) -> None:
     deeds = {f"{play}###play": touch.toggle, "Step": touch.step, "Put back": touch.reset_objects}
     if clicked:
         deeds[clicked]()
-    _, touch.colliders = imgui.checkbox("show colliders", touch.colliders)
-    tip("Key C. What the physics touches: green moves, blue stays.", ui_scale)
+    if colliders:
+        _, touch.colliders = imgui.checkbox("show colliders", touch.colliders)
+        tip("Key J. What the physics touches: green moves, blue stays.", ui_scale)
     name = pad_object(touch)
-    if name is not None:
-        draw_pad(touch, name, world.objects[name].item.two_axes, ui_scale)
+    axes = world.objects[name].item.two_axes if name is not None else None
+    if name is not None and axes is not None:
+        draw_pad(touch, name, axes, ui_scale)
     for line in touch.told:
         imgui.text_disabled(line)
 
 
 def pad_object(touch: TouchState) -> str | None:
     """Whose pad is shown: of those that have one the chosen object, else the first."""
-    names = [n for n, thing in touch.world.objects.items() if thing.item.two_axes is not None]
+    names = [n for n, thing in touch.living.objects.items() if thing.item.two_axes is not None]
     chosen = touch.chosen
     return chosen if chosen in names else names[0] if names else None
 
 
 def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> None:
     """A square to drag in: to the sides balance -1 to 1, upwards power 0 to 1."""
-    thing = touch.world.objects[name]
+    thing = touch.living.objects[name]
     balance, power = touch.pads[name] = pad_of(
         axes, thing.machine.blend.slider_x(thing.reaction_state.x), touch.pads.get(name, (0.0, 1.0))
     )
@@ -80,8 +86,8 @@ def draw_pad(touch: TouchState, name: str, axes: TwoAxes, ui_scale: float) -> No
 def side_names(thing: RigidObject, axes: TwoAxes) -> tuple[str, str]:
     """What is at both sides: a state or a stop that lies there, "" where none does."""
     stops = named_stops(thing.item, thing.drawn.model)
-    named = (next((s.name for s in stops if s.x == x), "") for x in (axes.below, axes.above))
-    return tuple(named)
+    below, above = (next((s.name for s in stops if s.x == x), "") for x in (axes.below, axes.above))
+    return below, above
 
 
 def pad_of(axes: TwoAxes, x: float, last: tuple[float, float]) -> tuple[float, float]:
@@ -90,7 +96,7 @@ def pad_of(axes: TwoAxes, x: float, last: tuple[float, float]) -> tuple[float, f
     Beyond both sides, where nothing gives x, the nearest.
     """
     balance, power = last
-    if abs(axes.x(balance, power) - x) < 1e-4:
+    if abs(x_of(axes, balance, power) - x) < 1e-4:
         return last
     best = (0.0, power)
     for side, sign in ((axes.above, 1.0), (axes.below, -1.0)):
@@ -98,6 +104,11 @@ def pad_of(axes: TwoAxes, x: float, last: tuple[float, float]) -> tuple[float, f
         part = min(max((x - axes.rest) / reach, 0.0), 1.0) if reach else 0.0
         needed = max(power, part)  # less power could not reach so far
         found = (sign * part / needed, needed) if part > 0 else (0.0, power)
-        if abs(axes.x(*found) - x) < abs(axes.x(*best) - x) - 1e-9:
+        if abs(x_of(axes, *found) - x) < abs(x_of(axes, *best) - x) - 1e-9:
             best = found
     return best
+
+
+def x_of(axes: TwoAxes, balance: float, power: float) -> float:
+    """Where both lead; without the model's stops that is a place on the slider, never a blend."""
+    return cast(float, axes.x(balance, power))

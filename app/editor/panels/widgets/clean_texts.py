@@ -5,6 +5,8 @@ surrogate pairs, which any name in JSON may hold, raise an error in the middle o
 """
 
 import functools
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from imgui_bundle import imgui
 
@@ -12,13 +14,21 @@ from shapeshift.runtime_models.files.plain_text import one_line, several_lines
 
 EDITED = ("input_text", "input_text_multiline", "input_text_with_hint")  # what somebody types
 WITH_LINES = ("text", "calc_text_size", "set_tooltip", "set_item_tooltip")  # may have several
+ITEMS = (  # what can be hit
+    "button", "checkbox", "selectable", "combo", "slider_float", "slider_int", "drag_float",
+    "drag_float3", "input_text", "color_edit3", "invisible_button", "tree_node_ex", "arrow_button",
+)  # fmt: skip
+
+Box = tuple[float, float, float, float]  # left, top, right, bottom, logical pixels
+_listed: list[dict[str, Box]] = []  # of `listing_items`, the innermost last
 
 
 def clean_texts() -> None:
     """Makes ImGui's functions that take texts clean them; once a process is enough."""
     for name, function in vars(imgui).copy().items():
         if type(function).__name__ == "nb_func" and "str" in (function.__doc__ or ""):
-            setattr(imgui, name, cleaning(function, maker(name)))
+            clean = cleaning(function, maker(name))
+            setattr(imgui, name, listed(clean) if name in ITEMS else clean)
     lists = imgui.ImDrawList
     if not hasattr(lists.add_text, "__wrapped__"):
         lists.add_text = cleaning(lists.add_text, clean_line)
@@ -39,6 +49,31 @@ def cleaning(function, make):
         return function(*map(make, arguments), **{key: make(named[key]) for key in named})
 
     return call
+
+
+def listed(function):
+    """The function, which tells whoever lists items where its item lies."""
+
+    @functools.wraps(function, assigned=("__doc__", "__name__"))
+    def call(label, *arguments, **named):
+        done = function(label, *arguments, **named)
+        if _listed and imgui.is_item_visible():
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            name = label.split("##")[0] or label.strip("#")
+            _listed[-1].setdefault(name, (low.x, low.y, high.x, high.y))
+        return done
+
+    return call
+
+
+@contextmanager
+def listing_items() -> Iterator[dict[str, Box]]:
+    """Within it: what can be hit and is in sight, by its label; of one label the first."""
+    _listed.append({})
+    try:
+        yield _listed[-1]
+    finally:
+        _listed.pop()
 
 
 def clean_line(value):

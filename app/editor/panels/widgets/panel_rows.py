@@ -1,6 +1,7 @@
 """What sections of the panel are made of: headings that fold, rows, sliders with an open end."""
 
 from collections.abc import Iterable, Mapping
+from typing import TypeVar
 
 import numpy as np
 from imgui_bundle import imgui
@@ -8,6 +9,7 @@ from imgui_bundle import imgui
 from shapeshift.app.editor.panels.widgets import theme
 
 Vec = imgui.ImVec2
+T = TypeVar("T")
 TIP_WIDTH = 300.0  # logical pixels; longer explanations wrap
 
 
@@ -58,9 +60,11 @@ def right_aligned(text: str) -> None:
 
 
 def tip(text: str, ui_scale: float) -> None:
-    """Explains the item before it when the mouse rests there, also when it is disabled."""
-    flags = imgui.HoveredFlags_
-    if not imgui.is_item_hovered(flags.for_tooltip | flags.allow_when_disabled):
+    """Explains the item before it when the mouse rests there, also when it is disabled; a ray
+    never rests, and has no keys to be told of.
+    """
+    rests = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
+    if not (theme.has_keys() and imgui.is_item_hovered(rests)):
         return
     imgui.begin_tooltip()
     imgui.push_text_wrap_pos(TIP_WIDTH * ui_scale)
@@ -117,7 +121,7 @@ def labelled_slider(
     return moved, new
 
 
-def choice(name: str, value: object, values: Iterable, labels: Iterable[str]) -> object:
+def choice(name: str, value: T, values: Iterable[T], labels: Iterable[str]) -> T:
     """A list to choose from; returns the value that is chosen now."""
     values = list(values)
     changed, chosen = imgui.combo(f"##{name}", values.index(value), list(labels))

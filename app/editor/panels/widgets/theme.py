@@ -12,6 +12,8 @@ FONT = Path(imgui_bundle.__file__).parent / "assets/fonts/Roboto/Roboto-Regular.
 # Latin, Greek, Cyrillic, dashes, arrows: what the font has
 GLYPHS = [0x20, 0x17F, 0x370, 0x3FF, 0x400, 0x4FF, 0x2000, 0x2027, 0x2190, 0x21FF, 0]
 
+BEYOND = (3.0, 3.0)  # logical pixels that items reach beyond their edges for a ray or a finger
+
 ACCENT = (0.95, 0.63, 0.27)
 TEXT = (0.90, 0.90, 0.91)
 MUTED = (0.58, 0.59, 0.62)
@@ -33,12 +35,23 @@ def window_box() -> Box:
     return (low.x, low.y, low.x + size.x, low.y + size.y)
 
 
-def apply(ui_scale: float, pixels_per_unit: float) -> None:
+def has_keys() -> bool:
+    """Whether there are a mouse and keys: numbers are typed then, and tips name keys.
+
+    Else a ray or a finger points, as in a headset.
+    """
+    return not imgui.get_io().config_flags & imgui.ConfigFlags_.no_keyboard
+
+
+def apply(ui_scale: float, pixels_per_unit: float, keys: bool = True) -> None:
     """Styles the current ImGui context; fonts are rastered at the density of the framebuffer.
 
-    Between frames alone, and whoever draws needs the texture of the fonts anew.
+    Between frames alone, and whoever draws needs the texture of the fonts anew.  Without `keys`
+    a ray or a finger points at it: all that can be hit is larger.
     """
     io = imgui.get_io()
+    if not keys:
+        io.config_flags |= imgui.ConfigFlags_.no_keyboard | imgui.ConfigFlags_.is_touch_screen
     io.fonts.clear()
     size = round(FONT_SIZE * ui_scale * pixels_per_unit)
     io.fonts.add_font_from_file_ttf(str(FONT), size, glyph_ranges_as_int_list=GLYPHS)
@@ -56,6 +69,11 @@ def apply(ui_scale: float, pixels_per_unit: float) -> None:
     style.cell_padding = imgui.ImVec2(4, 2)
     style.grab_min_size = 12
     style.scrollbar_size = 10
+    if not keys:
+        style.frame_padding, style.item_spacing = imgui.ImVec2(8, 5), imgui.ImVec2(8, 8)
+        style.touch_extra_padding = imgui.ImVec2(*BEYOND)
+        style.scrollbar_size, style.grab_min_size = 16, 20
+        style.window_rounding = style.child_border_size = 0
     for where, (rgb, alpha) in _colors().items():
         style.set_color_(where, imgui.ImVec4(*rgb, alpha))
     style.scale_all_sizes(ui_scale)

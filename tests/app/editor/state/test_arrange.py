@@ -11,7 +11,6 @@ from shapeshift.app.editor.state import arrange
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.open_scene import opened_scene
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Source, read_files
-from shapeshift.app.headset.wrist_menu import sliders_of
 from shapeshift.runtime_models.model import BadFile, SplatLayers, Stop
 from shapeshift.scene.cameras.camera_list import CameraReading
 from shapeshift.scene.colliders import collider_files
@@ -150,15 +149,8 @@ def test_the_chosen_object_follows_its_name(state):
     assert state.chosen == ""
 
 
-def test_a_stop_has_one_name_on_the_desktop_and_in_the_headset(state, monkeypatch):
+def test_a_stop_has_the_name_that_the_scene_gives_it(state):
     """The cube's last stop is called "again" in its folder, and is the ring's beginning."""
-    monkeypatch.setattr(collider_files, "one_collider", lambda *_: cube())
-    ready(state)
-    worn = {slider.name: slider.stops for slider in sliders_of(state.world)}
-    assert len(worn) >= 3
-    for index, thing in enumerate(state.scene.objects):
-        if thing.name in worn:
-            assert state.stops(index) == worn[thing.name]
     assert [stop.name for stop in state.stops(1)] == [
         "normal", "ice", "fire", "charcoal", "normal",
     ]  # fmt: skip

@@ -1,0 +1,164 @@
+"""What the panel has in a headset alone: the head with its slider, "Room", and the foot."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
+from shapeshift.app.editor.panels.slider import draw_slider
+from shapeshift.app.editor.panels.widgets import theme
+from shapeshift.app.editor.state.editor_state import EditorState
+from shapeshift.app.editor.state.track import shown_stop
+from shapeshift.app.headset.pacing import QUALITIES
+from shapeshift.app.headset.xr_user import XrState
+
+Vec = imgui.ImVec2
+SIZES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
+SURE_S = 4.0  # Exit asks once more for so long
+SCALE_TALL = 124.0  # units of the overlay, of the scale of a thermal stop
+SCALE_WIDE = 100.0
+HOW = (
+    "The menu button, or the palm turned up, opens and closes the panel. The stick of the hand "
+    "that carries it slides; the stick of the hand that points at it scrolls."
+)
+
+
+@dataclass
+class RoomActions:
+    """What the panel asks of the session; the frame is known there."""
+
+    recentre: Callable[[], None]
+    resize: Callable[[float], None]  # metres of the world a metre of the room
+    leave: Callable[[], None]
+
+
+def draw_head(state: EditorState, ui_scale: float) -> None:
+    """Whose slider it is, which stop is shown, and the slider; what could not be done."""
+    if not state.sliders:
+        imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), "Shapeshift")
+        imgui.text_disabled("nothing here changes its shape")
+    for index in state.sliders:
+        imgui.push_id(index)
+        thing = state.scene.objects[index]
+        _named(state, thing.name, shown_stop(state.stops(index), thing.slider_x), ui_scale)
+        draw_slider(state, index, ui_scale)
+        imgui.pop_id()
+    for sentence in state.messages.problems:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.WARNING, 1))
+        imgui.text_wrapped(sentence)
+        imgui.pop_style_color()
+        if imgui.button(f"OK##{sentence}"):
+            state.messages.dismiss(sentence)
+
+
+def _named(state: EditorState, name: str, shown: str, ui_scale: float) -> None:
+    """The name, what it shows, and arrows to the others that have a slider and are seen."""
+    seen = [i for i in state.movable if state.scene.objects[i].visible]
+    names = [state.scene.objects[index].name for index in seen]
+    side, gap = imgui.get_frame_height(), imgui.get_style().item_spacing.x
+    start, room = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
+    arrows = 2 * side + gap if len(names) > 1 else 0.0
+    corner = imgui.get_cursor_screen_pos()
+    edge = Vec(corner.x + room - arrows - gap, corner.y + side)
+    imgui.push_clip_rect(corner, edge, True)
+    imgui.align_text_to_frame_padding()
+    imgui.text_disabled(name)
+    imgui.same_line()
+    imgui.text_colored(imgui.ImVec4(*theme.ACCENT, 1), shown)
+    imgui.pop_clip_rect()
+    place = names.index(name) if name in names else -1
+    for label, way in (("previous", -1), ("next", 1)) if arrows else ():
+        left = room - arrows if way < 0 else room - side
+        imgui.set_cursor_pos(Vec(start.x + left, start.y))
+        if imgui.arrow_button(label, imgui.Dir.left if way < 0 else imgui.Dir.right):
+            state.chosen = names[(place + way) % len(names)]
+
+
+def draw_room(state: XrState, actions: RoomActions) -> None:
+    """How large the world looks, how it is drawn, the grid on the floor."""
+    gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
+    width, left = (room - 3 * gap) / 4, imgui.get_cursor_pos_x()
+    scale = state.standing.scale
+    imgui.align_text_to_frame_padding()
+    imgui.text(size_text(scale))
+    for number, (label, wanted) in enumerate(
+        (("\u2013", next_scale(scale, False)), ("+", next_scale(scale, True)), ("1 : 1", 1.0))
+    ):
+        imgui.same_line()
+        imgui.set_cursor_pos_x(left + (number + 1) * (width + gap))
+        if lit_button(label, label == "1 : 1" and abs(scale - 1) < 1e-3, width):
+            actions.resize(wanted)
+    names = [name.capitalize() for name in QUALITIES]
+    texts = [imgui.calc_text_size(name).x for name in names]
+    spare = (room - 3 * gap - sum(texts)) / len(texts)
+    for number, name in enumerate(QUALITIES):
+        if number:
+            imgui.same_line()
+        if lit_button(names[number], state.pacing.quality == name, texts[number] + spare):
+            state.pacing.quality = name
+    _, state.floor_shown = imgui.checkbox("grid on the floor", state.floor_shown)
+
+
+def draw_help() -> None:
+    """How the panel opens, and what the sticks do while it is there."""
+    imgui.push_text_wrap_pos(0)
+    imgui.text_unformatted(HOW)
+    imgui.pop_text_wrap_pos()
+
+
+def lit_button(label: str, lit: bool, width: float) -> bool:
+    """A button, in the accent's colour where it is what holds now."""
+    if lit:
+        imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.ACCENT, 1))
+    clicked = imgui.button(label, Vec(width, 0))
+    if lit:
+        imgui.pop_style_color()
+    return clicked
+
+
+def draw_scale(state: EditorState, ui_scale: float) -> None:
+    """The palette of the thermal stop with its values."""
+    corner = imgui.get_cursor_screen_pos()
+    box = (corner.x, corner.y, corner.x + SCALE_WIDE * ui_scale, corner.y + SCALE_TALL * ui_scale)
+    draw_scale_bar(state.scene, box, ui_scale, imgui.get_window_draw_list())
+    imgui.dummy(Vec(SCALE_WIDE * ui_scale, SCALE_TALL * ui_scale))
+
+
+class Foot:
+    """Recentre and Exit, which asks once more."""
+
+    def __init__(self, actions: RoomActions) -> None:
+        self._actions = actions
+        self.sure_s = 0.0  # seconds for which Exit asks "really?"
+
+    def draw(self, seconds: float) -> None:
+        self.sure_s = max(self.sure_s - seconds, 0.0)
+        width = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+        if imgui.button("Recentre", Vec(width, 0)):
+            self.sure_s = 0.0
+            self._actions.recentre()
+        imgui.same_line()
+        asks = self.sure_s > 0
+        if asks:
+            imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*theme.WARNING, 1))
+        if imgui.button("Really exit?###exit" if asks else "Exit###exit", Vec(width, 0)):
+            self.sure_s = 0.0 if asks else SURE_S
+            if asks:
+                self._actions.leave()
+        if asks:
+            imgui.pop_style_color()
+
+
+def size_text(scale: float) -> str:
+    """How large the world looks."""
+    size = 100 / scale
+    return f"{size:.0f} %" if size >= 100 else f"{size:.3g} %"
+
+
+def next_scale(scale: float, larger: bool) -> float:
+    """The next size of SIZES; larger looking means fewer metres of the world in the room."""
+    size, slack = 1 / scale, 1.001
+    if larger:
+        return 1 / next((s for s in SIZES if s > size * slack), max(size, SIZES[-1]))
+    return 1 / next((s for s in reversed(SIZES) if s * slack < size), min(size, SIZES[0]))
