@@ -153,20 +153,24 @@ def test_a_throw_has_the_velocity_of_its_hand_within_five_percent(mass, speed):
     assert np.linalg.norm(physics.pose(body).position - want) < 0.005
 
 
-def test_a_swung_hand_throws_with_its_turning():
+@pytest.mark.parametrize("along", [0.0, 2.0])
+def test_a_swung_hand_throws_with_its_turning(along):
+    """And with where it is at the end: along in m/s it moves meanwhile."""
     physics = Physics(gravity_m_s2=0)
     body = physics.add_body([box(0.03, 0.03, 0.03)], at(0.4, 0, 0), 0.3)
     grab = physics.grab(body, at(0, 0, 0), (0.4, 0, 0))  # 40 cm from the wrist
     for i in range(1, 46):
         half = 3.0 * i / 90 / 2  # 3 rad/s about +Y
-        physics.move_hand(grab, at(0, 0, 0, (np.cos(half), 0, np.sin(half), 0)))
+        hand = along * i / 90
+        physics.move_hand(grab, at(hand, 0, 0, (np.cos(half), 0, np.sin(half), 0)))
         physics.step()
     angle, (x, _, z) = 3.0 * 0.5, physics.pose(body).position
     physics.release(grab)
     linear, turning = physics.velocity(body)
     assert np.allclose(turning, (0, 3, 0), atol=0.15)
-    assert np.allclose(linear, (-1.2 * np.sin(angle), 0, -1.2 * np.cos(angle)), atol=0.06)
-    assert np.hypot(x - 0.4 * np.cos(angle), z + 0.4 * np.sin(angle)) <= 5 * MM
+    swung = along - 1.2 * np.sin(angle), 0, -1.2 * np.cos(angle)
+    assert np.allclose(linear, swung, atol=0.06)
+    assert np.hypot(x - along * 0.5 - 0.4 * np.cos(angle), z + 0.4 * np.sin(angle)) <= 5 * MM
 
 
 @pytest.mark.parametrize("mass", [0.05, 0.3, 5.0])
