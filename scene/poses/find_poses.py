@@ -71,6 +71,7 @@ def find_poses(
     """
     make_folders(out.parent, out.name)
     work = make_folders(out, WORK)
+    refuse_links(work)
     masks = copy_masks(photos, settings.masks, work) if settings.masks else None
     job = describe(photos, work, settings, masks)
     told = run_child("find", start_job(work, job), work / "log.txt", progress)
@@ -102,6 +103,15 @@ def find_poses(
     )  # fmt: skip
     write_posed(photos, placed, out, work, settings.straight, report)
     return report
+
+
+def refuse_links(work: Path) -> None:
+    """pycolmap writes into files of the folder by their names: a link there leads it elsewhere."""
+    link = next((path for path in work.rglob("*") if path.is_symlink()), None)
+    if link is not None:
+        raise BadFile(
+            f"{link} is a link, and a search writes through none; --overwrite begins anew."
+        )
 
 
 def describe(photos: PhotoList, work: Path, settings: PoseSettings, masks: Path | None) -> dict:

@@ -222,6 +222,18 @@ def test_an_unfinished_search_goes_on_and_no_other_takes_its_place(room, tmp_pat
     assert len(model.cameras) == 1, "photos done before the kill share the camera of the others"
 
 
+@pytest.mark.parametrize("name", ["log.txt", "database.db", "best/images.bin"])
+def test_nothing_is_written_through_a_link_in_an_unfinished_search(room, tmp_path, name):
+    """A folder from elsewhere may hold one that leads to a file of the user's."""
+    mine, link = tmp_path / "mine", tmp_path / "out/poses.work" / name
+    mine.write_bytes(b"mine")
+    link.parent.mkdir(parents=True)
+    link.symlink_to(mine)
+    with pytest.raises(BadFile, match="is a link"):
+        find_poses(list_photos(room[0]), tmp_path / "out", PoseSettings(threads=2), quiet)
+    assert mine.read_bytes() == b"mine"
+
+
 BAD_LISTS = {
     "no folder": (lambda root: None, "does not exist"),
     "empty": (lambda root: root.mkdir(), "holds 0 photos"),
