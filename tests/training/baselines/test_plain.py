@@ -289,12 +289,12 @@ def test_only_a_folder_of_ours_is_written_into(tmp_path):
     ("text", "match"),
     [
         ("{", "not JSON"),
-        ("[]", "has format None"),
-        ('{"format": "shapeshift-layers 2"}', "has format 'shapeshift-layers 2'"),
+        ("[]", r"is \[\]; one object in braces is wanted"),
+        ('{"format": "shapeshift-layers 2"}', 'has format "shapeshift-layers 2"'),
         ('{"format": "shapeshift-layers 1", "stops": []}', "at least one stop"),
-        ('{"format": "shapeshift-layers 1", "mode": "both", "stops": [STOP]}', "mode is 'both'"),
+        ('{"format": "shapeshift-layers 1", "mode": "both", "stops": [STOP]}', 'is "both"'),
         ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [{"name": "a", "x": 0,'
-         ' "kind": "rgb"}]}', "lacks 'file'"),
+         ' "kind": "rgb"}]}', "'file' is missing"),
         ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [STOP, {"name": "b", '
          '"x": 1, "kind": "rgb", "file": "0_a.ply"}]}', "names one file twice"),
         ('{"format": "shapeshift-layers 1", "mode": "exclusive", "stops": [{"name": "a", "x": 0,'
@@ -313,5 +313,5 @@ def test_a_list_that_is_wrong_is_refused(tmp_path, text, match):
 
 def test_a_list_without_end_is_refused(tmp_path):
     (tmp_path / LIST).write_bytes(b" " * ((1 << 20) + 1))
-    with pytest.raises(BadFile, match="no list of stops is so long"):
+    with pytest.raises(BadFile, match="bytes; at most 1,048,576 are read"):
         read_model(tmp_path)
