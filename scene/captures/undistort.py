@@ -97,7 +97,9 @@ def pinhole_of(lens: Lens) -> Pinhole:
 
     def reach(tangents: np.ndarray, axis: int, edge: float, sign: int) -> float:
         at = sign * pixels_of(lens, tangents)[:, axis]
-        return float(np.interp(sign * edge, at, along)) if (np.diff(at) > 0).all() else 0.0
+        rising = np.diff(at) > 0  # NaN is not; the last step may lie over the fold itself
+        end = len(at) if rising.all() else int(rising.argmin()) + 1
+        return float(np.interp(sign * edge, at[:end], along[:end]))
 
     right = reach(np.stack([along, none], 1), 0, width, 1)
     left = reach(np.stack([-along, none], 1), 0, 0.0, -1)

@@ -279,6 +279,17 @@ def test_what_is_lost_does_not_depend_on_the_rows_at_a_time(monkeypatch):
     np.testing.assert_array_equal(lost(lens, pinhole_of(lens).size, 1), at_once)
 
 
+@pytest.mark.parametrize("bend", np.linspace(-0.16, -0.1, 61).tolist())
+def test_a_long_lens_that_folds_far_outside_the_photo_is_read(bend):
+    """Its polynomial turns at tangents of 1.4 to 1.8, the photo ends at 0.16: the straight photo
+    is 1.000 to 1.004 times as wide, r k r^2, wherever between two samples the turn lies."""
+    lens = Lens("SIMPLE_RADIAL", (1000, 1000), (3084.0, 500.0, 500.0, bend))
+    straight = pinhole_of(lens)
+    edge = 500 / 3084
+    for side in straight.size:
+        assert 1000 <= side <= 1000 * (1 - 1.1 * bend * edge**2) + 1
+
+
 def test_a_lens_folds_back_where_its_polynomial_turns():
     """r (1 + k r^2) grows until r = 1 / sqrt(-3 k)."""
     lens = Lens("SIMPLE_RADIAL", SIZE, (F, *CENTRE, -0.3))
