@@ -15,8 +15,8 @@ from shapeshift.app.program import program
 from shapeshift.app.terminal import say, tell, tell_json
 
 if TYPE_CHECKING:
-    from shapeshift.scene.poses.find_poses import Length, PoseSettings
-    from shapeshift.scene.poses.pose_report import PoseReport
+    from shapeshift.decomposition.poses.find_poses import Length, PoseSettings
+    from shapeshift.decomposition.poses.pose_report import PoseReport
 
 FRAMES = "frames"  # of a video, below --out, as long as the search is not done
 OURS = {"images", "masks", "sparse", "poses.json", "poses.work", FRAMES}
@@ -57,9 +57,9 @@ class Options:
 def run(options: Options) -> int:
     from shapeshift.app.errors import UsageError
     from shapeshift.app.progress import progress_bar
-    from shapeshift.scene.poses.find_poses import WORK, find_poses
-    from shapeshift.scene.poses.photo_list import list_photos
-    from shapeshift.scene.poses.video_frames import VIDEOS
+    from shapeshift.decomposition.poses.find_poses import WORK, find_poses
+    from shapeshift.decomposition.poses.photo_list import list_photos
+    from shapeshift.decomposition.poses.video_frames import VIDEOS
 
     settings = settings_of(options)
     if not options.every >= 1:
@@ -94,8 +94,8 @@ def run(options: Options) -> int:
 def settings_of(options: Options) -> "PoseSettings":
     """Raises UsageError."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.poses.find_poses import NEIGHBOURS, PoseSettings
-    from shapeshift.scene.poses.video_frames import VIDEOS
+    from shapeshift.decomposition.poses.find_poses import NEIGHBOURS, PoseSettings
+    from shapeshift.decomposition.poses.video_frames import VIDEOS
 
     video = options.photos.suffix.lower() in VIDEOS
     near = {"all": 0, "neighbours": NEIGHBOURS, "auto": NEIGHBOURS if video else None}
@@ -111,7 +111,7 @@ def settings_of(options: Options) -> "PoseSettings":
 def parse_length(text: str) -> "Length | None":
     """Of --metres.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
-    from shapeshift.scene.poses.find_poses import Length
+    from shapeshift.decomposition.poses.find_poses import Length
 
     if not text:
         return None
@@ -130,8 +130,8 @@ def parse_length(text: str) -> "Length | None":
 def refuse_target(options: Options) -> None:
     """What --out holds must be an unfinished search, nothing, or given up.  Raises UsageError."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.decomposition.poses.find_poses import WORK
     from shapeshift.scene.captures.read_capture import has_poses
-    from shapeshift.scene.poses.find_poses import WORK
 
     out, photos = options.out, options.photos
     if out.resolve() in (photos.resolve(), *photos.resolve().parents):
@@ -155,8 +155,8 @@ def refuse_target(options: Options) -> None:
 def frames_of(options: Options, progress) -> Path:
     """The folder of the video's frames; what a run before took out is used again."""
     from shapeshift.app.errors import UsageError
+    from shapeshift.decomposition.poses.video_frames import take_frames
     from shapeshift.runtime_models.files.whole_file import make_folders, whole_folder
-    from shapeshift.scene.poses.video_frames import take_frames
 
     if not options.frames >= 3:
         raise UsageError(f"--frames is {options.frames}; give 3 or more.")

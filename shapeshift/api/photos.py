@@ -10,7 +10,7 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
 
 if TYPE_CHECKING:
-    from shapeshift.scene.poses.pose_report import PoseReport
+    from shapeshift.decomposition.poses.pose_report import PoseReport
 
 Told = Callable[[str, int, int], None]  # what is done now, how many of how many
 
@@ -29,7 +29,8 @@ def poses(
     photos: a folder, its sub-folders modalities; thermal photos get the poses of the photos of
     visible light with the same name.  out: a new or empty folder, or one with the same search
     unfinished, which goes on.  every: each n-th photo of a folder.  settings: any field of
-    `shapeshift.scene.poses.find_poses.PoseSettings`, such as length, neighbours or straight.
+    `shapeshift.decomposition.poses.find_poses.PoseSettings`, such as length, neighbours or
+    straight.
     Lengths are arbitrary unless `length` names one.  Gives what was found: photos placed, left
     out, or placed by few points; mean error in pixels.
 
@@ -38,8 +39,8 @@ def poses(
         found = ss.poses("photos", "capture")
         model = ss.train("capture", seconds=60)
     """
-    from shapeshift.scene.poses.find_poses import WORK, PoseSettings, find_poses
-    from shapeshift.scene.poses.photo_list import list_photos
+    from shapeshift.decomposition.poses.find_poses import WORK, PoseSettings, find_poses
+    from shapeshift.decomposition.poses.photo_list import list_photos
 
     if not every >= 1:
         raise UsageError(f"every is {every}; give 1 or more.")

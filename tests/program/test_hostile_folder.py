@@ -17,7 +17,8 @@ from tests.support.splat_scenes import random_layers
 ROOT = Path(__file__).resolve().parents[2]
 CLI = [sys.executable, "-P", str(ROOT / "shapeshift" / "__main__.py")]  # as launch.py starts it
 INSTALLED = "from shapeshift.app.cli import main\nraise SystemExit(main())\n"
-SHIPPED = ("app", "renderer", "rasterizer", "runtime_models", "scene", "training", "vr")
+SHIPPED = ("app", "decomposition", "rasterizer", "renderer", "runtime_models", "scene", "training",
+           "vr")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +116,7 @@ HEAVY = [
      "--sweep", "2"),
     ("view", "a.ply", "--screenshot", "heavy/window.png", "--frames", "1"),
     ("vr", "--help"),  # without a runtime it only says so; tests/xr has one
-    ("poses", "--help"),  # tests/scene/poses finds some
+    ("poses", "--help"),  # tests/decomposition/poses finds some
     (),
 ]  # fmt: skip
 

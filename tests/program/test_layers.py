@@ -16,9 +16,26 @@ MAY_IMPORT = {
     "scene": {"runtime_models"},
     "renderer": {"rasterizer", "scene", "runtime_models"},
     "training": {"rasterizer", "scene", "runtime_models"},
+    "decomposition": {"training", "renderer", "rasterizer", "scene", "runtime_models"},
     "vr": {"renderer", "scene", "runtime_models"},
-    "app": {"vr", "renderer", "training", "rasterizer", "scene", "runtime_models"},
-    "shapeshift": {"app", "renderer", "training", "rasterizer", "scene", "runtime_models"},
+    "app": {
+        "vr",
+        "renderer",
+        "decomposition",
+        "training",
+        "rasterizer",
+        "scene",
+        "runtime_models",
+    },
+    "shapeshift": {
+        "app",
+        "renderer",
+        "decomposition",
+        "training",
+        "rasterizer",
+        "scene",
+        "runtime_models",
+    },
 }
 # folder: outside packages it must never see
 NEVER = {
@@ -26,6 +43,7 @@ NEVER = {
     "rasterizer": {"xr", "rapier3d", "moderngl", "torch", "PIL", "onnx", "onnxruntime", "glfw"},
     "scene": {"xr", "moderngl", "torch", "pyopencl", "glfw"},
     "renderer": {"xr", "rapier3d", "torch", "glfw", "imgui_bundle", "moderngl_window"},
+    "decomposition": {"xr", "moderngl", "glfw", "imgui_bundle", "torch"},
     "training": {"xr", "rapier3d", "moderngl", "glfw", "imgui_bundle", "torch"},
     "vr": {"rapier3d", "torch", "imgui_bundle", "moderngl_window", "pyopencl"},
     "app": {"rapier3d", "torch", "xr"},

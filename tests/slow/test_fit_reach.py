@@ -44,7 +44,7 @@ def test_balls_in_visible_light_and_heat_do(tmp_path):
     assert words["colour that follows x"] == KEPT
     assert words["what no stop shows"] == DROPPED
     assert words["features as float32 instead of float16"] == DROPPED
-    assert set(SHAPE_HEADS) <= set(need.settings.layout().fixed)
+    assert set(SHAPE_HEADS) <= set(need.settings.layout(2).fixed)
     assert need.fitted.bytes < 0.6 * need.full.bytes
     for name, before in need.full.psnr.items():
         assert need.fitted.psnr[name].mean() > before.mean() - 0.5

@@ -17,6 +17,7 @@ MOST = {
     "api": 0,
     "app": 0,
     "rasterizer": 0,
+    "decomposition": 0,
     "renderer": 0,
     "runtime_models": 0,
     "scene": 0,

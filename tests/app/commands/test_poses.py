@@ -130,7 +130,7 @@ def test_a_capture_without_poses_names_this_command(photos):
 def test_a_video_gives_its_sharpest_frames(tmp_path, capsys):
     """Of each three frames the first and the last are blurred; the middle ones are taken."""
     av = pytest.importorskip("av", reason="PyAV is not installed")
-    from shapeshift.scene.poses.video_frames import take_frames
+    from shapeshift.decomposition.poses.video_frames import take_frames
 
     video, sharp = tmp_path / "walk.mp4", []
     with av.open(str(video), "w") as container:

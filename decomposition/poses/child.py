@@ -11,8 +11,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import IO
 
+from shapeshift.decomposition.poses.colmap_run import ABSENT
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.poses.colmap_run import ABSENT
 
 Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 POLL_S = 0.5

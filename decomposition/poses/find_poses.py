@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
+from shapeshift.decomposition.poses.child import Progress, run_child
+from shapeshift.decomposition.poses.photo_list import PhotoFile, PhotoList
+from shapeshift.decomposition.poses.pose_report import PoseReport
+from shapeshift.decomposition.poses.upright import COLMAP_UP, find_up, length_between, similarity
+from shapeshift.decomposition.poses.write_posed import write_posed
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.read_colmap import find_mask
-from shapeshift.scene.poses.child import Progress, run_child
-from shapeshift.scene.poses.photo_list import PhotoFile, PhotoList
-from shapeshift.scene.poses.pose_report import PoseReport
-from shapeshift.scene.poses.upright import COLMAP_UP, find_up, length_between, similarity
-from shapeshift.scene.poses.write_posed import write_posed
 
 WORK = "poses.work"  # below the folder that is written, as long as the search is not done
 MOST_FOR_ALL_PAIRS = 120  # photos; beyond that neighbours by name are matched alone

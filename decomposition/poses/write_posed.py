@@ -9,11 +9,11 @@ import shutil
 from dataclasses import asdict
 from pathlib import Path
 
+from shapeshift.decomposition.poses.photo_list import PhotoList
+from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
 from shapeshift.scene.captures.colmap_tables import COUNT, Lens, Posed, read_tables
-from shapeshift.scene.poses.photo_list import PhotoList
-from shapeshift.scene.poses.pose_report import PoseReport
 
 REPORT = "poses.json"
 PAIRED_LENS = "SIMPLE_PINHOLE"

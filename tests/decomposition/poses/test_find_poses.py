@@ -12,16 +12,16 @@ from PIL import Image
 pytest.importorskip("pycolmap", reason="pycolmap is not installed")
 
 import shapeshift as ss
-from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.read_capture import read_capture
-from shapeshift.scene.poses.find_poses import (
+from shapeshift.decomposition.poses.find_poses import (
     Length,
     PoseSettings,
     count_pairs,
     find_poses,
     model_length,
 )
-from shapeshift.scene.poses.photo_list import list_photos
+from shapeshift.decomposition.poses.photo_list import list_photos
+from shapeshift.runtime_models.model import BadFile
+from shapeshift.scene.captures.read_capture import read_capture
 from tests.support.scene.textured_room import FOCAL, SIZE, camera, fitted, hits, write_photos
 
 COUNT = 8
