@@ -15,6 +15,7 @@ import ast
 import difflib
 import inspect
 import re
+import shlex
 import textwrap
 import types
 import typing
@@ -123,7 +124,7 @@ def parse(kind: type[Options], words: Sequence[str], prog: str) -> Options:
     values, loose = _values_of(words, known, prog)
     values |= _place([each for each in arguments if each.opt.positional], loose, prog)
     missing = [a for a in arguments if a.required and a.field.name not in values]
-    _refuse_missing(missing, values, prog)
+    _refuse_missing(missing, values, shlex.join([*prog.split(), *loose]))
     for each in arguments:
         if each.into and each.field.name in values:
             values.setdefault(each.into, {})[each.field.name] = values.pop(each.field.name)
@@ -254,8 +255,8 @@ def _place(arguments: Sequence[Argument], words: Sequence[str], prog: str) -> di
     return values
 
 
-def _refuse_missing(missing: Sequence[Argument], values: Mapping[str, Any], prog: str) -> None:
-    """Raises UsageError that shows how it is written."""
+def _refuse_missing(missing: Sequence[Argument], values: Mapping[str, Any], command: str) -> None:
+    """Raises UsageError that shows how it is written; command: what was written so far."""
     if not missing:
         return
     names, wanted = " and ".join(a.name for a in missing), " ".join(a.invocation for a in missing)
@@ -264,7 +265,7 @@ def _refuse_missing(missing: Sequence[Argument], values: Mapping[str, Any], prog
     if missing[0].opt.positional and greedy:
         hint = "write it first, since options like --x take all words that follow."
     be = "is" if len(missing) == 1 else "are"
-    raise UsageError(f"{names} {be} missing: `{prog} {wanted}`; {hint}")
+    raise UsageError(f"{names} {be} missing: `{command} {wanted}`; {hint}")
 
 
 def _read(text: str, each: Argument) -> Any:

@@ -1,5 +1,6 @@
 """Opens whatever this program can show, recognised by content where the format allows."""
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,6 +52,7 @@ from shapeshift.runtime_models.splats.sog.read_streamed import (
 )
 from shapeshift.runtime_models.splats.sog.sog_files import META
 
+PHOTOS = (".jpg", ".jpeg")  # a scene's own pictures are .png and .webp
 THINNING = 160  # bytes a splat on the way, beside what is kept
 KNOWN = (
     "a package (folder or .shift), a file of splats (.ply, .splat, .ksplat, .spz, .sog, .glb, "
@@ -113,7 +115,7 @@ def read_whole(path: Path, reading: Reading) -> Model:
             return in_run(read_model(cloud.parent, reading), path, cloud)
         layers = layer_files(path)
         if not layers:
-            raise BadFile(f"{path} holds nothing to show; wanted is {KNOWN}.")
+            raise BadFile(nothing_to_show(path))
         return read_layers(layers, reading) if len(layers) > 1 else read_file(layers[0], reading)
     if is_scaffold(path):
         return read_scaffold(path, reading)
@@ -122,6 +124,15 @@ def read_whole(path: Path, reading: Reading) -> Model:
     if format_of(path):
         return read_file(path, reading)
     raise BadFile(refusal(path, head_of(path), KNOWN))
+
+
+def nothing_to_show(folder: Path) -> str:
+    """What is said of a folder without a scene; one of photos can become a scene."""
+    places = (folder, *(p for p in folder.iterdir() if p.is_dir()))
+    if any(p.suffix.lower() in PHOTOS for place in places for p in place.iterdir()):
+        command = shlex.join(["python3", "launch.py", "train", str(folder), "--out", "SCENE.shift"])
+        return f"{folder} holds photos and no scene; make one of them with `{command}`."
+    return f"{folder} holds nothing to show; wanted is {KNOWN}."
 
 
 def read_upright(path: Path, reading: Reading) -> AnchorModel:

@@ -110,7 +110,7 @@ REFUSED = {
     "a.ply --out o --zzz": f"there is no option '--zzz'; `{PROG} --help` lists them.",
     "--out o --zzz": "there is no option '--zzz'",  # before what is missing
     "": f"SCENE and --out are missing: `{PROG} SCENE --out PATH`; --help says more.",
-    "a.ply": f"--out is missing: `{PROG} --out PATH`; --help says more.",
+    "a.ply": f"--out is missing: `{PROG} a.ply --out PATH`; --help says more.",
     "--out o --x 0 a.ply": "SCENE is missing: `python3 launch.py draw SCENE`; write it first",
     "a.ply b.ply --out o": "'b.ply' is one word too many: `python3 launch.py draw` takes SCENE.",
     "a.ply --out": "--out has no value, expected a path.",

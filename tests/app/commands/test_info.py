@@ -74,12 +74,15 @@ def test_what_is_no_scene_is_one_sentence(tmp_path, capsys):
     (tmp_path / "text.shift").write_text("hello")
     (tmp_path / "short.ply").write_bytes(b"ply\nformat binary_little_endian 1.0\n")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "capture" / "images").mkdir(parents=True)
+    (tmp_path / "capture" / "images" / "one.JPG").touch()
     np.save(tmp_path / "array.npy", np.zeros(3))
     cases = {
         "none.shift": "does not exist",
         "text.shift": "does not begin with a zip's mark",
         "short.ply": "short.ply",
         "empty": "holds nothing to show",
+        "capture": "holds photos and no scene; make one of them with `python3 launch.py train ",
         "array.npy": "is a single array of numpy",
     }
     for name, words in cases.items():
