@@ -157,31 +157,37 @@ def mug() -> list[Solid]:
     )
 
 
-def tools() -> list[Solid]:
-    """A screwdriver, a ring spanner and an oil can on the front of the bench."""
+CHROME = Surface((0.68, 0.69, 0.72), 20.0, 0.5, 40.0, 0.45)
+
+
+def screwdriver() -> list[Solid]:
+    """On the front of the bench, as are the ring spanner and the oil can."""
     orange = Surface((0.93, 0.45, 0.08), 31.0, 0.4, 30.0, 0.1)
-    chrome = Surface((0.68, 0.69, 0.72), 20.0, 0.5, 40.0, 0.45)
     driver = [
         bar((0, 0.017, 0), (0.095, 0.017, 0), 0.0165, orange, top_radius=0.013, bevel=0.004),
-        bar((0.095, 0.017, 0), (0.215, 0.015, 0), 0.0048, chrome),
+        bar((0.095, 0.017, 0), (0.215, 0.015, 0), 0.0048, CHROME),
     ]
-    spanner = [
-        box((0, 0.007, 0), (0.085, 0.006, 0.011), chrome),
-        ring((0.1, 0.009, 0), "y", 0.018, 0.009, chrome),
-        ring((-0.1, 0.009, 0), "y", 0.021, 0.009, chrome),
+    return inside(frame((-0.02, 0, 0.305), turned("y", 12)), driver)
+
+
+def spanner() -> list[Solid]:
+    flat = [
+        box((0, 0.007, 0), (0.085, 0.006, 0.011), CHROME),
+        ring((0.1, 0.009, 0), "y", 0.018, 0.009, CHROME),
+        ring((-0.1, 0.009, 0), "y", 0.021, 0.009, CHROME),
     ]
+    return inside(frame((0.40, 0, 0.31), turned("y", -8)), flat)
+
+
+def oil_can() -> list[Solid]:
     red = Surface((0.76, 0.13, 0.10), 23.0, 0.35, 30.0, 0.15)
     can = [
         bar((0, 0, 0), (0, 0.065, 0), 0.037, red, bevel=0.004),
         bar((0, 0.065, 0), (0, 0.098, 0), 0.035, red, top_radius=0.01),
-        bar((0, 0.09, 0), (0.075, 0.165, 0), 0.007, chrome, top_radius=0.003),
+        bar((0, 0.09, 0), (0.075, 0.165, 0), 0.007, CHROME, top_radius=0.003),
         bar((0, 0.02, 0), (0, 0.045, 0), 0.0375, Surface((0.95, 0.82, 0.30), 23.0)),
     ]
-    return (
-        inside(frame((-0.02, 0, 0.305), turned("y", 12)), driver)
-        + inside(frame((0.40, 0, 0.31), turned("y", -8)), spanner)
-        + inside(frame((0.56, 0, -0.04), turned("y", 120)), can)
-    )
+    return inside(frame((0.56, 0, -0.04), turned("y", 120)), can)
 
 
 def base_plate() -> list[Solid]:

@@ -194,7 +194,6 @@ def drip_stain(p: np.ndarray) -> np.ndarray:
     return bump(p * (1, 0, 1), (LEAK, 0, LINE_Z + 0.01), 0.045)
 
 
-def pipework(opened: bool) -> list[Solid]:
-    hot = flange_pair(LEAK, MEDIUM, (0.86, 0.42, 0.10)) if opened else []
-    cover = [] if opened else insulation()
-    return line() + hot + cover + valve() + gauge() + return_line()
+def joint(opened: bool) -> list[Solid]:
+    """Where the pipe leaks: bare flanges, or the insulation round them."""
+    return flange_pair(LEAK, MEDIUM, (0.86, 0.42, 0.10)) if opened else insulation()

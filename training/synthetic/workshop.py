@@ -26,15 +26,18 @@ from shapeshift.training.synthetic.furniture import (
     cabinet,
     conduit,
     mug,
-    tools,
+    oil_can,
+    screwdriver,
+    spanner,
 )
 from shapeshift.training.synthetic.motor import motor
 from shapeshift.training.synthetic.openness import Clearance
-from shapeshift.training.synthetic.pipework import pipework
+from shapeshift.training.synthetic.pipework import gauge, joint, line, return_line, valve
 from shapeshift.training.synthetic.placing import frame, inside
 from shapeshift.training.synthetic.tracer import (
     Light,
     Place,
+    Solid,
     look,
     pattern_at,
     photograph,
@@ -66,19 +69,30 @@ ELEVATIONS = (8.0, 66.0)  # degrees
 GOLDEN = (5**0.5 + 1) / 2
 
 
+def things(opened: bool) -> list[tuple[str, list[Solid]]]:
+    """What stands in the workshop: names and their solids, in the order in which they are traced.
+
+    "bench" is what nobody would take away: the bench and the pipe that is fixed under it.
+    """
+    return [
+        ("bench", bench()),
+        ("pipe", line() + joint(opened)),
+        ("valve", valve()),
+        ("gauge", gauge()),
+        ("bench", return_line()),
+        ("cabinet", cabinet()),
+        ("conduit", conduit()),
+        ("mug", mug()),
+        ("screwdriver", screwdriver()),
+        ("spanner", spanner()),
+        ("can", oil_can()),
+        ("motor", base_plate() + inside(frame(MOTOR), motor(opened))),
+    ]
+
+
 @lru_cache(maxsize=2)
 def place(opened: bool) -> tuple[Place, Clearance]:
-    motor_there = inside(frame(MOTOR), motor(opened))
-    here = Place.of(
-        bench()
-        + pipework(opened)
-        + cabinet()
-        + conduit()
-        + mug()
-        + tools()
-        + base_plate()
-        + motor_there
-    )
+    here = Place.of([solid for _, solids in things(opened) for solid in solids])
     return here, Clearance.of(here, (-0.75, -0.2, -0.48), (0.75, 0.5, 0.48))
 
 
