@@ -6,6 +6,8 @@ import numpy as np
 
 from shapeshift.runtime_models.model import AnchorModel, BadFile
 from shapeshift.runtime_models.package.refit_encoding import encoding_for
+from shapeshift.scene.cameras.framing import frame_points
+from shapeshift.scene.cameras.photo_view import photo_view
 from shapeshift.scene.captures.capture import Capture
 from shapeshift.training.blended_shapes import BlendedShapes, ShapeBlending
 from shapeshift.training.density.densification_stats import DensificationStats
@@ -341,6 +343,9 @@ class Trainer(Run):
             "background": self.schedule.background,
             "rate_scale": self.rate_scale,
         }
-        return model_of(
-            self.adam.state(), self.layout, self.voxel, self.encoding, self.stops, provenance
-        )
+        state = self.adam.state()
+        points = state["anchors.value"]
+        bounds = frame_points(points, np.ones(len(points), np.float32))
+        if (view := photo_view([p.view for p in self.capture.photos], *bounds)) is not None:
+            provenance["view"] = view
+        return model_of(state, self.layout, self.voxel, self.encoding, self.stops, provenance)
