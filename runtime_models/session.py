@@ -13,8 +13,8 @@ def load_onnxruntime():
     return onnxruntime
 
 
-def open_session(data: bytes, threads: int):
-    """An onnxruntime session on the CPU of an ONNX file's bytes."""
+def open_session(data: bytes | str, threads: int):
+    """An onnxruntime session on the CPU of an ONNX file: its bytes, or its path."""
     onnxruntime = load_onnxruntime()
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads  # 1 measured fastest for these small networks

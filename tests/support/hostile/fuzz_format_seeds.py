@@ -1,4 +1,4 @@
-"""Further seeds: meshes, scene files and scripts, checkpoints, LCC, and files packed once more."""
+"""Further seeds: meshes, scene files, object lists, checkpoints, LCC, files packed once more."""
 
 import gzip
 import io
@@ -22,6 +22,7 @@ def format_seeds(folder: Path, some_splats: Made) -> list[Seed]:
     return [
         *mesh_seeds(),
         *act_seeds(),
+        *mask_seeds(folder),
         *text_ply_seeds(folder),
         *ksplat_seeds(),
         *lcc_seeds(folder, some_splats),
@@ -64,6 +65,32 @@ def act_seeds() -> list[Seed]:
             read_scene_file,
         ),
         Seed("script", script, partial(named_script, items=items)),
+    ]
+
+
+def mask_seeds(folder: Path) -> list[Seed]:
+    """objects.json, a label map, and a mask of another program."""
+    from shapeshift.decomposition.masks.label_maps import read_label_map, read_mask, write_label_map
+    from shapeshift.decomposition.masks.specs import (
+        ObjectSpec,
+        ObjectSpecs,
+        PhotoPrompt,
+        read_specs,
+        write_specs,
+    )
+
+    prompts = (PhotoPrompt("rgb/1.png", (1, 2, 30.5, 40), ((3, 4),), ((5, 6),)),
+               PhotoPrompt("rgb/2.png", mask="masks/2.png", mask_label=3))  # fmt: skip
+    mug = ObjectSpec(1, "mug", prompts, "a mug", 0.3, False, None)
+    write_specs(ObjectSpecs(folder, (mug, ObjectSpec(7, "can"))), folder / "objects.json")
+    labels = np.zeros((12, 16), np.uint8)
+    labels[3:6, 4:9], labels[0, 0] = 3, 255
+    write_label_map(labels, folder / "labels.png")
+    data = {name: (folder / name).read_bytes() for name in ("objects.json", "labels.png")}
+    return [
+        Seed("objects", {"objects.json": data["objects.json"]}, read_specs),
+        Seed("label map", {"a.png": data["labels.png"]}, lambda p: read_label_map(p, (16, 12))),
+        Seed("mask", {"a.png": data["labels.png"]}, lambda p: read_mask(p, (32, 24), 3)),
     ]
 
 

@@ -1,0 +1,1 @@
+"""Masks of objects in photos: read, asked of a segmenter, or walked from a few hints."""
