@@ -89,7 +89,7 @@ def touch(
     for side in let_go:
         world.release(side)
     grasps = [(s, palm) for s, palm in palms.items() if palm is not None and s in squeezes]
-    taken = [s for s, palm in grasps if take(world, s, palm, standing)]
+    taken = [s for s, palm in grasps if grab_nearest(world, s, palm, standing)]
     busy |= set(taken)
     # Of a controller with one button taking is all it does, and what it acted on is all it has.
     acting = pulls - set(taken)
@@ -140,7 +140,7 @@ def jump(world: World, side: str, palm: Pose) -> None:
         world.carry(side, moved)
 
 
-def take(world: World, side: str, palm: Pose, standing: Standing) -> bool:
+def grab_nearest(world: World, side: str, palm: Pose, standing: Standing) -> bool:
     """Takes the nearest object within reach."""
     reach = REACH_M * standing.scale
     return world.nearest(palm.position, reach) is not None and bool(world.grab(side, reach))

@@ -128,14 +128,14 @@ def keep_chart(pricing: "Pricing", renderer: Renderer, ctx, drawn: Drawn, rows: 
 
 def store_rows(path: Path, rows: Sequence[BudgetRow]) -> None:
     """Best kept, never needed: a cache that cannot be written is said and done without."""
-    told = [
+    rows_json = [
         {"name": row.name, "ms": row.ms, "db": row.db, "settings": _plain(row.settings)}
         for row in rows
         if math.isfinite(row.ms) and math.isfinite(row.db)
     ]
     try:
         make_folders(path.parent.parent, path.parent.name)
-        write_text(path, json.dumps({"format": FORMAT, "rows": told}, indent=1) + "\n")
+        write_text(path, json.dumps({"format": FORMAT, "rows": rows_json}, indent=1) + "\n")
     except OSError as error:
         say(f"The chart is not kept for the next time: {error}.")
 

@@ -106,17 +106,17 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
     walk = replace(walk, frames=options.frames or walk.frames)
     stage = make_stage(subjects, x, size, walk, cameras)
     contents = [s.scene if s.file else s.scene.objects[0].model for s in subjects]
-    told = scene_line(options, stage, digest(contents, cameras))
+    scene_words = scene_line(options, stage, digest(contents, cameras))
     with open_pair(options.context, options.drawing) as (renderers, ctx):
         pricing = Pricing(renderers, ctx, stage, subjects[0].background)
         on_cpu = draws_on_cpu(pricing.drawing, ctx)
-        head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
+        head = (command_line(options), machine_line(ctx), f"{scene_words}; {pricing.drawing}")
         file = RowsFile(options.out / "rows.csv", ChartRow, head)
         measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
         if len(subjects) == 1 and not (options.quick or cameras):
             drawn = Drawn(subjects[0], x, size)
             keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
-    title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
+    title = f"{scene_words.split(';')[0]}, {options.size}, {pricing.drawing}"
     front = draw_chart(file.rows, title, options.out, on_cpu)
     print_front(front, len(file.rows), options.out)
     return 0

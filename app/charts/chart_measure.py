@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from shapeshift.app.charts.chart_settings import Named, render_settings, told_changes
+from shapeshift.app.charts.chart_settings import Named, changed_settings, render_settings
 from shapeshift.app.charts.chart_stage import WARM_UP, Stage
 from shapeshift.app.charts.comparison import MOST_DB, exact
 from shapeshift.renderer.renderer import Renderer
@@ -91,7 +91,7 @@ class Pricing:
             drawn=round(np.mean([stats.drawn for stats in path.stats])),
             splats=path.stats[0].splats,
             sorts=_rounded(np.mean([stats.sorts for stats in path.stats])),
-            changes=told_changes(self._trial.settings),
+            changes=changed_settings(self._trial.settings),
         )
 
     def _path(self, named: Named, pictures: bool) -> "_Frames":

@@ -53,18 +53,18 @@ class Look:
     #                                       the world's zero; far ones are shown nearer to it
 
 
-def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
+def export(parts: Sequence[Part], look: Look, path: Path, progress) -> PlainSplats:
     """Writes the parts into one file, all or nothing; gives back what was written.
 
-    told(what, part done 0..1).  Raises BadFile and UsageError.
+    progress(what, part done 0..1).  Raises BadFile and UsageError.
     """
     writer = writer_of(path)
     look = replace(look, sh_degree=min(look.sh_degree, writer.sh_degree))
     baked = []
     for number, part in enumerate(parts):
-        told(f"baking {part.thing.name}", number / (len(parts) + 1))
+        progress(f"baking {part.thing.name}", number / (len(parts) + 1))
         baked.append(bake_part(part, look))
-    told(f"writing {path.name}", len(parts) / (len(parts) + 1))
+    progress(f"writing {path.name}", len(parts) / (len(parts) + 1))
     splats = truncate_harmonics(merged(baked), look.sh_degree)
     x, y, z = np.add(splats.origin, look.origin).tolist()
     splats = replace(splats, origin=(x, y, z))

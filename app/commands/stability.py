@@ -70,9 +70,9 @@ def run(options: Options) -> int:
         perform(stage, names, table)
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]
-    told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
+    verdict = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
-    say(f"{count}, {told}; {full(table.path)} and pictures beside it")
+    say(f"{count}, {verdict}; {full(table.path)} and pictures beside it")
     return FAILED if failed else 0
 
 
@@ -115,11 +115,11 @@ def perform(stage, names: list[str], table) -> None:
     from shapeshift.app.stability_cases.table import CASES, save_panels
 
     console = open_console()
-    with working("starting") as tell:
+    with working("starting") as progress:
         for i, name in enumerate(names):
             if name in table.rows:
                 continue
-            tell(f"{name} ({i + 1} of {len(names)})")
+            progress(f"{name} ({i + 1} of {len(names)})")
             result = CASES[name](stage)
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)

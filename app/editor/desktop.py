@@ -44,9 +44,9 @@ def run(options: Options) -> int:
     if not found.sources and found.file is None:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
     scene, edited = opened_scene(found, options.x)
-    state.take(found.sources, scene, first_look(found), edited)
+    state.open_sources(found.sources, scene, first_look(found), edited)
     state.settings = replace(state.settings, debug=options.debug)
-    state.regions.take(read_selectors(options.select, state), 0)
+    state.regions.add_selectors(read_selectors(options.select, state), 0)
     state.keep_regions()
     settings = Settings.read(config_folder()) if options.screenshot is None else Settings()
     with refiner, state.bodies, Window("Shapeshift", size, settings.text_size) as window:

@@ -65,10 +65,10 @@ class Report:
             for side, framebuffer in zip(SIDES, eyes, strict=True):
                 save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
 
-    def write(self, told: dict) -> None:
+    def write(self, facts: dict) -> None:
         """The report itself; and a word on what has been written."""
         if self._path is not None:
-            text = json.dumps({**told, "ended": self.ended}, indent=1) + "\n"
+            text = json.dumps({**facts, "ended": self.ended}, indent=1) + "\n"
             write_whole(self._path, text.encode())
         written = [self._path, self._lines and self._lines.name, self._pictures]
         if names := [full(path) for path in written if path]:

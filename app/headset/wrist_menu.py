@@ -144,7 +144,8 @@ class WristMenu:
         playing = tuple(sweep.playing for sweep in editor.sweeps)
         return (
             things, playing, editor.chosen, editor.palette, editor.settings.debug,
-            editor.settings.background, tuple(editor.messages.problems), tuple(state.touch.told),
+            editor.settings.background, tuple(editor.messages.problems),
+            tuple(state.touch.reactions),
             state.world.paused, state.pacing.quality, state.standing.scale, state.floor_shown,
             self._foot.sure_s > 0,
         )  # fmt: skip

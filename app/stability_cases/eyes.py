@@ -125,11 +125,11 @@ def canted(stage: Stage) -> Result:
                 at_least(f"{degrees:g} degrees, against an order each, dB", db, YAW_DB,
                          "one order by rule, a quarter of a degree off for each eye (stale-yaw)")
             )  # fmt: skip
-        told = f"left eye, {degrees:g} degrees between the eyes"
-        comparisons.append(Comparison(db, told, one[0], each[0]))
-    _, told, shared, own = worst_of(comparisons)
+        what = f"left eye, {degrees:g} degrees between the eyes"
+        comparisons.append(Comparison(db, what, one[0], each[0]))
+    _, what, shared, own = worst_of(comparisons)
     panels = [
-        stage.panel(told, shared),
+        stage.panel(what, shared),
         stage.panel("with an order of its own", own),
         Panel("8 times the difference", difference(shared, own)),
     ]
@@ -177,8 +177,8 @@ def lean(stage: Stage) -> tuple[Finding, list[np.ndarray]]:
     for image, whole, x in zip(frame, wholes, (0, narrow), strict=True):
         there = stage.draw(scene, whole)[height // 5 :, x : x + width - narrow]
         dbs.append(decibels(image, there))
-    told = "lenses off centre on a head askew, an eye against the centred picture around it, dB"
-    return at_least(told, min(dbs), SAME_EYE_DB, f"an off-centre lens is a part; {SAME_EYE}"), frame
+    what = "lenses off centre on a head askew, an eye against the centred picture around it, dB"
+    return at_least(what, min(dbs), SAME_EYE_DB, f"an off-centre lens is a part; {SAME_EYE}"), frame
 
 
 def eyes_of(stage: Stage) -> list[View]:

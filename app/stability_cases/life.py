@@ -69,10 +69,10 @@ def loaded_and_dropped(stage: Stage) -> list[float | None]:
 def growth(what: str, memory: list[float | None], most: float, reason: str) -> Finding:
     """MB a round by which the process grew once it had settled."""
     figure = f"growth of resident memory, MB {what}, {len(memory)} times"
-    told = [mb for mb in memory if mb is not None]
-    if len(told) < len(memory):
+    known = [mb for mb in memory if mb is not None]
+    if len(known) < len(memory):
         return not_here(figure, "this system does not say how much memory a process holds")
-    settled = told[int(SETTLED * len(told)) :]
+    settled = known[int(SETTLED * len(known)) :]
     # The median of the slopes of all pairs (Theil and Sen): one late pool does not count as a leak.
     pairs = combinations(enumerate(settled), 2)
     slopes = [(after - before) / (j - i) for (i, before), (j, after) in pairs]

@@ -113,7 +113,7 @@ class Span:
         beside = min(at + 1, len(self.xs) - 1)
         captions = {at: "worst", beside: "its neighbour", 0: "end", len(self.xs) - 1: "end"}
         return [
-            Panel(f"{told}: x = {self.xs[i]:.3f}", self.seen[i]) for i, told in captions.items()
+            Panel(f"{what}: x = {self.xs[i]:.3f}", self.seen[i]) for i, what in captions.items()
         ]
 
 
@@ -145,13 +145,13 @@ def stale(stage: Stage, move, bounds: dict[float, float]) -> Result:
     _, what, old, exact = worst_of(comparisons)
     # A model whose opacities follow the eye is put in order wherever that moves.
     moved = any(map(follows_eye, stage.subject.models)) and move is not turned
-    told = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
+    stale = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
     panels = [
         stage.panel(what, old),
         stage.panel("its own order", exact),
         Panel("8 times the difference", difference(old, exact)),
     ]
-    return Result([clean(*(c.image for c in comparisons)), told, *findings], panels)
+    return Result([clean(*(c.image for c in comparisons)), stale, *findings], panels)
 
 
 def is_old(stage: Stage) -> bool:

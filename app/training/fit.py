@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from shapeshift.app.command_line import MODALITY, POSITIONAL, Settings
-from shapeshift.app.terminal import open_console, say, tell_json
+from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.app.training.train_options import Asked, MachineOptions
 from shapeshift.training.settings import TrainSettings
 
@@ -95,7 +95,7 @@ def run(options: Options) -> int:
     what = "the fitted model of the first seed with this report in it"
     say(f"{full(options.out)}: {size:,} bytes, {what}")
     if options.json == Path("-"):
-        tell_json(result)
+        print_json(result)
     elif options.json is not None:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")

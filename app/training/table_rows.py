@@ -107,13 +107,13 @@ def compare(rows: list[Row]) -> list[str]:
     means = {row.method: row for row in rows if row.modality == MEAN}
     if "joint" not in means:
         return []
-    one, told = means["joint"], []
+    one, sentences = means["joint"], []
     for method in ("separate", "splats", "spz"):
         if method in means:
             other, name = means[method], OTHERS.get(method, NAMES[method])
             gain, time = one.psnr_db - other.psnr_db, one.seconds / max(other.seconds, 0.1)
-            told.append(
+            sentences.append(
                 f"{NAMES['joint']} against {name}: {gain:+.2f} dB in the mean, "
                 f"{one.mb / other.mb:.3f} of the bytes, {time:.2f} of the seconds."
             )
-    return told
+    return sentences

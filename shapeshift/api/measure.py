@@ -21,7 +21,7 @@ VIEWS = 8  # of the orbit on which two scenes are compared
 BENCH_SIZE, QUALITY_SIZE, CHART_SIZE = (640, 360), (256, 144), (1280, 720)
 
 
-def silent(*told: object) -> None:
+def silent(*progress: object) -> None:
     """Nobody listens."""
 
 

@@ -90,8 +90,8 @@ def measure(renderer: Renderer, name: str, model, x: float, folder: Path) -> lis
             codes = [psnr(a, b) for a, b in zip(found, baked, strict=True)]
             row = (
                 name, f"{x:g}", stop, writer.ending, degree, len(splats.means),
-                path.stat().st_size, told(min(likeness)), told(np.mean(likeness)),
-                told(np.mean(np.minimum(codes, MOST_DB))),
+                path.stat().st_size, db_text(min(likeness)), db_text(np.mean(likeness)),
+                db_text(np.mean(np.minimum(codes, MOST_DB))),
             )  # fmt: skip
             rows.append(dict(zip(COLUMNS, row, strict=True)))
     return rows
@@ -113,7 +113,7 @@ def draw(renderer: Renderer, thing: SceneObject, views: list) -> list[np.ndarray
     return pictures
 
 
-def told(db: float) -> str:
+def db_text(db: float) -> str:
     return f"{min(db, MOST_DB):.2f}"
 
 

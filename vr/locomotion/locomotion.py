@@ -15,7 +15,7 @@ from shapeshift.vr.frame import SIDES, Frame
 from shapeshift.vr.locomotion.play_space import Standing
 from shapeshift.vr.locomotion.stance import heading, moved, pinned, resized, turned, underfoot, yaw
 from shapeshift.vr.locomotion.teleport import Arc, Ground, level_ground, throw_arc
-from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, take
+from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, held_points
 
 TURNINGS = ("snap", "smooth", "none")
 LONGEST_S = 0.1  # of a frame: after a hitch nobody is thrown far
@@ -116,7 +116,7 @@ def hold_world(standing: Standing, travel: Travel, frame: Frame) -> tuple[Standi
     holding = squeezing & (before | (squeezing - travel.squeezing))
     # With every hand that comes or goes, and in a room with a new origin, holds begin anew.
     anew = holding != before or frame.recentred
-    grips = take(standing, frame, holding) if anew else travel.grips
+    grips = held_points(standing, frame, holding) if anew else travel.grips
     if grips:
         standing = drawn_along(standing, frame, grips)
     return standing, replace(travel, squeezing=squeezing, grips=grips)

@@ -17,7 +17,7 @@ LEAST_APART = 0.05  # metres between two hands: nearer, their distance and direc
 Grips = tuple[tuple[str, np.ndarray], ...]  # side, (3,) metres of the world that it holds
 
 
-def take(standing: Standing, frame: Frame, sides: frozenset[str]) -> Grips:
+def held_points(standing: Standing, frame: Frame, sides: frozenset[str]) -> Grips:
     """What these hands hold now."""
     return tuple(
         (side, standing.point(grip_of(frame.hands[side]).position)) for side in sorted(sides)

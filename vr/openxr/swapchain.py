@@ -40,8 +40,8 @@ def choose_format(offered: list[int], wanted: str = "") -> Format:
     if wanted:
         known = [each for each in known if each.name == wanted]
     if not known:
-        told = ", ".join(hex(each) for each in offered)
-        raise ValueError(f"no format of {wanted or 'ours'} among the runtime's ({told}).")
+        names = ", ".join(hex(each) for each in offered)
+        raise ValueError(f"no format of {wanted or 'ours'} among the runtime's ({names}).")
     return known[0]
 
 

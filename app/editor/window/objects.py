@@ -67,7 +67,7 @@ class Objects:
     def status(self) -> str:
         return "not saved" if self.unsaved else ""
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for shortcuts, for a click that chooses, and for what is dropped to be added."""
         if isinstance(event, KeyDown) and (self.saving.asking or self.adding.asking):
             return True  # a box is open, and keys are for it

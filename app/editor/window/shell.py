@@ -25,7 +25,7 @@ class Shell:
         self.keys_open = False
         self.actions = PanelActions(self.fold, self.resize_text, self.show_keys)
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for a key that is the shell's."""
         match event:
             case KeyDown(key=glfw.KEY_F1):

@@ -56,7 +56,7 @@ def attach_touch(
     mouse = MouseTouch(touch, state, window, viewpoint, hands)
     marks = Marks(touch, state, window, viewpoint, mouse.under)
     waits = options.screenshot is None  # for marks to fade
-    hooks.takes.append(mouse.take)
+    hooks.event_handlers.append(mouse.handle_event)
     hooks.each_frame.append(lambda: mouse.each_frame() and waits)
     hooks.over.append(marks.draw_colliders)
     hooks.marks.append(marks.draw)
@@ -84,7 +84,7 @@ class MouseTouch:
         self._touch, self._state, self._window = touch, state, window
         self._viewpoint, self._hands = viewpoint, hands
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for what concerns the hand, its ray and the physics."""
         world, hand = self._touch.world, self._touch.hand
         if world is None:
@@ -99,9 +99,9 @@ class MouseTouch:
             case Wheel():
                 self.turn_wheel(hand, event.notches)
             case Release(button="left"):
-                self._touch.let_go()
+                self._touch.release()
             case Press() | DoubleClick():  # another button, or the camera is meant
-                self._touch.let_go()
+                self._touch.release()
                 return False
             case _:
                 return False
@@ -120,7 +120,7 @@ class MouseTouch:
             case glfw.KEY_J:
                 self._touch.colliders = not self._touch.colliders
             case glfw.KEY_ESCAPE if self._touch.hand is not None:
-                self._touch.let_go()
+                self._touch.release()
             case _:
                 return False
         return True

@@ -94,7 +94,7 @@ class Viewer:
         self._framed = Framed(self.viewpoint.free_size, self.viewpoint.refit)
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
         self.hooks.opened.append(self._framed.forget)
-        self.hooks.takes.insert(0, self.shell.take)
+        self.hooks.event_handlers.insert(0, self.shell.handle_event)
         self._title = ""  # what the window's title says
         self.frames = 0  # drawn since the window opened
         self._overlay_ms = 0.0
@@ -113,7 +113,7 @@ class Viewer:
         hooks.top.append(files.draw_row)
         hooks.marks.append(files.draw_box)
         hooks.cards.append(files.draw_empty)
-        hooks.takes.append(files.take_event)
+        hooks.event_handlers.append(files.handle_event)
         hooks.status.append(lambda: state.bodies.status)
         return files
 
@@ -128,12 +128,12 @@ class Viewer:
         )  # fmt: skip
         self.gizmo = gizmo = Gizmo(state, self.viewpoint, self.window)
         objects = Objects(self.window, self.hands, edits, saving, adding)
-        hooks.takes.insert(0, gizmo.take)
-        hooks.takes.append(objects.take)
+        hooks.event_handlers.insert(0, gizmo.handle_event)
+        hooks.event_handlers.append(objects.handle_event)
         hooks.marks += [gizmo.draw, objects.draw_boxes]
         hooks.each_frame.append(objects.each_frame)
         hooks.status.append(objects.status)
-        hooks.opened += [objects.forget, gizmo.let_go]
+        hooks.opened += [objects.forget, gizmo.release]
         if self.options.screenshot is None:
             hooks.closing.append(objects.may_close)
         hooks.sections.append(
@@ -212,7 +212,7 @@ class Viewer:
         start, viewpoint = time.perf_counter(), self.viewpoint
         self.state.messages.ended(start)
         for event in self.window.begin_frame():
-            self.take(event)
+            self.handle_event(event)
         self.state.advance(seconds)
         pushed = self.hands.push
         if pushed.any:
@@ -238,9 +238,9 @@ class Viewer:
             self.dial.seen((now - start) * 1e3, self._moving)
         self.readings.idle = not fresh
 
-    def take(self, event: Event) -> None:
+    def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
-        self.hands.take(event)
+        self.hands.handle_event(event)
 
     def open_soon(self, paths: tuple[Path, ...]) -> None:
         """Opens files and folders, scenes or cameras, while the window goes on."""

@@ -269,7 +269,7 @@ def test_it_is_drawn_only_while_something_changes_or_a_hand_is_on_it(wearer, mon
         lambda: setattr(wearer.state.pacing, "quality", "best"),
         lambda: setattr(wearer.state, "floor_shown", False),
         lambda: setattr(wearer.editor, "chosen", "leg"),
-        lambda: wearer.state.touch.told.append("cube: struck"),
+        lambda: wearer.state.touch.reactions.append("cube: struck"),
     ):
         change()
         wearer.wait()

@@ -22,24 +22,26 @@ PERIOD = 1 / 90
 
 def test_a_life_begins_once_and_ends_once():
     life = Life()
-    acts = [life.take(state) for state in ("IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED")]
+    acts = [life.enter(state) for state in ("IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED")]
     assert acts == ["", BEGIN, "", "", ""] and life.running and life.focused and not life.over
-    acts = [life.take(state) for state in ("VISIBLE", "SYNCHRONIZED", "STOPPING", "IDLE")]
+    acts = [life.enter(state) for state in ("VISIBLE", "SYNCHRONIZED", "STOPPING", "IDLE")]
     assert acts == ["", "", END, ""] and not (life.running or life.focused or life.over)
-    life.take("EXITING")
+    life.enter("EXITING")
     assert life.over and not life.lost
 
 
 def test_a_headset_that_is_taken_off_and_put_on_again_begins_anew():
     life = Life()
-    acts = [life.take(state) for state in ("IDLE", "READY", "FOCUSED", "STOPPING", "IDLE", "READY")]
+    acts = [
+        life.enter(state) for state in ("IDLE", "READY", "FOCUSED", "STOPPING", "IDLE", "READY")
+    ]
     assert acts == ["", BEGIN, "", END, "", BEGIN] and life.running and not life.over
 
 
 def test_a_session_that_is_taken_away_is_over_and_lost():
     life = Life()
     for state in ("IDLE", "READY", "FOCUSED", "LOSS_PENDING"):
-        life.take(state)
+        life.enter(state)
     assert life.over and life.lost and not life.running
 
 

@@ -26,7 +26,7 @@ class Steps:
         self._from: View | None = None  # where the flight began
         self._seconds = FLIGHT_S
 
-    def take(self, cameras: CameraList | None) -> None:
+    def set_cameras(self, cameras: CameraList | None) -> None:
         """Cameras instead of those that there were; nobody stands at one yet."""
         self.cameras, self.index, self.standing, self._from = cameras, -1, False, None
         self.untold = cameras.notes if cameras else ()

@@ -127,7 +127,7 @@ class Viewpoint:
     def follow_cameras(self, cameras: CameraList | None, stand: bool) -> None:
         """Other cameras to step through; to the first of them at once where one is to `stand`."""
         now = self.view()
-        self.steps.take(cameras)
+        self.steps.set_cameras(cameras)
         if stand and cameras is not None:
             self.steps.go_to(0, now if self.seen else None)
             self.steps.untold = ()  # said with the file's other notes

@@ -77,9 +77,9 @@ class Exporting:
             state.problem = str(error)
             return
         self.progress = ("", 0.0)
-        self._work = self._thread.submit(export, parts, look, self._path, self._tell)
+        self._work = self._thread.submit(export, parts, look, self._path, self._show_progress)
 
-    def _tell(self, what: str, part: float) -> None:
+    def _show_progress(self, what: str, part: float) -> None:
         self.progress = (what, part)
 
     def poll(self) -> bool:

@@ -24,7 +24,7 @@ NOW = orbit_path(1, np.zeros(3), 1.0, SIZE)[0]
 
 def steps(count: int = 3) -> Steps:
     out = Steps()
-    out.take(cameras(count=count))
+    out.set_cameras(cameras(count=count))
     return out
 
 
@@ -54,7 +54,7 @@ def test_next_and_previous_go_around():
 
 def test_a_long_name_is_cut_at_its_beginning():
     at = Steps()
-    at.take(CameraList(views(1), ("x" * 300 + "/photo.jpg",), "test"))
+    at.set_cameras(CameraList(views(1), ("x" * 300 + "/photo.jpg",), "test"))
     at.go_to(0)
     assert at.text.endswith("/photo.jpg") and len(at.text) < 70
 

@@ -83,7 +83,7 @@ def test_what_no_hand_has_moved_is_fitted_into_any_window(any_size, framed):
     if framed == "everything":
         viewer.viewpoint.frame_all()
     elif framed == "by hand":
-        viewer.take(Drag("left", 3, 0))
+        viewer.handle_event(Drag("left", 3, 0))
     run_frames(viewer, 40, seconds=0.1)
     distance = viewer.viewpoint.camera.distance
     for size in ((1900, 700), (700, 900), (1280, 720)):
