@@ -12,7 +12,7 @@ RECENT = 30  # frames: the shortest of their periods is the display's
 
 
 @dataclass
-class Pace:
+class FramePace:
     """Takes times of frames; seconds in, milliseconds out.
 
     `display_s` is the display's own period where the runtime tells it.  What it predicts with a

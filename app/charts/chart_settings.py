@@ -15,7 +15,7 @@ TAU_PLACES = ("", "near", "far")  # tau_dist: 20 and 40 m there, Distances of th
 
 @dataclass(frozen=True)
 class Distances:
-    """What near and far mean in one scene, metres: `distances_of` of chart_stage measures it."""
+    """What near and far mean in one scene, metres: `distances_of` of chart_scene measures it."""
 
     near: float
     far: float

@@ -76,9 +76,11 @@ def run(options: Options) -> int:
         subject = subject.placed(options.x)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         if budget:
-            from shapeshift.app.charts.budget_chart import Drawn, settings_for
+            from shapeshift.app.charts.budget_chart import ChartSubject, settings_for
 
-            renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, None, size))
+            renderer.settings = settings_for(
+                budget, renderer, ctx, ChartSubject(subject, None, size)
+            )
         elif options.settings or options.target:
             renderer.settings = asked_settings(options, renderer, subject, size)
         work = Measure(renderer, ctx, subject, None, size)
@@ -98,8 +100,8 @@ def asked_settings(
     """RenderSettings of --settings and --target; UsageError where there is none such."""
     from dataclasses import replace
 
+    from shapeshift.app.charts.chart_scene import distances_of
     from shapeshift.app.charts.chart_settings import named_settings, render_settings
-    from shapeshift.app.charts.chart_stage import distances_of
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.cameras.framing import orbit_path
 

@@ -57,7 +57,7 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.commands.exported import Look, check_output, export, is_folder
+    from shapeshift.app.commands.exported import ExportLook, check_output, export, is_folder
     from shapeshift.app.errors import UsageError
     from shapeshift.runtime_models.evaluate import follows_eye
     from shapeshift.runtime_models.splats.write_plain import writer_of
@@ -87,7 +87,7 @@ def run(options: Options) -> int:
         for path, scene in zip(scenes, opened, strict=True)
         for part in parts_of(path, scene, scene.origin - origin, options)
     ]
-    look = Look(options.sh_degree, options.palette, eye, tuple(origin))
+    look = ExportLook(options.sh_degree, options.palette, eye, tuple(origin))
     with progress_after(PATIENCE_S) as progress:
         splats = export(parts, look, options.out, progress)
     for finding in splats.findings:

@@ -49,7 +49,7 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from shapeshift.app.document import open_document
     from shapeshift.app.drawing import make_folder, open_renderer, parse_size
-    from shapeshift.app.stability_cases.stage import Stage
+    from shapeshift.app.stability_cases.case_context import CaseContext
     from shapeshift.app.stability_cases.table import open_table
 
     size = parse_size(options.size)
@@ -64,10 +64,10 @@ def run(options: Options) -> int:
         table = open_table(
             options.out, command_line(), subject(options, renderer, scene), options.overwrite
         )
-        stage = Stage(
+        case = CaseContext(
             renderer, ctx, scene, size, reopen, scene.background, options.steps, options.rounds
         )
-        perform(stage, names, table)
+        perform(case, names, table)
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]
     verdict = f"FAILED: {', '.join(failed)}" if failed else "all hold"
@@ -108,7 +108,7 @@ def command_line() -> str:
     return typed()
 
 
-def perform(stage, names: list[str], table) -> None:
+def perform(case, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
 
     from shapeshift.app.progress import working
@@ -120,7 +120,7 @@ def perform(stage, names: list[str], table) -> None:
             if name in table.rows:
                 continue
             progress(f"{name} ({i + 1} of {len(names)})")
-            result = CASES[name](stage)
+            result = CASES[name](case)
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)
             failed = sum(f.verdict == "FAILS" for f in result.findings)

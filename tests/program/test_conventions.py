@@ -1,6 +1,7 @@
 """CONVENTIONS.md, executed: an assert a row.  If one must change, look at every shader and file."""
 
 import ast
+from collections import defaultdict
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -155,6 +156,12 @@ PRODUCT = (
     "app", "decomposition", "rasterizer", "renderer", "runtime_models", "scene", "shapeshift",
     "training", "vr",
 )  # fmt: skip
+# Classes whose name is there more than once -> why.
+SHARED_NAMES = {
+    "Options": "each command has one, which the command line finds by name",
+    "Renderer": "the library's wraps the program's, for who imports shapeshift alone",
+    "Scene": "the library's wraps the program's, for who imports shapeshift alone",
+}
 BARE_VERBS = {"take", "tell", "put", "let", "told"}  # anything can be taken, told or put
 
 
@@ -183,3 +190,15 @@ def test_functions_and_parameters_have_the_verb_of_what_they_do():
     ]
     assert len(functions) > 3000, "the walk has missed most of the product"
     assert not [(place, name) for place, name in names if name.strip("_") in BARE_VERBS]
+
+
+def test_no_two_classes_have_one_name():
+    places = defaultdict(list)
+    for path, node in definitions():
+        if isinstance(node, ast.ClassDef):
+            places[node.name].append(path)
+    shared = {name: paths for name, paths in places.items() if len(paths) > 1}
+    assert shared.keys() == SHARED_NAMES.keys(), shared
+    assert {path.split("/")[0] for path in shared["Options"]} == {"app"}
+    for name in ("Renderer", "Scene"):
+        assert sorted(path.startswith("shapeshift/api/") for path in shared[name]) == [False, True]

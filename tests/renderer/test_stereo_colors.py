@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.eye_colors import SHARED_DB, Look
+from shapeshift.renderer.colors.eye_colors import SHARED_DB, EyeColors
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.colors.color_slope import color_slope
@@ -171,28 +171,28 @@ def test_the_slope_of_networks():
 def test_nothing_that_is_absent_counts():
     layers = random_layers(50, coefficients=4)
     assert color_slope(replace(layers, opacity=np.zeros(50, np.float32))) == 0
-    assert Look.of(replace(layers, opacity=np.zeros(50, np.float32))).shared_db(
+    assert EyeColors.of(replace(layers, opacity=np.zeros(50, np.float32))).shared_db(
         np.array([[-1.0, 0, 0], [1, 0, 0]])
     ) == np.inf  # fmt: skip
 
 
 def test_the_reckoning_is_the_formula():
     """A hundred splats 2 m off, eyes 64 mm apart: 20 log10(d / (slope apart / 2))."""
-    look = Look(np.tile([0.0, 0, -2], (100, 1)), 0.1)
+    look = EyeColors(np.tile([0.0, 0, -2], (100, 1)), 0.1)
     pair = np.array([[-APART / 2, 0, 0], [APART / 2, 0, 0]])
     assert look.shared_db(pair) == pytest.approx(20 * np.log10(2 / (0.1 * APART / 2)))
     assert look.shared_db(pair * 10) == pytest.approx(look.shared_db(pair) - 20)
     assert look.shared_db(pair * 0) == np.inf
-    assert Look(look.places, np.inf).shared_db(pair) < -100
-    assert Look(look.places, 0.0).shared_db(pair) == np.inf
-    assert Look(np.zeros((1, 3)), 0.1).shared_db(pair) < 0, "an eye in a splat"
+    assert EyeColors(look.places, np.inf).shared_db(pair) < -100
+    assert EyeColors(look.places, 0.0).shared_db(pair) == np.inf
+    assert EyeColors(np.zeros((1, 3)), 0.1).shared_db(pair) < 0, "an eye in a splat"
 
 
 @pytest.mark.parametrize("name", ["harmonics", "networks"])
 def test_auto_shares_just_where_it_says(renderer, name):
     """On either side of the bound; where colours are shared the picture is better than that."""
     scene = SCENES[name]()
-    look = Look.of(scene.objects[0].model)
+    look = EyeColors.of(scene.objects[0].model)
     nearest = eyes(away=3.0)[0].world_from_eye.position - TURNED.position
     # So far apart that the reckoning says SHARED_DB: it goes by 1 / apart.
     object_eyes = np.array([[-0.5, 0, 0], [0.5, 0, 0]]) + TURNED.matrix()[:3, :3].T @ nearest

@@ -20,7 +20,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from shapeshift.app.commands.exported import Look, Part, bake_part, export  # noqa: E402
+from shapeshift.app.commands.exported import ExportLook, Part, bake_part, export  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers, Stop  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -78,7 +78,7 @@ def measure(renderer: Renderer, name: str, model, x: float, folder: Path) -> lis
     stop = next((stop.name for stop in model.stops if stop.x == x), "")
     rows = []
     for degree in DEGREES:
-        look = Look(degree)
+        look = ExportLook(degree)
         baked = draw(renderer, as_object(bake_part(Part(thing), look)), views)
         for writer in WRITERS:
             if degree > writer.sh_degree:

@@ -26,7 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from shapeshift.app.charts.chart_stage import Walk, arc  # noqa: E402
+from shapeshift.app.charts.chart_scene import Walk, arc  # noqa: E402
 from shapeshift.renderer.gl.context import NoContext, open_context  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402

@@ -34,11 +34,11 @@ from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.life import BEGIN, END, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import Swapchain, choose_format
-from shapeshift.vr.pace import Pace
-from shapeshift.vr.shown import Shown
+from shapeshift.vr.pace import FramePace
+from shapeshift.vr.shown import Blit
 
 REST_S = 0.01  # between two looks at what the runtime says while there is nothing to draw
-NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a Standing
+NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a PlaySpace
 MOST_ERRORS = 16  # of GL that a runtime may have left behind
 
 
@@ -56,7 +56,7 @@ class Session:
         pixels: str = "",  # name of a Format; "": the best
     ) -> None:
         self._instance, self._ctx, self._xr = instance, ctx, instance.xr
-        self.life, self.pace = Life(), Pace()
+        self.life, self.pace = Life(), FramePace()
         self.recentrings = 0
         self.profiles: dict[str, str] = {}  # side -> what its controller is taken for
         self.keep = False  # read the runtime's images back into `kept`
@@ -68,7 +68,7 @@ class Session:
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
-        self._shown = Shown(ctx)
+        self._shown = Blit(ctx)
         self._swapchains: list[Swapchain] = []
         self.hands = Hands(instance.handle)
         self._handle = self._create()

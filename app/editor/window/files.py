@@ -66,7 +66,7 @@ class Files:
             self.recent = RecentFiles.read(config_folder())
             if options.scenes:
                 self.remember_all(found)
-        self.use_cameras(found, stand=options.camera is not None)
+        self.use_cameras(found, look_through=options.camera is not None)
         self._state.say(repair_notes(found))
 
     def ask(self) -> None:
@@ -112,11 +112,11 @@ class Files:
             self._at_demo = [source.path for source in found.sources] == [DEMO]
             state.messages.problems = []
             self._actions.opened()
-        self.use_cameras(found, stand=not found.sources)
+        self.use_cameras(found, look_through=not found.sources)
         self.remember_all(found)
         self._state.say(repair_notes(found))
 
-    def use_cameras(self, found: OpenedFiles, stand: bool) -> None:
+    def use_cameras(self, found: OpenedFiles, look_through: bool) -> None:
         """The cameras of a file for n and p; of a scene without any there are none."""
         cameras, things = found.cameras, self._state.scene.objects
         if cameras is None and found.floor is not None and not found.sources:
@@ -125,7 +125,7 @@ class Files:
             return
         if cameras is not None and things:
             cameras = in_scene(cameras, things[0].model)
-        self._viewpoint.follow_cameras(cameras, stand)
+        self._viewpoint.follow_cameras(cameras, look_through)
 
     def draw_row(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""

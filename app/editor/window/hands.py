@@ -33,7 +33,7 @@ TURN = 0.006  # radians a logical pixel of mouse movement
 LOOK = 0.003
 
 
-class Hands:
+class InputActions:
     """Lets input act; `open_soon` takes the files that are dropped."""
 
     def __init__(
@@ -57,7 +57,7 @@ class Hands:
                 self.press_key(event)
             case Press() | Drag() | Release() if self.works_on_regions(event):
                 pass
-            case Drag() if viewpoint.steps.standing:
+            case Drag() if viewpoint.steps.at_camera:
                 viewpoint.leave_camera()
                 self.handle_event(event)
             case Drag(button="middle") | Drag(button="right") if self.pans(event):

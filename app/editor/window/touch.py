@@ -8,7 +8,7 @@ from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.touch_state import HAND, Flash, TouchState
-from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.touch_marks import Marks
 from shapeshift.app.editor.window.window import (
@@ -48,7 +48,7 @@ KEYS = (
 
 
 def attach_touch(
-    window: Window, state: EditorState, viewpoint: Viewpoint, hands: Hands, hooks: Hooks,
+    window: Window, state: EditorState, viewpoint: Viewpoint, hands: InputActions, hooks: Hooks,
     options: Options,
 ) -> TouchState:  # fmt: skip
     """Adds the section, keys and mouse of touching to the hooks."""
@@ -79,7 +79,7 @@ class MouseTouch:
 
     def __init__(
         self, touch: TouchState, state: EditorState, window: Window, viewpoint: Viewpoint,
-        hands: Hands,
+        hands: InputActions,
     ) -> None:  # fmt: skip
         self._touch, self._state, self._window = touch, state, window
         self._viewpoint, self._hands = viewpoint, hands

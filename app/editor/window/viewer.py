@@ -30,11 +30,11 @@ from shapeshift.app.editor.state.layout import Box, Layout, lay_out
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, QualityController
 from shapeshift.app.editor.state.user.own_files import OwnFiles
-from shapeshift.app.editor.state.user.settings import Settings
+from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.adding import Adding
 from shapeshift.app.editor.window.files import Files, OpenActions
 from shapeshift.app.editor.window.gizmo import Gizmo
-from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
@@ -63,11 +63,13 @@ class Viewer:
 
     def __init__(
         self, window: Window, renderer: Renderer, state: EditorState, options: Options,
-        settings: Settings | None = None, own_files: OwnFiles | None = None,
+        settings: ProgramSettings | None = None, own_files: OwnFiles | None = None,
     ) -> None:  # fmt: skip
         self.window, self.renderer, self.state, self.options = window, renderer, state, options
         state.overlay = options.panel
-        self.settings = settings or Settings()  # of the program; state.settings are the picture's
+        self.settings = (
+            settings or ProgramSettings()
+        )  # of the program; state.settings are the picture's
         folders = WorkFolders.of(options.pictures)
         self._pictures = folders.pictures
         self.hooks = Hooks()
@@ -85,7 +87,7 @@ class Viewer:
             options.floor_db or FLOOR_DB,
             wanted=(options.target_ms or options.floor_db) is not None,
         )
-        self.hands = Hands(window, state, self.viewpoint, self.hooks, self.open_soon)
+        self.hands = InputActions(window, state, self.viewpoint, self.hooks, self.open_soon)
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)

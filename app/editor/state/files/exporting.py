@@ -3,7 +3,7 @@
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from shapeshift.app.commands.exported import Look, Part, export
+from shapeshift.app.commands.exported import ExportLook, Part, export
 from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -70,7 +70,7 @@ class Exporting:
         parts, state = self.parts(), self._state
         seen = any(follows_eye(part.thing.model) for part in parts)
         eye = three(self._viewpoint.view().world_from_eye.position) if seen else None
-        look = Look(self.sh_degree, self.palette, eye, three(state.origin))
+        look = ExportLook(self.sh_degree, self.palette, eye, three(state.origin))
         try:
             self._path = claim_name(self._folder, parts, self.ending)
         except (OSError, UsageError) as error:

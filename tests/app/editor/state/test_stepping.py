@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.state.camera.camera import Camera, Push
+from shapeshift.app.editor.state.camera.camera import EditorCamera, Push
 from shapeshift.app.editor.state.camera.stepping import (
     FLIGHT_S,
     Steps,
@@ -34,7 +34,7 @@ def shown(at: Steps):
 
 def test_next_and_previous_go_around():
     at = steps()
-    assert at.text == "3 cameras" and not at.standing
+    assert at.text == "3 cameras" and not at.at_camera
     order = []
     for by in (1, 1, 1, 1, -1, -1):
         assert at.step(by, NOW)
@@ -108,8 +108,8 @@ def test_between_two_views_half_way():
 # The hand's camera takes over where one was left
 
 
-def hand() -> Camera:
-    return Camera(NOW, np.zeros(3), 1.0)
+def hand() -> EditorCamera:
+    return EditorCamera(NOW, np.zeros(3), 1.0)
 
 
 @pytest.mark.parametrize("flying", [False, True])

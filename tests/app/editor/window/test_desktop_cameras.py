@@ -67,7 +67,7 @@ def test_n_and_p_step_and_moving_leaves(dropped):
     assert viewer.viewpoint.steps.index == 2
     before = viewer.viewpoint.view()
     viewer.handle_event(Wheel(0.0))  # touches, and moves nothing
-    assert not viewer.viewpoint.steps.standing
+    assert not viewer.viewpoint.steps.at_camera
     after = viewer.viewpoint.view()
     np.testing.assert_allclose(
         after.world_from_eye.matrix(), before.world_from_eye.matrix(), atol=1e-6
@@ -79,19 +79,19 @@ def test_n_and_p_step_and_moving_leaves(dropped):
 @pytest.mark.parametrize("event", [Drag("left", 9, 4), Drag("right", 9, 4), Wheel(1.0)])
 def test_every_hand_leaves_a_camera(dropped, event):
     dropped.handle_event(event)
-    assert not dropped.viewpoint.steps.standing and dropped.viewpoint.steps.text == "3 cameras"
+    assert not dropped.viewpoint.steps.at_camera and dropped.viewpoint.steps.text == "3 cameras"
 
 
 @pytest.mark.parametrize("key", [glfw.KEY_V, glfw.KEY_F])
 def test_keys_that_move_leave_a_camera(dropped, key):
     press(dropped, key)
     run_frames(dropped, 3)
-    assert not dropped.viewpoint.steps.standing
+    assert not dropped.viewpoint.steps.at_camera
 
 
 def test_without_cameras_n_says_so(viewer):
     press(viewer, glfw.KEY_N)
-    assert "no cameras" in viewer.state.messages.note and not viewer.viewpoint.steps.standing
+    assert "no cameras" in viewer.state.messages.note and not viewer.viewpoint.steps.at_camera
 
 
 def test_k_keeps_views_in_one_file_of_this_start(dropped):
