@@ -6,7 +6,7 @@ import os
 import sys
 
 from shapeshift.app.paths import leave_current_folder
-from shapeshift.app.terminal import clean_streams, drop_output, say, tell
+from shapeshift.app.terminal import clean_streams, drop_output, print_text, say
 
 # command: (module below app, what it does); each module has `Options` and `run(options) -> int`
 COMMANDS = {
@@ -166,7 +166,7 @@ def run_command(command: str, arguments: list[str]) -> int:
         from shapeshift.app.command_help import help_text
 
         defaults = module.defaults() if hasattr(module, "defaults") else {}
-        tell(help_text(module.Options, prog, defaults))
+        print_text(help_text(module.Options, prog, defaults))
         return 0
     options = begin_at_start(parse(module.Options, arguments, prog))
     settle_caches_for(command)
@@ -204,12 +204,12 @@ def answer(arguments: list[str]) -> int:
     if arguments[:1] == ["help"] and len(arguments) == 2:
         arguments = [arguments[1], "--help"]
     if arguments[:1] in (["-h"], ["--help"], ["help"]):
-        tell(usage())
+        print_text(usage())
         return 0
     if arguments[:1] in (["--version"], ["-V"], ["version"]):
         from shapeshift.app.program import version
 
-        tell(f"shapeshift {version()}")
+        print_text(f"shapeshift {version()}")
         return 0
     command, rest = choose(arguments)
     named = rest[0] if rest else "-"  # an address is left to the readers, who say what to do

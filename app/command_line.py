@@ -46,7 +46,7 @@ class Opt:
 
 
 @dataclass(frozen=True)
-class Settings:
+class FieldsOf:
     """An annotation: the options of this field, a dict, are fields of another dataclass.
 
     `parse` puts those that were given into the dict, by name; help shows that dataclass's defaults.
@@ -71,7 +71,7 @@ class Argument:
     count: int | None  # values: 1, or of a tuple so many, None: any number
     is_tuple: bool
     help: str
-    into: str = ""  # the dict among the dataclass's fields that takes the value: see Settings
+    into: str = ""  # the dict among the dataclass's fields that takes the value: see FieldsOf
 
     @property
     def name(self) -> str:
@@ -150,7 +150,7 @@ def arguments_of(kind: type) -> tuple[Argument, ...]:
         hint, opt = hints[field.name], Opt()
         if typing.get_origin(hint) is Annotated:
             hint, *notes = typing.get_args(hint)
-            if isinstance(notes[0], Settings):
+            if isinstance(notes[0], FieldsOf):
                 made += _arguments_in(notes[0], field.name)
                 continue
             opt = next((note for note in notes if isinstance(note, Opt)), opt)
@@ -158,7 +158,7 @@ def arguments_of(kind: type) -> tuple[Argument, ...]:
     return tuple(made)
 
 
-def _arguments_in(settings: Settings, into: str) -> list[Argument]:
+def _arguments_in(settings: FieldsOf, into: str) -> list[Argument]:
     """Those of the fields of another dataclass."""
     known = {each.field.name: each for each in arguments_of(settings.of)}
     usual = [replace(known[name], into=into) for name in settings.usual]

@@ -49,7 +49,7 @@ def split_controls(words: tuple[str, ...]) -> list[float | str]:
 
 @contextmanager
 def open_renderer(
-    context: str, drawing: str, tell: Callable[[str], None] = say
+    context: str, drawing: str, report: Callable[[str], None] = say
 ) -> Iterator[tuple[Renderer, moderngl.Context | None]]:
     """(Renderer, context or None) without a window; `none` draws with OpenCL tiles and no GL.
 
@@ -66,7 +66,7 @@ def open_renderer(
         except NoContext as reason:
             if context != "auto" or drawing == "quads":
                 raise
-            tell(f"Drawing with OpenCL alone: {reason}")
+            report(f"Drawing with OpenCL alone: {reason}")
     try:
         with Renderer(ctx, drawing if ctx is not None else "tiles") as renderer:
             yield renderer, ctx

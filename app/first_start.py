@@ -45,7 +45,7 @@ OPENCL_WHEEL = "pocl-binary-distribution==3.0"  # Linux x86-64 only, half as fas
 
 # Settings of pip that would put packages elsewhere than into .venv.
 PIP_ELSEWHERE = ("PIP_TARGET", "PIP_PREFIX", "PIP_ROOT", "PIP_USER", "PIP_PYTHON", "PIP_DRY_RUN")
-# What pip says when it failed -> what that means; the first that fits is told.
+# What pip says when it failed -> what that means; the first that fits is shown.
 PIP_REASONS = (
     (r"No space left on device", "the disk is full; make room and start again"),
     (r"CERTIFICATE_VERIFY_FAILED|SSLError", "the certificate of the package index is not trusted "
@@ -179,11 +179,11 @@ def one_at_a_time() -> Iterator[int | None]:
     None on a file system without locks.
     """
     with open(Path(__file__), "rb") as file:
-        told = False
+        announced = False
         while (taken := try_lock(file.fileno())) is False:
-            if not told:
+            if not announced:
                 say("Another start is setting up; waiting for it.")
-            told = True
+            announced = True
             time.sleep(0.2)
         yield file.fileno() if taken else None
 
@@ -290,8 +290,8 @@ def run_pip(words: list[str], lock: int | None) -> int:
     environment = {k: v for k, v in os.environ.items() if k not in PIP_ELSEWHERE}
     words = ["-m", "pip", *words, "--disable-pip-version-check", "--no-input"]
     with (VENV / INSTALL_LOG).open("wb") as log:
-        told = {"stdout": log, "stderr": subprocess.STDOUT, "env": environment}
-        pip = run_python(PYTHON, *words, lock=lock, **told)
+        output = {"stdout": log, "stderr": subprocess.STDOUT, "env": environment}
+        pip = run_python(PYTHON, *words, lock=lock, **output)
         try:
             while True:
                 try:

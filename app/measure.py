@@ -51,14 +51,14 @@ class Measure:
         frames: int,
         sweep: int,
         quality_size: tuple[int, int],
-        tell: Callable[[str], None] = lambda text: None,
+        progress: Callable[[str], None] = lambda text: None,
     ) -> dict:
-        """The rows that `launch.py bench` prints and writes; `tell` hears what is going on."""
-        tell(f"{frames} frames of an orbit, mono and stereo in turns")
+        """The rows that `launch.py bench` prints and writes; `progress` hears what is going on."""
+        progress(f"{frames} frames of an orbit, mono and stereo in turns")
         mono, stereo, passes, sorts, stats = self.orbit(frames)
-        tell(f"{sweep} frames from x = 0 to 1")
+        progress(f"{sweep} frames from x = 0 to 1")
         sweep_ms = self.sweep(sweep)
-        tell("pictures of the float64 reference")
+        progress("pictures of the float64 reference")
         errors = self.errors(quality_size)
         drawing = sum(passes[name]["p50"] for name in DRAW_PASSES if name in passes)
         return {
@@ -116,13 +116,13 @@ class Measure:
         sorts: list[int] = []
         pass_times: dict[str, list[float]] = {}  # ms
         for i, eyes in frames_of:
-            ms, told = self.timed(eyes)
+            ms, frame_stats = self.timed(eyes)
             if i < WARM_UP:
                 continue
             times[len(eyes)].append(ms)
             if len(eyes) == 2:
                 continue
-            stats = told
+            stats = frame_stats
             sorts.append(stats.sorts)
             for name, pass_ms in stats.ms.items():
                 pass_times.setdefault(name, []).append(pass_ms)
@@ -219,9 +219,9 @@ def machine(ctx) -> dict[str, object]:
 
 def machine_line(ctx) -> str:
     """Processor, cores, drivers and versions, as they matter for a time."""
-    told = machine(ctx) | {"gl": gl_renderer(ctx)}
-    words = [f"{told['processor']}, {told['cores']} cores", f"OpenCL {told['opencl']}",
-             f"GL {told['gl']}", *(f"{name} {told[name]}" for name in VERSIONS)]  # fmt: skip
+    facts = machine(ctx) | {"gl": gl_renderer(ctx)}
+    words = [f"{facts['processor']}, {facts['cores']} cores", f"OpenCL {facts['opencl']}",
+             f"GL {facts['gl']}", *(f"{name} {facts[name]}" for name in VERSIONS)]  # fmt: skip
     return "; ".join(words)
 
 

@@ -68,11 +68,11 @@ def refuse_memory(gigabytes: float) -> None:
 
 
 def open_model(
-    path: Path, options: ReadingOptions, told: Callable[[str, float], None] | None = None
+    path: Path, options: ReadingOptions, progress: Callable[[str, float], None] | None = None
 ) -> Model:
     """The model in a file or folder; progress and findings go to stderr.  Raises BadFile.
 
-    `told` takes the progress instead: (what, part 0..1), from the thread that reads.
+    `progress` receives it instead: (what, part 0..1), from the thread that reads.
     """
     from dataclasses import replace
 
@@ -84,8 +84,8 @@ def open_model(
         raise BadFile(
             f"{path} is a scene file of objects; one model is wanted here: name the file of one."
         )
-    with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
-        model = read_model(path, replace(options.reading(), progress=tell))
+    with nullcontext(progress) if progress else progress_after(PATIENCE_S) as shown_progress:
+        model = read_model(path, replace(options.reading(), progress=shown_progress))
     for finding in model.findings:
         say(sentence(finding))
     return model
@@ -120,12 +120,12 @@ def sentence(finding: Finding) -> str:
 
 @contextmanager
 def progress_after(seconds: float) -> Iterator:
-    """told(what, part 0..1) that shows a bar from `seconds` on."""
+    """progress(what, part 0..1) that shows a bar from `seconds` on."""
     from shapeshift.app.progress import Words, listed, progress_bar
 
     began, bar, task, words = time.monotonic(), None, None, Words()
 
-    def told(what: str, part: float) -> None:
+    def progress(what: str, part: float) -> None:
         nonlocal bar, task
         words.text = f"{what}, {part:.0%}"
         if bar is None:
@@ -138,7 +138,7 @@ def progress_after(seconds: float) -> Iterator:
 
     try:
         with listed(words):
-            yield told
+            yield progress
     finally:
         if bar is not None:
             bar.stop()

@@ -26,5 +26,5 @@ def with_pace(model: AnchorModel) -> AnchorModel:
     from shapeshift.app.opening import progress_after
     from shapeshift.renderer.pace import measure_pace
 
-    with progress_after(PATIENCE_S) as told:
-        return replace(model, pace=measure_pace(model, told))
+    with progress_after(PATIENCE_S) as progress:
+        return replace(model, pace=measure_pace(model, progress))

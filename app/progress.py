@@ -58,11 +58,11 @@ def working(what: str) -> Iterator[Callable[[str], None]]:
     now = Words(what)
     with listed(now), open_console().status(what) as status:
 
-        def tell(text: str) -> None:
+        def report(text: str) -> None:
             now.text = text
             status.update(text)
 
-        yield tell
+        yield report
 
 
 @contextmanager
@@ -73,7 +73,7 @@ def lines(command: str) -> Iterator[None]:
         return
     over, began = threading.Event(), time.monotonic()
 
-    def tell() -> None:
+    def report() -> None:
         while not over.wait(LINE_EVERY_S):
             words = next(filter(None, (work.words() for work in reversed(_under_way))), "at work")
             minutes = (time.monotonic() - began) / 60
@@ -82,13 +82,13 @@ def lines(command: str) -> Iterator[None]:
             except (OSError, ValueError):
                 return  # nobody reads any more
 
-    teller = threading.Thread(target=tell, name="a line a minute", daemon=True)
-    teller.start()
+    thread = threading.Thread(target=report, name="a line a minute", daemon=True)
+    thread.start()
     try:
         yield
     finally:
         over.set()
-        teller.join()
+        thread.join()
 
 
 def is_terminal(stream) -> bool:

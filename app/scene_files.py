@@ -15,12 +15,12 @@ OF_OBJECTS = ("mode", "up", "flip")  # options that the file has for each object
 
 
 def open_scene_file(
-    path: Path, options: ReadingOptions, tell: bool = True
+    path: Path, options: ReadingOptions, show_findings: bool = True
 ) -> tuple["SceneFile", dict[str, "Model"], "Scene"]:
     """What the file says, the model of each object, and what is drawn.
 
-    Progress goes to stderr, and findings unless `tell` is false.  Raises BadFile, and UsageError
-    for options that an object has in the file.
+    Progress goes to stderr, and findings unless `show_findings` is false.  Raises BadFile, and
+    UsageError for options that an object has in the file.
     """
     from dataclasses import replace
 
@@ -32,15 +32,15 @@ def open_scene_file(
         if getattr(options, name):
             raise UsageError(f"--{name} is for one model; in {path.name} each object has its own.")
     file = read_scene_file(path)
-    with progress_after(PATIENCE_S) as told:
-        models = read_models(file, replace(options.reading(), progress=told))
-    if tell:
-        tell_findings(models)
+    with progress_after(PATIENCE_S) as progress:
+        models = read_models(file, replace(options.reading(), progress=progress))
+    if show_findings:
+        print_findings(models)
     return file, models, scene_of(file, models)
 
 
-def tell_findings(models: dict[str, "Model"]) -> None:
-    """What is wrong with the models, each told once however many objects have it."""
+def print_findings(models: dict[str, "Model"]) -> None:
+    """What is wrong with the models, each printed once however many objects have it."""
     for model in {id(model): model for model in models.values()}.values():
         for finding in model.findings:
             say(sentence(finding))

@@ -59,12 +59,12 @@ def say(*lines: str) -> None:
     print(*map(one_line, lines), sep="\n", file=sys.stderr, flush=True)
 
 
-def tell(text: str) -> None:
+def print_text(text: str) -> None:
     """What was asked for, on standard output, in as many lines as it has."""
     print(several_lines(text))
 
 
-def tell_json(value: object, indent: int | None = 1) -> None:
+def print_json(value: object, indent: int | None = 1) -> None:
     """A result as JSON on standard output, as long as it is."""
     stream = trusted(sys.stdout)
     plain = "utf" in (getattr(stream, "encoding", None) or "utf").lower()

@@ -27,12 +27,12 @@ text = json.dumps({"convention": "opengl", "modalities": stops, **lens, "frames"
 
 
 # 2. Training; the more seconds, the better.
-def tell(step) -> None:
+def show_step(step) -> None:
     if step.iteration % 100 == 0:
         print(f"{step.iteration} steps, {step.fraction:.0%}, {step.anchors:,} anchors")
 
 
-model = ss.train(capture, seconds=SECONDS, max_anchors=2000, progress=tell, pace=False)
+model = ss.train(capture, seconds=SECONDS, max_anchors=2000, progress=show_step, pace=False)
 print(f"{model.steps} steps in {model.seconds:.0f} s; held-out photos:", model.psnr_db)
 
 # 3. A trained scene is a scene.

@@ -23,7 +23,7 @@ FORMS = {
 
 
 @dataclass(frozen=True)
-class Frame:
+class RasterFrame:
     """An image on the device and what its backward pass needs."""
 
     image: "Array"  # (3, H, W) float32 = sum of colours + transmittance * background
@@ -38,7 +38,7 @@ def rasterize(
     size: tuple[int, int],
     background: tuple[float, float, float] = (0.0, 0.0, 0.0),
     form: str | None = None,
-) -> Frame:
+) -> RasterFrame:
     """The image of `size` (width, height) pixels over a background colour.
 
     form: "cpu" or "gpu", by default the device's kind; any form draws the lists of any other.
@@ -53,7 +53,7 @@ def rasterize(
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends,
     )  # fmt: skip
-    return Frame(image, transmittance, ends)
+    return RasterFrame(image, transmittance, ends)
 
 
 def rasterize_rgba(
@@ -155,7 +155,7 @@ def rasterize_backward(
     device: Device,
     projected: Projected,
     tiles: Tiles,
-    frame: Frame,
+    frame: RasterFrame,
     grad_image: "Array",
     grad_transmittance: "Array | None" = None,
     form: str | None = None,

@@ -13,7 +13,7 @@ import numpy as np
 from shapeshift.rasterizer.bin import Tiles
 from shapeshift.rasterizer.device import Device
 from shapeshift.rasterizer.project import GROUP, RECORD, WIDTH, Camera, Projected
-from shapeshift.rasterizer.raster import FORMS, Frame
+from shapeshift.rasterizer.raster import FORMS, RasterFrame
 
 if TYPE_CHECKING:
     from pyopencl.array import Array
@@ -25,9 +25,9 @@ WITH_DEPTH = {"SURFACE": 1}  # what the kernels of raster.py are built with for 
 
 @dataclass(frozen=True)
 class DepthFrame:
-    """A Frame with the depth that was blended into it."""
+    """A RasterFrame with the depth that was blended into it."""
 
-    frame: Frame
+    frame: RasterFrame
     surface: "Array"  # (N, 8) float32
     metres: "Array"  # (H, W) float32, the sum of alpha T z: depth times coverage
 
@@ -104,7 +104,7 @@ def rasterize_depth(
         width, height, tiles.grid[0], tiles.starts, tiles.intersections, projected.record,
         *(float(c) for c in background), image, transmittance, ends, surfaces, metres,
     )  # fmt: skip
-    return DepthFrame(Frame(image, transmittance, ends), surfaces, metres)
+    return DepthFrame(RasterFrame(image, transmittance, ends), surfaces, metres)
 
 
 def rasterize_depth_backward(

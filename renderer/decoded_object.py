@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from shapeshift.renderer.colors.color_cache import ColorCache
-from shapeshift.renderer.colors.eye_colors import Look
+from shapeshift.renderer.colors.eye_colors import EyeColors
 from shapeshift.renderer.colors.false_colors import Shade
 from shapeshift.runtime_models.model import Model
 from shapeshift.runtime_models.stop_weights import Controls
@@ -21,4 +21,4 @@ class DecodedObject:
     x: Controls = 0.0  # of its geometry
     version: int = 0  # goes up with every other x
     shade: Shade = NO_SHADE  # which colours are decoded
-    look: Look | None = None  # made for the first pair of eyes
+    look: EyeColors | None = None  # made for the first pair of eyes

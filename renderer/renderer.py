@@ -18,7 +18,7 @@ from shapeshift.renderer.colors.color_cache import (
     reach_of_scaffold,
     visible_anchors,
 )
-from shapeshift.renderer.colors.eye_colors import Look, drawn_together, shared_is_enough
+from shapeshift.renderer.colors.eye_colors import EyeColors, drawn_together, shared_is_enough
 from shapeshift.renderer.colors.false_colors import (
     BESIDE,
     PICTURE,
@@ -200,7 +200,7 @@ class Renderer:
         if choice != "auto":
             return choice == "each"
         for decoded in self._decoded:
-            decoded.look = decoded.look or Look.of(decoded.model)
+            decoded.look = decoded.look or EyeColors.of(decoded.model)
         looks = [decoded.look for decoded in self._decoded if decoded.look is not None]
         return not shared_is_enough(self._scene, looks, views)
 

@@ -9,7 +9,7 @@ import numpy as np
 from shapeshift.runtime_models.files.plain_text import path_end
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.photo import open_image
 from shapeshift.scene.captures.undistort import is_straight, pinhole_of
 from shapeshift.scene.pose import View
@@ -28,7 +28,7 @@ def image_size(path: Path, claimed: tuple[int, int] | None) -> tuple[int, int]:
 
 
 def posed_photo(
-    path: Path, modality: str, world_from_camera: np.ndarray, lens: Lens, where: str
+    path: Path, modality: str, world_from_camera: np.ndarray, lens: ColmapCamera, where: str
 ) -> Photo:
     """A photo with the view of its lens' straight camera.  Raises BadFile.
 
@@ -46,7 +46,7 @@ def posed_photo(
     return Photo(view, path, modality, lens=lens)
 
 
-def of_size(lens: Lens, size: tuple[int, int], path: Path) -> Lens:
+def of_size(lens: ColmapCamera, size: tuple[int, int], path: Path) -> ColmapCamera:
     """The lens for a file of `size` pixels: photos may have been made smaller after the poses.
 
     Raises BadFile where file and capture differ by more than that.

@@ -7,7 +7,7 @@ from typing import Any
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles
 from shapeshift.rasterizer.project import Camera, Projected, project, project_backward
-from shapeshift.rasterizer.raster import Frame, rasterize, rasterize_backward
+from shapeshift.rasterizer.raster import RasterFrame, rasterize, rasterize_backward
 from shapeshift.rasterizer.surface import (
     DepthFrame,
     rasterize_depth,
@@ -24,14 +24,14 @@ Timed = Callable[[str], AbstractContextManager]  # of a pass, by its name
 
 
 @dataclass(frozen=True)
-class Drawing:
+class DrawnView:
     """A drawn view with what the way back needs; device arrays."""
 
     camera: Camera
     splats: Gaussians
     projected: Projected
     tiles: Tiles
-    frame: Frame
+    frame: RasterFrame
     depth: DepthFrame | None = None  # the same frame with its depth, where that was asked for
 
     @property
@@ -53,7 +53,7 @@ def untimed(name: str) -> AbstractContextManager:
 def draw_splats(
     device, splats: Gaussians, view: View, background: Color, with_depth: bool = False,
     timed: Timed = untimed,
-) -> Drawing:  # fmt: skip
+) -> DrawnView:  # fmt: skip
     """The view of splats over a background."""
     camera, depth = camera_of(view), None
     with timed("project"):
@@ -69,11 +69,11 @@ def draw_splats(
         with timed("rasterize"):
             depth = rasterize_depth(device, projected, tiles, surfaces, view.size, background)
             frame = depth.frame
-    return Drawing(camera, splats, projected, tiles, frame, depth)
+    return DrawnView(camera, splats, projected, tiles, frame, depth)
 
 
 def splats_backward(
-    device, drawing: Drawing, grad_image, depth: DepthTerm | None = None, timed: Timed = untimed,
+    device, drawing: DrawnView, grad_image, depth: DepthTerm | None = None, timed: Timed = untimed,
     **asked: Any,
 ) -> tuple[Gaussians, object]:  # fmt: skip
     """Gradients of the splats and (N, 12) of the records by those of the image.

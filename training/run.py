@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.rasterizer.device import Device
 from shapeshift.training.baselines.plain_settings import PlainSettings
-from shapeshift.training.drawing import Color, Drawing
+from shapeshift.training.drawing import Color, DrawnView
 from shapeshift.training.evaluation.metrics import psnr
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import Target
@@ -55,7 +55,7 @@ class Run(ABC):
     adam: Adam
     targets: Targets
     exposures: Exposures
-    drawing: Drawing  # the last one
+    drawing: DrawnView  # the last one
     iteration: int  # steps done
     elapsed: float  # seconds that the steps took, by clock_of
     densified_at: int  # iteration of the last change of what is counted
@@ -119,7 +119,7 @@ class Run(ABC):
         shown = self.device.view(self.drawing.projected.record)[:, 9] > 0
         return float(shown.sum() / self.splat_count)
 
-    def psnr_of(self, drawing: Drawing, photo: LoadedPhoto, background: Color) -> float:
+    def psnr_of(self, drawing: DrawnView, photo: LoadedPhoto, background: Color) -> float:
         """Decibels of a drawing against its photo."""
         image = self.device.download(drawing.frame.image).transpose(1, 2, 0)
         return psnr(image, photo.over(background), photo.weight)

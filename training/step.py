@@ -8,7 +8,7 @@ import numpy as np
 
 from shapeshift.scene.pose import View
 from shapeshift.training.density.densification_stats import DensificationStats
-from shapeshift.training.drawing import Color, Drawing, draw_splats, splats_backward
+from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Activation, Gaussians
 from shapeshift.training.heads.networks import HeadLayout, Heads
 from shapeshift.training.heads.optimizer import Adam
@@ -17,7 +17,7 @@ from shapeshift.training.losses.losses import ImageLoss, Target
 from shapeshift.training.losses.min_opacity import SHARE, add_min_opacity_gradient
 
 
-class Step:
+class TrainingStep:
     """Draws the model that an optimiser holds and learns from a target."""
 
     def __init__(self, device, layout: HeadLayout, voxel: float, adam: Adam) -> None:
@@ -54,13 +54,13 @@ class Step:
     def draw(
         self, view: View, control: np.ndarray, background: Color, with_depth: bool = False,
         rows=None,
-    ) -> Drawing:  # fmt: skip
+    ) -> DrawnView:  # fmt: skip
         splats = self.decode(control, view.world_from_eye.position, rows)
         return draw_splats(self.device, splats, view, background, with_depth, self.timed)
 
     def gradients(
         self,
-        drawing: Drawing,
+        drawing: DrawnView,
         loss: ImageLoss,
         target: Target,
         stats: DensificationStats | None = None,

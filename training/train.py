@@ -35,7 +35,7 @@ from shapeshift.training.photos import (
 from shapeshift.training.run import SETTLE, Run
 from shapeshift.training.schedule import WARM_UP_STEPS, Budget, LrWarmup, Schedule
 from shapeshift.training.settings import Rates, TrainSettings
-from shapeshift.training.step import Step
+from shapeshift.training.step import TrainingStep
 from shapeshift.training.supervision.backgrounds import background_warning, choose_background
 from shapeshift.training.supervision.exposure import Exposures
 from shapeshift.training.supervision.targets import Targets
@@ -112,7 +112,7 @@ class Trainer(Run):
             self.initialise(photos)
         else:
             self.restore(*resume)
-        self.step = Step(device, self.layout, self.voxel, self.adam)
+        self.step = TrainingStep(device, self.layout, self.voxel, self.adam)
         self.guard = DivergenceGuard(self.adam.state())
         self.next_snapshot = self.iteration + SNAPSHOT_EVERY
         if resume is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from shapeshift.renderer.gl.shader import compile_program
 from shapeshift.scene.pose import View
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.shown import SHADERS
 
 REST = 0.35  # of the clearness while one moves
@@ -29,7 +29,7 @@ class Grid:
     clearness: float = REST  # 0..1; 0: nothing is drawn
 
 
-def clearness(before: float, was: Standing, now: Standing, seconds: float) -> float:
+def clearness(before: float, was: PlaySpace, now: PlaySpace, seconds: float) -> float:
     """How clear the grid is after `seconds`: it comes as the room is moved, and goes slowly."""
     moves = was.scale != now.scale or not (
         np.array_equal(was.world_from_play.position, now.world_from_play.position)
@@ -53,7 +53,7 @@ class Floor:
         self,
         framebuffer: moderngl.Framebuffer,
         play_view: View,
-        standing: Standing,
+        play_space: PlaySpace,
         coverage: moderngl.Texture | np.ndarray,
         grid: Grid,
         background: tuple[float, float, float],
@@ -65,14 +65,14 @@ class Floor:
         if not grid.clearness > 0:
             return
         ctx, program = self._ctx, self._program
-        spacing, finer = spacing_of(standing.scale)
-        eye = standing.point(play_view.world_from_eye.position)
+        spacing, finer = spacing_of(play_space.scale)
+        eye = play_space.point(play_view.world_from_eye.position)
         whole = 10 * spacing  # a multiple of all lines: floats stay exact far from the origin
-        rotation = (standing.world_from_play.matrix() @ play_view.world_from_eye.matrix())[:3, :3]
+        rotation = (play_space.world_from_play.matrix() @ play_view.world_from_eye.matrix())[:3, :3]
         program["eye"].value = tuple(eye - np.floor(eye / whole) * whole * (1 - UP))
         program["world_from_eye"].write(rotation.T.astype(np.float32).tobytes())
         program["tangents"].value = play_view.tangents
-        program["level_m"].value, program["scale"].value = grid.level_m, standing.scale
+        program["level_m"].value, program["scale"].value = grid.level_m, play_space.scale
         program["spacing_m"].value, program["finer"].value = spacing, finer
         program["clearness"].value = grid.clearness
         from_array = isinstance(coverage, np.ndarray)

@@ -42,25 +42,25 @@ def glove(side: str, hand: Hand, holds: bool = False) -> list[Capsule]:
     to_play = hand.grip.matrix()[:3, :3] * MIRROR[side]  # columns: of the right hand's frame
     at = hand.grip.position
 
-    def put(a, b, radii, color) -> Capsule:
+    def capsule(a, b, radii, color) -> Capsule:
         return Capsule(to_play @ a + at, to_play @ b + at, radii, color)
 
     parts = []
     for number, (across, _) in enumerate(FINGERS):
         knuckle = _knuckle(across)
         wrist = _beside(WRIST, 0.0, across * 0.62)
-        parts.append(put(wrist, _beside(knuckle, 0.004, 0.0), (0.0165, 0.0135), GLOVE))
+        parts.append(capsule(wrist, _beside(knuckle, 0.004, 0.0), (0.0165, 0.0135), GLOVE))
         joints = _finger(number, side, hand)
         for bone in range(3):
             radii = (THICK[bone], THICK[bone + 1])
-            parts.append(put(joints[bone], joints[bone + 1], radii, GLOVE))
+            parts.append(capsule(joints[bone], joints[bone + 1], radii, GLOVE))
     joints = _thumb(hand.squeeze)
     for bone, radii in enumerate(((0.0150, 0.0118), (0.0118, 0.0095))):
-        parts.append(put(joints[bone], joints[bone + 1], radii, GLOVE))
+        parts.append(capsule(joints[bone], joints[bone + 1], radii, GLOVE))
     cuff = LIT if holds else CUFF
     for y in (0.010, 0.024):
         ends = _beside(WRIST, y, -0.012), _beside(WRIST, y, 0.012)
-        parts.append(put(*ends, (0.024, 0.024), cuff))
+        parts.append(capsule(*ends, (0.024, 0.024), cuff))
     return parts
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.glove import Capsule
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 
 AWAY_M = 0.004  # of the room, from the hull: lines beside what they are around
 THICK_M = 0.0028  # radius
@@ -66,16 +66,16 @@ def hull_of(points: np.ndarray) -> Hull | None:
 
 
 def outline(
-    hull: Hull, world_from_object: Pose, standing: Standing, eye: np.ndarray, color: tuple
+    hull: Hull, world_from_object: Pose, play_space: PlaySpace, eye: np.ndarray, color: tuple
 ) -> list[Capsule]:
     """Lines around a hull as an eye (3,) of the room sees it; metres of the room."""
     to_world = world_from_object.matrix()
-    room = standing.world_from_play
-    to_room = room.matrix()[:3, :3].T / standing.scale
-    seen_from = to_world[:3, :3].T @ (standing.point(eye) - to_world[:3, 3])  # object frame
+    room = play_space.world_from_play
+    to_room = room.matrix()[:3, :3].T / play_space.scale
+    seen_from = to_world[:3, :3].T @ (play_space.point(eye) - to_world[:3, 3])  # object frame
     turned_to = hull.planes[:, :3] @ seen_from + hull.planes[:, 3] > 0
     rim = turned_to[hull.faces[:, 0]] != turned_to[hull.faces[:, 1]]
-    points = hull.points + hull.outward * (AWAY_M * standing.scale)
+    points = hull.points + hull.outward * (AWAY_M * play_space.scale)
     world = points @ to_world[:3, :3].T + to_world[:3, 3]
     places = (world - room.position) @ to_room.T
     return [Capsule(places[a], places[b], (THICK_M, THICK_M), color) for a, b in hull.edges[rim]]

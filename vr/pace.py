@@ -12,7 +12,7 @@ RECENT = 30  # frames: the shortest of their periods is the display's
 
 
 @dataclass
-class Pace:
+class FramePace:
     """Takes times of frames; seconds in, milliseconds out.
 
     `display_s` is the display's own period where the runtime tells it.  What it predicts with a
@@ -26,14 +26,14 @@ class Pace:
     own_ms: list[float] = field(default_factory=list)  # from the runtime's go to our hand-over
     drawing_ms: list[float] = field(default_factory=list)  # of that, the splats of both eyes
     wait_ms: list[float] = field(default_factory=list)  # the runtime let us wait
-    _told: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
+    _periods: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT))  # periods, seconds
     _seen_s: float | None = None  # when the last frame was to be seen
     _unfair: int = 0  # frames whose times and gaps do not count
 
     @property
     def period_s(self) -> float:
         """Of the display; 0 while nothing is known."""
-        return self.display_s or min(self._told, default=0.0)
+        return self.display_s or min(self._periods, default=0.0)
 
     @property
     def settled(self) -> bool:
@@ -43,9 +43,9 @@ class Pace:
     def start(self, seen_s: float, period_s: float, wait_s: float) -> None:
         """A frame begins that will be seen at `seen_s`; the runtime tells `period_s` with it."""
         if self.frames == SETTLED:
-            self._told.clear()  # the first were guesses
+            self._periods.clear()  # the first were guesses
         if period_s > 0:
-            self._told.append(period_s)
+            self._periods.append(period_s)
         if self._seen_s is not None and self.period_s > 0 and self.settled and not self._unfair:
             self.dropped += max(round((seen_s - self._seen_s) / self.period_s) - 1, 0)
         self._seen_s = seen_s

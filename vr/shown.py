@@ -11,7 +11,7 @@ GL_FRAMEBUFFER_SRGB = 0x8DB9
 WHOLE = (0.0, 0.0, 1.0, 1.0)  # left, bottom, width, height
 
 
-class Shown:
+class Blit:
     """The one program for that; display values in, display values or light out."""
 
     def __init__(self, ctx: moderngl.Context) -> None:

@@ -13,7 +13,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import SIDES, Frame, Hand, Pulse, aim_of
 from shapeshift.vr.locomotion.locomotion import GRIPS_AT, LETS_GO_AT
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 
 REACH_M = 0.10  # of the room, from the palm to what it takes
 SKIN_M = 0.02  # so near a palm touches
@@ -67,7 +67,7 @@ class Touched:
 
 
 def touch(
-    world: World, touching: Touching, frame: Frame, standing: Standing
+    world: World, touching: Touching, frame: Frame, play_space: PlaySpace
 ) -> tuple[Touching, Touched]:
     """Moves the hands in the world, takes, lets go and acts.
 
@@ -84,19 +84,19 @@ def touch(
     pulls = (now.pulling - touching.pulling) & touching.seen
     pulls = frozenset(side for side in pulls if frame.hands[side].aim is not None)
     busy = now.squeezing & (touching.busy | (now.seen - touching.seen))
-    palms = {s: place(world, s, frame.hands[s], standing, frame.recentred) for s in SIDES}
+    palms = {s: place(world, s, frame.hands[s], play_space, frame.recentred) for s in SIDES}
     let_go = [s for s in SIDES if s not in now.squeezing and world.held(s) is not None]
     for side in let_go:
         world.release(side)
     grasps = [(s, palm) for s, palm in palms.items() if palm is not None and s in squeezes]
-    taken = [s for s, palm in grasps if take(world, s, palm, standing)]
+    taken = [s for s, palm in grasps if grab_nearest(world, s, palm, play_space)]
     busy |= set(taken)
     # Of a controller with one button taking is all it does, and what it acted on is all it has.
     acting = pulls - set(taken)
-    beams = [beam(world, s, frame.hands[s], standing, s in acting) for s in SIDES
+    beams = [beam(world, s, frame.hands[s], play_space, s in acting) for s in SIDES
              if s in acting or (s not in busy and shows(frame.hands[s]))]  # fmt: skip
     hits = {line.side for line in beams if line.acts and answers(world, line.meets)}
-    near = tuple(touched(world, palms[side], standing) for side in SIDES)
+    near = tuple(touched(world, palms[side], play_space) for side in SIDES)
     brushed = [s for s, name, before in zip(SIDES, near, touching.near, strict=True)
                if name not in (None, before) and world.held(s) is None]  # fmt: skip
     felt = ((let_go, LEFT), (taken, TAKEN), (hits, ACTED), (brushed, TOUCHED))
@@ -105,7 +105,7 @@ def touch(
     held = {side: world.held(side) for side in SIDES}
     now = replace(now, busy=busy, near=near)
     free = [side for side in SIDES if held[side] is None and side not in now.squeezing]
-    found = (offered(world, side, frame.hands[side], palms[side], standing) for side in free)
+    found = (offered(world, side, frame.hands[side], palms[side], play_space) for side in free)
     offers = tuple(offer for offer in found if offer is not None)
     return now, Touched(strongest(pulses), tuple(beams), held, offers)
 
@@ -118,12 +118,12 @@ def pressed(
     return frozenset(s for s, hand in hands if getattr(hand, what) >= at[1 if s in before else 0])
 
 
-def place(world: World, side: str, hand: Hand, standing: Standing, jumps: bool) -> Pose | None:
+def place(world: World, side: str, hand: Hand, play_space: PlaySpace, jumps: bool) -> Pose | None:
     """Where the palm is in the world, told to the world; None: lost, and it has let go."""
     if not hand.active or hand.grip is None:
         world.move_hand(side, None)
         return None
-    palm = standing.pose(hand.grip)
+    palm = play_space.pose(hand.grip)
     if jumps:
         jump(world, side, palm)
     world.move_hand(side, palm)
@@ -140,30 +140,30 @@ def jump(world: World, side: str, palm: Pose) -> None:
         world.carry(side, moved)
 
 
-def take(world: World, side: str, palm: Pose, standing: Standing) -> bool:
+def grab_nearest(world: World, side: str, palm: Pose, play_space: PlaySpace) -> bool:
     """Takes the nearest object within reach."""
-    reach = REACH_M * standing.scale
+    reach = REACH_M * play_space.scale
     return world.nearest(palm.position, reach) is not None and bool(world.grab(side, reach))
 
 
-def touched(world: World, palm: Pose | None, standing: Standing) -> str | None:
+def touched(world: World, palm: Pose | None, play_space: PlaySpace) -> str | None:
     """The object at a palm."""
-    found = world.nearest(palm.position, SKIN_M * standing.scale) if palm is not None else None
+    found = world.nearest(palm.position, SKIN_M * play_space.scale) if palm is not None else None
     return found[0] if found else None
 
 
 def offered(
-    world: World, side: str, hand: Hand, palm: Pose | None, standing: Standing
+    world: World, side: str, hand: Hand, palm: Pose | None, play_space: PlaySpace
 ) -> Offer | None:
     """What a squeeze would take; else what a pull of the trigger would reach that answers to it."""
     if palm is None:
         return None
-    near = world.nearest(palm.position, REACH_M * standing.scale)
+    near = world.nearest(palm.position, REACH_M * play_space.scale)
     if near is not None:
         return Offer(side, near[0], "hand")
     if hand.aim is None:
         return None
-    aim = standing.pose(hand.aim)
+    aim = play_space.pose(hand.aim)
     hit = world.aim(aim.position, -aim.matrix()[:3, 2])
     if hit is None or hit.object not in world.objects or not answers(world, hit.object):
         return None
@@ -175,13 +175,13 @@ def shows(hand: Hand) -> bool:
     return hand.aim is not None and hand.trigger >= SHOWS_AT
 
 
-def beam(world: World, side: str, hand: Hand, standing: Standing, acts: bool) -> Beam:
+def beam(world: World, side: str, hand: Hand, play_space: PlaySpace, acts: bool) -> Beam:
     """Along the hand's aim; it acts on what it meets first."""
     room = aim_of(hand)
-    aim = standing.pose(room)
+    aim = play_space.pose(room)
     along = -aim.matrix()[:3, 2]
     hit = (world.ray if acts else world.aim)(aim.position, along)
-    length = BEAM_M if hit is None else hit.distance_m / standing.scale  # metres of the room
+    length = BEAM_M if hit is None else hit.distance_m / play_space.scale  # metres of the room
     start = room.position
     end = start - room.matrix()[:3, 2] * min(length, BEAM_M)
     meets = hit.object if hit is not None and hit.object in world.objects else None
@@ -202,10 +202,10 @@ def at_rest(frame: Frame, touching: Touching) -> Frame:
     return replace(frame, hands=hands)
 
 
-def follow(world: World, frame: Frame, standing: Standing, jumps: bool) -> None:
+def follow(world: World, frame: Frame, play_space: PlaySpace, jumps: bool) -> None:
     """The hands where the room has been moved to; at a jump, with what they hold."""
     for side in SIDES:
-        place(world, side, frame.hands[side], standing, jumps)
+        place(world, side, frame.hands[side], play_space, jumps)
 
 
 def feel(world: World, records: Iterable) -> tuple[Pulse, ...]:

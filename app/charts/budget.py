@@ -13,14 +13,14 @@ FLOOR_DB = 35.0  # where a difference begins to be seen side by side
 
 
 @dataclass(frozen=True)
-class Budget:
+class FrameBudget:
     """What a user wants kept: milliseconds a frame, dB to the exact picture."""
 
     target_ms: float
     floor_db: float = FLOOR_DB
 
 
-def read_budget(target_ms: float | None, floor_db: float | None) -> Budget | None:
+def read_budget(target_ms: float | None, floor_db: float | None) -> FrameBudget | None:
     """The budget of --target-ms and --floor-db, None without them; UsageError in one sentence."""
     for name, value in (("--target-ms", target_ms), ("--floor-db", floor_db)):
         if value is not None and not 0 < value < inf:
@@ -29,10 +29,10 @@ def read_budget(target_ms: float | None, floor_db: float | None) -> Budget | Non
         if floor_db is not None:
             raise UsageError("--floor-db bounds what --target-ms may choose; give both.")
         return None
-    return Budget(target_ms, FLOOR_DB if floor_db is None else floor_db)
+    return FrameBudget(target_ms, FLOOR_DB if floor_db is None else floor_db)
 
 
-class Row(Protocol):
+class MeasuredSetting(Protocol):
     """One measured setting; rows of a stored chart and of the window's quick chart alike."""
 
     @property
@@ -57,7 +57,7 @@ class Choice:
     reached: bool  # whether ms is at or below the target
 
 
-def choose(rows: Sequence[Row], target_ms: float, floor_db: float) -> Choice:
+def choose(rows: Sequence[MeasuredSetting], target_ms: float, floor_db: float) -> Choice:
     """The most alike of the rows that reach the target; none does: the fastest above the floor.
 
     Rows whose ms or db is NaN are never chosen.  Without a row above the floor it is the exact
@@ -77,7 +77,9 @@ def choose(rows: Sequence[Row], target_ms: float, floor_db: float) -> Choice:
     return Choice(best.settings, best.name, best.ms, best.db, sentence, bool(reaching))
 
 
-def _sentence(best: Row, exact: Row, target_ms: float, floor_db: float, reached: bool) -> str:
+def _sentence(
+    best: MeasuredSetting, exact: MeasuredSetting, target_ms: float, floor_db: float, reached: bool
+) -> str:
     """One line: what was chosen, what it costs in dB and in ms, whether it is enough."""
     if best is exact:
         what = f"exact: {best.ms:.1f} ms a frame, nothing is left out"
@@ -94,7 +96,7 @@ def _sentence(best: Row, exact: Row, target_ms: float, floor_db: float, reached:
     )
 
 
-def least_scale(rows: Sequence[Row], floor_db: float) -> float:
+def least_scale(rows: Sequence[MeasuredSetting], floor_db: float) -> float:
     """The smallest render_scale that was measured at the floor or better with nothing else changed.
 
     How far dynamic resolution may go down; 1 where no scale is good enough.

@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from shapeshift.app.charts.budget import Budget, Choice, choose
+from shapeshift.app.charts.budget import Choice, FrameBudget, choose
 from shapeshift.app.charts.chart_rows import write_text
 from shapeshift.app.document import Document
 from shapeshift.app.terminal import say
@@ -35,7 +35,7 @@ class BudgetRow:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ChartSubject:
     """What is going to be drawn: the chart belongs to exactly this."""
 
     subject: Document
@@ -44,7 +44,9 @@ class Drawn:
     eyes: int = 1
 
 
-def settings_for(budget: Budget, renderer: Renderer, ctx, drawn: Drawn) -> RenderSettings:
+def settings_for(
+    budget: FrameBudget, renderer: Renderer, ctx, drawn: ChartSubject
+) -> RenderSettings:
     """The renderer's settings moved within the budget; says in one line on stderr what it chose.
 
     Rows that keep an order are not taken: views of render and bench lie far apart.
@@ -65,7 +67,7 @@ def applied(choice: Choice, settings: RenderSettings) -> RenderSettings:
     return replace(choice.settings, background=settings.background, debug=settings.debug)
 
 
-def budget_rows(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
+def budget_rows(renderer: Renderer, ctx, drawn: ChartSubject) -> list[BudgetRow]:
     """From the user's cache, or measured now and kept there."""
     path = stored_path(renderer, ctx, drawn)
     rows = read_rows(path)
@@ -75,10 +77,10 @@ def budget_rows(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
     return rows
 
 
-def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
+def stored_path(renderer: Renderer, ctx, drawn: ChartSubject) -> Path:
     """Where the chart of this scene, machine, size, back end and background lies."""
+    from shapeshift.app.charts.chart_scene import digest
     from shapeshift.app.charts.chart_settings import SETTINGS
-    from shapeshift.app.charts.chart_stage import digest
     from shapeshift.app.measure import machine_line
     from shapeshift.runtime_models.files.user_cache import OURS, cache_base
 
@@ -90,18 +92,18 @@ def stored_path(renderer: Renderer, ctx, drawn: Drawn) -> Path:
     return cache_base() / OURS / "charts" / f"{key}.json"
 
 
-def measure(renderer: Renderer, ctx, drawn: Drawn) -> list[BudgetRow]:
+def measure(renderer: Renderer, ctx, drawn: ChartSubject) -> list[BudgetRow]:
     """Prices the quick settings with progress on stderr; the renderer keeps its settings."""
     from shapeshift.app.charts.chart_measure import Pricing, twin_of
+    from shapeshift.app.charts.chart_scene import QUICK, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
-    from shapeshift.app.charts.chart_stage import QUICK, make_stage
     from shapeshift.app.progress import tracked
 
     kept = renderer.settings
-    stage = make_stage([drawn.subject], drawn.x, drawn.size, QUICK)
+    chart_scene = make_chart_scene([drawn.subject], drawn.x, drawn.size, QUICK)
     try:
         with twin_of(renderer, ctx) as twin:
-            pricing = Pricing((renderer, twin), ctx, stage, kept.background)
+            pricing = Pricing((renderer, twin), ctx, chart_scene, kept.background)
             table = [replace(named, eyes=drawn.eyes)
                      for named in settings_of(pricing.drawing, quick=True)]  # fmt: skip
             work = tracked(table, "measuring this scene once")
@@ -117,7 +119,9 @@ def budget_rows_of(priced: Sequence[tuple[RenderSettings, "ChartRow"]]) -> list[
     return [BudgetRow(row.name, settings, row.ratio * base, row.db) for settings, row in priced]
 
 
-def keep_chart(pricing: "Pricing", renderer: Renderer, ctx, drawn: Drawn, rows: Sequence) -> None:
+def keep_chart(
+    pricing: "Pricing", renderer: Renderer, ctx, drawn: ChartSubject, rows: Sequence
+) -> None:
     """Keeps a whole chart's rows of one eye in place of the quick one that would be measured."""
     from shapeshift.app.charts.chart_settings import settings_of
 
@@ -128,14 +132,14 @@ def keep_chart(pricing: "Pricing", renderer: Renderer, ctx, drawn: Drawn, rows: 
 
 def store_rows(path: Path, rows: Sequence[BudgetRow]) -> None:
     """Best kept, never needed: a cache that cannot be written is said and done without."""
-    told = [
+    rows_json = [
         {"name": row.name, "ms": row.ms, "db": row.db, "settings": _plain(row.settings)}
         for row in rows
         if math.isfinite(row.ms) and math.isfinite(row.db)
     ]
     try:
         make_folders(path.parent.parent, path.parent.name)
-        write_text(path, json.dumps({"format": FORMAT, "rows": told}, indent=1) + "\n")
+        write_text(path, json.dumps({"format": FORMAT, "rows": rows_json}, indent=1) + "\n")
     except OSError as error:
         say(f"The chart is not kept for the next time: {error}.")
 

@@ -91,12 +91,12 @@ def read_views(options: Options, subject, size: tuple[int, int]) -> list:
 
 
 def measure_and_draw(options: Options, subjects: list, cameras: list, size: tuple) -> int:
-    from shapeshift.app.charts.budget_chart import Drawn, keep_chart
+    from shapeshift.app.charts.budget_chart import ChartSubject, keep_chart
     from shapeshift.app.charts.chart_measure import ChartRow, Pricing, open_pair
     from shapeshift.app.charts.chart_picture import draw_chart
     from shapeshift.app.charts.chart_rows import RowsFile
+    from shapeshift.app.charts.chart_scene import QUICK, Walk, digest, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
-    from shapeshift.app.charts.chart_stage import QUICK, Walk, digest, make_stage
     from shapeshift.app.measure import machine_line
 
     x = None
@@ -104,19 +104,19 @@ def measure_and_draw(options: Options, subjects: list, cameras: list, size: tupl
         x = subjects[0].x  # scenes side by side show one stop
     walk = QUICK if options.quick else Walk()
     walk = replace(walk, frames=options.frames or walk.frames)
-    stage = make_stage(subjects, x, size, walk, cameras)
+    chart_scene = make_chart_scene(subjects, x, size, walk, cameras)
     contents = [s.scene if s.file else s.scene.objects[0].model for s in subjects]
-    told = scene_line(options, stage, digest(contents, cameras))
+    scene_words = scene_line(options, chart_scene, digest(contents, cameras))
     with open_pair(options.context, options.drawing) as (renderers, ctx):
-        pricing = Pricing(renderers, ctx, stage, subjects[0].background)
+        pricing = Pricing(renderers, ctx, chart_scene, subjects[0].background)
         on_cpu = draws_on_cpu(pricing.drawing, ctx)
-        head = (command_line(options), machine_line(ctx), f"{told}; {pricing.drawing}")
+        head = (command_line(options), machine_line(ctx), f"{scene_words}; {pricing.drawing}")
         file = RowsFile(options.out / "rows.csv", ChartRow, head)
         measure_rows(pricing, file, settings_of(pricing.drawing, options.quick), not options.quick)
         if len(subjects) == 1 and not (options.quick or cameras):
-            drawn = Drawn(subjects[0], x, size)
+            drawn = ChartSubject(subjects[0], x, size)
             keep_chart(pricing, renderers[0], ctx, drawn, file.rows)  # for --target-ms
-    title = f"{told.split(';')[0]}, {options.size}, {pricing.drawing}"
+    title = f"{scene_words.split(';')[0]}, {options.size}, {pricing.drawing}"
     front = draw_chart(file.rows, title, options.out, on_cpu)
     print_front(front, len(file.rows), options.out)
     return 0
@@ -162,18 +162,18 @@ def command_line(options: Options) -> str:
     return " ".join([*words, "--out DIR"])
 
 
-def scene_line(options: Options, stage, contents: str) -> str:
+def scene_line(options: Options, chart_scene, contents: str) -> str:
     """What was drawn: names, splats, contents, and what near and far are there."""
     from collections import Counter
 
-    from shapeshift.app.charts.chart_stage import WARM_UP
+    from shapeshift.app.charts.chart_scene import WARM_UP
 
     names = Counter(path.name for path in options.scenes)
     words = [name if n == 1 else f"{n} x {name}" for name, n in names.items()]
-    far = stage.distances
+    far = chart_scene.distances
     return (
-        f"{' + '.join(words)} ({stage.scene.splat_count:,} splats); contents {contents}; "
-        f"{len(stage.path) - WARM_UP} views; near {far.near:g} m, far {far.far:g} m"
+        f"{' + '.join(words)} ({chart_scene.scene.splat_count:,} splats); contents {contents}; "
+        f"{len(chart_scene.path) - WARM_UP} views; near {far.near:g} m, far {far.far:g} m"
     )
 
 

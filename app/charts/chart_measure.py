@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from shapeshift.app.charts.chart_settings import Named, render_settings, told_changes
-from shapeshift.app.charts.chart_stage import WARM_UP, Stage
+from shapeshift.app.charts.chart_scene import WARM_UP, ChartScene
+from shapeshift.app.charts.chart_settings import Named, changed_settings, render_settings
 from shapeshift.app.charts.comparison import MOST_DB, exact
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import FrameStats, RenderSettings
@@ -56,11 +56,11 @@ class Pricing:
     """
 
     def __init__(
-        self, renderers: tuple[Renderer, Renderer], ctx: moderngl.Context | None, stage: Stage,
-        background: tuple[float, float, float],
+        self, renderers: tuple[Renderer, Renderer], ctx: moderngl.Context | None,
+        chart_scene: ChartScene, background: tuple[float, float, float],
     ) -> None:  # fmt: skip
         self._exact, self._trial = renderers
-        self._ctx, self._stage, self._background = ctx, stage, background
+        self._ctx, self._stage, self._background = ctx, chart_scene, background
         self.drawing = self._exact.backends["drawing"].split()[0]
         self._exact.settings = exact(RenderSettings(background=background), self.drawing)
 
@@ -91,7 +91,7 @@ class Pricing:
             drawn=round(np.mean([stats.drawn for stats in path.stats])),
             splats=path.stats[0].splats,
             sorts=_rounded(np.mean([stats.sorts for stats in path.stats])),
-            changes=told_changes(self._trial.settings),
+            changes=changed_settings(self._trial.settings),
         )
 
     def _path(self, named: Named, pictures: bool) -> "_Frames":

@@ -71,8 +71,8 @@ def _beside_two_eyes(rows: list[ChartRow]) -> tuple[list[ChartRow], str]:
     if second is None:
         return rows, ""
     plain = replace(second, name="exact", ratio=1.0, psnr_db=TOP_DB, sweep_psnr_db=TOP_DB)
-    told = f" ({second.ratio:.2f} times one eye)"
-    return [plain, *(row for row in rows if row is not second)], told
+    note = f" ({second.ratio:.2f} times one eye)"
+    return [plain, *(row for row in rows if row is not second)], note
 
 
 def _place(row: ChartRow) -> tuple[float, float]:
@@ -127,8 +127,8 @@ def _style(axis, places: list[tuple[float, float]], title: str, clock: str) -> N
     axis.set_ylim(low - 4, TOP_DB + 12)
     ticks = [tick for tick in range(int(low), int(TOP_DB), 10)]
     axis.set_yticks([*ticks, TOP_DB], [*map(str, ticks), "equal"])
-    told = f"speed by {clock}, times the exact setting in the same run"
-    axis.set_xlabel(told, fontsize=9, color=INK)
+    note = f"speed by {clock}, times the exact setting in the same run"
+    axis.set_xlabel(note, fontsize=9, color=INK)
     axis.set_ylabel("worst PSNR to the exact picture, dB", fontsize=9, color=INK)
     axis.tick_params(labelsize=8, colors=INK)
     axis.grid(color=PALE, lw=0.6, zorder=0)

@@ -15,7 +15,7 @@ TAU_PLACES = ("", "near", "far")  # tau_dist: 20 and 40 m there, Distances of th
 
 @dataclass(frozen=True)
 class Distances:
-    """What near and far mean in one scene, metres: `distances_of` of chart_stage measures it."""
+    """What near and far mean in one scene, metres: `distances_of` of chart_scene measures it."""
 
     near: float
     far: float
@@ -121,12 +121,12 @@ def named_settings(name: str, drawing: str) -> Named:
     """The row of that name; UsageError says which there are, or that this drawing has it not."""
     found = {row.name: row for row in SETTINGS}.get(name)
     if found is None:
-        told = "; ".join(row.name for row in SETTINGS)
-        raise UsageError(f"there is no setting '{name}'; choose one of: {told}.")
+        words = "; ".join(row.name for row in SETTINGS)
+        raise UsageError(f"there is no setting '{name}'; choose one of: {words}.")
     if found not in settings_of(drawing):
         other = next(each for each in NOT_READ if found in settings_of(each))
-        told = f"setting '{name}' changes nothing in {drawing}"
-        raise UsageError(f"{told}; choose --drawing {other}.")
+        words = f"setting '{name}' changes nothing in {drawing}"
+        raise UsageError(f"{words}; choose --drawing {other}.")
     return found
 
 
@@ -141,13 +141,13 @@ def render_settings(
     return replace(plain, **{"target": RenderSettings().target, **named.changes, **limit})
 
 
-def told_changes(settings: RenderSettings) -> str:
+def changed_settings(settings: RenderSettings) -> str:
     """What differs from the defaults, for a table: "key_bits=16 min_pixels=1"."""
     plain = RenderSettings()
     names = [f.name for f in fields(plain) if f.name != "background"]
     changed = [n for n in names if getattr(settings, n) != getattr(plain, n)]
-    return " ".join(f"{name}={_told(getattr(settings, name))}" for name in changed)
+    return " ".join(f"{name}={value_text(getattr(settings, name))}" for name in changed)
 
 
-def _told(value: object) -> str:
+def value_text(value: object) -> str:
     return f"{value:.5g}" if isinstance(value, float) else str(value)

@@ -43,7 +43,7 @@ def run_decode(folder: Path, context: str, command: str) -> int:
     model = read_model(DEMO)
     assert isinstance(model, AnchorModel)  # the bundled demo has networks
     with open_renderer(context, "auto") as (_, ctx):
-        head = (command, machine_line(ctx), f"networks of {DEMO.name}: {told_networks(model)}")
+        head = (command, machine_line(ctx), f"networks of {DEMO.name}: {network_words(model)}")
         file = RowsFile(folder / "decode.csv", DecodeRow, head)
         known = {(row.back_end, row.anchors) for row in file.rows}
         wanted = [(name, n) for name in BACK_ENDS if ctx or name != "GL compute" for n in ANCHORS]
@@ -56,7 +56,7 @@ def run_decode(folder: Path, context: str, command: str) -> int:
     return 0
 
 
-def told_networks(model: AnchorModel) -> str:
+def network_words(model: AnchorModel) -> str:
     """Widths, as a reader needs them: the time follows them."""
     hidden = " ".join(str(len(bias)) for bias in model.networks["color"].biases[:-1])
     return (
@@ -142,12 +142,12 @@ def draw_decode(rows: list[DecodeRow], folder: Path) -> None:
     axis = figure.subplots()
     for name, (color, marker) in LOOKS.items():
         mine = sorted((row for row in rows if row.back_end == name), key=lambda row: row.anchors)
-        for field, style, told in (("all_ms", "-", "all five networks"),
+        for field, style, what in (("all_ms", "-", "all five networks"),
                                    ("color_ms", "--", "colour alone")):  # fmt: skip
             if mine:
                 axis.plot([row.anchors for row in mine], [getattr(row, field) for row in mine],
                           style, color=color, marker=marker, ms=4.5, lw=1.5,
-                          label=f"{name}, {told}")  # fmt: skip
+                          label=f"{name}, {what}")  # fmt: skip
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xticks(ANCHORS, [f"{n // 1000}k" for n in ANCHORS])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, SIZE, Opt
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
-from shapeshift.app.terminal import open_console, say, tell_json
+from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
     from shapeshift.app.document import Document
@@ -76,16 +76,18 @@ def run(options: Options) -> int:
         subject = subject.placed(options.x)
     with open_renderer(options.context, options.drawing) as (renderer, ctx):
         if budget:
-            from shapeshift.app.charts.budget_chart import Drawn, settings_for
+            from shapeshift.app.charts.budget_chart import ChartSubject, settings_for
 
-            renderer.settings = settings_for(budget, renderer, ctx, Drawn(subject, None, size))
+            renderer.settings = settings_for(
+                budget, renderer, ctx, ChartSubject(subject, None, size)
+            )
         elif options.settings or options.target:
             renderer.settings = asked_settings(options, renderer, subject, size)
         work = Measure(renderer, ctx, subject, None, size)
         result = measure(work, options, quality_size)
     print_table(result)
     if options.json == STANDARD_OUTPUT:
-        tell_json(result)
+        print_json(result)
     elif options.json is not None:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")
@@ -98,8 +100,8 @@ def asked_settings(
     """RenderSettings of --settings and --target; UsageError where there is none such."""
     from dataclasses import replace
 
+    from shapeshift.app.charts.chart_scene import distances_of
     from shapeshift.app.charts.chart_settings import named_settings, render_settings
-    from shapeshift.app.charts.chart_stage import distances_of
     from shapeshift.app.errors import UsageError
     from shapeshift.scene.cameras.framing import orbit_path
 
@@ -119,8 +121,8 @@ def measure(work, options, quality_size: tuple[int, int]) -> dict:
     """All rows of a Measure, with what was asked; says on stderr what it is at."""
     from shapeshift.app.progress import working
 
-    with working("starting") as tell:
-        result = work.all(options.frames, options.sweep, quality_size, tell)
+    with working("starting") as progress:
+        result = work.all(options.frames, options.sweep, quality_size, progress)
     return result | {"command": command_line(), "scene": options.scene.name}
 
 
@@ -189,7 +191,7 @@ def print_table(result: dict) -> None:
             table.add_section()
     db = result["psnr_db"]
     quality = "NaN in a picture" if db is None else f"{db:.1f} dB"
-    told = (
+    caption = (
         f"PSNR to the float64 reference {quality} at {result['quality_size']} "
         f"(worst of {result['quality_images']}), {result['drawn']:,} of {result['splats']:,} "
         f"splats drawn, stereo/mono {result['stereo_over_mono']:.2f}, "
@@ -200,7 +202,7 @@ def print_table(result: dict) -> None:
     title = f"{result['scene']}, {result['size']}, {backends}, {result['gl_renderer']}"
     console.print(title, markup=False)  # a scene's name may hold brackets
     console.print(table)
-    console.print(told, markup=False)
+    console.print(caption, markup=False)
 
 
 def frame_over_draw(result: dict) -> str:

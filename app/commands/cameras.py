@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import POSITIONAL
 from shapeshift.app.paths import full
-from shapeshift.app.terminal import open_console, say, tell_json
+from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
     from shapeshift.scene.cameras.camera_list import CameraList
@@ -50,7 +50,7 @@ def run(options: Options) -> int:
     if options.out is not None:
         write(options, options.out, cameras)
     elif options.json:
-        tell_json(facts_of(cameras))
+        print_json(facts_of(cameras))
     else:
         print_table(cameras)
     return 0

@@ -48,8 +48,8 @@ def run(options: Options) -> int:
         key = collider_key(item, models[item.name])
         if key not in made:
             made[key] = paths[item.name]
-            told = write_one(make_one(file, item, models[item.name]), made[key])
-            say(f"{item.name}: {told} in {full(made[key])}")
+            written = write_one(make_one(file, item, models[item.name]), made[key])
+            say(f"{item.name}: {written} in {full(made[key])}")
         file = naming(file, item.name, made[key])
     write_scene_file(file, options.out)
     say(f"{full(options.out)} names them.")
@@ -92,8 +92,8 @@ def make_one(file: "SceneFile", item, model) -> "Collider":
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.colliders.collider_files import one_collider
 
-    with progress_after(PATIENCE_S) as told:
-        return one_collider(file, item, model, Making(progress=told))
+    with progress_after(PATIENCE_S) as progress:
+        return one_collider(file, item, model, Making(progress=progress))
 
 
 def write_one(collider: "Collider", path: Path) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from shapeshift.app.command_line import EXPERT, POSITIONAL, SIZE
 from shapeshift.app.opening import ReadingOptions
 from shapeshift.app.paths import full
-from shapeshift.app.terminal import open_console, say, tell_json
+from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
     from shapeshift.app.commands.compare_sides import SceneSide
@@ -92,12 +92,12 @@ def run(options: Options) -> int:
             )
         assert isinstance(a, SceneSide)
         compared = drawn_views(options, choose_views(options, a), a, b)
-    with working("comparing") as tell:
-        result = score(compared, (a.name, b.name), options, tell)
+    with working("comparing") as progress:
+        result = score(compared, (a.name, b.name), options, progress)
     if options.out is not None:
         say(f"{len(result['views'])} sheets in {full(options.out)}")
     if options.json:
-        tell_json(result)
+        print_json(result)
     else:
         print_table(result)
     return 0
@@ -195,13 +195,13 @@ def artist(renderer, side, background: tuple[float, float, float]):
 
 def score(
     compared: Iterator[Compared], names: tuple[str, str], options: Options,
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
 ) -> dict:  # fmt: skip
-    """What is printed; the sheets are written at the end.  tell: hears how far it is."""
+    """What is printed; the sheets are written at the end.  progress: hears how far it is."""
     rows, kept = [], []
     for pair in compared:
         rows.append(pair.scores())
-        tell(f"comparing: {len(rows)} views done")
+        progress(f"comparing: {len(rows)} views done")
         if options.out is not None:
             kept.append(pair)
     decibels = [row["psnr_db"] for row in rows]
@@ -254,9 +254,9 @@ def print_table(result: dict) -> None:
     rows = [(row["view"], row) for row in result["views"]] + [("mean", result["mean"])]
     for i, (name, row) in enumerate(rows):
         db = row["psnr_db"]
-        told = db if db == "equal" else f"{db:.2f}"
+        db_text = db if db == "equal" else f"{db:.2f}"
         last = i >= len(rows) - 2
-        cells = (Text(name), told, f"{row['ssim']:.4f}", f"{255 * row['largest']:.1f}")
+        cells = (Text(name), db_text, f"{row['ssim']:.4f}", f"{255 * row['largest']:.1f}")
         table.add_row(*cells, end_section=last)
     console = open_console(stderr=False)
     console.print(Text(f"A  {result['a']}\nB  {result['b']}"))

@@ -75,8 +75,8 @@ def match_pictures(a: PictureSide, b: PictureSide) -> tuple[list[tuple[str, Path
     common = [stem for stem in by_name[0] if stem in by_name[1]]
     if common:
         left = len(a.files) + len(b.files) - 2 * len(common)
-        told = f"matched by name{f', {left} without a partner left out' if left else ''}"
-        return [(stem, by_name[0][stem], by_name[1][stem]) for stem in common], told
+        matching = f"matched by name{f', {left} without a partner left out' if left else ''}"
+        return [(stem, by_name[0][stem], by_name[1][stem]) for stem in common], matching
     if len(a.files) != len(b.files):
         raise BadFile(
             f"{a.name} holds {len(a.files)} pictures and {b.name} {len(b.files)}, and no two have "

@@ -57,7 +57,7 @@ class Options(ReadingOptions):
 
 
 def run(options: Options) -> int:
-    from shapeshift.app.commands.exported import Look, check_output, export, is_folder
+    from shapeshift.app.commands.exported import ExportLook, check_output, export, is_folder
     from shapeshift.app.errors import UsageError
     from shapeshift.runtime_models.evaluate import follows_eye
     from shapeshift.runtime_models.splats.write_plain import writer_of
@@ -87,15 +87,15 @@ def run(options: Options) -> int:
         for path, scene in zip(scenes, opened, strict=True)
         for part in parts_of(path, scene, scene.origin - origin, options)
     ]
-    look = Look(options.sh_degree, options.palette, eye, tuple(origin))
-    with progress_after(PATIENCE_S) as told:
-        splats = export(parts, look, options.out, told)
+    look = ExportLook(options.sh_degree, options.palette, eye, tuple(origin))
+    with progress_after(PATIENCE_S) as progress:
+        splats = export(parts, look, options.out, progress)
     for finding in splats.findings:
         say(sentence(finding))
     degree = round(splats.sh.shape[1] ** 0.5) - 1
     say(
         f"{full(options.out)}: {len(splats.means):,} splats, SH degree {degree}, "
-        f"{options.out.stat().st_size:,} bytes, {told_x(parts)}."
+        f"{options.out.stat().st_size:,} bytes, {x_words(parts)}."
     )
     return 0
 
@@ -238,7 +238,7 @@ def with_x(text: str) -> str:
     return f"{text}:0"
 
 
-def told_x(parts: list) -> str:
+def x_words(parts: list) -> str:
     """x of what was written, with the stop's name where it is one."""
     from shapeshift.runtime_models.stop_weights import control_text
 

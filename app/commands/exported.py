@@ -43,7 +43,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Look:
+class ExportLook:
     """How it is exported."""
 
     sh_degree: int = 3  # at most
@@ -53,18 +53,18 @@ class Look:
     #                                       the world's zero; far ones are shown nearer to it
 
 
-def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
+def export(parts: Sequence[Part], look: ExportLook, path: Path, progress) -> PlainSplats:
     """Writes the parts into one file, all or nothing; gives back what was written.
 
-    told(what, part done 0..1).  Raises BadFile and UsageError.
+    progress(what, part done 0..1).  Raises BadFile and UsageError.
     """
     writer = writer_of(path)
     look = replace(look, sh_degree=min(look.sh_degree, writer.sh_degree))
     baked = []
     for number, part in enumerate(parts):
-        told(f"baking {part.thing.name}", number / (len(parts) + 1))
+        progress(f"baking {part.thing.name}", number / (len(parts) + 1))
         baked.append(bake_part(part, look))
-    told(f"writing {path.name}", len(parts) / (len(parts) + 1))
+    progress(f"writing {path.name}", len(parts) / (len(parts) + 1))
     splats = truncate_harmonics(merged(baked), look.sh_degree)
     x, y, z = np.add(splats.origin, look.origin).tolist()
     splats = replace(splats, origin=(x, y, z))
@@ -77,7 +77,7 @@ def export(parts: Sequence[Part], look: Look, path: Path, told) -> PlainSplats:
     return replace(splats, findings=(*splats.findings, *lost))
 
 
-def bake_part(part: Part, look: Look) -> PlainSplats:
+def bake_part(part: Part, look: ExportLook) -> PlainSplats:
     """One object as plain splats, where it stands in the world."""
     thing = part.thing
     eye, said = eye_of(thing, look)
@@ -91,7 +91,7 @@ def bake_part(part: Part, look: Look) -> PlainSplats:
     return placed(splats, pose.matrix()[:3, :3], pose.position)
 
 
-def eye_of(thing: SceneObject, look: Look) -> tuple[np.ndarray | None, tuple[Finding, ...]]:
+def eye_of(thing: SceneObject, look: ExportLook) -> tuple[np.ndarray | None, tuple[Finding, ...]]:
     """From where an object is seen (3,), in its frame, if that matters, and a word about it."""
     if not follows_eye(thing.model):
         return None, ()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from shapeshift.app.command_line import SIZE
 from shapeshift.app.paths import DEMO
 from shapeshift.app.program import program
-from shapeshift.app.terminal import say, tell_json
+from shapeshift.app.terminal import print_json, say
 
 if TYPE_CHECKING:
     from shapeshift.app.document import Document
@@ -68,9 +68,9 @@ def run(options: Options) -> int:
             result["touch"] = play_touch(renderer, ctx, size, options.out)
     print_table(result)
     write_json(result_path, result)
-    say(f"{told_pictures(result)} and bench.json are in {options.out.resolve()}")
-    told = {"out": str(options.out), "frame_ms": result["frame_ms"]}
-    tell_json(told | {"psnr_db": result["psnr_db"], "touch": result.get("touch")}, indent=None)
+    say(f"{picture_words(result)} and bench.json are in {options.out.resolve()}")
+    summary = {"out": str(options.out), "frame_ms": result["frame_ms"]}
+    print_json(summary | {"psnr_db": result["psnr_db"], "touch": result.get("touch")}, indent=None)
     return 0
 
 
@@ -86,7 +86,7 @@ def play_touch(renderer, ctx, size: tuple[int, int], out: Path) -> dict | None:
         return None
 
 
-def told_pictures(result: dict) -> str:
+def picture_words(result: dict) -> str:
     """What pictures there are, in words."""
     touch = f", {TOUCH} the touch scene" if result.get("touch") else ""
     return f"Pictures (sheet.png shows all{touch})"

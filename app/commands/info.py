@@ -6,7 +6,7 @@ from typing import Annotated
 
 from shapeshift.app.command_line import POSITIONAL
 from shapeshift.app.opening import ReadingOptions, open_model
-from shapeshift.app.terminal import open_console, tell_json
+from shapeshift.app.terminal import open_console, print_json
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def run(options: Options) -> int:
     else:
         facts = describe(open_model(options.scene, options), options.scene)
     if options.json:
-        tell_json(facts)
+        print_json(facts)
     else:
         print_table(facts)
     return 0

@@ -7,7 +7,7 @@ from typing import Annotated
 from shapeshift.app.command_line import POSITIONAL
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after
 from shapeshift.app.scene_files import open_scene_file
-from shapeshift.app.terminal import open_console, tell_json
+from shapeshift.app.terminal import open_console, print_json
 from shapeshift.runtime_models.model import BadFile
 
 
@@ -28,10 +28,10 @@ def run(options: Options) -> int:
     except BadFile as refusal:
         if options.json:
             why = {"file": str(options.scene), "refused": True, "why": str(refusal), "findings": []}
-            tell_json(why)
+            print_json(why)
         raise
     if options.json:
-        tell_json(facts)
+        print_json(facts)
     else:
         print_report(facts)
     return 0
@@ -49,8 +49,8 @@ def examine(options: Options) -> dict:
     from shapeshift.runtime_models.lint.lint_whole import fill_ratio, sample_of
     from shapeshift.runtime_models.read_scene import describe, read_model
 
-    with progress_after(PATIENCE_S) as told:
-        model = read_model(options.scene, replace(options.reading(), progress=told))
+    with progress_after(PATIENCE_S) as progress:
+        model = read_model(options.scene, replace(options.reading(), progress=progress))
         moves = uneven(model, options.scene.name)
     facts = describe(model, options.scene)
     splats = splats_of(model)
@@ -94,7 +94,7 @@ def examine_objects(options: Options) -> dict:
     from shapeshift.scene.colliders.read_mesh import read_mesh
     from shapeshift.scene.document.scene_file import FORMAT, HULLS, machine_of
 
-    file, models, scene = open_scene_file(options.scene, options, tell=False)
+    file, models, scene = open_scene_file(options.scene, options, show_findings=False)
     meshes = {item.collider: item for item in file.all_items if item.collider not in (None, HULLS)}
     for name, item in meshes.items():
         try:

@@ -35,17 +35,17 @@ def draw_outputs(
     from shapeshift.app.progress import tracked
     from shapeshift.scene.stereo import stereo_pair
 
-    told: dict[str, dict] = {}
+    summaries: dict[str, dict] = {}
     legend: dict[str, object] = {"output": output, "meaning": MEANINGS[output]}
     if output == "depth":
         legend["metres_per_step"] = metres_per_step
-    legend["pictures"] = told
+    legend["pictures"] = summaries
     work = list(zip(scenes, views, paths, strict=True))
     for scene, view, path in tracked(work, "drawing"):
         renderer.update(scene)
         eyes = stereo_pair(view, eye_distance) if eye_distance > 0 else [view]
         values = np.concatenate([values_of(renderer.surface(e), output) for e in eyes], axis=1)
-        told[path.name] = summary(values)
+        summaries[path.name] = summary(values)
         texts = {key: str(text) for key, text in legend.items() if key != "pictures"}
         write_png16(as_steps(values, output, metres_per_step), path, texts)
         held = io.BytesIO()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from shapeshift.app.command_line import EXPERT, POSITIONAL
 from shapeshift.app.paths import full
 from shapeshift.app.program import program
-from shapeshift.app.terminal import say, tell, tell_json
+from shapeshift.app.terminal import print_json, print_text, say
 
 if TYPE_CHECKING:
     from shapeshift.decomposition.poses.find_poses import Length, PoseSettings
@@ -84,10 +84,10 @@ def run(options: Options) -> int:
     if options.json:
         from dataclasses import asdict
 
-        tell_json(asdict(report))
+        print_json(asdict(report))
         return 0
     for sentence in sentences(report, options):
-        tell(sentence)
+        print_text(sentence)
     return 0
 
 

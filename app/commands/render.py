@@ -85,7 +85,7 @@ class Options(ReadingOptions):
 
 def run(options: Options) -> int:
     from shapeshift.app.charts.budget import read_budget
-    from shapeshift.app.charts.budget_chart import Drawn, settings_for
+    from shapeshift.app.charts.budget_chart import ChartSubject, settings_for
     from shapeshift.app.commands.outputs import draw_outputs
     from shapeshift.app.drawing import (
         MOST_VALUES,
@@ -122,7 +122,7 @@ def run(options: Options) -> int:
             settings, target=renderer.settings.target, background=background
         )
         if budget:
-            drawn = Drawn(subjects[0], None, views[0].size, 1 + (options.stereo > 0))
+            drawn = ChartSubject(subjects[0], None, views[0].size, 1 + (options.stereo > 0))
             renderer.settings = settings_for(budget, renderer, ctx, drawn)
             if options.stereo_colors != "auto":
                 renderer.settings = replace(renderer.settings, stereo_colors=options.stereo_colors)

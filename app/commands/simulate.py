@@ -67,11 +67,11 @@ def run(options: Options) -> int:
     result = options.out / RESULT
     refuse_taken([result, *paths], options)
     make_folder(options.out)
-    told = shown(tell(simulation, steps, result, options), steps)
+    steps_done = shown(write_steps(simulation, steps, result, options), steps)
     if every:
-        draw_run(told, simulation, file, size, options)
+        draw_run(steps_done, simulation, file, size, options)
     else:
-        for _ in told:
+        for _ in steps_done:
             pass
     pictures = f" and {len(paths)} pictures" if paths else ""
     say(f"{steps} steps, {steps / HZ:.2f} s: {RESULT}{pictures} in {full(options.out)}")
@@ -93,7 +93,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
     """The scene with its models, bodies and physics.  Raises BadFile, UsageError."""
     from shapeshift.app.document import file_at
     from shapeshift.app.opening import PATIENCE_S, progress_after, sentence
-    from shapeshift.app.scene_files import tell_findings
+    from shapeshift.app.scene_files import print_findings
     from shapeshift.runtime_models.splats.plain_splats import Reading
     from shapeshift.scene.colliders.collider_files import colliders_of
     from shapeshift.scene.document.scene_file import read_models
@@ -105,7 +105,7 @@ def make_simulation(file, acts: tuple, x: str = ""):
         file = file_at(file, models, x) if x else file
         colliders = colliders_of(file, models, shown)
     world = World(file, models, colliders, hz=HZ)
-    tell_findings(models)
+    print_findings(models)
     for finding in world.findings:
         say(sentence(finding))
     return Simulation(world, acts)
@@ -123,7 +123,7 @@ def refuse_taken(paths: list[Path], options: Options) -> None:
             raise UsageError(f"{path} exists; choose another --out or add --overwrite.")
 
 
-def tell(simulation, steps: int, path: Path, options: Options):
+def write_steps(simulation, steps: int, path: Path, options: Options):
     """Steps and writes what is new; gives the number of steps done, 0 at first.
 
     Lines are whole at every moment: who stops it keeps what was told until then.
@@ -143,13 +143,13 @@ def tell(simulation, steps: int, path: Path, options: Options):
         out.write(line({"end": steps, "hash": world.physics.hash()}))
 
 
-def shown(told, steps: int):
+def shown(steps_done, steps: int):
     """The same steps, with a bar of how many are done."""
     from shapeshift.app.progress import progress_bar
 
     with progress_bar() as bar:
         task = bar.add_task("simulating", total=steps)
-        for number in told:
+        for number in steps_done:
             bar.update(task, completed=number)
             yield number
 
@@ -158,7 +158,7 @@ def line(row: dict) -> str:
     return json.dumps(row, ensure_ascii=False, allow_nan=False, separators=(",", ":")) + "\n"
 
 
-def draw_run(told, simulation, file, size: tuple[int, int], options: Options) -> None:
+def draw_run(steps_done, simulation, file, size: tuple[int, int], options: Options) -> None:
     """A picture of the scene as it stands every --pictures steps."""
     from dataclasses import replace
 
@@ -168,7 +168,7 @@ def draw_run(told, simulation, file, size: tuple[int, int], options: Options) ->
     view = first_view(file, simulation.world.drawn(), size)
     with open_renderer(options.context, options.drawing) as (renderer, _):
         renderer.settings = replace(renderer.settings, background=(0.0, 0.0, 0.0))
-        for number in told:
+        for number in steps_done:
             if number % options.pictures == 0:
                 renderer.update(simulation.world.drawn())
                 renderer.draw([view])

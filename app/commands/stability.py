@@ -49,7 +49,7 @@ class Options(ReadingOptions):
 def run(options: Options) -> int:
     from shapeshift.app.document import open_document
     from shapeshift.app.drawing import make_folder, open_renderer, parse_size
-    from shapeshift.app.stability_cases.stage import Stage
+    from shapeshift.app.stability_cases.case_context import CaseContext
     from shapeshift.app.stability_cases.table import open_table
 
     size = parse_size(options.size)
@@ -64,15 +64,15 @@ def run(options: Options) -> int:
         table = open_table(
             options.out, command_line(), subject(options, renderer, scene), options.overwrite
         )
-        stage = Stage(
+        case = CaseContext(
             renderer, ctx, scene, size, reopen, scene.background, options.steps, options.rounds
         )
-        perform(stage, names, table)
+        perform(case, names, table)
     print_table(table, names)
     failed = [name for name in names if table.failed(name)]
-    told = f"FAILED: {', '.join(failed)}" if failed else "all hold"
+    verdict = f"FAILED: {', '.join(failed)}" if failed else "all hold"
     count = f"{len(names)} case{'s' * (len(names) > 1)}"
-    say(f"{count}, {told}; {full(table.path)} and pictures beside it")
+    say(f"{count}, {verdict}; {full(table.path)} and pictures beside it")
     return FAILED if failed else 0
 
 
@@ -108,19 +108,19 @@ def command_line() -> str:
     return typed()
 
 
-def perform(stage, names: list[str], table) -> None:
+def perform(case, names: list[str], table) -> None:
     """Runs what is not in the table yet; each case is on disk before the next one starts."""
 
     from shapeshift.app.progress import working
     from shapeshift.app.stability_cases.table import CASES, save_panels
 
     console = open_console()
-    with working("starting") as tell:
+    with working("starting") as progress:
         for i, name in enumerate(names):
             if name in table.rows:
                 continue
-            tell(f"{name} ({i + 1} of {len(names)})")
-            result = CASES[name](stage)
+            progress(f"{name} ({i + 1} of {len(names)})")
+            result = CASES[name](case)
             save_panels(result.panels, table.folder / f"{name}.png")
             table.add(name, result.findings)
             failed = sum(f.verdict == "FAILS" for f in result.findings)

@@ -13,7 +13,7 @@ from shapeshift.app.editor.state.files.open_scene import first_look, named_camer
 from shapeshift.app.editor.state.files.opened import read_files
 from shapeshift.app.editor.state.files.refine import Refiner
 from shapeshift.app.editor.state.user.own_files import OwnFiles
-from shapeshift.app.editor.state.user.settings import Settings
+from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.levels import attach_refiner
 from shapeshift.app.editor.window.split import splitting
 from shapeshift.app.editor.window.viewer import Viewer
@@ -44,11 +44,13 @@ def run(options: Options) -> int:
     if not found.sources and found.file is None:
         raise UsageError(f"{paths[0]} holds cameras; name a scene as well.")
     scene, edited = opened_scene(found, options.x)
-    state.take(found.sources, scene, first_look(found), edited)
+    state.open_sources(found.sources, scene, first_look(found), edited)
     state.settings = replace(state.settings, debug=options.debug)
-    state.regions.take(read_selectors(options.select, state), 0)
+    state.regions.add_selectors(read_selectors(options.select, state), 0)
     state.keep_regions()
-    settings = Settings.read(config_folder()) if options.screenshot is None else Settings()
+    settings = (
+        ProgramSettings.read(config_folder()) if options.screenshot is None else ProgramSettings()
+    )
     with refiner, state.bodies, Window("Shapeshift", size, settings.text_size) as window:
         with Renderer(window.ctx, drawing=options.drawing) as renderer:
             if not options.size and options.screenshot is None:

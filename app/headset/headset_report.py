@@ -20,7 +20,7 @@ from shapeshift.scene.world.record import Record
 from shapeshift.vr.frame import SIDES, Frame, Hand
 from shapeshift.vr.openxr.life import Life
 from shapeshift.vr.openxr.swapchain import read
-from shapeshift.vr.pace import Pace
+from shapeshift.vr.pace import FramePace
 
 DECIMALS = 6
 
@@ -35,7 +35,7 @@ class DoneFrame:
     pulses: Sequence[tuple[str, float, float]]  # side, strength, seconds
     records: Sequence[Record]
     life: Life
-    pace: Pace
+    pace: FramePace
 
 
 class Report:
@@ -65,10 +65,10 @@ class Report:
             for side, framebuffer in zip(SIDES, eyes, strict=True):
                 save_png(read(framebuffer), self._pictures / f"{side}-{number:05d}.png")
 
-    def write(self, told: dict) -> None:
+    def write(self, facts: dict) -> None:
         """The report itself; and a word on what has been written."""
         if self._path is not None:
-            text = json.dumps({**told, "ended": self.ended}, indent=1) + "\n"
+            text = json.dumps({**facts, "ended": self.ended}, indent=1) + "\n"
             write_whole(self._path, text.encode())
         written = [self._path, self._lines and self._lines.name, self._pictures]
         if names := [full(path) for path in written if path]:
@@ -87,7 +87,7 @@ class Report:
 
 def frame_row(done: DoneFrame) -> dict:
     """What a line tells."""
-    frame, world, standing = done.frame, done.state.world, done.state.standing
+    frame, world, play_space = done.frame, done.state.world, done.state.play_space
     times = done.pace.own_ms
     return {
         "frame": done.pace.frames,
@@ -103,7 +103,7 @@ def frame_row(done: DoneFrame) -> dict:
             for view in frame.views
         ],
         "hands": {side: hand_row(hand) for side, hand in frame.hands.items()},
-        "standing": {**pose_row(standing.world_from_play), "scale": rounded(standing.scale)},
+        "standing": {**pose_row(play_space.world_from_play), "scale": rounded(play_space.scale)},
         "held": {side: world.held(side) for side in SIDES},
         "offers": [
             {"hand": offer.side, "object": offer.object, "by": offer.by}

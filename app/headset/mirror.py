@@ -7,7 +7,7 @@ import glfw
 import moderngl
 
 from shapeshift.renderer.gl.context import NEEDED, NoContext, open_context
-from shapeshift.vr.shown import Shown, middle
+from shapeshift.vr.shown import Blit, middle
 
 TITLE = "Shapeshift in the headset"
 SIZE = (960, 720)
@@ -23,7 +23,7 @@ class Mirror:
         glfw.make_context_current(self._handle)
         glfw.swap_interval(0)
         self.ctx: moderngl.Context = moderngl.create_context(require=NEEDED)
-        self._shown = Shown(self.ctx)
+        self._shown = Blit(self.ctx)
 
     @property
     def closing(self) -> bool:

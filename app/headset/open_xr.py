@@ -28,8 +28,8 @@ def open_xr(path: Path, options: ReadingOptions, x: str = "") -> tuple[Document,
         return open_alone(path, options, x)
     file, models, scene = open_scene_file(path, options)
     file = file_at(file, models, x) if x else file
-    with progress_after(PATIENCE_S) as told:
-        colliders = colliders_of(file, models, told)
+    with progress_after(PATIENCE_S) as progress:
+        colliders = colliders_of(file, models, progress)
     world = World(file, models, colliders, hz=HZ)
     for finding in world.findings:
         say(sentence(finding))
@@ -53,8 +53,8 @@ def open_alone(path: Path, options: ReadingOptions, x: str = "") -> tuple[Docume
 def editor_of(world: World, edited: EditedFile) -> EditorState:
     """The editor's state over a world that lives already: what the panel's sections work on."""
     editor = EditorState(read_model)
-    editor.take(tuple(edited.sources.values()), world.drawn(), None, edited)
-    editor.bodies.take_over(world, edited)
+    editor.open_sources(tuple(edited.sources.values()), world.drawn(), None, edited)
+    editor.bodies.adopt(world, edited)
     editor.most_sliders = 1  # on the panel: the chosen object's
     editor.follow_world()
     return editor

@@ -79,7 +79,7 @@ def draw_room(state: XrState, actions: RoomActions) -> None:
     """How large the world looks, how it is drawn, the grid on the floor."""
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     width, left = (room - 3 * gap) / 4, imgui.get_cursor_pos_x()
-    scale = state.standing.scale
+    scale = state.play_space.scale
     imgui.align_text_to_frame_padding()
     imgui.text(size_text(scale))
     for number, (label, wanted) in enumerate(

@@ -144,8 +144,9 @@ class WristMenu:
         playing = tuple(sweep.playing for sweep in editor.sweeps)
         return (
             things, playing, editor.chosen, editor.palette, editor.settings.debug,
-            editor.settings.background, tuple(editor.messages.problems), tuple(state.touch.told),
-            state.world.paused, state.pacing.quality, state.standing.scale, state.floor_shown,
+            editor.settings.background, tuple(editor.messages.problems),
+            tuple(state.touch.reactions),
+            state.world.paused, state.pacing.quality, state.play_space.scale, state.floor_shown,
             self._foot.sure_s > 0,
         )  # fmt: skip
 
@@ -171,7 +172,7 @@ class WristMenu:
     def _resize(self, scale: float) -> None:
         state = self._state
         if self._frame is not None:
-            state.standing = resized(state.standing, self._frame.head, scale)
+            state.play_space = resized(state.play_space, self._frame.head, scale)
             state.user.jumped()
 
     def _pulse_at_stop(self, side: str, index: int) -> None:

@@ -139,17 +139,17 @@ class XrApp:
             self.recentre(frame)
         self._stood |= frame.drawn  # before, nobody knows where the head is
         self._seen_s = frame.seen_s
-        before = self.state.standing
+        before = self.state.play_space
         left_over = self.menu.act(frame, seconds)
-        self.state.standing = self.state.user.act(left_over, self.state.standing, seconds)
-        self._clearness = clearness(self._clearness, before, self.state.standing, seconds)
+        self.state.play_space = self.state.user.act(left_over, self.state.play_space, seconds)
+        self._clearness = clearness(self._clearness, before, self.state.play_space, seconds)
         if self._worn_s > 0 or any(hand.active for hand in frame.hands.values()):
             self._worn_s += seconds
         records = self._pass(seconds)
         for pulse in strongest(self.state.user.felt(records)):
             self.pulse(pulse.side, pulse.strength, pulse.seconds)
         if frame.drawn:
-            views = [self.state.standing.view(view) for view in frame.views]
+            views = [self.state.play_space.view(view) for view in frame.views]
             self._choose_quality(views)
             self.draw(views, frame.views, self._over(frame))
             self.session.submit(self.eyes.textures)
@@ -189,7 +189,7 @@ class XrApp:
             if hull is None or points:
                 continue
             pose, ink = thing.drawn.world_from_object, BY_HAND if offer.by == "hand" else BY_RAY
-            lines += outline(hull, pose, self.state.standing, frame.head.position, ink)
+            lines += outline(hull, pose, self.state.play_space, frame.head.position, ink)
         return lines
 
     def _cards(self, frame: Frame) -> tuple[Card, ...]:
@@ -219,7 +219,7 @@ class XrApp:
                 grid = Grid(self._level_m, self._clearness)
                 behind, hidden = self.background, self.renderer.coverage(i)
                 floor = self.eyes.floor
-                floor.draw(framebuffer, play_views[i], self.state.standing, hidden, grid, behind)
+                floor.draw(framebuffer, play_views[i], self.state.play_space, hidden, grid, behind)
             self.eyes.overlay.draw(framebuffer, play_views[i], over)
 
     def _choose_quality(self, views: list[View]) -> None:
@@ -237,9 +237,9 @@ class XrApp:
 
     def recentre(self, frame: Frame) -> None:
         """Back to where the scene is looked at first, at the size it has now."""
-        self.state.standing = self.state.user.before_scene(frame, self.state.standing.scale)
+        self.state.play_space = self.state.user.before_scene(frame, self.state.play_space.scale)
         self.state.user.jumped()
-        floor_y, under = self.state.user.floor_y, self.state.standing.point(underfoot(frame.head))
+        floor_y, under = self.state.user.floor_y, self.state.play_space.point(underfoot(frame.head))
         self._level_m = float(under[1]) if floor_y is None else floor_y
 
     def pulse(self, side: str, strength: float, seconds: float) -> None:

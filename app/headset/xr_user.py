@@ -10,8 +10,8 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import World
 from shapeshift.vr.frame import Frame, Pulse
 from shapeshift.vr.locomotion.locomotion import RULES, Comfort, Rules, Travel, move
-from shapeshift.vr.locomotion.play_space import Standing
-from shapeshift.vr.locomotion.stance import standing_before, underfoot
+from shapeshift.vr.locomotion.play_space import PlaySpace
+from shapeshift.vr.locomotion.stance import play_space_before, underfoot
 from shapeshift.vr.locomotion.teleport import ground_of
 from shapeshift.vr.touching import Touched, Touching, at_rest, feel, follow, touch
 
@@ -30,22 +30,22 @@ class XrUser:
         self.touched, self.comfort = Touched(), Comfort()  # of the last frame, to be shown
         self._jumps = False
 
-    def before_scene(self, frame: Frame, scale: float = 1.0) -> Standing:
+    def before_scene(self, frame: Frame, scale: float = 1.0) -> PlaySpace:
         """Where the scene is looked at first, on its floor."""
-        return standing_before(self.eye, frame.head, self.floor_y, scale)
+        return play_space_before(self.eye, frame.head, self.floor_y, scale)
 
     def jumped(self) -> None:
         """The room was put elsewhere or scaled: what is held comes along in the next `act`."""
         self._jumps = True
 
-    def act(self, frame: Frame, standing: Standing, seconds: float) -> Standing:
+    def act(self, frame: Frame, play_space: PlaySpace, seconds: float) -> PlaySpace:
         """Before the world's steps: hands take, let go and act, and the room is moved."""
         if self._jumps:
             frame, self._jumps = replace(frame, recentred=True), False
-        self.touching, self.touched = touch(self.world, self.touching, frame, standing)
-        level = standing.point(underfoot(frame.head))[1] if self.floor_y is None else None
-        standing, self.travel, self.comfort = move(
-            standing,
+        self.touching, self.touched = touch(self.world, self.touching, frame, play_space)
+        level = play_space.point(underfoot(frame.head))[1] if self.floor_y is None else None
+        play_space, self.travel, self.comfort = move(
+            play_space,
             self.travel,
             at_rest(frame, self.touching),
             seconds,
@@ -53,9 +53,9 @@ class XrUser:
             ground_of(self.world, level),
         )
         if self.comfort.home:
-            standing = self.before_scene(frame)
-        follow(self.world, frame, standing, self.comfort.jumps)
-        return standing
+            play_space = self.before_scene(frame)
+        follow(self.world, frame, play_space, self.comfort.jumps)
+        return play_space
 
     def felt(self, records: Sequence) -> tuple[Pulse, ...]:
         """After the world's steps: what buzzes, of these and of what the hands did."""
@@ -73,7 +73,7 @@ class XrState:
     touch: TouchState
     pacing: Pacing
     user: XrUser
-    standing: Standing = field(default_factory=Standing)
+    play_space: PlaySpace = field(default_factory=PlaySpace)
     floor_shown: bool = True
 
     @property

@@ -4,9 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.app.stability_cases.case_context import (
+    CaseContext,
+    difference,
+    turned,
+    turned_about,
+)
 from shapeshift.app.stability_cases.finding import (
-    Comparison,
-    Finding,
+    CaseFinding,
+    ComparedPicture,
     Panel,
     Result,
     at_least,
@@ -16,7 +22,6 @@ from shapeshift.app.stability_cases.finding import (
     worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, front, glossy, splats
-from shapeshift.app.stability_cases.stage import Stage, difference, turned, turned_about
 from shapeshift.renderer.colors import eye_colors
 from shapeshift.scene.cameras.framing import distances_from
 from shapeshift.scene.pose import View
@@ -37,9 +42,9 @@ AUTO_REASON = (
 YAW_DB = 46  # a quarter degree off costs splats of random colours 54 (case stale-yaw), 0.5 each 48
 
 
-def disparity(stage: Stage) -> Result:
+def disparity(case: CaseContext) -> Result:
     """Two eyes see a splat where a pinhole puts it, off-centre lenses too, and in this order."""
-    size = stage.size
+    size = case.size
     straight = front(size, 0.0)
     left_view, right_view = stereo_pair(straight, PUPILS_M)
     left, right, down, up = straight.tangents
@@ -52,7 +57,7 @@ def disparity(stage: Stage) -> Result:
         place = np.array([0.05 * depth, 0.03 * depth, -depth])  # metres
         pixel = (right - left) / size[0] * depth  # metres at that depth
         scene = alone(splats(place, 2.5 * pixel))
-        images = stage.draw_all(scene, views)
+        images = case.draw_all(scene, views)
         found = [centroid(image) for image in images]
         wanted = [pinhole_pixel(view, place) for view in views]
         off = max(float(np.abs(a - b).max()) for a, b in zip(found, wanted, strict=True))
@@ -65,7 +70,7 @@ def disparity(stage: Stage) -> Result:
         )  # fmt: skip
         drawn += images
     shifted = [centroid(image)[0] for image in drawn[:2]]
-    straight_pair = stage.draw_all(scene_of_disparity(), stereo_pair(straight, PUPILS_M))
+    straight_pair = case.draw_all(scene_of_disparity(), stereo_pair(straight, PUPILS_M))
     across = centroid(straight_pair[0])[0] - centroid(straight_pair[1])[0]
     fx = size[0] / (right - left)
     findings.append(
@@ -75,10 +80,10 @@ def disparity(stage: Stage) -> Result:
         )
     )  # fmt: skip
     panels = [
-        stage.panel(f"left eye, splat at {shifted[0]:.1f} px", drawn[0]),
-        stage.panel(f"right eye, splat at {shifted[1]:.1f} px", drawn[1]),
+        case.panel(f"left eye, splat at {shifted[0]:.1f} px", drawn[0]),
+        case.panel(f"right eye, splat at {shifted[1]:.1f} px", drawn[1]),
     ]
-    return Result([clean(*drawn, *straight_pair), *findings, *shared(stage)], panels)
+    return Result([clean(*drawn, *straight_pair), *findings, *shared(case)], panels)
 
 
 def scene_of_disparity():
@@ -86,11 +91,11 @@ def scene_of_disparity():
     return alone(splats((0, 0, -1.0), 0.01))
 
 
-def shared(stage: Stage) -> list:
+def shared(case: CaseContext) -> list:
     """The user's scene by parallel eyes: one order for both against an order each."""
-    scene, pair = stage.scene(), eyes_of(stage)
-    one = stage.draw_all(scene, pair, stereo_sort="shared")
-    each = stage.draw_all(scene, pair, stereo_sort="each")
+    scene, pair = case.scene(), eyes_of(case)
+    one = case.draw_all(scene, pair, stereo_sort="shared")
+    each = case.draw_all(scene, pair, stereo_sort="each")
     db = min(decibels(a, b) for a, b in zip(one, each, strict=True))
     return [
         clean(*one, *each),
@@ -101,16 +106,16 @@ def shared(stage: Stage) -> list:
     ]  # fmt: skip
 
 
-def canted(stage: Stage) -> Result:
+def canted(case: CaseContext) -> Result:
     """Eyes turned outwards by 2, 5 and 10 degrees, against an order for each eye."""
-    scene = stage.scene()
+    scene = case.scene()
     findings, images, comparisons = [], [], []
     for degrees in (NEARLY_PARALLEL, *CANTED):
-        left, right = eyes_of(stage)
+        left, right = eyes_of(case)
         pair = [turned(left, degrees / 2), turned(right, -degrees / 2)]
-        one = stage.draw_all(scene, pair, stereo_sort="shared")
-        sorts = stage.stats.sorts
-        each = stage.draw_all(scene, pair, stereo_sort="each")
+        one = case.draw_all(scene, pair, stereo_sort="shared")
+        sorts = case.stats.sorts
+        each = case.draw_all(scene, pair, stereo_sort="each")
         images += [*one, *each]
         db = min(decibels(a, b) for a, b in zip(one, each, strict=True))
         if degrees in CANTED:
@@ -125,66 +130,66 @@ def canted(stage: Stage) -> Result:
                 at_least(f"{degrees:g} degrees, against an order each, dB", db, YAW_DB,
                          "one order by rule, a quarter of a degree off for each eye (stale-yaw)")
             )  # fmt: skip
-        told = f"left eye, {degrees:g} degrees between the eyes"
-        comparisons.append(Comparison(db, told, one[0], each[0]))
-    _, told, shared, own = worst_of(comparisons)
+        what = f"left eye, {degrees:g} degrees between the eyes"
+        comparisons.append(ComparedPicture(db, what, one[0], each[0]))
+    _, what, shared, own = worst_of(comparisons)
     panels = [
-        stage.panel(told, shared),
-        stage.panel("with an order of its own", own),
+        case.panel(what, shared),
+        case.panel("with an order of its own", own),
         Panel("8 times the difference", difference(shared, own)),
     ]
     return Result([clean(*images), *findings], panels)
 
 
-def stereo(stage: Stage) -> Result:
+def stereo(case: CaseContext) -> Result:
     """Each eye of a stereo frame against that eye drawn alone; lenses that lean, heads askew."""
     findings, images, comparisons = [], [], []
-    near, reach = stereo_pair(front(stage.size, 1.5), PUPILS_M), f"half a metre away, {SAME_EYE}"
+    near, reach = stereo_pair(front(case.size, 1.5), PUPILS_M), f"half a metre away, {SAME_EYE}"
     for what, scene, pair, wish, least, reason in (
-        ("the scene", stage.scene(), eyes_of(stage), "auto", AUTO_DB, AUTO_REASON),
-        ("the scene, colours each", stage.scene(), eyes_of(stage), "each", SAME_EYE_DB, SAME_EYE),
+        ("the scene", case.scene(), eyes_of(case), "auto", AUTO_DB, AUTO_REASON),
+        ("the scene, colours each", case.scene(), eyes_of(case), "each", SAME_EYE_DB, SAME_EYE),
         ("a glossy ball", alone(glossy()), near, "auto", SAME_EYE_DB, reach),
     ):  # fmt: skip
-        frame = stage.draw_all(scene, pair, stereo_colors=wish)
-        single = [stage.draw(scene, eye) for eye in pair]
+        frame = case.draw_all(scene, pair, stereo_colors=wish)
+        single = [case.draw(scene, eye) for eye in pair]
         images += [*frame, *single]
         db, eye = min(
             (decibels(a, b), i) for i, (a, b) in enumerate(zip(frame, single, strict=True))
         )
         findings.append(at_least(f"{what}, an eye against it alone, dB", db, least, reason))
-        comparisons.append(Comparison(db, what, frame[eye], single[eye]))
-    leaning, drawn = lean(stage)
+        comparisons.append(ComparedPicture(db, what, frame[eye], single[eye]))
+    leaning, drawn = lean(case)
     _, what, together, itself = worst_of(comparisons)
     panels = [
-        stage.panel(f"{what}, one of two eyes", together),
-        stage.panel("the same eye alone", itself),
+        case.panel(f"{what}, one of two eyes", together),
+        case.panel("the same eye alone", itself),
         Panel("8 times the difference", difference(together, itself)),
     ]
     return Result([clean(*images, *drawn), *findings, leaning], panels)
 
 
-def lean(stage: Stage) -> tuple[Finding, list[np.ndarray]]:
+def lean(case: CaseContext) -> tuple[CaseFinding, list[np.ndarray]]:
     """Eyes of a headset on a head askew, against one centred picture that holds what each sees."""
-    width, height = stage.size
+    width, height = case.size
     scene, narrow = alone(glossy()), max(width // 4, 1)
-    straight = turned_about(front(stage.size, 1.5), np.zeros(3), 20.0, (0, 0, 1))
+    straight = turned_about(front(case.size, 1.5), np.zeros(3), 20.0, (0, 0, 1))
     wholes = stereo_pair(straight, PUPILS_M)
     lenses = [eye.part(x, height // 5, (width - narrow, height - height // 5))
               for eye, x in zip(wholes, (0, narrow), strict=True)]  # fmt: skip
     pair = [replace(lens, whole=None) for lens in lenses]
-    frame = stage.draw_all(scene, pair)
+    frame = case.draw_all(scene, pair)
     dbs = []
     for image, whole, x in zip(frame, wholes, (0, narrow), strict=True):
-        there = stage.draw(scene, whole)[height // 5 :, x : x + width - narrow]
+        there = case.draw(scene, whole)[height // 5 :, x : x + width - narrow]
         dbs.append(decibels(image, there))
-    told = "lenses off centre on a head askew, an eye against the centred picture around it, dB"
-    return at_least(told, min(dbs), SAME_EYE_DB, f"an off-centre lens is a part; {SAME_EYE}"), frame
+    what = "lenses off centre on a head askew, an eye against the centred picture around it, dB"
+    return at_least(what, min(dbs), SAME_EYE_DB, f"an off-centre lens is a part; {SAME_EYE}"), frame
 
 
-def eyes_of(stage: Stage) -> list[View]:
+def eyes_of(case: CaseContext) -> list[View]:
     """Two parallel eyes on the scene, as far apart as a person's are who stands 1.8 m before it."""
-    view = stage.view()
-    return stereo_pair(view, eyes_apart(distances_from(stage.subject.points(), view)))
+    view = case.view()
+    return stereo_pair(view, eyes_apart(distances_from(case.subject.points(), view)))
 
 
 def centroid(image: np.ndarray) -> np.ndarray:

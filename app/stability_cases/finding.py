@@ -12,7 +12,7 @@ ALPHA_SLACK = 2e-3  # of a coverage summed in half floats: two steps of theirs b
 
 
 @dataclass(frozen=True)
-class Finding:
+class CaseFinding:
     """One row of the table."""
 
     figure: str  # what was measured, with its unit
@@ -45,7 +45,7 @@ class Panel:
     image: np.ndarray  # (H, W, 3) display sRGB
 
 
-class Comparison(NamedTuple):
+class ComparedPicture(NamedTuple):
     """A picture and what it was held against; a case shows its worst one."""
 
     db: float
@@ -54,28 +54,28 @@ class Comparison(NamedTuple):
     wanted: np.ndarray  # (H, W, 4)
 
 
-def worst_of(comparisons: Iterable[Comparison]) -> Comparison:
+def worst_of(comparisons: Iterable[ComparedPicture]) -> ComparedPicture:
     """The one of the fewest decibels; of equal ones the first."""
     return min(comparisons, key=lambda comparison: comparison.db)
 
 
 @dataclass(frozen=True)
 class Result:
-    findings: list[Finding]
+    findings: list[CaseFinding]
     panels: list[Panel]
 
 
-def at_least(figure: str, measured: float, least: float, reason: str) -> Finding:
-    return Finding(figure, float(measured), f">= {least:.4g}", bool(measured >= least), reason)
+def at_least(figure: str, measured: float, least: float, reason: str) -> CaseFinding:
+    return CaseFinding(figure, float(measured), f">= {least:.4g}", bool(measured >= least), reason)
 
 
-def at_most(figure: str, measured: float, most: float, reason: str) -> Finding:
-    return Finding(figure, float(measured), f"<= {most:.4g}", bool(measured <= most), reason)
+def at_most(figure: str, measured: float, most: float, reason: str) -> CaseFinding:
+    return CaseFinding(figure, float(measured), f"<= {most:.4g}", bool(measured <= most), reason)
 
 
-def not_here(figure: str, reason: str) -> Finding:
+def not_here(figure: str, reason: str) -> CaseFinding:
     """The row of a figure that this scene or this machine does not have."""
-    return Finding(figure, math.nan, "", True, reason)
+    return CaseFinding(figure, math.nan, "", True, reason)
 
 
 def decibels(image: np.ndarray, reference: np.ndarray) -> float:
@@ -96,7 +96,7 @@ def covered(alpha: np.ndarray) -> np.ndarray:
     return (alpha >= 0) & (alpha <= 1 + ALPHA_SLACK)
 
 
-def clean(*images: np.ndarray) -> Finding:
+def clean(*images: np.ndarray) -> CaseFinding:
     """No pixel that is no colour; every case asks for it."""
     return at_most(
         "broken pixels (not finite, or not covered 0 to 1)", broken_pixels(*images), 0,

@@ -5,9 +5,15 @@ from itertools import pairwise
 
 import numpy as np
 
+from shapeshift.app.stability_cases.case_context import (
+    CaseContext,
+    difference,
+    turned,
+    turned_about,
+)
 from shapeshift.app.stability_cases.finding import (
-    Comparison,
-    Finding,
+    CaseFinding,
+    ComparedPicture,
     Panel,
     Result,
     at_least,
@@ -17,7 +23,6 @@ from shapeshift.app.stability_cases.finding import (
     not_here,
     worst_of,
 )
-from shapeshift.app.stability_cases.stage import Stage, difference, turned, turned_about
 from shapeshift.renderer.pace import EVEN_ENOUGH
 from shapeshift.runtime_models.evaluate import follows_eye
 
@@ -35,19 +40,19 @@ STALE_REASON = (
 )
 
 
-def sweep(stage: Stage) -> Result:
+def sweep(case: CaseContext) -> Result:
     """x from stop to stop: no frame darker, emptier, or further off than both its ends allow."""
-    xs = stage.subject.stops
+    xs = case.subject.stops
     if len(xs) < 2:
         only = not_here("frames between two stops", "the scene has a single stop")
         return Result([only], [])
     frames = {}
-    view = stage.view()
+    view = case.view()
     for low, high in pairwise(xs):
-        count = max(stage.steps, math.ceil((high - low) / LONGEST_STEP))
+        count = max(case.steps, math.ceil((high - low) / LONGEST_STEP))
         for x in np.linspace(low, high, count + 1):
-            image = stage.draw(stage.scene(float(x)), view)
-            frames[float(x)] = (image, stage.shown())
+            image = case.draw(case.scene(float(x)), view)
+            frames[float(x)] = (image, case.shown())
     spans = [Span(frames, low, high) for low, high in pairwise(xs)]
     tables = zip(*(span.findings() for span in spans), strict=True)
     findings = [min(rows, key=lambda row: row.headroom) for rows in tables]
@@ -70,7 +75,7 @@ class Span:
         self.steps = [float(np.abs(a - b).mean()) for a, b in pairwise(self.seen)]
         self.around = [np.abs(s - first).mean() + np.abs(s - last).mean() for s in self.seen]
 
-    def findings(self) -> list[Finding]:
+    def findings(self) -> list[CaseFinding]:
         span = f"x {self.xs[0]:.3g} to {self.xs[-1]:.3g}"
         alpha = [float(image[..., 3].mean()) for image in self.images]
         lights = [seen @ LUMA for seen in (self.seen[0], self.seen[-1])]
@@ -113,47 +118,47 @@ class Span:
         beside = min(at + 1, len(self.xs) - 1)
         captions = {at: "worst", beside: "its neighbour", 0: "end", len(self.xs) - 1: "end"}
         return [
-            Panel(f"{told}: x = {self.xs[i]:.3f}", self.seen[i]) for i, told in captions.items()
+            Panel(f"{what}: x = {self.xs[i]:.3f}", self.seen[i]) for i, what in captions.items()
         ]
 
 
-def stale_orbit(stage: Stage) -> Result:
+def stale_orbit(case: CaseContext) -> Result:
     """An order made before the eye went 0.25 to 16 degrees around the scene."""
-    centre, _ = stage.bounds()
-    return stale(stage, lambda view, angle: turned_about(view, centre, angle), STALE_ORBIT)
+    centre, _ = case.bounds()
+    return stale(case, lambda view, angle: turned_about(view, centre, angle), STALE_ORBIT)
 
 
-def stale_yaw(stage: Stage) -> Result:
+def stale_yaw(case: CaseContext) -> Result:
     """An order made before the head turned by 0.25 to 16 degrees."""
-    return stale(stage, turned, STALE_YAW)
+    return stale(case, turned, STALE_YAW)
 
 
-def stale(stage: Stage, move, bounds: dict[float, float]) -> Result:
+def stale(case: CaseContext, move, bounds: dict[float, float]) -> Result:
     """dB of a frame in an old order against the frame in its own, at every angle of `bounds`."""
-    scene, view = stage.scene(), stage.view()
+    scene, view = case.scene(), case.view()
     findings, comparisons, kept = [], [], 0
     for angle, least in bounds.items():
         there = move(view, angle)
-        exact = stage.draw(scene, there)
-        stage.draw(scene, view)  # every setting but KEPT makes its order anew
-        stage.draw(scene, view, **KEPT)
-        old = stage.draw(scene, there, **KEPT)
-        kept += is_old(stage)
+        exact = case.draw(scene, there)
+        case.draw(scene, view)  # every setting but KEPT makes its order anew
+        case.draw(scene, view, **KEPT)
+        old = case.draw(scene, there, **KEPT)
+        kept += is_old(case)
         db = decibels(old, exact)
         findings.append(at_least(f"order {angle:g} degrees old, dB", db, least, STALE_REASON))
-        comparisons.append(Comparison(db, f"order {angle:g} degrees old", old, exact))
+        comparisons.append(ComparedPicture(db, f"order {angle:g} degrees old", old, exact))
     _, what, old, exact = worst_of(comparisons)
     # A model whose opacities follow the eye is put in order wherever that moves.
-    moved = any(map(follows_eye, stage.subject.models)) and move is not turned
-    told = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
+    moved = any(map(follows_eye, case.subject.models)) and move is not turned
+    stale = at_least("frames drawn in an old order", kept, 0 if moved else len(bounds), WAS_OLD)
     panels = [
-        stage.panel(what, old),
-        stage.panel("its own order", exact),
+        case.panel(what, old),
+        case.panel("its own order", exact),
         Panel("8 times the difference", difference(old, exact)),
     ]
-    return Result([clean(*(c.image for c in comparisons)), told, *findings], panels)
+    return Result([clean(*(c.image for c in comparisons)), stale, *findings], panels)
 
 
-def is_old(stage: Stage) -> bool:
+def is_old(case: CaseContext) -> bool:
     """Whether the last frame was drawn in an order of an earlier one."""
-    return stage.stats.sorts == 0 and stage.stats.order_age >= 1
+    return case.stats.sorts == 0 and case.stats.order_age >= 1

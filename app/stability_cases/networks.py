@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.app.stability_cases.case_context import CaseContext, difference
 from shapeshift.app.stability_cases.finding import (
     Panel,
     Result,
@@ -15,25 +16,24 @@ from shapeshift.app.stability_cases.finding import (
 )
 from shapeshift.app.stability_cases.places import ORACLE_DB
 from shapeshift.app.stability_cases.scenes import alone, front, small_model
-from shapeshift.app.stability_cases.stage import Stage, difference
 from shapeshift.runtime_models.model import HEADS, SIZE_PER_SPLAT, AnchorModel, Mlp
 
 OUTSIDE = (-0.1, -1e-3, 1.001, 1.1, 1e30, np.inf, -np.inf, np.nan)  # of 0..1, both sides
 
 
-def extrapolated(stage: Stage) -> Result:
+def extrapolated(case: CaseContext) -> Result:
     """x outside [0, 1] is refused with a sentence, and what was drawn before is drawn again."""
-    scene, view = stage.scene(), stage.view()
-    before = stage.draw(scene, view)
+    scene, view = case.scene(), case.view()
+    before = case.draw(scene, view)
     taken, silent = 0, 0
     for x in OUTSIDE:
         try:
-            stage.renderer.update(stage.scene(x=float(x)))
+            case.renderer.update(case.scene(x=float(x)))
         except ValueError as refusal:
             silent += not is_sentence(str(refusal))
         else:
             taken += 1
-    after = stage.draw(scene, view)
+    after = case.draw(scene, view)
     findings = [
         clean(before, after),
         at_most(
@@ -49,7 +49,7 @@ def extrapolated(stage: Stage) -> Result:
             "a refused value leaves everything as it was",
         ),
     ]  # fmt: skip
-    panels = [stage.panel("after the refusals", after), stage.panel("before", before)]
+    panels = [case.panel("after the refusals", after), case.panel("before", before)]
     return Result(findings, panels)
 
 
@@ -58,23 +58,23 @@ def is_sentence(text: str) -> bool:
     return len(text.split()) >= 4 and "\n" not in text.strip() and text.strip().endswith(".")
 
 
-def broken_heads(stage: Stage) -> Result:
+def broken_heads(case: CaseContext) -> Result:
     """NaN and Inf in the weights or biases of one head at a time."""
-    only = stage.subject.models[0] if not stage.subject.file else None
+    only = case.subject.models[0] if not case.subject.file else None
     model = only if isinstance(only, AnchorModel) else small_model()
-    view = stage.view() if model is only else front(stage.size)
-    whole = stage.draw(alone(model), view)
+    view = case.view() if model is only else front(case.size)
+    whole = case.draw(alone(model), view)
     images, broken_by_name = {}, {}
     for head in HEADS:
         for what, value in (("NaN", np.nan), ("Inf", np.inf), ("-Inf", -np.inf)):
             for where in ("all weights", "one bias"):
                 broken = with_broken_head(model, head, value, where)
                 name = f"{what} in {where} of {head}"
-                images[name] = stage.draw(alone(broken), view)
+                images[name] = case.draw(alone(broken), view)
                 broken_by_name[name] = broken_pixels(images[name])
     worst = max(broken_by_name, key=lambda name: broken_by_name[name])
-    one = stage.draw(alone(small_model()), front(stage.size))
-    partly, known = half_broken(stage)
+    one = case.draw(alone(small_model()), front(case.size))
+    partly, known = half_broken(case)
     findings = [
         at_most(
             f"broken pixels in {len(images)} pictures (worst: {worst})",
@@ -88,19 +88,19 @@ def broken_heads(stage: Stage) -> Result:
         clean(whole, one),
     ]  # fmt: skip
     panels = [
-        stage.panel(worst, images[worst]),
-        stage.panel("whole networks", whole),
+        case.panel(worst, images[worst]),
+        case.panel("whole networks", whole),
         Panel("8 times the difference", difference(images[worst], whole)),
     ]
     return Result(findings, panels)
 
 
-def half_broken(stage: Stage) -> tuple[float, float]:
+def half_broken(case: CaseContext) -> tuple[float, float]:
     """dB of a small model of which one opacity output is NaN, and the least it may be."""
     model, view = small_model(), front((160, 96))
     broken = with_broken_head(model, "opacity", np.nan, "one bias")
-    image = stage.draw(alone(broken), view)
-    return decibels(image, stage.reference(alone(broken), view)), ORACLE_DB
+    image = case.draw(alone(broken), view)
+    return decibels(image, case.reference(alone(broken), view)), ORACLE_DB
 
 
 def with_broken_head(model: AnchorModel, head: str, value: float, where: str) -> AnchorModel:

@@ -4,8 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from shapeshift.app.stability_cases.case_context import (
+    CaseContext,
+    difference,
+    moved,
+    turned,
+    turned_about,
+)
 from shapeshift.app.stability_cases.finding import (
-    Comparison,
+    ComparedPicture,
     Panel,
     Result,
     at_least,
@@ -16,7 +23,6 @@ from shapeshift.app.stability_cases.finding import (
     worst_of,
 )
 from shapeshift.app.stability_cases.scenes import alone, around, front, shell, splats, turns
-from shapeshift.app.stability_cases.stage import Stage, difference, moved, turned, turned_about
 from shapeshift.scene.pose import Pose, View, look_at, perspective
 from shapeshift.scene.scene import IDENTITY
 
@@ -31,12 +37,12 @@ FILL = 12.0  # times the frame from outside
 CLOSE_UPS = 6
 
 
-def far_origin(stage: Stage) -> Result:
+def far_origin(case: CaseContext) -> Result:
     """The scene and its view 5,000 km from the origin look as they do at it."""
-    view = stage.view()
+    view = case.view()
     there = Pose(FAR_OFF, IDENTITY.wxyz)
-    here = stage.draw(stage.scene(), view)
-    far = stage.draw(stage.scene(pose=there), moved(view, FAR_OFF))
+    here = case.draw(case.scene(), view)
+    far = case.draw(case.scene(pose=there), moved(view, FAR_OFF))
     findings = [
         clean(here, far),
         at_least(
@@ -45,12 +51,12 @@ def far_origin(stage: Stage) -> Result:
             "equal depths; float32 would keep half a metre",
         ),
     ]  # fmt: skip
-    return Result(findings, compared(stage, "5e6 m off", far, "at the origin", here))
+    return Result(findings, compared(case, "5e6 m off", far, "at the origin", here))
 
 
-def depth_range(stage: Stage) -> Result:
+def depth_range(case: CaseContext) -> Result:
     """Walls at 1 cm to 1000 km, far ones listed first or last, each before the next."""
-    size = stage.size
+    size = case.size
     depths = np.geomspace(NEAREST, FARTHEST, WALLS)
     rng = np.random.default_rng(1)
     shuffled = rng.permutation(WALLS)
@@ -60,9 +66,9 @@ def depth_range(stage: Stage) -> Result:
     sizes = (0.06 * depths[:, None] * np.array([1, 1, 0.01]))[shuffled]
     scene = alone(splats(means, sizes, 0.9, rng.uniform(size=(WALLS, 3))))
     view = replace(front(size, 0.0, near=NEAREST / 2), far=2 * FARTHEST)
-    image = stage.draw(scene, view)
-    want = stage.reference(scene, view)
-    coarse = stage.draw(scene, view, key_bits=16)
+    image = case.draw(scene, view)
+    want = case.reference(scene, view)
+    coarse = case.draw(scene, view, key_bits=16)
     reason = "keys are the bits of the float depth: seven digits at any distance"
     tight = "linear steps of 15 m between 1 cm and 1000 km: one price that is named, not a fault"
     findings = [
@@ -70,16 +76,16 @@ def depth_range(stage: Stage) -> Result:
         at_least("32-bit keys against float64, dB", decibels(image, want), ORACLE_DB, reason),
         at_least("16-bit keys against float64, dB", decibels(coarse, want), 5, tight),
     ]
-    return Result(findings, compared(stage, "32-bit keys", image, "16-bit keys", coarse))
+    return Result(findings, compared(case, "32-bit keys", image, "16-bit keys", coarse))
 
 
-def inside(stage: Stage) -> Result:
+def inside(case: CaseContext) -> Result:
     """The eye within a splat, on the near plane of one, in the scene's middle, at its surface."""
-    findings, pair = within_a_splat(stage)
-    outside_ms = stage.cpu_ms(stage.scene(), stage.view())
-    looks = [*from_the_middle(stage), *from_close_up(stage)]
-    images = [stage.draw(stage.scene(), look) for look in looks]
-    times = [stage.cpu_ms(stage.scene(), look, 2) for look in looks]
+    findings, pair = within_a_splat(case)
+    outside_ms = case.cpu_ms(case.scene(), case.view())
+    looks = [*from_the_middle(case), *from_close_up(case)]
+    images = [case.draw(case.scene(), look) for look in looks]
+    times = [case.cpu_ms(case.scene(), look, 2) for look in looks]
     slowest = int(np.argmax(times))
     findings += [
         clean(*images),
@@ -91,31 +97,31 @@ def inside(stage: Stage) -> Result:
         ),
     ]  # fmt: skip
     panels = [
-        stage.panel(f"slowest look: {times[slowest]:.0f} ms of the CPU", images[slowest]),
-        stage.panel(f"from outside: {outside_ms:.0f} ms", stage.draw(stage.scene(), stage.view())),
+        case.panel(f"slowest look: {times[slowest]:.0f} ms of the CPU", images[slowest]),
+        case.panel(f"from outside: {outside_ms:.0f} ms", case.draw(case.scene(), case.view())),
         *pair,
     ]
     return Result(findings, panels)
 
 
-def from_the_middle(stage: Stage) -> list[View]:
+def from_the_middle(case: CaseContext) -> list[View]:
     """Six ways to look from the centre of the scene."""
-    centre, radius = stage.bounds()
+    centre, radius = case.bounds()
     forward = View(
-        Pose(centre, IDENTITY.wxyz), stage.view().tangents, 1e-3 * radius, 400 * radius, stage.size
+        Pose(centre, IDENTITY.wxyz), case.view().tangents, 1e-3 * radius, 400 * radius, case.size
     )
     across = [turned(forward, angle) for angle in (0, 90, 180, 270)]
     return across + [turned_about(forward, centre, angle, (1, 0, 0)) for angle in (89, -89)]
 
 
-def from_close_up(stage: Stage) -> list[View]:
+def from_close_up(case: CaseContext) -> list[View]:
     """Eyes a hundredth of the radius before splats of the scene, looking at them: the fullest."""
-    centre, radius = stage.bounds()
-    means, opacity = stage.subject.points()
+    centre, radius = case.bounds()
+    means, opacity = case.subject.points()
     seen = np.flatnonzero((np.linalg.norm(means - centre, axis=1) < radius) & (opacity > 0.1))
     if not len(seen):
         return []
-    view = replace(stage.view(), near=1e-3 * radius, far=400 * radius)
+    view = replace(case.view(), near=1e-3 * radius, far=400 * radius)
     eye = np.asarray(view.world_from_eye.position)
     looks = []
     for target in means[np.random.default_rng(6).choice(seen, CLOSE_UPS)]:
@@ -124,7 +130,7 @@ def from_close_up(stage: Stage) -> list[View]:
     return looks
 
 
-def within_a_splat(stage: Stage) -> tuple[list, list[Panel]]:
+def within_a_splat(case: CaseContext) -> tuple[list, list[Panel]]:
     """A splat of 30 cm whose centre lies before, on, and behind the near plane."""
     near = np.float32(0.05)
     places = {
@@ -136,32 +142,32 @@ def within_a_splat(stage: Stage) -> tuple[list, list[Panel]]:
     for what, depth in places.items():
         scene = alone(splats([[0, 0, -depth], [0.1, 0, -2]], [[0.3] * 3, [0.2] * 3]))
         view = front(SMALL, 0.0, near=float(near))
-        image = stage.draw(scene, view)
+        image = case.draw(scene, view)
         images.append(image)
         # On the plane itself a rounding decides: either of the two pictures is right.
-        wants = [stage.reference(scene, replace(view, near=float(near) * s)) for s in (1, 1.000001)]
-        wants.append(stage.reference(scene, replace(view, near=float(near) * 0.999999)))
+        wants = [case.reference(scene, replace(view, near=float(near) * s)) for s in (1, 1.000001)]
+        wants.append(case.reference(scene, replace(view, near=float(near) * 0.999999)))
         db = max(decibels(image, want) for want in wants)
-        comparisons.append(Comparison(db, what, image, wants[0]))
+        comparisons.append(ComparedPicture(db, what, image, wants[0]))
     worst = worst_of(comparisons)
     reason = "16 bits leave 78 dB and more; a splat on the plane may be drawn or not"
     findings = [
         clean(*images),
         at_least(f"splat {worst.what}, against float64, dB", worst.db, ORACLE_DB, reason),
     ]
-    return findings, [stage.panel(f"a splat {worst.what}", worst.image)]
+    return findings, [case.panel(f"a splat {worst.what}", worst.image)]
 
 
-def lenses(stage: Stage) -> Result:
+def lenses(case: CaseContext) -> Result:
     """Fields of view of 1 and 170 degrees; parts of a picture against what the whole has there."""
-    findings, images, panels = parts(stage)
+    findings, images, panels = parts(case)
     ball = shell()
     for degrees, distance in ((1.0, 100.0), (170.0, 0.2)):
         fov_y = np.radians(degrees)
         view = front(SMALL, distance, fov_y=fov_y)
         scene = alone(ball)
-        image = stage.draw(scene, view)
-        db = decibels(image, stage.reference(scene, view))
+        image = case.draw(scene, view)
+        db = decibels(image, case.reference(scene, view))
         findings.append(
             at_least(
                 f"{degrees:g} degrees, a ball against float64, dB", db, 45,
@@ -169,19 +175,19 @@ def lenses(stage: Stage) -> Result:
                 "one of 170 its edge the same way",
             )
         )  # fmt: skip
-        own = replace(stage.view(), tangents=perspective(fov_y, stage.size))
-        seen = stage.draw(stage.scene(), own)
+        own = replace(case.view(), tangents=perspective(fov_y, case.size))
+        seen = case.draw(case.scene(), own)
         images += [image, seen]
         panels += [
-            stage.panel(f"{degrees:g} degrees, a ball", image),
-            stage.panel(f"{degrees:g} degrees, the scene", seen),
+            case.panel(f"{degrees:g} degrees, a ball", image),
+            case.panel(f"{degrees:g} degrees, the scene", seen),
         ]
     return Result([clean(*images), *findings], panels)
 
 
-def parts(stage: Stage) -> tuple[list, list, list]:
+def parts(case: CaseContext) -> tuple[list, list, list]:
     """Findings, images and panels: what an off-centre lens sees, against the whole picture."""
-    width, height = stage.size
+    width, height = case.size
     quarter, eighth = max(width // 4, 1), max(width // 8, 1)
     edges = {  # left, top, width, height; the whole need not be known
         "left half": (0, 0, width // 2, height),
@@ -195,10 +201,10 @@ def parts(stage: Stage) -> tuple[list, list, list]:
         "ninth in the middle": (width // 3, height // 3, width // 3 + 1, height // 3 + 1),
     }
     findings, images, comparisons = [], [], []
-    scenes = {"splats around the eye": (alone(around()), front(stage.size, 0.0)),
-              "the scene": (stage.scene(), stage.view())}  # fmt: skip
+    scenes = {"splats around the eye": (alone(around()), front(case.size, 0.0)),
+              "the scene": (case.scene(), case.view())}  # fmt: skip
     for what, (scene, view) in scenes.items():
-        whole = stage.draw(scene, view)
+        whole = case.draw(scene, view)
         images.append(whole)
         for kind, boxes, reason in (
             ("at the edge", edges, "a lens off centre is that part of the centred one"),
@@ -207,28 +213,28 @@ def parts(stage: Stage) -> tuple[list, list, list]:
             decided = []
             for name, (left, top, across, down) in boxes.items():
                 part = view.part(left, top, (across, down))
-                image = stage.draw(scene, part if boxes is middle else replace(part, whole=None))
+                image = case.draw(scene, part if boxes is middle else replace(part, whole=None))
                 there = whole[top : top + down, left : left + across]
                 images.append(image)
                 decided.append((decibels(image, there), name))
-                comparisons.append(Comparison(decided[-1][0], f"{name}, {what}", image, there))
+                comparisons.append(ComparedPicture(decided[-1][0], f"{name}, {what}", image, there))
             db, name = min(decided)
             figure = f"{what}, parts {kind} (worst: {name}), dB to the whole"
             findings.append(at_least(figure, db, PART_DB, f"{reason}; {PART_REASON}"))
     worst = worst_of(comparisons)
-    return findings, images, compared(stage, worst.what, worst.image, "in the whole", worst.wanted)
+    return findings, images, compared(case, worst.what, worst.image, "in the whole", worst.wanted)
 
 
-def random_eyes(stage: Stage) -> Result:
+def random_eyes(case: CaseContext) -> Result:
     """Eyes anywhere in and around the scene, turned anyhow: no picture may break."""
-    centre, radius = stage.bounds()
+    centre, radius = case.bounds()
     rng = np.random.default_rng(3)
-    view = stage.view()
+    view = case.view()
     broken, most, images = 0, -1, 0
-    for wxyz in turns(stage.steps, rng):
+    for wxyz in turns(case.steps, rng):
         eye = centre + rng.normal(size=3) * radius * rng.uniform(0.01, 2)
         look = replace(view, world_from_eye=Pose(eye, wxyz))
-        image = stage.draw(stage.scene(), look)
+        image = case.draw(case.scene(), look)
         bad = broken_pixels(image)
         images += 1
         if bad > most:
@@ -236,12 +242,12 @@ def random_eyes(stage: Stage) -> Result:
         broken += bad
     reason = "no place of the eye may break a pixel; which ones were tried is fixed by a seed"
     findings = [at_most(f"broken pixels in {images} pictures", broken, 0, reason)]
-    return Result(findings, [stage.panel("one of the eyes", worst)])
+    return Result(findings, [case.panel("one of the eyes", worst)])
 
 
-def compared(stage: Stage, name: str, image, other: str, beside) -> list[Panel]:
+def compared(case: CaseContext, name: str, image, other: str, beside) -> list[Panel]:
     return [
-        stage.panel(name, image),
-        stage.panel(other, beside),
+        case.panel(name, image),
+        case.panel(other, beside),
         Panel("8 times the difference", difference(image, beside)),
     ]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapeshift.app.stability_cases.case_context import CaseContext, difference, turned
 from shapeshift.app.stability_cases.finding import (
     Panel,
     Result,
@@ -17,7 +18,6 @@ from shapeshift.app.stability_cases.finding import (
 )
 from shapeshift.app.stability_cases.motion import KEPT, STALE_YAW, WAS_OLD, is_old
 from shapeshift.app.stability_cases.scenes import alone, front, splats
-from shapeshift.app.stability_cases.stage import Stage, difference, turned
 from shapeshift.scene.pose import View, perspective
 from shapeshift.scene.scene import Scene
 
@@ -30,14 +30,14 @@ VISIBLE = 8 / 255  # of a pixel: what smaller changes do is no pop
 SMALL = (160, 96)
 
 
-def popping(stage: Stage) -> Result:
+def popping(case: CaseContext) -> Result:
     """A 90-degree turn: what changes from frame to frame beyond the motion itself.
 
     The motion is taken out exactly: each view is drawn in its own order and in that of the view
     before.  For limits the picture stands still and the limit moves, as when the eye steps back.
     """
-    depth, distance = (turn_in_order(stage, order) for order in ("depth", "distance"))
-    step = TURN / stage.steps
+    depth, distance = (turn_in_order(case, order) for order in ("depth", "distance"))
+    step = TURN / case.steps
     allowed = float(np.interp(step, list(STALE_YAW), list(STALE_YAW.values())))
     findings = [
         at_least(
@@ -49,14 +49,14 @@ def popping(stage: Stage) -> Result:
             "a turn changes no distance to the eye; only rounding may swap neighbours",
         ),
         at_least(
-            "frames drawn in an old order", depth.kept + distance.kept, 2 * stage.steps,
+            "frames drawn in an old order", depth.kept + distance.kept, 2 * case.steps,
             WAS_OLD,
         ),
-        *fades_alone(stage), *fades_in_the_scene(stage),
+        *fades_alone(case), *fades_in_the_scene(case),
     ]  # fmt: skip
     panels = [
-        stage.panel("order of the view before", depth.old),
-        stage.panel("its own order", depth.own),
+        case.panel("order of the view before", depth.old),
+        case.panel("its own order", depth.own),
         Panel("8 times the difference", difference(depth.old, depth.own)),
     ]
     return Result([clean(*depth.images, *distance.images), *findings], panels)
@@ -72,15 +72,15 @@ class TurnInOrder(NamedTuple):
     images: list[np.ndarray]  # each (H, W, 4)
 
 
-def turn_in_order(stage: Stage, order: str) -> TurnInOrder:
-    scene, wide = stage.scene(), widened(stage.view())
+def turn_in_order(case: CaseContext, order: str) -> TurnInOrder:
+    scene, wide = case.scene(), widened(case.view())
     least, kept, images = np.inf, 0, []
-    for before, angle in pairwise(np.linspace(-TURN / 2, TURN / 2, stage.steps + 1)):
+    for before, angle in pairwise(np.linspace(-TURN / 2, TURN / 2, case.steps + 1)):
         here, there = turned(wide, before), turned(wide, angle)
-        own = stage.draw(scene, there, order=order)
-        stage.draw(scene, here, order=order, **KEPT)
-        old = stage.draw(scene, there, order=order, **KEPT)
-        kept += is_old(stage)
+        own = case.draw(scene, there, order=order)
+        case.draw(scene, here, order=order, **KEPT)
+        old = case.draw(scene, there, order=order, **KEPT)
+        kept += is_old(case)
         images.append(old)
         db = decibels(old, own)
         if not db >= least:
@@ -95,7 +95,7 @@ def widened(view: View) -> View:
     return replace(view, tangents=perspective(fov_y, view.size))
 
 
-def fades_alone(stage: Stage) -> list:
+def fades_alone(case: CaseContext) -> list:
     """Splats side by side, of many sizes and distances, each crossing a limit by itself."""
     columns, rows = np.meshgrid(np.linspace(-1, 1, 8), np.linspace(-0.6, 0.6, 5))
     rng = np.random.default_rng(5)
@@ -110,7 +110,7 @@ def fades_alone(stage: Stage) -> list:
     }  # fmt: skip
     findings = []
     for name, start in starts.items():
-        hard, soft = (pops(stage, alone(model), view, name, start, f, 30) for f in (0.0, FADE))
+        hard, soft = (pops(case, alone(model), view, name, start, f, 30) for f in (0.0, FADE))
         findings.append(
             at_most(
                 f"{name}, splats apart, largest pop of a pixel with fade {FADE} over without",
@@ -122,15 +122,15 @@ def fades_alone(stage: Stage) -> list:
     return findings
 
 
-def fades_in_the_scene(stage: Stage) -> list:
+def fades_in_the_scene(case: CaseContext) -> list:
     """The same in the user's scene, where many splats meet a limit at once."""
-    view = stage.view()
-    centre, _ = stage.bounds()
+    view = case.view()
+    centre, _ = case.bounds()
     away = float(np.linalg.norm(np.asarray(view.world_from_eye.position) - centre))
     starts = {"max_distance": away, "max_pixels": 0.012 * max(view.size), "min_pixels": 1.5}
     findings = []
     for name, start in starts.items():
-        hard, soft = (pops(stage, stage.scene(), view, name, start, f) for f in (0.0, FADE))
+        hard, soft = (pops(case, case.scene(), view, name, start, f) for f in (0.0, FADE))
         if not hard > VISIBLE:
             reason = f"its largest pop without a fade is {255 * hard:.1f} of 255: nobody sees it"
             findings.append(not_here(f"{name} {start:.3g}, the scene, fade {FADE}", reason))
@@ -145,10 +145,10 @@ def fades_in_the_scene(stage: Stage) -> list:
 
 
 def pops(
-    stage: Stage, scene: Scene, view: View, name: str, start: float, fade: float,
+    case: CaseContext, scene: Scene, view: View, name: str, start: float, fade: float,
     frames: int = FRAMES,
 ) -> float:  # fmt: skip
     """Largest change of a pixel from frame to frame while a limit moves by LIMIT_STEP a frame."""
     limits = [float(start * (1 + LIMIT_STEP) ** i) for i in range(frames)]
-    images = [stage.draw(scene, view, fade=fade, **{name: limit}) for limit in limits]
+    images = [case.draw(scene, view, fade=fade, **{name: limit}) for limit in limits]
     return max(float(np.abs(a - b).max()) for a, b in pairwise(images))

@@ -66,7 +66,7 @@ def around(count: int = 1200, seed: int = 0) -> SplatLayers:
 
 
 @dataclass(frozen=True)
-class Layers:
+class FaintLayers:
     """Faint round splats side by side in one plane, the first before the second, each in the middle
     of a pixel: what they look like is known without any projection.
     """
@@ -76,7 +76,7 @@ class Layers:
     picture: np.ndarray  # (H, W, 4) float64
 
 
-def faint_layers(count: int, size: tuple[int, int], opacity: float, sigma_px: float) -> Layers:
+def faint_layers(count: int, size: tuple[int, int], opacity: float, sigma_px: float) -> FaintLayers:
     """`count` splats of random colours with footprints of sigma_px, blended by their formula."""
     rng, (width, height), distance = np.random.default_rng(3), size, 3.0
     view = front(size, distance)
@@ -100,7 +100,7 @@ def faint_layers(count: int, size: tuple[int, int], opacity: float, sigma_px: fl
         image[i : i + len(away), j : j + len(away)] += (alpha * under)[..., None] * rgb
         under *= 1 - alpha
     whole = np.concatenate([image, 1 - through[..., None]], axis=2)
-    return Layers(view, scene, whole[edge:-edge, edge:-edge])
+    return FaintLayers(view, scene, whole[edge:-edge, edge:-edge])
 
 
 def turns(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from shapeshift.app.stability_cases.case_context import CaseContext, difference
 from shapeshift.app.stability_cases.finding import (
-    Comparison,
+    ComparedPicture,
     Panel,
     Result,
     at_least,
@@ -14,7 +15,6 @@ from shapeshift.app.stability_cases.finding import (
 )
 from shapeshift.app.stability_cases.places import ORACLE_DB, SMALL, compared
 from shapeshift.app.stability_cases.scenes import alone, faint_layers, front, shell, splats, turns
-from shapeshift.app.stability_cases.stage import Stage, difference
 from shapeshift.scene.scene import Scene, SceneObject
 
 LONG = 1e4  # times as long as thick
@@ -28,7 +28,7 @@ STACKED = 400
 FAINT = 100_000
 
 
-def needles(stage: Stage) -> Result:
+def needles(case: CaseContext) -> Result:
     """Splats 10,000 times as long as thick, and as wide as flat, turned every way."""
     rng = np.random.default_rng(2)
     count = 120
@@ -39,8 +39,8 @@ def needles(stage: Stage) -> Result:
     view = front(SMALL)
     for name, shape in shapes.items():
         model = splats(means, long * shape, 0.7, rng.uniform(size=(count, 3)), turns(count, rng))
-        image = stage.draw(alone(model), view)
-        want = stage.reference(alone(model), view)
+        image = case.draw(alone(model), view)
+        want = case.reference(alone(model), view)
         db = decibels(image, want)
         findings.append(
             at_least(
@@ -49,16 +49,16 @@ def needles(stage: Stage) -> Result:
                 "here, beside the 0.3 px^2 that every splat has",
             )
         )  # fmt: skip
-        comparisons.append(Comparison(db, name, image, want))
+        comparisons.append(ComparedPicture(db, name, image, want))
     _, name, image, want = worst_of(comparisons)
-    panels = compared(stage, name, image, "float64", want)
+    panels = compared(case, name, image, "float64", want)
     return Result([clean(*(c.image for c in comparisons)), *findings], panels)
 
 
-def faint(stage: Stage) -> Result:
+def faint(case: CaseContext) -> Result:
     """100,000 faint splats over each other: what each step of the picture's numbers adds up to."""
     layers = faint_layers(FAINT, SMALL, 2 / 255, 3.0)
-    image = stage.draw(layers.scene, layers.view)
+    image = case.draw(layers.scene, layers.view)
     dark = abs(float(np.mean(image - layers.picture)))
     findings = [
         clean(image),
@@ -73,10 +73,10 @@ def faint(stage: Stage) -> Result:
             "an eighth of a grey step; half floats lose 0.015",
         ),
     ]  # fmt: skip
-    return Result(findings, compared(stage, "drawn", image, "the formula", layers.picture))
+    return Result(findings, compared(case, "drawn", image, "the formula", layers.picture))
 
 
-def limits(stage: Stage) -> Result:
+def limits(case: CaseContext) -> Result:
     """Scales, opacities and colours at and beyond what half floats and 8 bits hold."""
     view = front(SMALL)
     behind = ([0.4, 0, -0.5], [0.2] * 3)  # a plain splat that must stay as it is
@@ -92,13 +92,13 @@ def limits(stage: Stage) -> Result:
             [[0, 0, 0], behind[0]], [[scale] * 3, behind[1]], [opacity, 0.8], [color, (0.2, 0.4, 1)]
         )
         alone_there = splats([behind[0]], [behind[1]], 0.8, (0.2, 0.4, 1))
-        image = stage.draw(alone(model), view)
+        image = case.draw(alone(model), view)
         # Drawn as float64 draws it, or left out: nothing in between.
-        wants = [stage.reference(alone(m), view) for m in (model, alone_there)]
+        wants = [case.reference(alone(m), view) for m in (model, alone_there)]
         scale_of = [max(1.0, float(np.abs(w).max())) for w in wants]
         db = max(decibels(image / s, w / s) for w, s in zip(wants, scale_of, strict=True))
         value = {"scale": scale, "opacity": opacity, "colour": color[0]}[what]
-        comparisons.append(Comparison(db, f"{what} {value:.6g}", image, wants[0]))
+        comparisons.append(ComparedPicture(db, f"{what} {value:.6g}", image, wants[0]))
     worst = worst_of(comparisons)
     right_or_absent = at_least(
         f"worst of {len(rows)} ({worst.what}), dB to float64 with or without it", worst.db,
@@ -106,23 +106,23 @@ def limits(stage: Stage) -> Result:
     )  # fmt: skip
     rng = np.random.default_rng(4)
     wall = splats(rng.normal(size=(STACKED, 3)) * 0.02, 0.5, 1.0, rng.uniform(size=(STACKED, 3)))
-    stack = stage.draw(alone(wall), view)
+    stack = case.draw(alone(wall), view)
     covered = at_most(
         f"coverage under {STACKED} opaque splats", stack[..., 3].max(), 1.002,
         "0.99 of what is left each time never passes 1; two steps of a half float below 1",
     )  # fmt: skip
     panels = [
-        *compared(stage, worst.what, worst.image, "float64", np.clip(worst.wanted, 0, 1)),
-        stage.panel(f"{STACKED} opaque splats", stack),
+        *compared(case, worst.what, worst.image, "float64", np.clip(worst.wanted, 0, 1)),
+        case.panel(f"{STACKED} opaque splats", stack),
     ]
     images = [comparison.image for comparison in comparisons]
     return Result([clean(*images, stack), right_or_absent, covered], panels)
 
 
-def counts(stage: Stage) -> Result:
+def counts(case: CaseContext) -> Result:
     """Zero objects, zero splats, all culled, one splat, and then the scene as if nothing was."""
-    scene, view = stage.scene(), stage.view()
-    before = stage.draw(scene, view)
+    scene, view = case.scene(), case.view()
+    before = case.draw(scene, view)
     one = splats([[0, 0, 0]], 0.1)
     hidden = SceneObject("hidden", one, visible=False)
     nothing = {
@@ -134,14 +134,14 @@ def counts(stage: Stage) -> Result:
     }
     images, covered = [], {}
     for what, empty in nothing.items():
-        image = stage.draw(empty, front(stage.size))
+        image = case.draw(empty, front(case.size))
         images.append(image)
         covered[what] = float(np.abs(image).max())
     worst = max(covered, key=lambda what: covered[what])
-    single = stage.draw(alone(one), front(SMALL))
-    db = decibels(single, stage.reference(alone(one), front(SMALL)))
-    culled = stage.draw(scene, view, max_distance=1e-6)
-    after = stage.draw(scene, view)
+    single = case.draw(alone(one), front(SMALL))
+    db = decibels(single, case.reference(alone(one), front(SMALL)))
+    culled = case.draw(scene, view, max_distance=1e-6)
+    after = case.draw(scene, view)
     left_out = "a frame with nothing in it is nothing, to the last bit"
     findings = [
         clean(*images, single, culled, after),
@@ -154,24 +154,24 @@ def counts(stage: Stage) -> Result:
         ),
     ]  # fmt: skip
     panels = [
-        stage.panel("the scene after the empty frames", after),
-        stage.panel("before them", before),
+        case.panel("the scene after the empty frames", after),
+        case.panel("before them", before),
         Panel("8 times the difference", difference(after, before)),
-        stage.panel("one splat", single),
+        case.panel("one splat", single),
     ]
     return Result(findings, panels)
 
 
-def crowd(stage: Stage) -> Result:
+def crowd(case: CaseContext) -> Result:
     """The same ball twice in one place: equal depths must not make the picture depend on luck."""
     ball = shell()
     both = Scene((SceneObject("a", ball), SceneObject("b", ball)))
-    images = [stage.draw(both, front(SMALL)) for _ in range(3)]
+    images = [case.draw(both, front(SMALL)) for _ in range(3)]
     change = max(float(np.abs(image - images[0]).max()) for image in images[1:])
-    db = decibels(images[0], stage.reference(both, front(SMALL)))
+    db = decibels(images[0], case.reference(both, front(SMALL)))
     findings = [
         clean(*images),
         at_most("largest change between three draws of it", change, 0, "orders are stable"),
         at_least("against float64, dB", db, ORACLE_DB, "16 bits leave 78 dB and more"),
     ]
-    return Result(findings, [stage.panel("two balls in one place", images[0])])
+    return Result(findings, [case.panel("two balls in one place", images[0])])

@@ -10,7 +10,7 @@ import numpy as np
 from shapeshift.app.drawing import save_png
 from shapeshift.app.errors import UsageError
 from shapeshift.app.stability_cases import eyes, life, motion, networks, places, popping, shapes
-from shapeshift.app.stability_cases.finding import Finding, Panel
+from shapeshift.app.stability_cases.finding import CaseFinding, Panel
 from shapeshift.runtime_models.files.plain_text import one_line
 from shapeshift.runtime_models.files.whole_file import write_whole
 
@@ -55,7 +55,7 @@ class Table:
     def path(self) -> Path:
         return self.folder / NAME
 
-    def add(self, case: str, findings: list[Finding]) -> None:
+    def add(self, case: str, findings: list[CaseFinding]) -> None:
         """Takes the rows of a case and writes the file anew, all or nothing."""
         self.rows[case] = [
             (case, f.figure, f"{f.measured:.5g}" if f.bound else "", f.bound, f.verdict, f.reason)

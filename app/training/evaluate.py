@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL
 from shapeshift.app.opening import ReadingOptions, open_capture, open_model
-from shapeshift.app.terminal import open_console, say, tell_json
+from shapeshift.app.terminal import open_console, print_json, say
 
 if TYPE_CHECKING:
     from shapeshift.scene.captures.capture import Capture
@@ -78,7 +78,7 @@ def run(options: Options) -> int:
             "whole."
         )
     if options.json == Path("-"):
-        tell_json(result)
+        print_json(result)
     elif options.json is not None:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from shapeshift.app.command_line import MODALITY, POSITIONAL, Settings
-from shapeshift.app.terminal import open_console, say, tell_json
+from shapeshift.app.command_line import MODALITY, POSITIONAL, FieldsOf
+from shapeshift.app.terminal import open_console, print_json, say
 from shapeshift.app.training.train_options import Asked, MachineOptions
 from shapeshift.training.settings import TrainSettings
 
@@ -29,7 +29,7 @@ class Options(MachineOptions):
     """A folder of posed photos, as of train."""
     out: Path
     """The package to write: NAME.shift or a folder."""
-    asked: Annotated[Asked, Settings(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
     tolerance_db: float = 0.1
     """dB that each modality may lose in all against the largest model, its error included."""
     seeds: int = 2
@@ -95,7 +95,7 @@ def run(options: Options) -> int:
     what = "the fitted model of the first seed with this report in it"
     say(f"{full(options.out)}: {size:,} bytes, {what}")
     if options.json == Path("-"):
-        tell_json(result)
+        print_json(result)
     elif options.json is not None:
         write_json(options.json, result)
         say(f"written to {full(options.json)}")

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, Settings
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
 from shapeshift.app.opening import open_capture
 from shapeshift.app.paths import full
 from shapeshift.app.terminal import say
 from shapeshift.app.training.run_loop import INTERRUPTED
-from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, finish, mean_row
+from shapeshift.app.training.table_rows import MEAN, NAMES, TableRow, VggRow, finish, mean_row
 from shapeshift.app.training.train_options import OF_SPLATS, Asked, MachineOptions
 from shapeshift.app.training.train_options import Options as TrainOptions
 from shapeshift.training.baselines.plain_settings import PlainSettings
@@ -41,8 +41,8 @@ class Options(MachineOptions):
     """A folder of posed photos; each modality needs held-out ones."""
     out: Path
     """A folder for the models, table.csv and table.md.  A method that is in it is not run again."""
-    asked: Annotated[Asked, Settings(TrainSettings, USUAL, ("seed",))] = field(default_factory=dict)
-    splats: Annotated[Asked, Settings(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, ("seed",))] = field(default_factory=dict)
+    splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
     seconds: float | None = None
     """Budget of every method; its models share it.  Default: none, give this or --iterations."""
     iterations: int | None = None
@@ -80,7 +80,7 @@ def run(options: Options) -> int:
     check_capture(capture, options, distance)
     options.out.mkdir(parents=True, exist_ok=True)
     head = [command_line(options), machine_line(device), capture_line(capture, options, distance)]
-    table = RowsFile(options.out / "table.csv", VggRow if distance else Row, head)
+    table = RowsFile(options.out / "table.csv", VggRow if distance else TableRow, head)
     say(head[1])
     rig = offset_of(device, capture, options)
     capture = with_extrinsics(capture, rig)
@@ -173,7 +173,7 @@ def train_method(
     return None if outcome.interrupted else outcome.runs
 
 
-def pack_splats(capture: "Capture", out: Path, rows: list[Row]) -> "dict[str, TrainedFile]":
+def pack_splats(capture: "Capture", out: Path, rows: list[TableRow]) -> "dict[str, TrainedFile]":
     """Each modality: the files of `splats` as spz, trained when those were."""
     from shapeshift.app.errors import UsageError
     from shapeshift.app.training.train_baselines import TrainedFile
@@ -215,7 +215,7 @@ def train_options(method: str, options: Options) -> TrainOptions:
 
 def rows_of(
     method: str, device, capture: "Capture", options: Options, runs: dict, distance
-) -> list[Row]:
+) -> list[TableRow]:
     """The rows of a method: its files, read back from disk, on the held-out photos."""
     from shapeshift.runtime_models.read_scene import read_model
     from shapeshift.runtime_models.splats.plain_splats import Reading
@@ -224,7 +224,7 @@ def rows_of(
     from shapeshift.training.photos import choose_downscale
 
     factor = options.asked.get("downscale") or choose_downscale(capture.photos)
-    kind, reading, rows = VggRow if distance else Row, Reading(allow_huge=True), []
+    kind, reading, rows = VggRow if distance else TableRow, Reading(allow_huge=True), []
     whole = read_model(options.out / PLACES[method], reading) if method != "separate" else None
     for stop in capture.stops:
         part, made = one_modality(capture, stop.name), runs[stop.name]

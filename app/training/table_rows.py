@@ -17,7 +17,7 @@ OTHERS = {"spz": "3DGS splats as spz"}  # where no line above says what is the s
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     method: str
     modality: str  # MEAN: over all modalities, with the bytes and seconds of all files together
     psnr_db: float
@@ -31,11 +31,11 @@ class Row:
 
 
 @dataclass(frozen=True)
-class VggRow(Row):
+class VggRow(TableRow):
     vgg_distance: float
 
 
-def mean_row(rows: list[Row], runs: list) -> Row:
+def mean_row(rows: list[TableRow], runs: list) -> TableRow:
     """What a method gives on average, and what it takes in all."""
     from shapeshift.training.evaluation.evaluate import bytes_on_disk
 
@@ -52,7 +52,7 @@ def mean_row(rows: list[Row], runs: list) -> Row:
     )  # fmt: skip
 
 
-def finish(rows: list[Row], out: Path, head: list[str]) -> None:
+def finish(rows: list[TableRow], out: Path, head: list[str]) -> None:
     """table.md, and the same on standard error."""
     from rich.table import Table
 
@@ -76,7 +76,7 @@ def row_of(cells: list[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def cells(rows: list[Row]) -> tuple[list[str], list[list[str]]]:
+def cells(rows: list[TableRow]) -> tuple[list[str], list[list[str]]]:
     """Column names and lines as the paper has them: a method is named where its lines begin."""
     vgg = [] if not rows or not isinstance(rows[0], VggRow) else ["VGG distance"]
     columns = [
@@ -102,18 +102,18 @@ def cells(rows: list[Row]) -> tuple[list[str], list[list[str]]]:
     return columns, lines
 
 
-def compare(rows: list[Row]) -> list[str]:
+def compare(rows: list[TableRow]) -> list[str]:
     """What the one model gains and saves against each of the others, in a sentence."""
     means = {row.method: row for row in rows if row.modality == MEAN}
     if "joint" not in means:
         return []
-    one, told = means["joint"], []
+    one, sentences = means["joint"], []
     for method in ("separate", "splats", "spz"):
         if method in means:
             other, name = means[method], OTHERS.get(method, NAMES[method])
             gain, time = one.psnr_db - other.psnr_db, one.seconds / max(other.seconds, 0.1)
-            told.append(
+            sentences.append(
                 f"{NAMES['joint']} against {name}: {gain:+.2f} dB in the mean, "
                 f"{one.mb / other.mb:.3f} of the bytes, {time:.2f} of the seconds."
             )
-    return told
+    return sentences

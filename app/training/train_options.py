@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, Settings
+from shapeshift.app.command_line import EXPERT, MODALITY, POSITIONAL, FieldsOf
 from shapeshift.training.baselines.plain_settings import PlainSettings
 from shapeshift.training.settings import TrainSettings, adjusted, resumed
 
@@ -41,8 +41,8 @@ class Options(MachineOptions):
     """A folder of posed photos: COLMAP, transforms.json or cameras.json (docs/capture.md)."""
     out: Path
     """The package to write: NAME.shift or a folder.  NAME.checkpoint.npz is written beside it."""
-    asked: Annotated[Asked, Settings(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
-    splats: Annotated[Asked, Settings(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
+    asked: Annotated[Asked, FieldsOf(TrainSettings, USUAL, EXPERTS)] = field(default_factory=dict)
+    splats: Annotated[Asked, FieldsOf(PlainSettings, (), OF_SPLATS)] = field(default_factory=dict)
     resume: bool = False
     """Continue from the checkpoint with its settings; --iterations or --seconds may be larger."""
     calibrate: Annotated[str | None, MODALITY] = None

@@ -40,7 +40,7 @@ ENOUGH = 0.9  # of the photos
 BLOCK = 8  # photos by photos whose matches are written at once: progress, and what a kill loses
 
 
-def tell(**what: object) -> None:
+def report(**what: object) -> None:
     sys.stdout.write(json.dumps(what) + "\n")
     sys.stdout.flush()
 
@@ -52,29 +52,29 @@ def find(job: dict) -> None:
     database = work / "database.db"
     pycolmap.set_random_seed(0)
     count = sum(len(group) for group in job["groups"])
-    tell(watch="keypoints", stage="features", of=count)
+    report(watch="keypoints", stage="features", of=count)
     extract(pycolmap, database, job)
     guided, best = None, None
     for rung in LADDER:
         if guided is not rung["guided"]:
             guided = rung["guided"]
-            tell(watch="two_view_geometries", stage="matches", of=job["pairs"])
+            report(watch="two_view_geometries", stage="matches", of=job["pairs"])
             match(pycolmap, database, job, guided)
         models = solve(pycolmap, database, job, rung, count)
         found = max((rank(model) for model in models), default=(0, 0))
         others = sorted((model.num_reg_images() for model in models), reverse=True)[1:]
-        tell(attempt=rung["said"], registered=found[0], of=count, others=others)
+        report(attempt=rung["said"], registered=found[0], of=count, others=others)
         if best is None or found > rank(best):
             best = max(models, key=rank, default=best)
         if found[0] >= ENOUGH * count:
             break
     if best is None:
-        tell(registered=0)
+        report(registered=0)
         return
     (work / "best").mkdir(exist_ok=True)
     best.write(str(work / "best"))
     keep_arrays(best, work / "best.npz", job["measured"], job["ends"])
-    tell(registered=best.num_reg_images())
+    report(registered=best.num_reg_images())
 
 
 def rank(model: Any) -> tuple[int, int]:
@@ -149,7 +149,7 @@ def solve(pycolmap: Any, database: Path, job: dict, rung: dict, count: int) -> l
 
     def placed() -> None:
         done[0] += 1
-        tell(stage=f"poses, {rung['said']}", done=min(done[0] + 1, count), of=count)
+        report(stage=f"poses, {rung['said']}", done=min(done[0] + 1, count), of=count)
 
     models = pycolmap.incremental_mapping(
         database, job["photos"], folder, options=plan, next_image_callback=placed

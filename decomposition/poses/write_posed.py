@@ -13,7 +13,7 @@ from shapeshift.decomposition.poses.photo_list import PhotoList
 from shapeshift.decomposition.poses.pose_report import PoseReport
 from shapeshift.runtime_models.files.whole_file import make_folders, write_whole
 from shapeshift.scene.cameras.write_colmap_cameras import camera_bytes, image_bytes
-from shapeshift.scene.captures.colmap_tables import COUNT, Lens, Posed, read_tables
+from shapeshift.scene.captures.colmap_tables import COUNT, ColmapCamera, Posed, read_tables
 
 REPORT = "poses.json"
 PAIRED_LENS = "SIMPLE_PINHOLE"
@@ -65,7 +65,7 @@ def with_pairs(photos: PhotoList, model: Path, tables: dict[str, bytes]) -> dict
     lenses, posed = read_tables(model, ".bin")
     by_name = {image.name: image for image in posed}
     next_lens, next_image = max(lenses) + 1, max(image.number for image in posed) + 1
-    new_lenses: dict[Lens, int] = {}
+    new_lenses: dict[ColmapCamera, int] = {}
     rows: list[Posed] = []
     for thermal, visible in photos.paired.items():
         if visible not in by_name:
@@ -74,7 +74,7 @@ def with_pairs(photos: PhotoList, model: Path, tables: dict[str, bytes]) -> dict
         lens = lenses[first.lens]
         width, height = thermal.size
         focal = lens.focal[1] * height / lens.size[1]
-        like = Lens(PAIRED_LENS, thermal.size, (focal, width / 2, height / 2))
+        like = ColmapCamera(PAIRED_LENS, thermal.size, (focal, width / 2, height / 2))
         number = new_lenses.setdefault(like, next_lens + len(new_lenses))
         rows.append(Posed(next_image + len(rows), thermal.name, first.wxyz, first.place, number))
     cameras = camera_bytes({number: lens for lens, number in new_lenses.items()})

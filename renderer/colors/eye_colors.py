@@ -20,18 +20,18 @@ SAMPLE = 4096  # splats or anchors that tell
 
 
 @dataclass(frozen=True)
-class Look:
+class EyeColors:
     """What of a model tells how much two eyes differ in its colours."""
 
     places: np.ndarray  # (n, 3) metres, object frame: a sample of its splats or anchors
     slope: float  # color_slope; infinite where more than colours follows the eye
 
     @staticmethod
-    def of(model: Model) -> "Look":
+    def of(model: Model) -> "EyeColors":
         places = model.means[model.opacity > 0] if isinstance(model, SplatLayers) else model.anchors
         step = max(-(-len(places) // SAMPLE), 1)
         slope = math.inf if isinstance(model, ScaffoldModel) else color_slope(model)
-        return Look(np.array(places[::step], np.float64), slope)
+        return EyeColors(np.array(places[::step], np.float64), slope)
 
     def shared_db(self, eyes: np.ndarray) -> float:
         """PSNR, dB, that colours for the middle of the eyes (E, 3), object frame, have at least.
@@ -46,7 +46,7 @@ class Look:
         return 20 * math.log10(max(away / (self.slope * apart), 1e-30))
 
 
-def shared_is_enough(scene: Scene, looks: list[Look], views: list[View]) -> bool:
+def shared_is_enough(scene: Scene, looks: list[EyeColors], views: list[View]) -> bool:
     """Whether nobody sees that colours are those of the middle of the eyes; a look an object."""
     eyes_world = np.array([view.world_from_eye.position for view in views])
     for thing, look in zip(scene.objects, looks, strict=True):

@@ -52,7 +52,7 @@ MOST_LABELS = 24  # rows of a legend
 RECOLORED = ("depth", "object")  # drawn with other colours than the scene's
 
 
-class Drawing(Protocol):
+class DebugDrawing(Protocol):
     """What debug pictures need of QuadsDrawing and TilesDrawing."""
 
     def splat_points(self) -> Points: ...
@@ -61,7 +61,7 @@ class Drawing(Protocol):
     def image(self, i: int) -> np.ndarray: ...
 
 
-def prepare_debug(drawing: Drawing, views: list[View], scene: Scene, name: str) -> bool:
+def prepare_debug(drawing: DebugDrawing, views: list[View], scene: Scene, name: str) -> bool:
     """Before the draw: other colours for depth and object; True where the scene's are gone."""
     if name not in RECOLORED or not scene.splat_count:
         return False
@@ -96,7 +96,7 @@ def farthest_depth(depth: np.ndarray) -> np.float32:
 
 
 def debug_image(
-    drawing: Drawing, i: int, view: View, scene: Scene, settings: RenderSettings
+    drawing: DebugDrawing, i: int, view: View, scene: Scene, settings: RenderSettings
 ) -> tuple[np.ndarray, dict[str, float]]:
     """After the draw: (H, W, 3) float32 display sRGB, row 0 on top, of view i as it was drawn;
     and what its legend says: counts, metres, the largest number.

@@ -8,7 +8,7 @@ from shapeshift.renderer.colors.palette import palette_colors
 from shapeshift.renderer.gl.buffers import Arena
 from shapeshift.renderer.gl.gpu import Gpu
 from shapeshift.renderer.gl.layers import Layers
-from shapeshift.renderer.gl.networks import Networks
+from shapeshift.renderer.gl.networks import GlNetworks
 from shapeshift.runtime_models.colors.color_memory import ColorMemory
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers
@@ -31,14 +31,14 @@ class Decoder:
         self._gpu, self._arena = gpu, arena
         # Its programs compile now, not in the first frame between a thermal stop and another.
         self._heater = Heater(gpu) if any(map(has_heat, models)) else None
-        made: dict[int, Layers | Networks | Evaluator] = {}
+        made: dict[int, Layers | GlNetworks | Evaluator] = {}
         for model in models:
             if id(model) in made:
                 continue
             if isinstance(model, SplatLayers):
                 made[id(model)] = Layers(gpu, model)
             elif mlps == "gl" and isinstance(model, AnchorModel):
-                made[id(model)] = Networks(gpu, model)
+                made[id(model)] = GlNetworks(gpu, model)
             else:
                 made[id(model)] = Evaluator(model, keep=True)
         self._models = [made[id(model)] for model in models]

@@ -89,7 +89,7 @@ def pack_mlp(mlp: Mlp, features: int, d: int, own_control: bool = False) -> Pack
     return PackedMlp(rows, np.asarray(mlp.biases[0], np.float64), control, len(weights), widest)
 
 
-class Networks:
+class GlNetworks:
     """The five networks of one model.  Weights lie in uniform blocks (2 times faster than storage
     on software GL); a network too large for a block is read from storage, said once on stderr.
     """

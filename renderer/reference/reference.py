@@ -33,7 +33,7 @@ JACOBIAN_MARGIN = 1.3  # 3DGS: beyond 1.3 times the field of view the projection
 
 
 @dataclass(frozen=True)
-class Projected:
+class ReferenceSplats:
     """All splats of an object as a view sees them; rows with a reason may hold anything."""
 
     reason: np.ndarray  # (N,) uint8: 0 drawn, else 1 + index into CULL_REASONS
@@ -84,7 +84,7 @@ def reference_image(
 
 def shaded_objects(
     scene: Scene, view: View, settings: RenderSettings, eye: np.ndarray
-) -> tuple[list[Projected], FalseColors]:
+) -> tuple[list[ReferenceSplats], FalseColors]:
     """The visible objects; colours are (N, 3), or (N, 5) with the heat that is drawn beside."""
     colors = false_colors(scene, [control_of(thing) for thing in scene.objects])
     found = [
@@ -130,7 +130,7 @@ def project_object(
 def gate_object(
     thing: SceneObject, view: View, settings: RenderSettings, eye: np.ndarray,
     shading: tuple[str, Shade] | None = None,
-) -> Projected:  # fmt: skip
+) -> ReferenceSplats:  # fmt: skip
     """Projects every splat and finds the first gate that it fails.
 
     shading: how the scene's heat is shown and what of the object is heat; None: none is.
@@ -169,7 +169,7 @@ def gate_object(
         mean_px = np.stack([fx * mean[:, 0] / depth + cx, fy * mean[:, 1] / depth + cy], axis=1)
         reason, faded = gate(mean, mean_px, covariance, opacity, seen, color, view, settings)
         place = means @ world_from_object[:3, :3].T + world_from_object[:3, 3]
-    return Projected(reason, depth, place, mean_px, covariance, faded, color, mean, in_camera)
+    return ReferenceSplats(reason, depth, place, mean_px, covariance, faded, color, mean, in_camera)
 
 
 def shaded_color(
@@ -204,7 +204,7 @@ def gate(
     view: View,
     settings: RenderSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) reasons and faded opacities; mean (N, 3) metres in the camera, the rest as Projected.
+    """(N,) reasons and faded opacities; mean (N, 3) metres in the camera; as ReferenceSplats.
 
     seen: (N,) opacity on the screen, of antialiased splats less than the model's.
     """

@@ -4,7 +4,7 @@ import numpy as np
 
 from shapeshift.rasterizer.reference import MAX_ALPHA
 from shapeshift.rasterizer.surface_reference import midpoint
-from shapeshift.renderer.reference.reference import Projected, gate_object
+from shapeshift.renderer.reference.reference import ReferenceSplats, gate_object
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.renderer.surface import Surface
 from shapeshift.scene.pose import View
@@ -37,16 +37,16 @@ def reference_surface(scene: Scene, view: View, settings: RenderSettings | None 
     return Surface(metres, normal, 1 - transmittance)
 
 
-def _drawn(found: list[Projected]) -> Projected:
+def _drawn(found: list[ReferenceSplats]) -> ReferenceSplats:
     """What passes every gate, of all objects."""
     if not found:
-        return Projected(*(np.zeros((0, *shape)) for shape in SHAPES))
+        return ReferenceSplats(*(np.zeros((0, *shape)) for shape in SHAPES))
     rows = [f.reason == 0 for f in found]
     columns = {
         name: np.concatenate([getattr(f, name)[row] for f, row in zip(found, rows, strict=True)])
-        for name in Projected.__dataclass_fields__
+        for name in ReferenceSplats.__dataclass_fields__
     }
-    return Projected(**columns)
+    return ReferenceSplats(**columns)
 
 
-SHAPES = ((), (), (3,), (2,), (2, 2), (), (3,), (3,), (3, 3))  # of Projected's fields
+SHAPES = ((), (), (3,), (2,), (2, 2), (), (3,), (3,), (3, 3))  # of ReferenceSplats

@@ -61,7 +61,7 @@ class Tensor:
 
 
 @dataclass
-class Record:
+class ScriptModule:
     """A module of TorchScript: what it is called ("Linear"), what it holds by name."""
 
     kind: str = ""
@@ -111,7 +111,7 @@ def _name_parts(tree: object, found: Index, file: str) -> None:
         if isinstance(node, Tensor):
             found.tensors[name] = node
             continue
-        if isinstance(node, Record):
+        if isinstance(node, ScriptModule):
             found.modules[name] = node.kind
             node = node.fields
         inside: list[tuple[object, object]] = []
@@ -222,12 +222,12 @@ class _Machine:
         given, kind = self.stack.pop(), self.stack.pop()
         if given != () or not isinstance(kind, Name) or not kind.module.startswith(MODULE):
             raise ValueError("only TorchScript's modules are objects")
-        self.stack.append(Record(kind.name))
+        self.stack.append(ScriptModule(kind.name))
 
     def _build(self) -> None:
         """State goes into a module once; of a dictionary (a state dict's _metadata) it is left."""
         state, target = self.stack.pop(), self.stack[-1]
-        if isinstance(target, Record) and type(state) is dict and not target.fields:
+        if isinstance(target, ScriptModule) and type(state) is dict and not target.fields:
             target.fields = state
         elif type(target) is not dict:
             raise ValueError("only modules have a state")

@@ -19,7 +19,7 @@ class ColorMemory:
 
     def __init__(self, evaluator: Evaluator) -> None:
         self._evaluator = evaluator
-        self._parts: dict[Part, _Decoded] = {}
+        self._parts: dict[Part, _KeptColors] = {}
 
     def at(
         self, part: Part, control: Controls, eye: np.ndarray, seen: np.ndarray | None = None
@@ -36,7 +36,7 @@ class ColorMemory:
         colors = self._evaluator.color(control, eye, seen, None if last is None else last.colors)
         if same is not None and same.seen is not None and seen is not None:  # others came into view
             seen = seen | same.seen
-        self._parts[part] = _Decoded(control, np.array(eye), seen, colors)
+        self._parts[part] = _KeptColors(control, np.array(eye), seen, colors)
         return colors
 
     def forget_after(self, which: int, number: int) -> None:
@@ -46,7 +46,7 @@ class ColorMemory:
 
 
 @dataclass(frozen=True)
-class _Decoded:
+class _KeptColors:
     """Colours, and what they were decoded for."""
 
     control: Controls

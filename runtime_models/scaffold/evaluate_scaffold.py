@@ -54,7 +54,7 @@ def views_of(anchors: np.ndarray, eye: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Look:
+class EyeInputs:
     """What one eye sees: every anchor's inputs to the networks, every splat's opacity."""
 
     eye: tuple
@@ -92,9 +92,9 @@ class ScaffoldEvaluator:
             name: Network(name, model.networks[name], fixed, widths) for name in SCAFFOLD_HEADS
         }
         self._means = (model.anchors[:, None] + model.offsets).reshape(-1, 3)
-        self._look: Look | None = None
+        self._look: EyeInputs | None = None
 
-    def look(self, eye: np.ndarray | None, seen: np.ndarray | None = None) -> Look:
+    def look(self, eye: np.ndarray | None, seen: np.ndarray | None = None) -> EyeInputs:
         """The opacities seen from an eye (3,), metres in the object's frame; kept until it moves.
 
         seen: (A,) bool, the rest is absent; None: all, or as looked before from there.
@@ -108,7 +108,7 @@ class ScaffoldEvaluator:
             kept = self._look = self._look_from(place, seen)
         return kept
 
-    def _look_from(self, eye: np.ndarray, seen: np.ndarray | None) -> Look:
+    def _look_from(self, eye: np.ndarray, seen: np.ndarray | None) -> EyeInputs:
         model = self.model
         count, k = model.offsets.shape[:2]
         drawn, part = np.ones(count, bool), None
@@ -119,7 +119,7 @@ class ScaffoldEvaluator:
         features = None if bank is None else np.zeros_like(model.features)
         opacity = np.full((count, k), -1, np.float32)
         view = np.empty((count, 4), np.float32)
-        look = Look(tuple(eye), view, features, opacity, drawn.copy(), seen)
+        look = EyeInputs(tuple(eye), view, features, opacity, drawn.copy(), seen)
 
         def decode(rows: Rows) -> None:
             look.view[rows] = views_of(model.anchors[rows], eye)
@@ -169,7 +169,7 @@ class ScaffoldEvaluator:
         """(N, 3) display sRGB seen from an eye (3,); absent splats have any."""
         return self._color_of(self.look(eye))
 
-    def _color_of(self, look: Look) -> np.ndarray:
+    def _color_of(self, look: EyeInputs) -> np.ndarray:
         color = self._room("color", 3)
 
         def decode(rows: Rows) -> None:

@@ -40,7 +40,7 @@ class Header:
 
 
 @dataclass(frozen=True)
-class Section:
+class SplatSection:
     count: int
     room: int  # rows, those that nothing was put in with them
     bucket_size: int  # splats of a full bucket
@@ -87,7 +87,7 @@ def read_raw_ksplat(path: Path, reading: Reading) -> RawSplats:
     return raw
 
 
-def fill(raw: RawSplats, rows: slice, data: bytes, header: Header, section: Section) -> None:
+def fill(raw: RawSplats, rows: slice, data: bytes, header: Header, section: SplatSection) -> None:
     """Puts the splats of a section into their rows."""
     kind = row_of(header.level, section.degree)
     table = np.frombuffer(data, kind, section.count, section.rows_at)
@@ -123,7 +123,7 @@ def read_header(data: bytes, file: str) -> Header:
     return Header(level, sections, count, least, most, file)
 
 
-def read_sections(data: bytes, header: Header) -> list[Section]:
+def read_sections(data: bytes, header: Header) -> list[SplatSection]:
     """Those that hold splats, each with its parts inside the file.  Raises BadFile."""
     out, at = [], HEADER_SIZE + header.sections * SECTION_SIZE
     for i in range(header.sections):
@@ -139,7 +139,7 @@ def read_sections(data: bytes, header: Header) -> list[Section]:
     return out
 
 
-def read_section(data: bytes, header: Header, i: int, at: int) -> Section:
+def read_section(data: bytes, header: Header, i: int, at: int) -> SplatSection:
     """The i-th, whose parts begin at byte `at`.  Raises BadFile."""
     begins = HEADER_SIZE + i * SECTION_SIZE
     count, room, bucket_size, buckets, block, center_size, steps, _ = SECTION.unpack_from(
@@ -164,7 +164,7 @@ def read_section(data: bytes, header: Header, i: int, at: int) -> Section:
             )
         if not 0 < block < 1e18 or steps >= 1 << 24:
             raise BadFile(f"{what} has buckets of {block:g} m in {steps:,} steps.")
-    return Section(
+    return SplatSection(
         count, room, bucket_size, block, steps or RANGE, full, partly, degree, at, centers_at,
         rows_at, end,
     )  # fmt: skip
@@ -184,7 +184,7 @@ def row_of(level: int, degree: int) -> np.dtype:
     )
 
 
-def centers_of(data: bytes, header: Header, section: Section) -> np.ndarray:
+def centers_of(data: bytes, header: Header, section: SplatSection) -> np.ndarray:
     """(count, 3) metres: the centre of each splat's bucket.  Raises BadFile."""
     partly = np.frombuffer(data, "<u4", section.partly, section.lengths_at)
     buckets = section.full + section.partly

@@ -13,7 +13,7 @@ from shapeshift.scene.cameras.camera_list import (
     pinhole_view,
     read_name,
 )
-from shapeshift.scene.captures.colmap_tables import Lens, Posed, read_tables
+from shapeshift.scene.captures.colmap_tables import ColmapCamera, Posed, read_tables
 from shapeshift.scene.pose import Pose, View
 
 UNIT = 1e-2  # by which a quaternion's length may differ from 1: text files are rounded
@@ -38,7 +38,7 @@ def read_colmap_cameras(folder: Path, ending: str, reading: CameraReading) -> Ca
     )
 
 
-def view_of(image: Posed, lens: Lens, turn: np.ndarray, where: str) -> View:
+def view_of(image: Posed, lens: ColmapCamera, turn: np.ndarray, where: str) -> View:
     world_from_camera = turn @ camera_pose(image, where)
     return pinhole_view(world_from_camera, lens.focal, lens.centre, lens.size, where)
 

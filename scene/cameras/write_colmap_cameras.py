@@ -7,7 +7,14 @@ import numpy as np
 
 from shapeshift.runtime_models.files.whole_file import write_whole
 from shapeshift.scene.cameras.camera_list import CameraList, data_from_ours
-from shapeshift.scene.captures.colmap_tables import CAMERA, COUNT, IMAGE, LENS_NUMBERS, Lens, Posed
+from shapeshift.scene.captures.colmap_tables import (
+    CAMERA,
+    COUNT,
+    IMAGE,
+    LENS_NUMBERS,
+    ColmapCamera,
+    Posed,
+)
 from shapeshift.scene.pose import Pose
 
 PINHOLE = "PINHOLE"
@@ -32,14 +39,14 @@ def write_colmap_cameras(cameras: CameraList, folder: Path, ending: str) -> list
     return paths
 
 
-def tables_of(cameras: CameraList) -> tuple[dict[int, Lens], list[Posed]]:
+def tables_of(cameras: CameraList) -> tuple[dict[int, ColmapCamera], list[Posed]]:
     """COLMAP's rows: equal lenses once, numbers from 1 in the views' order."""
-    lenses: dict[Lens, int] = {}
+    lenses: dict[ColmapCamera, int] = {}
     posed, turn = [], data_from_ours()
     for i, (view, name) in enumerate(zip(cameras.views, cameras.names, strict=True)):
         camera_from_ours, fx, fy, cx, cy = view.pinhole()
         size = (int(view.size[0]), int(view.size[1]))
-        lens = Lens(PINHOLE, size, (float(fx), float(fy), float(cx), float(cy)))
+        lens = ColmapCamera(PINHOLE, size, (float(fx), float(fy), float(cx), float(cy)))
         number = lenses.setdefault(lens, len(lenses) + 1)
         pose = Pose.from_matrix(camera_from_ours @ np.linalg.inv(turn))
         name = name or f"{i:05d}.png"
@@ -47,7 +54,7 @@ def tables_of(cameras: CameraList) -> tuple[dict[int, Lens], list[Posed]]:
     return {number: lens for lens, number in lenses.items()}, posed
 
 
-def camera_bytes(lenses: dict[int, Lens]) -> bytes:
+def camera_bytes(lenses: dict[int, ColmapCamera]) -> bytes:
     rows = [
         CAMERA.pack(number, LENS_NUMBERS[lens.model], *lens.size)
         + struct.pack(f"<{len(lens.params)}d", *lens.params)
@@ -64,7 +71,7 @@ def image_bytes(posed: list[Posed]) -> bytes:
     return COUNT.pack(len(rows)) + b"".join(rows)
 
 
-def camera_text(lenses: dict[int, Lens]) -> bytes:
+def camera_text(lenses: dict[int, ColmapCamera]) -> bytes:
     rows = [
         " ".join([str(number), lens.model, *map(str, lens.size), *map(repr, lens.params)])
         for number, lens in lenses.items()

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from shapeshift.runtime_models.model import Stop
-from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.pose import View
 
 
@@ -20,7 +20,7 @@ class Photo:
     depth: Path | None = None  # metres along the view, of the same field of view
     depth_unit: float = 0.001  # metres a step, where the depth photo holds integers
     counts: tuple[float, float] | None = None  # numbers of a grey photo that stand for 0 and 1
-    lens: Lens | None = None  # of the file, where it bends lines: the view is without it
+    lens: ColmapCamera | None = None  # of the file, where it bends lines: the view is without it
 
     @property
     def file_size(self) -> tuple[int, int]:

@@ -33,7 +33,7 @@ AGAIN = "copy or export it again"
 
 
 @dataclass(frozen=True)
-class Lens:
+class ColmapCamera:
     """One row of COLMAP's table of cameras."""
 
     model: str
@@ -68,7 +68,7 @@ class Posed:
     name: str
     wxyz: tuple[float, ...]  # camera from world, OpenCV axes
     place: tuple[float, ...]  # (3,) of that transform
-    lens: int  # the Lens' number
+    lens: int  # of a ColmapCamera
 
 
 def find_model(folder: Path, tables: tuple[str, ...] = ("images",)) -> tuple[Path, str] | None:
@@ -80,7 +80,7 @@ def find_model(folder: Path, tables: tuple[str, ...] = ("images",)) -> tuple[Pat
     return None
 
 
-def read_tables(folder: Path, ending: str) -> tuple[dict[int, Lens], list[Posed]]:
+def read_tables(folder: Path, ending: str) -> tuple[dict[int, ColmapCamera], list[Posed]]:
     """Lenses by their number, and the images by theirs.  Raises BadFile."""
     cameras, images = folder / f"cameras{ending}", folder / f"images{ending}"
     for path in (cameras, images):
@@ -110,7 +110,7 @@ def mapped(path: Path) -> Iterator[bytes | mmap.mmap]:
         yield data
 
 
-def cameras_of_bytes(data: bytes | mmap.mmap, path: Path) -> dict[int, Lens]:
+def cameras_of_bytes(data: bytes | mmap.mmap, path: Path) -> dict[int, ColmapCamera]:
     count, at = count_of(data, CAMERA.size + 3 * 8, path), COUNT.size
     lenses = {}
     for _ in range(count):
@@ -125,7 +125,7 @@ def cameras_of_bytes(data: bytes | mmap.mmap, path: Path) -> dict[int, Lens]:
             raise short_of(path, count, "cameras")
         values = struct.unpack_from(f"<{params}d", data, at)
         at += 8 * params
-        lenses[number] = Lens(LENSES[model][0], (width, height), values)
+        lenses[number] = ColmapCamera(LENSES[model][0], (width, height), values)
     return lenses
 
 
@@ -160,7 +160,7 @@ def count_of(data: bytes | mmap.mmap, least: int, path: Path) -> int:
     return count
 
 
-def cameras_of_text(path: Path) -> dict[int, Lens]:
+def cameras_of_text(path: Path) -> dict[int, ColmapCamera]:
     lenses = {}
     for line, words in enumerate(map(str.split, text_lines(path)), 1):
         if not words or words[0].startswith("#"):
@@ -172,7 +172,9 @@ def cameras_of_text(path: Path) -> dict[int, Lens]:
         params = LENSES[LENS_NUMBERS[model]][2]
         if len(values) != 3 + params:
             raise BadFile(f"{path}, line {line}: {model} has {params} numbers after its size.")
-        lenses[int(values[0])] = Lens(model, (int(values[1]), int(values[2])), tuple(values[3:]))
+        lenses[int(values[0])] = ColmapCamera(
+            model, (int(values[1]), int(values[2])), tuple(values[3:])
+        )
     return lenses
 
 

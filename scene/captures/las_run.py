@@ -20,7 +20,7 @@ REFUSED = 2  # exit code where the last line of standard error says what is wron
 SECONDS, SECONDS_A_BYTE = 5, 1e-6
 
 
-class Unreadable(ValueError):
+class UnreadableCloud(ValueError):
     """What is wrong with a file, without its name."""
 
 
@@ -28,7 +28,7 @@ def las_points(path: Path, most: int, chunk_points: int = CHUNK) -> tuple[np.nda
     """(P, 3) float64 metres of about `most` points, and how many the file has.
 
     Thinned by taking every nth: scanners write line after line, so the density stays as it was.
-    Raises Unreadable.
+    Raises UnreadableCloud.
     """
     import laspy
     import lazrs
@@ -42,7 +42,7 @@ def las_points(path: Path, most: int, chunk_points: int = CHUNK) -> tuple[np.nda
             count = file.header.point_count
             size, there = file.header.point_format.size, path.stat().st_size
             if count * size > there * (UNPACKED if file.header.are_points_compressed else 1):
-                raise Unreadable(f"states {count:,} points of {size} bytes in {there:,} bytes")
+                raise UnreadableCloud(f"states {count:,} points of {size} bytes in {there:,} bytes")
             parts, step, at = [], max(-(-count // most), 1), 0
             at_once = max(min(chunk_points, CHUNK_BYTES // max(size, 1)), 1)
             for chunk in file.chunk_iterator(at_once):
@@ -50,12 +50,12 @@ def las_points(path: Path, most: int, chunk_points: int = CHUNK) -> tuple[np.nda
                 parts.append(np.stack([np.asarray(chunk[c])[rows] for c in "xyz"], axis=1))
                 at += len(chunk)
     except broken as error:
-        if isinstance(error, Unreadable):
+        if isinstance(error, UnreadableCloud):
             raise
         text = " ".join(str(error).split())
-        raise Unreadable(f"no LAS or LAZ that can be read ({text:.80})") from None
+        raise UnreadableCloud(f"no LAS or LAZ that can be read ({text:.80})") from None
     if not at or at != count:
-        raise Unreadable(f"states {count:,} points and has {at:,}")
+        raise UnreadableCloud(f"states {count:,} points and has {at:,}")
     return np.concatenate(parts).astype(np.float64), count
 
 
@@ -87,7 +87,7 @@ def main(given: str, wanted: str, most: str, memory: str) -> None:
     limit(os.path.getsize(given), int(memory))
     try:
         points, count = las_points(Path(given), int(most))
-    except Unreadable as error:
+    except UnreadableCloud as error:
         sys.stderr.write(f"\n{error}\n")
         sys.exit(REFUSED)
     np.savez(wanted, points=points, count=count)

@@ -13,7 +13,7 @@ from PIL import Image, UnidentifiedImageError
 from shapeshift.runtime_models.files.memory import GB, VARIABLE, Memory
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.captures.capture import Photo
-from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.undistort import lost, pinhole_of, undistorted
 
 MOST_PIXELS = 1 << 27
@@ -99,7 +99,7 @@ def over_black(image: Image.Image) -> Image.Image:
 
 
 def smaller(
-    image: Image.Image, file_size: tuple[int, int], lens: Lens | None, factor: int
+    image: Image.Image, file_size: tuple[int, int], lens: ColmapCamera | None, factor: int
 ) -> Image.Image:
     """The image with the sides of its file divided by `factor`, straight where a lens is given.
 

@@ -15,7 +15,7 @@ from shapeshift.scene.captures.las_run import (
     REFUSED,
     SECONDS,
     SECONDS_A_BYTE,
-    Unreadable,
+    UnreadableCloud,
     las_points,
 )
 
@@ -37,12 +37,12 @@ def read_las(path: Path, most: int) -> tuple[np.ndarray, int]:
     packed = refuse_head(path, where)
     try:
         return unpacked(path, most) if packed else las_points(path, most)
-    except Unreadable as error:
+    except UnreadableCloud as error:
         raise BadFile(f"{where}: {error}; copy it again") from None
 
 
 def unpacked(path: Path, most: int) -> tuple[np.ndarray, int]:
-    """las_points of a LAZ in a process of its own.  Raises Unreadable, whatever becomes of that."""
+    """las_points of a LAZ in a process of its own.  Raises UnreadableCloud alone."""
     script = str(Path(__file__).with_name("las_run.py"))
     patience = WAIT * (SECONDS + SECONDS_A_BYTE * path.stat().st_size)
     with tempfile.TemporaryDirectory() as folder:
@@ -56,11 +56,11 @@ def unpacked(path: Path, most: int) -> tuple[np.ndarray, int]:
                     timeout=patience,
                 )  # fmt: skip
             except subprocess.TimeoutExpired:
-                raise Unreadable("takes longer to unpack than it can have points") from None
+                raise UnreadableCloud("takes longer to unpack than it can have points") from None
         if done.returncode == REFUSED:
-            raise Unreadable(said.read_text(errors="replace").strip().splitlines()[-1])
+            raise UnreadableCloud(said.read_text(errors="replace").strip().splitlines()[-1])
         if done.returncode or not wanted.is_file():
-            raise Unreadable("no LAZ that can be unpacked")
+            raise UnreadableCloud("no LAZ that can be unpacked")
         with np.load(wanted) as file:
             return file["points"], int(file["count"])
 

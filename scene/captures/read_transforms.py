@@ -26,7 +26,7 @@ from shapeshift.scene.captures.capture_rules import (
     stops_from,
     with_counts,
 )
-from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 from shapeshift.scene.captures.depth_photo import NAMES as DEPTH_NAMES
 from shapeshift.scene.captures.depth_photo import depth_of, refuse_other_units
 from shapeshift.scene.captures.read_points import read_points
@@ -220,7 +220,7 @@ def find_image(path: Path) -> Path:
     return path
 
 
-def photo_of(shot: Shot, lens: Lens, world: CaptureWorld, folder: Path) -> Photo:
+def photo_of(shot: Shot, lens: ColmapCamera, world: CaptureWorld, folder: Path) -> Photo:
     entry, where = shot.entry, shot.where
     fields = Fields(entry, where)
     split = fields.text("split", "train")
@@ -238,7 +238,7 @@ def photo_of(shot: Shot, lens: Lens, world: CaptureWorld, folder: Path) -> Photo
     return replace(photo, mask=mask, split=SPLITS[split], depth=depth, depth_unit=unit)
 
 
-def lens_of(shot: Shot) -> Lens:
+def lens_of(shot: Shot) -> ColmapCamera:
     """The lens as the file states it, of the size that it states; else of that of the photo."""
     entry, where = shot.entry, shot.where
     fields = Fields(entry, where)
@@ -265,13 +265,13 @@ def lens_of(shot: Shot) -> Lens:
     if any(name in model for name in NO_PINHOLES):
         raise BadFile(f"{where} is of camera model {model:.40}, which no pinhole can stand for")
     if "FISHEYE" in model or entry.get("is_fisheye") is True:
-        return Lens("OPENCV_FISHEYE", size, (fx, fy, *centre, k1, k2, k3, k4))
+        return ColmapCamera("OPENCV_FISHEYE", size, (fx, fy, *centre, k1, k2, k3, k4))
     if k4:
         raise BadFile(
             f'{where} has k4 = {k4:g}, which only fisheye lenses have: "camera_model": '
             '"OPENCV_FISHEYE" says that it is one'
         )
-    return Lens("FULL_OPENCV", size, (fx, fy, *centre, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0))
+    return ColmapCamera("FULL_OPENCV", size, (fx, fy, *centre, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0))
 
 
 def focal_of(entry: Mapping, key: str, side: int, where: str) -> float:

@@ -1,6 +1,6 @@
 """Photos of a bent lens as a pinhole camera would have taken them, and what of them is lost.
 
-The distortion models are COLMAP's (pycolmap): a Lens maps tangents x/z, y/z of its camera's axes
+The distortion models are COLMAP's (pycolmap): a ColmapCamera maps tangents x/z, y/z of its axes
 (OpenCV: x right, y down) to pixels of the photo.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
-from shapeshift.scene.captures.colmap_tables import Lens
+from shapeshift.scene.captures.colmap_tables import ColmapCamera
 
 STRAIGHT = 0.5  # pixels that distortion may shift a corner by before it matters
 WIDEST = 1.75  # tangent of the half angle up to which a pinhole shows anything: 120 degrees
@@ -47,7 +47,7 @@ class Pinhole:
     size: tuple[int, int]  # pixels
 
 
-def pixels_of(lens: Lens, tangents: np.ndarray) -> np.ndarray:
+def pixels_of(lens: ColmapCamera, tangents: np.ndarray) -> np.ndarray:
     """(N, 2) pixels of the photo that lie at tangents (N, 2); NaN or far away where none does."""
     import pycolmap
 
@@ -57,7 +57,7 @@ def pixels_of(lens: Lens, tangents: np.ndarray) -> np.ndarray:
         return camera.img_from_cam(np.column_stack([tangents, np.ones(len(tangents))]))
 
 
-def is_straight(lens: Lens, where: str) -> bool:
+def is_straight(lens: ColmapCamera, where: str) -> bool:
     """Whether the lens shifts no corner by more than STRAIGHT pixels.  Raises BadFile."""
     focal, (width, height) = lens.focal, lens.size
     if not all(0 < f < np.inf for f in focal):
@@ -71,7 +71,7 @@ def is_straight(lens: Lens, where: str) -> bool:
 
 
 @lru_cache(maxsize=64)
-def fold(lens: Lens) -> float:
+def fold(lens: ColmapCamera) -> float:
     """The tangent up to which pixels move outwards in every direction; beyond it lenses fold back.
 
     Polynomials that were fitted to a photo do so a little beyond its corners.
@@ -87,7 +87,7 @@ def fold(lens: Lens) -> float:
 
 
 @lru_cache(maxsize=64)
-def pinhole_of(lens: Lens) -> Pinhole:
+def pinhole_of(lens: ColmapCamera) -> Pinhole:
     """The straight camera.  Raises BadFile where the lens leaves too little of the photo, or would
     make too much of it.
     """
@@ -119,7 +119,7 @@ def pinhole_of(lens: Lens) -> Pinhole:
     return Pinhole((fx, fy), (left * fx, up * fy), size)
 
 
-def straight_pixels(lens: Lens, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def straight_pixels(lens: ColmapCamera, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(len(y), len(x), 2) pixels of the photo at columns x and rows y of its straight camera.
 
     OUTSIDE where the lens has folded back.
@@ -134,7 +134,7 @@ def straight_pixels(lens: Lens, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def mesh(lens: Lens, size: tuple[int, int], by: float, pitch: int) -> tuple:
+def mesh(lens: ColmapCamera, size: tuple[int, int], by: float, pitch: int) -> tuple:
     """What Image.transform takes: boxes of an image of `size`, and their corners in the photo.
 
     by, pitch: as in `undistorted`.
@@ -159,7 +159,7 @@ def mesh(lens: Lens, size: tuple[int, int], by: float, pitch: int) -> tuple:
 
 
 def undistorted(
-    image: Image.Image, lens: Lens, size: tuple[int, int], by: float = 1, pitch: int = 1
+    image: Image.Image, lens: ColmapCamera, size: tuple[int, int], by: float = 1, pitch: int = 1
 ) -> Image.Image:
     """The photo as its straight camera sees it; where it shows nothing, 0.
 
@@ -172,7 +172,7 @@ def undistorted(
 
 
 @lru_cache(maxsize=8)
-def lost(lens: Lens, size: tuple[int, int], by: float) -> np.ndarray:
+def lost(lens: ColmapCamera, size: tuple[int, int], by: float) -> np.ndarray:
     """(H, W) bool which pixels of the straight camera, each `by` of its own, see past the photo."""
     x, y = ((np.arange(side) + 0.5) * by for side in size)
     edge, out = max(by / 2, 0.5), np.ones(size[::-1], bool)

@@ -190,7 +190,7 @@ def with_x_of(file: SceneFile, other: SceneFile) -> SceneFile:
 
 
 @dataclass(frozen=True)
-class Step:
+class HistoryStep:
     """A file, and in words the edit that led to it."""
 
     file: SceneFile
@@ -204,12 +204,12 @@ class Step:
 class History:
     """What the file was, is, and was before something was undone."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[HistoryStep, ...]
     at: int = 0  # the step that holds now
 
     @staticmethod
     def of(file: SceneFile, regions: tuple = ()) -> "History":
-        return History((Step(file, regions=regions),))
+        return History((HistoryStep(file, regions=regions),))
 
     @property
     def file(self) -> SceneFile:
@@ -238,7 +238,7 @@ class History:
             return self
         now = self.steps[self.at]
         keep = self.at if together and now.together == together else self.at + 1
-        steps = (*self.steps[:keep], Step(file, what, together, regions, more_bytes))
+        steps = (*self.steps[:keep], HistoryStep(file, what, together, regions, more_bytes))
         steps = steps[-MOST_STEPS - 1 :]
         while len(steps) > 2 and sum(step.bytes for step in steps) > MOST_BYTES:
             steps = steps[1:]

@@ -21,7 +21,7 @@ VIEWS = 8  # of the orbit on which two scenes are compared
 BENCH_SIZE, QUALITY_SIZE, CHART_SIZE = (640, 360), (256, 144), (1280, 720)
 
 
-def silent(*told: object) -> None:
+def silent(*progress: object) -> None:
     """Nobody listens."""
 
 
@@ -142,16 +142,18 @@ def chart(
         fastest = min(rows, key=lambda row: row.ms)
     """
     from shapeshift.app.charts.chart_measure import Pricing, open_pair
+    from shapeshift.app.charts.chart_scene import QUICK, Walk, make_chart_scene
     from shapeshift.app.charts.chart_settings import settings_of
-    from shapeshift.app.charts.chart_stage import QUICK, Walk, make_stage
 
     if frames < 0 or frames == 1:
         raise UsageError(f"frames is {frames}, expected 2 or more, or 0.")
     scene = opened(scene).at(x)
     walk = QUICK if quick else Walk()
-    stage = make_stage([scene.subject], None, size, replace(walk, frames=frames or walk.frames))
+    chart_scene = make_chart_scene(
+        [scene.subject], None, size, replace(walk, frames=frames or walk.frames)
+    )
     with open_pair(context, drawing) as (renderers, ctx):
-        pricing = Pricing(renderers, ctx, stage, scene.subject.background)
+        pricing = Pricing(renderers, ctx, chart_scene, scene.subject.background)
         named = settings_of(pricing.drawing, quick)
         known = {each.name: each for each in named}
         if unknown := [name for name in only if name not in known]:

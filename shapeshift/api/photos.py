@@ -12,7 +12,7 @@ from shapeshift.app.paths import plain
 if TYPE_CHECKING:
     from shapeshift.decomposition.poses.pose_report import PoseReport
 
-Told = Callable[[str, int, int], None]  # what is done now, how many of how many
+Progress = Callable[[str, int, int], None]  # what is done now, how many of how many
 
 
 def poses(
@@ -21,7 +21,7 @@ def poses(
     *,
     every: int = 1,
     masks: PathText | None = None,
-    progress: Told | None = None,
+    progress: Progress | None = None,
     **settings: Any,
 ) -> "PoseReport":
     """Finds where photos were taken from, upright, and writes a COLMAP folder for `train`.

@@ -49,7 +49,7 @@ class Renderer:
         self._stack = ExitStack()
         self._frames: FrameRenderer
         self._ctx: moderngl.Context | None
-        opened = open_renderer(context, drawing, tell=lambda text: None)
+        opened = open_renderer(context, drawing, report=lambda text: None)
         self._frames, self._ctx = self._stack.enter_context(opened)
         self._stats = FrameStats()
         if settings is not None:

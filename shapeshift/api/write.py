@@ -11,7 +11,7 @@ from shapeshift.api.arguments import PathText, Progress, X
 from shapeshift.api.edit import regions_of
 from shapeshift.api.opened import OpenedScene
 from shapeshift.api.read import opened
-from shapeshift.app.commands.exported import Look, Part, bake_part, check_output, is_folder
+from shapeshift.app.commands.exported import ExportLook, Part, bake_part, check_output, is_folder
 from shapeshift.app.commands.exported import export as export_parts
 from shapeshift.app.errors import UsageError
 from shapeshift.app.paths import plain
@@ -114,16 +114,16 @@ def save(scene: OpenedScene, path: PathText, overwrite: bool) -> Exported:
 
 def look_of(
     sh_degree: int, palette: bool, eye: Sequence[float] | None, origin: tuple = (0.0, 0.0, 0.0)
-) -> Look:
+) -> ExportLook:
     """How splats are baked.  Raises UsageError."""
     if sh_degree not in range(4):
         raise UsageError(f"sh_degree is {sh_degree}, expected 0 to 3.")
     if eye is None:
-        return Look(sh_degree, palette, None, origin)
+        return ExportLook(sh_degree, palette, None, origin)
     place = tuple(map(float, eye))
     if len(place) != 3 or not np.isfinite(place).all():
         raise UsageError(f"eye is {place}; three numbers in metres are wanted.")
-    return Look(sh_degree, palette, (place[0], place[1], place[2]), origin)
+    return ExportLook(sh_degree, palette, (place[0], place[1], place[2]), origin)
 
 
 def bake_scene(

@@ -73,9 +73,9 @@ def test_a_line_a_minute_says_what_is_under_way(monkeypatch, capsys):
     monkeypatch.setattr(progress, "LINE_EVERY_S", 0.05)
     with progress.lines("demo"):
         time.sleep(0.12)  # nothing says what is done
-        with progress.working("reading [bold]photos") as tell:
+        with progress.working("reading [bold]photos") as report:
             time.sleep(0.12)
-            tell("carving")
+            report("carving")
             time.sleep(0.12)
         for number in progress.tracked(range(4), "photographing [x]"):
             time.sleep(0.12 if number == 2 else 0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app import cli
-from shapeshift.app.charts.chart_stage import side_by_side
+from shapeshift.app.charts.chart_scene import side_by_side
 from shapeshift.app.commands.compare_sides import open_side
 from shapeshift.app.document import Document, open_document
 from shapeshift.app.errors import UsageError

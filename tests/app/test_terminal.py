@@ -13,7 +13,14 @@ from pathlib import Path
 import pytest
 
 from shapeshift.app import cli
-from shapeshift.app.terminal import CleanStream, clean_streams, open_console, say, tell, tell_json
+from shapeshift.app.terminal import (
+    CleanStream,
+    clean_streams,
+    open_console,
+    print_json,
+    print_text,
+    say,
+)
 from shapeshift.runtime_models.files.plain_text import LONGEST_LINE, UNSAFE
 from shapeshift.runtime_models.model import Stop
 from shapeshift.runtime_models.package.write_package import write_package
@@ -177,7 +184,7 @@ def test_what_anybody_prints_is_clean():
             warnings.showwarning = lambda text, *_: sys.stderr.write(f"{text}\n")
             warnings.warn(f"four {BAD}", stacklevel=1)
         say(f"five {BAD}\nsix", "seven")
-        tell(f"eight {BAD}\nnine")
+        print_text(f"eight {BAD}\nnine")
     assert arrived(out) == f"one {CLEAN}\ntwo\nthree {CLEAN}\neight {CLEAN}\nnine\n"
     assert arrived(err) == f"four {CLEAN}\nfive {CLEAN}\\nsix\nseven\n"
 
@@ -212,7 +219,7 @@ def test_json_keeps_its_meaning_whatever_the_encoding():
         out = io.TextIOWrapper(io.BytesIO(), encoding)
         value = {"name": f"{BAD} 漢字 😀", "long": "n" * 10**5}
         with redirect_stdout(out), clean_streams():
-            tell_json(value)
+            print_json(value)
         out.flush()
         assert json.loads(out.buffer.getvalue().decode(encoding)) == value
 

@@ -54,7 +54,7 @@ def test_each_way_has_six_steps():
         ("COMMANDS", "app/cli.py"),
         ("ReadingOptions", "app/opening.py"),
         ("TrainSettings", "training/settings.py"),
-        ("tell_json", "app/terminal.py"),
+        ("print_json", "app/terminal.py"),
         ("say", "app/terminal.py"),
     ],
 )
@@ -103,9 +103,9 @@ def test_a_command_is_a_dataclass_and_a_function(monkeypatch, capsys):
         times: int = 1
 
     def run(options: Options) -> int:
-        from shapeshift.app.terminal import tell
+        from shapeshift.app.terminal import print_text
 
-        tell(" ".join([f"hello {options.name}"] * options.times))
+        print_text(" ".join([f"hello {options.name}"] * options.times))
         return 0
 
     module = types.ModuleType("shapeshift.app.commands.greet")

@@ -1,6 +1,10 @@
 """CONVENTIONS.md, executed: an assert a row.  If one must change, look at every shader and file."""
 
+import ast
+from collections import defaultdict
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -143,3 +147,58 @@ def test_bad_arrays_say_what_and_where():
     anchors[3, 1] = np.nan
     with pytest.raises(ValueError, match=r"anchors has 1 NaN or Inf, first at \[3, 1\]"):
         AnchorModel(anchors, np.zeros((5, 16), np.float32), *rest)
+
+
+# ---- Names.  A verb says what it does to what; a name is one thing in the whole product.
+
+ROOT = Path(__file__).resolve().parents[2]
+PRODUCT = (
+    "app", "decomposition", "rasterizer", "renderer", "runtime_models", "scene", "shapeshift",
+    "training", "vr",
+)  # fmt: skip
+# Classes whose name is there more than once -> why.
+SHARED_NAMES = {
+    "Options": "each command has one, which the command line finds by name",
+    "Renderer": "the library's wraps the program's, for who imports shapeshift alone",
+    "Scene": "the library's wraps the program's, for who imports shapeshift alone",
+}
+BARE_VERBS = {"take", "tell", "put", "let", "told"}  # anything can be taken, told or put
+
+
+@cache
+def definitions() -> list[tuple[str, ast.AST]]:
+    """(file, node) of every class and function that the product defines, inner ones too."""
+    kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+    return [
+        (str(path.relative_to(ROOT)), node)
+        for folder in PRODUCT
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, kinds)
+    ]
+
+
+def test_functions_and_parameters_have_the_verb_of_what_they_do():
+    functions = [row for row in definitions() if not isinstance(row[1], ast.ClassDef)]
+    names = [
+        (f"{path}:{node.lineno}", name)
+        for path, node in functions
+        for name in [
+            getattr(node, "name", ""),
+            *(a.arg for a in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]),
+        ]
+    ]
+    assert len(functions) > 3000, "the walk has missed most of the product"
+    assert not [(place, name) for place, name in names if name.strip("_") in BARE_VERBS]
+
+
+def test_no_two_classes_have_one_name():
+    places = defaultdict(list)
+    for path, node in definitions():
+        if isinstance(node, ast.ClassDef):
+            places[node.name].append(path)
+    shared = {name: paths for name, paths in places.items() if len(paths) > 1}
+    assert shared.keys() == SHARED_NAMES.keys(), shared
+    assert {path.split("/")[0] for path in shared["Options"]} == {"app"}
+    for name in ("Renderer", "Scene"):
+        assert sorted(path.startswith("shapeshift/api/") for path in shared[name]) == [False, True]

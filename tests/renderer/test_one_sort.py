@@ -10,7 +10,7 @@ from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene, SceneObject
-from tests.support.renderer.frames import draw_told
+from tests.support.renderer.frames import draw_counted
 from tests.support.renderer.renderers import TILES, quads
 from tests.support.scene.object_scenes import (
     CYCLE,
@@ -31,7 +31,7 @@ SIZES = (8, 127, 128, 129, 255, 256, 257)  # of the first object: where blocks o
 
 
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
-    pictures, stats = draw_told(renderer, scene, views, **settings)
+    pictures, stats = draw_counted(renderer, scene, views, **settings)
     assert stats.sorts == (1 if settings.get("stereo_sort") != "each" else len(views))
     return pictures
 

@@ -19,7 +19,7 @@ from shapeshift.scene.scene import IDENTITY, Scene, SceneObject
 from shapeshift.scene.selectors.selector import Painted
 from shapeshift.scene.stereo import stereo_pair
 from shapeshift.training.evaluation.evaluate import ModelRenderer
-from tests.support.renderer.frames import draw_told
+from tests.support.renderer.frames import draw_counted
 from tests.support.splat_scenes import psnr_db, random_layers
 from tests.support.splats.scaffold_scenes import (
     CASES,
@@ -41,7 +41,7 @@ def test_tiles_are_the_oracle_from_every_eye(renderer, tmp_path, case):
     scene = in_scene(made(tmp_path, **CASES[case]), TURNED)
     pictures = []
     for eye in ((0, 0.3, 3), (2.5, 0, -1), (0.2, 0.1, 0.9)):
-        (image,), stats = draw_told(renderer, scene, [seen_from(*eye)])
+        (image,), stats = draw_counted(renderer, scene, [seen_from(*eye)])
         assert psnr_db(image, reference_image(scene, seen_from(*eye))) > 80
         assert stats.drawn > 20
         pictures.append(image)
@@ -55,7 +55,7 @@ def test_beside_other_objects_in_one_order(renderer, tmp_path):
         SceneObject("again", one, Pose(np.array([-0.4, 0, 0]), np.array([1.0, 0, 0, 0]))),
     ))  # fmt: skip
     view = seen_from(0, 0.3, 3)
-    (image,), stats = draw_told(renderer, both, [view])
+    (image,), stats = draw_counted(renderer, both, [view])
     assert psnr_db(image, reference_image(both, view)) > 80
     assert stats.geometry_runs == 3
 
@@ -66,13 +66,13 @@ def test_each_eye_sees_the_splats_that_it_sees_alone(renderer, tmp_path, order):
     one = made(tmp_path, anchors=60)
     both = Scene((SceneObject("scaffold", one, TURNED), SceneObject("layers", random_layers(200))))
     pair = stereo_pair(seen_from(0.3, 0.3, 2), 0.064)
-    images, stats = draw_told(renderer, both, pair, order=order)
+    images, stats = draw_counted(renderer, both, pair, order=order)
     assert (stats.geometry_runs, stats.color_runs) == (3, 4)  # layers stay where they are
     assert (stats.sorts, stats.color_sets) == (2, 2)
-    again, stats = draw_told(renderer, both, pair, order=order)
+    again, stats = draw_counted(renderer, both, pair, order=order)
     assert stats.geometry_runs == 2
     for eye, image, same in zip(pair, images, again, strict=True):
-        (by_itself,), _ = draw_told(renderer, both, [eye], order=order)
+        (by_itself,), _ = draw_counted(renderer, both, [eye], order=order)
         np.testing.assert_array_equal(image, by_itself)
         np.testing.assert_array_equal(same, by_itself)
 
@@ -80,7 +80,7 @@ def test_each_eye_sees_the_splats_that_it_sees_alone(renderer, tmp_path, order):
 def test_shared_both_eyes_are_decoded_once_for_their_middle(renderer, tmp_path):
     scene, view = in_scene(made(tmp_path, anchors=60)), seen_from(0.3, 0.3, 2)
     pair = stereo_pair(view, 0.064)
-    images, stats = draw_told(renderer, scene, pair, stereo_colors="shared")
+    images, stats = draw_counted(renderer, scene, pair, stereo_colors="shared")
     assert (stats.geometry_runs, stats.color_runs, stats.color_sets) == (1, 1, 1)
     for image, eye in zip(images, pair, strict=True):
         middle = reference_image(scene, eye, eye=view.world_from_eye.position)
@@ -90,12 +90,12 @@ def test_shared_both_eyes_are_decoded_once_for_their_middle(renderer, tmp_path):
 def test_decoded_again_only_when_the_eye_moves_far_enough(renderer, tmp_path):
     scene = in_scene(made(tmp_path, anchors=60))
     far = [seen_from(3 * np.sin(a), 0.2, 3 * np.cos(a)) for a in np.radians([0, 1, 3.5, 3.5])]
-    runs = [draw_told(renderer, scene, [view])[1].geometry_runs for view in far]
+    runs = [draw_counted(renderer, scene, [view])[1].geometry_runs for view in far]
     assert runs == [1, 1, 1, 0]
     runs, images = [], []
-    draw_told(renderer, Scene(()), [far[0]])
+    draw_counted(renderer, Scene(()), [far[0]])
     for view in far:
-        (image,), stats = draw_told(renderer, scene, [view], recolor_degrees=2.0)
+        (image,), stats = draw_counted(renderer, scene, [view], recolor_degrees=2.0)
         runs.append((stats.geometry_runs, stats.color_runs))
         images.append(image)
     assert runs == [(1, 1), (0, 0), (1, 1), (0, 0)]
@@ -117,33 +117,33 @@ def test_only_what_is_in_view_is_decoded_and_the_picture_is_the_same(renderer, t
         View(look_at(eye, eye + ahead), perspective(0.6, SIZE), 0.01, 50, SIZE)
         for ahead in np.stack([np.sin(turns), np.full(5, 0.1), np.cos(turns)], 1)
     ]
-    draw_told(renderer, Scene(()), views[:1])
-    whole = [draw_told(renderer, scene, [view])[0][0] for view in views]
-    draw_told(renderer, Scene(()), views[:1])
+    draw_counted(renderer, Scene(()), views[:1])
+    whole = [draw_counted(renderer, scene, [view])[0][0] for view in views]
+    draw_counted(renderer, Scene(()), views[:1])
     runs = []
     for view, image in zip(views, whole, strict=True):
-        (same,), stats = draw_told(renderer, scene, [view], skip_unseen=True)
+        (same,), stats = draw_counted(renderer, scene, [view], skip_unseen=True)
         assert np.array_equal(same, image)
         runs.append(stats.geometry_runs)
     assert runs[0] == runs[2] == runs[4] == 1
     assert runs[3] == 0
     seen = renderer._decoded[0].colored[0].anchors
     assert 0 < seen.sum() < len(seen) / 2
-    _, stats = draw_told(renderer, scene, [views[0]])
+    _, stats = draw_counted(renderer, scene, [views[0]])
     assert stats.geometry_runs == 1  # all are wanted now
-    assert draw_told(renderer, scene, [views[2]])[1].geometry_runs == 0
+    assert draw_counted(renderer, scene, [views[2]])[1].geometry_runs == 0
 
 
 def test_coming_nearer_counts_as_turning_does(renderer, tmp_path):
     """Levels and networks go by the distance, too: 2 degrees are 3.5 % of it."""
     scene = in_scene(made(tmp_path, anchors=120, levels=4))
     centre = scene.objects[0].model.anchors.mean(axis=0)
-    draw_told(renderer, Scene(()), [seen_from(0, 0, 3)])
+    draw_counted(renderer, Scene(()), [seen_from(0, 0, 3)])
     runs = []
     for away in (3.0, 2.95, 2.85, 2.85 * 1.03, 2.85 * 1.04):
         eye = centre + away * np.array([0, 0, 1])
         view = View(look_at(eye, centre), perspective(0.8, SIZE), 0.05, 50.0, SIZE)
-        runs.append(draw_told(renderer, scene, [view], recolor_degrees=2.0)[1].geometry_runs)
+        runs.append(draw_counted(renderer, scene, [view], recolor_degrees=2.0)[1].geometry_runs)
     assert runs == [1, 0, 1, 0, 1]
 
 
@@ -161,13 +161,13 @@ def test_no_splat_reaches_beyond_what_is_known_beforehand(tmp_path):
 
 def test_the_slider_decodes_nothing(renderer, tmp_path):
     model, view = made(tmp_path, anchors=60), seen_from(0, 0.2, 3)
-    draw_told(renderer, in_scene(model), [view])
-    (image,), stats = draw_told(renderer, in_scene(model, x=0.7), [view])
+    draw_counted(renderer, in_scene(model), [view])
+    (image,), stats = draw_counted(renderer, in_scene(model, x=0.7), [view])
     assert stats.geometry_runs == 0
     part = Painted.of(range(10), 60, 1.0)
     assert control_of(SceneObject("s", model, selectors=(part,))).shape == (60,)
     selected = in_scene(model, selectors=(part,))
-    (same,), stats = draw_told(renderer, selected, [view], skip_unseen=True)
+    (same,), stats = draw_counted(renderer, selected, [view], skip_unseen=True)
     assert stats.geometry_runs == 0
     assert np.array_equal(image, same)
 
@@ -186,8 +186,8 @@ def test_a_packages_scene_as_a_run_shows_the_same(renderer, tmp_path):
     demo = demo.with_anchors(free)
     run = read_model(write_run(from_anchors(demo, 0.0), tmp_path / "run", "split"))
     view = default_view(demo, (320, 180))
-    (image,), _ = draw_told(renderer, in_scene(demo), [view])
-    (same,), _ = draw_told(renderer, in_scene(run), [view])
+    (image,), _ = draw_counted(renderer, in_scene(demo), [view])
+    (same,), _ = draw_counted(renderer, in_scene(run), [view])
     assert psnr_db(same, image) > 60
 
 

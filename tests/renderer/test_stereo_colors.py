@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.renderer.colors.eye_colors import SHARED_DB, Look
+from shapeshift.renderer.colors.eye_colors import SHARED_DB, EyeColors
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models.colors.color_slope import color_slope
@@ -17,7 +17,7 @@ from shapeshift.scene.scene import Scene
 from shapeshift.scene.stereo import stereo_pair
 from tests.support.models import without_direction
 from tests.support.renderer.eye_scenes import APART, SCENES, TURNED, eyes
-from tests.support.renderer.frames import draw_told
+from tests.support.renderer.frames import draw_counted
 from tests.support.renderer.renderers import TILES, quads
 from tests.support.splat_scenes import alone, psnr_db, random_layers, random_model
 
@@ -31,8 +31,8 @@ RENDERERS = {
 
 def by_itself(renderer: Renderer, scene: Scene, view: View) -> np.ndarray:
     """The eye alone, from a renderer that has forgotten what it drew before."""
-    draw_told(renderer, Scene(()), [view])
-    return draw_told(renderer, scene, [view])[0][0]
+    draw_counted(renderer, Scene(()), [view])
+    return draw_counted(renderer, scene, [view])[0][0]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -40,7 +40,7 @@ def by_itself(renderer: Renderer, scene: Scene, view: View) -> np.ndarray:
 def test_each_eye_is_the_eye_drawn_alone(renderer, name, wish):
     """To the last bit: nothing is shared but the order, and that is the same for parallel eyes."""
     scene, pair = SCENES[name](), eyes()
-    images, stats = draw_told(renderer, scene, pair, stereo_colors=wish)
+    images, stats = draw_counted(renderer, scene, pair, stereo_colors=wish)
     assert stats.color_sets == (1 if name == "nothing" and wish == "auto" else 2)
     for view, image in zip(pair, images, strict=True):
         same_picture(renderer, image, by_itself(renderer, scene, view))
@@ -63,7 +63,7 @@ def test_lenses_off_centre_and_of_other_sizes_and_more_than_two_views(renderer):
     third = View(look_at((1.5, 0.2, -1), (0, 0, 0)), lens, 0.05, 50, (50, 40))
     scene = SCENES["both"]()
     for group in (leaning, [left, smaller], [left, right, third], [third, left, right, smaller]):
-        images, stats = draw_told(renderer, scene, group)
+        images, stats = draw_counted(renderer, scene, group)
         assert stats.color_sets == len(group)
         for view, image in zip(group, images, strict=True):
             # The first of two pairs may be sorted with the others: equal depths, other rounding.
@@ -74,11 +74,11 @@ def test_lenses_off_centre_and_of_other_sizes_and_more_than_two_views(renderer):
 def test_shared_colours_are_those_of_the_middle(renderer, name):
     """And they differ from an eye's own by what the setting costs: else nothing here is tested."""
     scene, pair = SCENES[name](), eyes()
-    images, stats = draw_told(renderer, scene, pair, stereo_colors="shared")
+    images, stats = draw_counted(renderer, scene, pair, stereo_colors="shared")
     assert stats.color_sets == 1
     middle = replace(pair[0], world_from_eye=eyes(0.0)[0].world_from_eye)
     assert psnr_db(images[0], by_itself(renderer, scene, pair[0])) < 75
-    near, _ = draw_told(renderer, scene, eyes(1e-7), stereo_colors="shared")
+    near, _ = draw_counted(renderer, scene, eyes(1e-7), stereo_colors="shared")
     assert psnr_db(near[0], by_itself(renderer, scene, middle)) > 80
 
 
@@ -87,33 +87,33 @@ def test_settings_may_change_from_frame_to_frame(renderer):
     scene, pair = SCENES["both"](), eyes()
     wanted = {}
     for wish in ("each", "shared"):
-        draw_told(renderer, Scene(()), pair)
-        wanted[wish] = draw_told(renderer, scene, pair, stereo_colors=wish)[0]
+        draw_counted(renderer, Scene(()), pair)
+        wanted[wish] = draw_counted(renderer, scene, pair, stereo_colors=wish)[0]
     single = by_itself(renderer, scene, pair[1])
     for wish in ("each", "shared", "each", "each", "shared"):
-        got, _ = draw_told(renderer, scene, pair, stereo_colors=wish)
+        got, _ = draw_counted(renderer, scene, pair, stereo_colors=wish)
         for one, other in zip(got, wanted[wish], strict=True):
             np.testing.assert_array_equal(one, other)
-        alone_now = draw_told(renderer, scene, pair[1:], stereo_colors=wish)[0][0]
+        alone_now = draw_counted(renderer, scene, pair[1:], stereo_colors=wish)[0][0]
         np.testing.assert_array_equal(alone_now, single)
 
 
 def test_at_rest_nothing_is_computed_again(renderer):
     scene, pair = SCENES["both"](), eyes()
-    draw_told(renderer, Scene(()), pair)
-    assert draw_told(renderer, scene, pair)[1].color_runs == 4  # two objects that are seen
-    assert draw_told(renderer, scene, pair)[1].color_runs == 0
+    draw_counted(renderer, Scene(()), pair)
+    assert draw_counted(renderer, scene, pair)[1].color_runs == 4  # two objects that are seen
+    assert draw_counted(renderer, scene, pair)[1].color_runs == 0
     moved = [*pair[:1], eyes(0.07)[1]]
-    assert draw_told(renderer, scene, moved)[1].color_runs == 2, "the right eye's alone"
+    assert draw_counted(renderer, scene, moved)[1].color_runs == 2, "the right eye's alone"
 
 
 @pytest.mark.parametrize("changes", [{"recolor_degrees": 3.0}, {"skip_unseen": True}])
 def test_shortcuts_of_colour_work_for_each_eye(renderer, changes):
     scene, pair = SCENES["both"](), eyes()
-    draw_told(renderer, Scene(()), pair)
-    first, _ = draw_told(renderer, scene, pair, **changes)
+    draw_counted(renderer, Scene(()), pair)
+    first, _ = draw_counted(renderer, scene, pair, **changes)
     nearly = eyes(away=1.81)
-    images, stats = draw_told(renderer, scene, nearly, **changes)
+    images, stats = draw_counted(renderer, scene, nearly, **changes)
     kept = "recolor_degrees" in changes
     assert (stats.color_runs == 0) == kept
     for view, image, before in zip(nearly, images, first, strict=True):
@@ -123,12 +123,12 @@ def test_shortcuts_of_colour_work_for_each_eye(renderer, changes):
 
 def test_debug_pictures_of_two_eyes_have_their_numbers_in_both(renderer):
     scene, pair = SCENES["both"](), eyes()
-    plain, _ = draw_told(renderer, scene, pair)
+    plain, _ = draw_counted(renderer, scene, pair)
     for name in ("depth", "object", "culls", "overdraw"):
-        draw_told(renderer, scene, pair, debug=name)
+        draw_counted(renderer, scene, pair, debug=name)
         pictures = [renderer.resolved(i) for i in range(2)]
         assert psnr_db(*pictures) > 12, "the same numbers in the same colours"
-    after, _ = draw_told(renderer, scene, pair)
+    after, _ = draw_counted(renderer, scene, pair)
     for one, other in zip(plain, after, strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -171,35 +171,35 @@ def test_the_slope_of_networks():
 def test_nothing_that_is_absent_counts():
     layers = random_layers(50, coefficients=4)
     assert color_slope(replace(layers, opacity=np.zeros(50, np.float32))) == 0
-    assert Look.of(replace(layers, opacity=np.zeros(50, np.float32))).shared_db(
+    assert EyeColors.of(replace(layers, opacity=np.zeros(50, np.float32))).shared_db(
         np.array([[-1.0, 0, 0], [1, 0, 0]])
     ) == np.inf  # fmt: skip
 
 
 def test_the_reckoning_is_the_formula():
     """A hundred splats 2 m off, eyes 64 mm apart: 20 log10(d / (slope apart / 2))."""
-    look = Look(np.tile([0.0, 0, -2], (100, 1)), 0.1)
+    look = EyeColors(np.tile([0.0, 0, -2], (100, 1)), 0.1)
     pair = np.array([[-APART / 2, 0, 0], [APART / 2, 0, 0]])
     assert look.shared_db(pair) == pytest.approx(20 * np.log10(2 / (0.1 * APART / 2)))
     assert look.shared_db(pair * 10) == pytest.approx(look.shared_db(pair) - 20)
     assert look.shared_db(pair * 0) == np.inf
-    assert Look(look.places, np.inf).shared_db(pair) < -100
-    assert Look(look.places, 0.0).shared_db(pair) == np.inf
-    assert Look(np.zeros((1, 3)), 0.1).shared_db(pair) < 0, "an eye in a splat"
+    assert EyeColors(look.places, np.inf).shared_db(pair) < -100
+    assert EyeColors(look.places, 0.0).shared_db(pair) == np.inf
+    assert EyeColors(np.zeros((1, 3)), 0.1).shared_db(pair) < 0, "an eye in a splat"
 
 
 @pytest.mark.parametrize("name", ["harmonics", "networks"])
 def test_auto_shares_just_where_it_says(renderer, name):
     """On either side of the bound; where colours are shared the picture is better than that."""
     scene = SCENES[name]()
-    look = Look.of(scene.objects[0].model)
+    look = EyeColors.of(scene.objects[0].model)
     nearest = eyes(away=3.0)[0].world_from_eye.position - TURNED.position
     # So far apart that the reckoning says SHARED_DB: it goes by 1 / apart.
     object_eyes = np.array([[-0.5, 0, 0], [0.5, 0, 0]]) + TURNED.matrix()[:3, :3].T @ nearest
     apart = 10 ** ((look.shared_db(object_eyes) - SHARED_DB) / 20)
     for part, sets in ((0.98, 1), (1.02, 2)):
         pair = eyes(apart * part, away=3.0)
-        images, stats = draw_told(renderer, scene, pair)
+        images, stats = draw_counted(renderer, scene, pair)
         assert stats.color_sets == sets
         if sets == 1:
             for view, image in zip(pair, images, strict=True):
@@ -208,7 +208,7 @@ def test_auto_shares_just_where_it_says(renderer, name):
 
 def test_colours_that_look_at_no_eye_are_shared(renderer):
     for model in (random_layers(200, coefficients=1), without_direction(random_model(20))):
-        _, stats = draw_told(renderer, alone(model), eyes(0.3))
+        _, stats = draw_counted(renderer, alone(model), eyes(0.3))
         assert (stats.color_sets, stats.color_runs) == (1, 1)
 
 
@@ -220,8 +220,8 @@ def test_a_trained_leg_in_both_eyes(renderer, data):
     away = np.linalg.norm(eye - centre)
     view = View(look_at(eye, centre), perspective(0.8, (160, 120)), 0.01, 100, (160, 120))
     pair = stereo_pair(view, APART / 1.8 * away)
-    shared, _ = draw_told(renderer, scene, pair, stereo_colors="shared")
-    images, stats = draw_told(renderer, scene, pair)
+    shared, _ = draw_counted(renderer, scene, pair, stereo_colors="shared")
+    images, stats = draw_counted(renderer, scene, pair)
     assert stats.color_sets == 2
     for view, image, before in zip(pair, images, shared, strict=True):
         wanted = by_itself(renderer, scene, view)

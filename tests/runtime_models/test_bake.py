@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.commands.exported import Look, Part, bake_part
+from shapeshift.app.commands.exported import ExportLook, Part, bake_part
 from shapeshift.renderer.colors.palette import LUMINANCE, palette_values
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.runtime_models.bake import (
@@ -145,9 +145,9 @@ def test_scaffold_models_are_baked_from_one_eye(tmp_path):
     assert error.mean() < 0.02
     flat = bake(model, 0.0, eye, sh_degree=0)
     assert np.abs(shade(flat.sh, toward) - whole.color[there]).mean() > 3 * error.mean()
-    splats = bake_part(Part(SceneObject("run", model)), Look())
+    splats = bake_part(Part(SceneObject("run", model)), ExportLook())
     assert any("--eye" in finding.done for finding in splats.findings)
-    other = bake_part(Part(SceneObject("run", model)), Look(eye=tuple(eye)))
+    other = bake_part(Part(SceneObject("run", model)), ExportLook(eye=tuple(eye)))
     np.testing.assert_array_equal(other.opacity, plain.opacity)
 
 
@@ -169,26 +169,26 @@ def as_layers(plain) -> SplatLayers:
 def test_a_region_looks_as_it_is_shown(model):
     inside = Sphere(centre=(0.3, 0, 0), radius=0.5, x=1.0, border=0.2)
     thing = SceneObject("random", model, selectors=(inside,))
-    plain = bake_part(Part(thing), Look())
+    plain = bake_part(Part(thing), ExportLook())
     view = default_view(model, (90, 60))
     wanted = drawn(thing, view=view)
     found = drawn(SceneObject("baked", as_layers(plain)), view=view)
     # The palette is laid over each splat here, and over the blended heat on screen.
     assert psnr(found, wanted) > 35
-    plainly = bake_part(Part(thing), Look(palette=False))
+    plainly = bake_part(Part(thing), ExportLook(palette=False))
     assert psnr(drawn(SceneObject("b", as_layers(plainly)), view=view), wanted) < 35
 
 
 def test_palette_of_layers_is_laid_over_each_color():
     layers = random_layers(200, coefficients=1, layers=1)
     stops = (Stop("heat", 0.0, "thermal", "ironbow"),)
-    plain = bake_part(Part(SceneObject("hot", replace(layers, stops=stops))), Look())
+    plain = bake_part(Part(SceneObject("hot", replace(layers, stops=stops))), ExportLook())
     there = layers.opacity >= LEAST_ALPHA
     up = np.tile(np.array([0, 1, 0], np.float32), (there.sum(), 1))
     false = palette_values(shade(layers.sh[there], up) @ LUMINANCE, "ironbow")
     np.testing.assert_allclose(shade(plain.sh, up), false, atol=1e-5)
     as_filed = bake_part(
-        Part(SceneObject("hot", replace(layers, stops=stops))), Look(palette=False)
+        Part(SceneObject("hot", replace(layers, stops=stops))), ExportLook(palette=False)
     )
     np.testing.assert_array_equal(as_filed.sh, layers.sh[there])
 
@@ -215,12 +215,12 @@ def test_inside_is_by_anchor_and_by_paint(model):
     thing = SceneObject("random", model)
     ball = Sphere(centre=(0.0, 0, 0), radius=0.6, x=0.0)
     near = np.linalg.norm(model.anchors, axis=1) <= 0.6
-    whole, part = (bake_part(Part(thing, i), Look(0)) for i in (None, (ball,)))
+    whole, part = (bake_part(Part(thing, i), ExportLook(0)) for i in (None, (ball,)))
     rows = np.repeat(near, 4)[evaluate(model, 0.0, np.zeros(3)).opacity >= LEAST_ALPHA]
     np.testing.assert_array_equal(part.means, whole.means[rows])
-    painted = bake_part(Part(thing, (Painted(near, 0.5),)), Look(0))
+    painted = bake_part(Part(thing, (Painted(near, 0.5),)), ExportLook(0))
     np.testing.assert_array_equal(painted.means, part.means)
-    both = bake_part(Part(thing, (ball, Painted(~near, 0.5))), Look(0))
+    both = bake_part(Part(thing, (ball, Painted(~near, 0.5))), ExportLook(0))
     np.testing.assert_array_equal(both.means, whole.means)
 
 
@@ -228,7 +228,7 @@ def test_objects_are_merged_where_they_stand():
     one, two = random_layers(70, seed=1), random_layers(50, seed=2, coefficients=16)
     pose = Pose(np.array([0.5, -0.2, 0.1]), np.array([0.5, 0.5, -0.5, 0.5]))
     things = (SceneObject("one", one), SceneObject("two", two, pose))
-    whole = merged([bake_part(Part(thing), Look()) for thing in things])
+    whole = merged([bake_part(Part(thing), ExportLook()) for thing in things])
     assert whole.sh.shape == (len(whole.means), 16, 3)
     whole = replace(whole, means=whole.means + np.float32(whole.origin))
     view = default_view(one, (90, 60))

@@ -12,7 +12,7 @@ from shapeshift.app.editor.state.camera.camera import (
     MAX_RADII,
     MIN_RADII,
     POLE,
-    Camera,
+    EditorCamera,
     Push,
 )
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -28,27 +28,27 @@ RADIUS = 0.7
 STOPS = (Stop("bone", 0.0), Stop("muscle", 0.5), Stop("skin", 1.0))
 
 
-def camera() -> Camera:
-    return Camera(orbit_path(1, CENTRE, RADIUS, SIZE)[0], CENTRE, RADIUS)
+def camera() -> EditorCamera:
+    return EditorCamera(orbit_path(1, CENTRE, RADIUS, SIZE)[0], CENTRE, RADIUS)
 
 
-def settle(cam: Camera, seconds: float = 5.0) -> Camera:
+def settle(cam: EditorCamera, seconds: float = 5.0) -> EditorCamera:
     cam.step(seconds)
     assert not cam.moving
     return cam
 
 
-def matrix(cam: Camera) -> np.ndarray:
+def matrix(cam: EditorCamera) -> np.ndarray:
     return cam.view(SIZE).world_from_eye.matrix()
 
 
-def where_on_screen(cam: Camera, point: np.ndarray) -> np.ndarray:
+def where_on_screen(cam: EditorCamera, point: np.ndarray) -> np.ndarray:
     view = cam.view(SIZE)
     clip = view.clip_from_eye() @ view.eye_from_world() @ np.r_[point, 1]
     return clip[:2] / clip[3]
 
 
-def assert_same_view(one: Camera, other: Camera, atol: float = 1e-9):
+def assert_same_view(one: EditorCamera, other: EditorCamera, atol: float = 1e-9):
     np.testing.assert_allclose(matrix(one), matrix(other), atol=atol)
 
 
@@ -62,7 +62,7 @@ def test_the_first_view_is_the_one_it_was_made_from():
     assert not camera().moving
     for other in orbit_path(5, CENTRE, RADIUS, SIZE):
         np.testing.assert_allclose(
-            matrix(Camera(other, CENTRE, RADIUS)), other.world_from_eye.matrix(), atol=1e-12
+            matrix(EditorCamera(other, CENTRE, RADIUS)), other.world_from_eye.matrix(), atol=1e-12
         )
 
 

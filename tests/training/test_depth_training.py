@@ -24,7 +24,7 @@ from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.photos import read
 from shapeshift.training.reference import decode_reference, image_loss_reference
 from shapeshift.training.settings import TrainSettings
-from shapeshift.training.step import Step
+from shapeshift.training.step import TrainingStep
 from shapeshift.training.supervision.targets import Targets
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
@@ -62,7 +62,7 @@ def test_every_gradient_of_a_step_with_depth(device, seed):
         return shown + SHARE * depth_loss_reference(metres, through, depth)
 
     rates = {name: np.array([1.0], np.float32) for name in parameters}
-    step = Step(device, LAYOUT, VOXEL, Adam(device, parameters, rates))
+    step = TrainingStep(device, LAYOUT, VOXEL, Adam(device, parameters, rates))
     image_loss, depth_loss = ImageLoss(device, size), DepthLoss(device, size)
     drawing = step.draw(view, control, BACKGROUND, with_depth=True)
     target = image_loss.target(device.upload(rgba), BACKGROUND)

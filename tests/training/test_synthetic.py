@@ -11,12 +11,12 @@ from shapeshift.scene.pose import View, look_at
 from shapeshift.training.synthetic import balls, workshop
 from shapeshift.training.synthetic.openness import FAR, Clearance
 from shapeshift.training.synthetic.placing import elbow, frame, inside, noise, run_of_pipe, turned
-from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, unit
+from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring, unit
 from shapeshift.training.synthetic.tracer import (
     Light,
+    Material,
     Place,
     Solid,
-    Surface,
     blocked,
     lit_share,
     look,
@@ -26,10 +26,10 @@ from shapeshift.training.synthetic.tracer import (
     trace,
 )
 
-PLAIN = Surface()
+PLAIN = Material()
 SHAPES = {
     "ball": Ball(0.7),
-    "box": Box((0.5, 0.3, 0.8)),
+    "box": Cuboid((0.5, 0.3, 0.8)),
     "cylinder": Cylinder(0.4, 0.6),
     "cone": Cylinder(0.6, 0.5, 0.0),
     "frustum": Cylinder(0.3, 0.5, 0.5),
@@ -141,7 +141,7 @@ def test_shadows():
 
 def test_photos_of_a_ball_cover_what_a_ball_covers():
     """The mask adds up to the projected area; edges are between object and background."""
-    place = Place.of([Solid(Ball(0.5), Surface((1.0, 1.0, 1.0)))])
+    place = Place.of([Solid(Ball(0.5), Material((1.0, 1.0, 1.0)))])
     view = View(look_at((0, 0, 5.0), (0, 0, 0)), (-0.2, 0.2, -0.2, 0.2), 0.1, 10.0, (60, 60))
 
     def white(o, d):
@@ -157,8 +157,8 @@ def test_photos_of_a_ball_cover_what_a_ball_covers():
 
 
 def test_openness_of_a_free_plane_and_of_a_corner():
-    floor = Solid(Box((1.0, 0.1, 1.0)), PLAIN, frame((0, -0.1, 0)))
-    wall = Solid(Box((0.1, 1.0, 1.0)), PLAIN, frame((-0.6, 0, 0)))
+    floor = Solid(Cuboid((1.0, 0.1, 1.0)), PLAIN, frame((0, -0.1, 0)))
+    wall = Solid(Cuboid((0.1, 1.0, 1.0)), PLAIN, frame((-0.6, 0, 0)))
     o, d = (
         np.array([[0.4, 1.0, 0], [-0.49, 1, 0], [0, 1, 0]]),
         np.array([[0.0, -1, 0]] * 2 + [[0, 1.0, 0]]),

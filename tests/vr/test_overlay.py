@@ -12,7 +12,7 @@ from shapeshift.vr.drawn import WRONG, Drawn, PanelQuad, arc, drawn_of
 from shapeshift.vr.frame import LOST
 from shapeshift.vr.glove import LIT, Capsule
 from shapeshift.vr.locomotion.locomotion import Comfort
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.teleport import Arc
 from shapeshift.vr.overlay import FINE, PLAIN, Overlay, box_of, capsule_mesh
 from shapeshift.vr.panel.carried import Carried, carry
@@ -122,9 +122,9 @@ def test_the_eyes_see_it_from_two_sides(overlay, target, panel):
 def test_a_world_of_any_scale_has_the_same_panel(overlay, target):
     """The eye in the world sees it where the eye in the room does: the room is all it needs."""
     turned = Pose(np.array([4.0, -2.0, 7.0]), np.array([0.9238795, 0, 0.3826834, 0]))
-    standing = Standing(turned, 3.0)
+    play_space = PlaySpace(turned, 3.0)
     place = LEFT.grip.position
-    assert pixel_of(standing.view(EYES[0]), standing.point(place)) == pixel_of(EYES[0], place)
+    assert pixel_of(play_space.view(EYES[0]), play_space.point(place)) == pixel_of(EYES[0], place)
 
 
 def test_the_picture_follows_the_texture(overlay, target, panel):

@@ -11,7 +11,7 @@ from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.world import FLOOR_NAME
 from shapeshift.vr.frame import SIDES, Pulse
 from shapeshift.vr.locomotion.locomotion import Travel, move
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import pinned, turned
 from shapeshift.vr.locomotion.teleport import ground_of
 from shapeshift.vr.touching import (
@@ -35,26 +35,26 @@ from tests.support.vr.vr_frames import LOST, at, frame, hand, tilted, yawed
 pytest.importorskip("rapier3d", reason="the physics engine is not installed")
 HZ = 90
 HERE = (0.2, 1.2, -0.4)  # of the right hand
-HOME = Standing()
-ROOM = Standing(Pose(np.array([3.0, 0.5, -1]), yawed(0.9)), 1.0)
+HOME = PlaySpace()
+ROOM = PlaySpace(Pose(np.array([3.0, 0.5, -1]), yawed(0.9)), 1.0)
 
 
-def world_with(*places, standing=HOME, **named):
+def world_with(*places, play_space=HOME, **named):
     """Boxes of 10 cm at places of the room."""
     names = "abcdef"
     items = [
-        item(names[i], position=tuple(standing.point(np.array(place))), **named)
+        item(names[i], position=tuple(play_space.point(np.array(place))), **named)
         for i, place in enumerate(places)
     ]
     return real(*items, floor_y=None, gravity_m_s2=0.0)
 
 
-def run(world, frames, touching=None, standing=HOME, seconds=1 / HZ):
+def run(world, frames, touching=None, play_space=HOME, seconds=1 / HZ):
     """As a headset's loop does it, without locomotion; all that was told."""
     touching, told, records = touching or Touching(seen=frozenset(SIDES)), [], []
     for one in frames:
-        touching, touched = touch(world, touching, one, standing)
-        follow(world, one, standing, False)
+        touching, touched = touch(world, touching, one, play_space)
+        follow(world, one, play_space, False)
         records = world.advance(seconds)
         felt = feel(world, records)
         told.append(replace(touched, pulses=strongest([*touched.pulses, *felt])))
@@ -73,8 +73,8 @@ def test_a_squeeze_takes_the_nearest_within_reach_at_every_scale(scale):
     for gap, taken in ((0.09, "a"), (0.11, None)):
         place = np.array(HERE) - [0, 0, gap + 0.05 / scale]
         level = replace(room, world_from_play=Pose(room.world_from_play.position, at(0, 0, 0).wxyz))
-        world = world_with(place, standing=level)
-        touching, told = run(world, [OPEN, SQUEEZE], standing=level)
+        world = world_with(place, play_space=level)
+        touching, told = run(world, [OPEN, SQUEEZE], play_space=level)
         assert told[-1].held == {"left": None, "right": taken}
         assert touching.busy == (frozenset({"right"}) if taken else frozenset())
         assert at_rest(SQUEEZE, touching).hands["right"].squeeze == (0.0 if taken else 1.0)
@@ -82,11 +82,11 @@ def test_a_squeeze_takes_the_nearest_within_reach_at_every_scale(scale):
 
 @pytest.mark.parametrize("scale", [1.0, 0.3, 3.0])
 def test_what_a_squeeze_would_take_is_offered_first(scale):
-    level = Standing(Pose(ROOM.world_from_play.position, at(0, 0, 0).wxyz), scale)
+    level = PlaySpace(Pose(ROOM.world_from_play.position, at(0, 0, 0).wxyz), scale)
     for gap, offered in ((REACH_M - 0.01, True), (REACH_M + 0.01, False)):
         place = np.array(HERE) - [0, 0, gap + 0.05 / scale]
-        world = world_with(place, standing=level)
-        touching, told = run(world, [OPEN], standing=level)
+        world = world_with(place, play_space=level)
+        touching, told = run(world, [OPEN], play_space=level)
         assert told[-1].offers == ((Offer("right", "a", "hand"),) if offered else ())
         _, told = run(world, [SQUEEZE], touching, level)
         assert (told[-1].held["right"] == "a") == offered, "what is offered is what is taken"
@@ -115,11 +115,11 @@ def test_reach_is_a_hand_s():
 @pytest.mark.parametrize("scale", [1.0, 0.5])
 def test_what_is_let_go_flies_with_the_hand(rate, scale):
     room = replace(ROOM, scale=scale)
-    world = world_with(HERE, standing=room)
+    world = world_with(HERE, play_space=room)
     speed = np.array([1.0, 1.4, -0.8])  # m/s in the room
     away = [np.array(HERE) + speed * i / rate for i in range(rate // 3)]
     moving = [frame(right=hand("right", place, squeeze=1.0)) for place in away]
-    touching, told = run(world, [SQUEEZE, *moving], standing=room, seconds=1 / rate)
+    touching, told = run(world, [SQUEEZE, *moving], play_space=room, seconds=1 / rate)
     assert told[-1].held["right"] == "a"
     lag = world.objects["a"].pose.position - room.point(away[-1])
     assert np.linalg.norm(lag) <= 0.005 + np.linalg.norm(speed) * scale / 90
@@ -160,7 +160,7 @@ def test_a_hand_whose_object_was_taken_away_does_not_hold_the_world():
     touching, told = run(world, [SQUEEZE], touching)
     assert told[-1].held["right"] is None
     assert at_rest(SQUEEZE, touching).hands["right"].squeeze == 0
-    _, travel, _ = move(Standing(), Travel(), at_rest(SQUEEZE, touching), 1 / HZ)
+    _, travel, _ = move(PlaySpace(), Travel(), at_rest(SQUEEZE, touching), 1 / HZ)
     assert not travel.grips
     touching, _ = run(world, [OPEN, SQUEEZE], touching)
     assert at_rest(SQUEEZE, touching).hands["right"].squeeze == 1
@@ -185,9 +185,11 @@ AHEAD = (HERE[0], HERE[1], HERE[2] - 1.0)
 
 def test_a_trigger_acts_once_a_pull_on_what_it_meets_first():
     hits = reaction("ray", "fire", cooldown_s=0.0)
-    for room in (Standing(), replace(ROOM, scale=0.5)):
-        world = world_with(AHEAD, (HERE[0], HERE[1], HERE[2] - 2), standing=room, reactions=(hits,))
-        touching, told = run(world, [aimed(trigger=0.6), aimed(trigger=0.9)], standing=room)
+    for room in (PlaySpace(), replace(ROOM, scale=0.5)):
+        world = world_with(
+            AHEAD, (HERE[0], HERE[1], HERE[2] - 2), play_space=room, reactions=(hits,)
+        )
+        touching, told = run(world, [aimed(trigger=0.6), aimed(trigger=0.9)], play_space=room)
         [seen], [shot] = told[0].beams, told[1].beams
         assert not seen.acts and seen.meets == "a" and told[0].pulses == ()
         assert shot.acts and shot.meets == "a" and told[1].pulses == (Pulse("right", *ACTED),)
@@ -263,8 +265,8 @@ def test_how_strong_a_blow_is():
 
 
 def test_a_snap_turn_takes_what_is_held_along():
-    world = world_with(HERE, (0.0, 1.2, -0.62), standing=ROOM)
-    touching, _ = run(world, [SQUEEZE] * 20, standing=ROOM)
+    world = world_with(HERE, (0.0, 1.2, -0.62), play_space=ROOM)
+    touching, _ = run(world, [SQUEEZE] * 20, play_space=ROOM)
     other = world.objects["b"].pose.position
     snap = frame(right=hand(squeeze=1.0, stick=(-1.0, 0)))
     touching, _ = touch(world, touching, snap, ROOM)
@@ -282,7 +284,7 @@ def test_a_snap_turn_takes_what_is_held_along():
 
 
 def test_walking_takes_what_is_held_along():
-    world = world_with(HERE, standing=ROOM)
+    world = world_with(HERE, play_space=ROOM)
     touching, room, travel = Touching(seen=frozenset(SIDES)), ROOM, Travel()
     walks = frame(left=hand("left", stick=(0, 1)), right=hand(squeeze=1.0))
     for _ in range(90):
@@ -301,8 +303,8 @@ def test_walking_takes_what_is_held_along():
 
 
 def test_a_new_origin_takes_what_is_held_along():
-    world = world_with(HERE, standing=ROOM)
-    touching, _ = run(world, [SQUEEZE] * 10, standing=ROOM)
+    world = world_with(HERE, play_space=ROOM)
+    touching, _ = run(world, [SQUEEZE] * 10, play_space=ROOM)
     other = pinned(turned(ROOM, 1.0, np.zeros(3)), np.zeros(3), np.array([9.0, 2, 1]))
     new = frame(right=hand("right", (0.5, 1.0, 0.3), squeeze=1.0), recentred=True)
     touch(world, touching, new, other)
@@ -350,7 +352,7 @@ def test_without_a_floor_there_is_the_level_one_stands_on():
 def test_a_jump_into_a_world_of_bodies():
     world = room_with_wall()
     held = frame(right=hand("right", (0.2, 1.2, 0.0), wxyz=tilted(-0.4), primary=True))
-    room, travel, comfort = move(Standing(), Travel(), held, 1 / HZ, ground=ground_of(world))
+    room, travel, comfort = move(PlaySpace(), Travel(), held, 1 / HZ, ground=ground_of(world))
     assert comfort.arc.fine
     landing = room.point(comfort.arc.landing)
     let_go = frame(right=replace(held.hands["right"], primary=False))

@@ -7,7 +7,7 @@ import pytest
 
 from shapeshift.scene.pose import Pose
 from shapeshift.vr.floor import REST, Floor, Grid, clearness, spacing_of
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from tests.support.vr.vr_hands import HEAD, eyes, pixel_of
 
 SIZE = (500, 450)
@@ -34,13 +34,13 @@ def target(ctx):
 
 
 def picture(
-    floor, target, view=DOWN[0], standing=None, coverage=None, grid=CLEAR, background=DARK
+    floor, target, view=DOWN[0], play_space=None, coverage=None, grid=CLEAR, background=DARK
 ) -> np.ndarray:
     """(H, W, 4) uint8, row 0 on top."""
     target.clear(*background, 1.0)
     nothing = np.zeros((4, 4), np.float32)
     hidden = nothing if coverage is None else coverage
-    floor.draw(target, view, standing or Standing(), hidden, grid, background)
+    floor.draw(target, view, play_space or PlaySpace(), hidden, grid, background)
     return np.frombuffer(target.read(components=4), np.uint8).reshape(*SIZE[::-1], 4)[::-1]
 
 
@@ -124,8 +124,8 @@ def test_the_context_is_as_it_was(ctx, floor, target):
 @pytest.mark.parametrize("away", [(100.0, 0.0, -300.0), (9000.0, 0.0, 4000.0)])
 def test_far_from_the_origin_it_is_the_same(floor, target, away):
     """A hundred metres are a multiple of all lines."""
-    there = Standing(Pose(np.array(away), np.array([1.0, 0, 0, 0])))
-    difference = light(picture(floor, target)) - light(picture(floor, target, standing=there))
+    there = PlaySpace(Pose(np.array(away), np.array([1.0, 0, 0, 0])))
+    difference = light(picture(floor, target)) - light(picture(floor, target, play_space=there))
     assert np.abs(difference).max() <= 1
 
 
@@ -135,7 +135,7 @@ def test_the_grid_stays_with_the_world_as_one_walks(floor, target):
 
     def after(metres: float) -> np.ndarray:
         return light(
-            picture(floor, target, standing=Standing(Pose(np.array([metres, 0, 0]), LEVEL)))
+            picture(floor, target, play_space=PlaySpace(Pose(np.array([metres, 0, 0]), LEVEL)))
         )
 
     assert np.abs(after(0.5) - start).max() > 25
@@ -150,7 +150,7 @@ def test_no_line_jumps_while_the_world_is_scaled(floor, target):
     """Across a power of ten the lines of a tenth take over from those that were fine."""
     for edge in (0.1, 1.0, 10.0):
         low, high = (
-            light(picture(floor, target, standing=Standing(scale=edge * factor)))
+            light(picture(floor, target, play_space=PlaySpace(scale=edge * factor)))
             for factor in (1 - 1e-6, 1 + 1e-6)
         )
         assert np.abs(low - high).max() <= 2
@@ -166,13 +166,13 @@ def test_from_below_and_at_the_level_itself_nothing_breaks(floor, target):
 
 
 def test_clearness_rises_at_once_and_falls_slowly():
-    here, there = Standing(), Standing(Pose(np.array([0.1, 0, 0]), LEVEL))
+    here, there = PlaySpace(), PlaySpace(Pose(np.array([0.1, 0, 0]), LEVEL))
     rising = REST
     for _ in range(18):  # a fifth of a second
         rising = clearness(rising, here, there, 1 / 90)
     assert rising > 0.9
     falling = clearness(rising, there, there, 0.35)
     assert REST < falling < rising and clearness(falling, there, there, 10.0) == pytest.approx(REST)
-    for moved in (replace(here, scale=2.0), Standing(Pose(np.zeros(3), np.array([0, 1.0, 0, 0])))):
+    for moved in (replace(here, scale=2.0), PlaySpace(Pose(np.zeros(3), np.array([0, 1.0, 0, 0])))):
         assert clearness(REST, here, moved, 0.1) > 0.7
     assert clearness(REST, here, there, 0.0) == clearness(REST, here, there, -1.0) == REST

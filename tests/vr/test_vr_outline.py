@@ -10,7 +10,7 @@ from shapeshift.vr.card import HALF_CLEAR, card_picture
 from shapeshift.vr.frame import LOST, SIDES
 from shapeshift.vr.hints import FADES_S, SHOWN_S, hint_lines, hints
 from shapeshift.vr.locomotion.locomotion import Rules
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.openxr.bindings import PROFILES
 from shapeshift.vr.outline import AWAY_M, BY_HAND, Outlines, hull_of, outline
 from tests.support.vr.vr_hands import HEAD, a_frame, hand_at
@@ -45,10 +45,10 @@ def loop_of(lines) -> int:
 def test_the_outline_of_a_cube_is_its_silhouette():
     """Seen from a corner six of its edges, from straight before a face four."""
     hull = hull_of(CUBE)
-    assert loop_of(outline(hull, THERE, Standing(), EYE, BY_HAND)) == 6
+    assert loop_of(outline(hull, THERE, PlaySpace(), EYE, BY_HAND)) == 6
     ahead = np.add(THERE.position, (0.0, 0.0, 1.0))
-    assert loop_of(outline(hull, THERE, Standing(), ahead, BY_HAND)) == 4
-    for line in outline(hull, THERE, Standing(), ahead, BY_HAND):
+    assert loop_of(outline(hull, THERE, PlaySpace(), ahead, BY_HAND)) == 4
+    for line in outline(hull, THERE, PlaySpace(), ahead, BY_HAND):
         local = np.abs(np.stack([line.a, line.b]) - THERE.position)
         np.testing.assert_allclose(local, 0.05 + AWAY_M / 3**0.5, atol=1e-9)
 
@@ -56,7 +56,7 @@ def test_the_outline_of_a_cube_is_its_silhouette():
 def test_the_outline_of_a_ball_is_a_circle_around_it():
     """Its lines are at the right angle to the line of sight, where a tangent meets the ball."""
     centre, eye = THERE.position, EYE
-    lines = outline(hull_of(sphere()), THERE, Standing(), eye, BY_HAND)
+    lines = outline(hull_of(sphere()), THERE, PlaySpace(), eye, BY_HAND)
     assert loop_of(lines) > 20
     away = np.linalg.norm(eye - centre)
     along = (eye - centre) / away
@@ -69,18 +69,18 @@ def test_the_outline_of_a_ball_is_a_circle_around_it():
 @pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
 def test_it_is_in_the_room_at_any_size_of_the_world(scale):
     turn = Pose(np.array([4.0, -2.0, 7.0]), np.array([0.9238795325, 0, 0.3826834324, 0]))
-    standing = Standing(turn, scale)
-    at = standing.pose(THERE)
+    play_space = PlaySpace(turn, scale)
+    at = play_space.pose(THERE)
     hull = hull_of(CUBE * scale)
-    lines = outline(hull, at, standing, EYE, BY_HAND)
-    same = outline(hull_of(CUBE), THERE, Standing(), EYE, BY_HAND)
+    lines = outline(hull, at, play_space, EYE, BY_HAND)
+    same = outline(hull_of(CUBE), THERE, PlaySpace(), EYE, BY_HAND)
     found = {tuple(np.round((a.a + a.b) / 2, 6)) for a in lines}
     assert found == {tuple(np.round((b.a + b.b) / 2, 6)) for b in same}
     assert lines[0].radii == same[0].radii
 
 
 def test_from_inside_nothing_is_seen_of_it():
-    assert outline(hull_of(CUBE), THERE, Standing(), THERE.position, BY_HAND) == []
+    assert outline(hull_of(CUBE), THERE, PlaySpace(), THERE.position, BY_HAND) == []
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shapeshift.vr.openxr.swapchain import FORMATS, choose_format, read
-from shapeshift.vr.shown import WHOLE, Shown, middle
+from shapeshift.vr.shown import WHOLE, Blit, middle
 
 SIZE = (64, 48)
 GL_SRGB8_ALPHA8, GL_FRAMEBUFFER_SRGB = 0x8C43, 0x8DB9
@@ -31,7 +31,7 @@ def light(display: np.ndarray) -> np.ndarray:
 
 @pytest.fixture
 def shown(ctx):
-    made = Shown(ctx)
+    made = Blit(ctx)
     yield made
     made.release()
 

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import heading
 from tests.support.xr.person import pose_of
 
 
-def standing(line: dict) -> Standing:
-    return Standing(pose_of(line["standing"]), line["standing"]["scale"])
+def play_space(line: dict) -> PlaySpace:
+    return PlaySpace(pose_of(line["standing"]), line["standing"]["scale"])
 
 
 def feet(line: dict) -> np.ndarray:
     """(3,) metres of the world: the floor of the room below the head."""
-    return standing(line).point(np.array(line["head"]["position"]) * [1, 0, 1])
+    return play_space(line).point(np.array(line["head"]["position"]) * [1, 0, 1])
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_the_world_follows_the_hands_and_comes_back(person):
     person.controller("right").stick = (0.0, 0.0)
     high = person.frames(2)
     with person.pressing("right", "primary"):
-        assert standing(person.frames(2)).scale == standing(high).scale
+        assert play_space(person.frames(2)).scale == play_space(high).scale
         np.testing.assert_allclose(feet(person.line), feet(high), atol=1e-5)
     line = person.line
     assert abs(feet(line)[1] - floor_y) < 1e-4

@@ -14,7 +14,7 @@ from shapeshift.scene.document.scene_file import read_models, scene_of
 from shapeshift.scene.pose import Pose, View
 from shapeshift.scene.scene import Scene
 from shapeshift.vr.frame import SIDES
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from tests.support.xr.person import SIZE, pixel_of
 
 SCENE = Path(__file__).resolve().parents[2] / "assets" / "touch.scene.json"
@@ -28,9 +28,9 @@ def pose_of(row: dict) -> Pose:
 
 def eyes_of(line: dict) -> list[View]:
     """Both eyes in the world."""
-    standing = Standing(pose_of(line["standing"]), line["standing"]["scale"])
+    play_space = PlaySpace(pose_of(line["standing"]), line["standing"]["scale"])
     return [
-        standing.view(View(pose_of(row), tuple(row["tangents"]), 0.05, 1000.0, SIZE))
+        play_space.view(View(pose_of(row), tuple(row["tangents"]), 0.05, 1000.0, SIZE))
         for row in line["views"]
     ]
 

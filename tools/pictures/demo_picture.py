@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
 
 from shapeshift.app.drawing import save_png  # noqa: E402
-from shapeshift.app.stability_cases.stage import turned_about  # noqa: E402
+from shapeshift.app.stability_cases.case_context import turned_about  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.renderer.settings import RenderSettings  # noqa: E402
 from shapeshift.runtime_models.package.read_package import read_package  # noqa: E402

@@ -90,10 +90,10 @@ def rows_of(gpu: Gpu, anchors: int) -> list[tuple]:
     model = random_model(anchors)
     rows, lowest = [], floors(model)
 
-    def add(told: str, limit: float, jobs: dict[str, Callable]) -> None:
+    def add(back_end: str, limit: float, jobs: dict[str, Callable]) -> None:
         for job, work in jobs.items():
             ms = median_ms({"ours": work, "floor": lowest[job]})
-            rows.append((told, job, ms["ours"], ms["floor"], limit))
+            rows.append((back_end, job, ms["ours"], ms["floor"], limit))
 
     evaluator = Evaluator(model, keep=True)  # as the drawings have it
     room = np.empty((model.splat_count, 3), np.float32)
@@ -131,9 +131,9 @@ def main() -> None:
             "anchors,back_end,networks,cpu_ms,floor_ms,over_floor,limit",
         ]
         for anchors in counts:
-            for told, job, ms, floor, limit in rows_of(gpu, anchors):
+            for back_end, job, ms, floor, limit in rows_of(gpu, anchors):
                 lines.append(
-                    f'{anchors},"{told}",{job},{ms:.2f},{floor:.2f},{ms / floor:.2f},{limit:g}'
+                    f'{anchors},"{back_end}",{job},{ms:.2f},{floor:.2f},{ms / floor:.2f},{limit:g}'
                 )
     sys.stdout.write("\n".join(lines) + "\n")
 

@@ -20,7 +20,7 @@ import numpy as np
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parents[1])]
 
-from shapeshift.app.commands.exported import Look, Part, bake_part, export  # noqa: E402
+from shapeshift.app.commands.exported import ExportLook, Part, bake_part, export  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import SplatLayers, Stop  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
@@ -78,7 +78,7 @@ def measure(renderer: Renderer, name: str, model, x: float, folder: Path) -> lis
     stop = next((stop.name for stop in model.stops if stop.x == x), "")
     rows = []
     for degree in DEGREES:
-        look = Look(degree)
+        look = ExportLook(degree)
         baked = draw(renderer, as_object(bake_part(Part(thing), look)), views)
         for writer in WRITERS:
             if degree > writer.sh_degree:
@@ -90,8 +90,8 @@ def measure(renderer: Renderer, name: str, model, x: float, folder: Path) -> lis
             codes = [psnr(a, b) for a, b in zip(found, baked, strict=True)]
             row = (
                 name, f"{x:g}", stop, writer.ending, degree, len(splats.means),
-                path.stat().st_size, told(min(likeness)), told(np.mean(likeness)),
-                told(np.mean(np.minimum(codes, MOST_DB))),
+                path.stat().st_size, db_text(min(likeness)), db_text(np.mean(likeness)),
+                db_text(np.mean(np.minimum(codes, MOST_DB))),
             )  # fmt: skip
             rows.append(dict(zip(COLUMNS, row, strict=True)))
     return rows
@@ -113,7 +113,7 @@ def draw(renderer: Renderer, thing: SceneObject, views: list) -> list[np.ndarray
     return pictures
 
 
-def told(db: float) -> str:
+def db_text(db: float) -> str:
     return f"{min(db, MOST_DB):.2f}"
 
 

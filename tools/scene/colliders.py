@@ -73,14 +73,14 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("files", nargs="+", type=Path, metavar="FILE")
     options.add_argument("--out", type=Path, help="the table; without, it is printed alone")
-    told = options.parse_args()
+    chosen = options.parse_args()
     rows = []
-    for path in told.files:
+    for path in chosen.files:
         rows.append(measure(path))
         sys.stdout.write("  ".join(map(str, rows[-1])) + "\n")
         sys.stdout.flush()
-    if told.out:
-        with told.out.open("w", newline="") as file:
+    if chosen.out:
+        with chosen.out.open("w", newline="") as file:
             file.write(
                 "# python tools/scene/colliders.py --out docs/bench/colliders.csv FILE ...\n"
                 f"# CoACD {version('coacd')}, 2,500 faces and 16 hulls at most\n"

@@ -26,7 +26,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from shapeshift.app.charts.chart_stage import Walk, arc  # noqa: E402
+from shapeshift.app.charts.chart_scene import Walk, arc  # noqa: E402
 from shapeshift.renderer.gl.context import NoContext, open_context  # noqa: E402
 from shapeshift.renderer.renderer import Renderer  # noqa: E402
 from shapeshift.runtime_models.model import AnchorModel, Model, SplatLayers  # noqa: E402
@@ -115,11 +115,11 @@ def compare(
             merged_ms.append(done[id(pair[1])][0])
             passes.append(done[id(pair[0])][1])
     mine, other = np.median(apart_ms), np.median(merged_ms)
-    told = [f"{np.median([p.get(name, 0) for p in passes]):.2f}" for name in ("decode", "project")]
+    cells = [f"{np.median([p.get(name, 0) for p in passes]):.2f}" for name in ("decode", "project")]
     least = min(decibels, default=None)
     equal = "" if least is None else "yes" if math.isinf(least) else f"{least:.0f}"
     return [f"{mine:.2f}", f"{other:.2f}", f"{np.median(np.divide(apart_ms, merged_ms)):.2f}",
-            *told, equal]  # fmt: skip
+            *cells, equal]  # fmt: skip
 
 
 def measure(name: str, model: Model, drawing: str, ctx, options) -> list[str]:
@@ -129,9 +129,9 @@ def measure(name: str, model: Model, drawing: str, ctx, options) -> list[str]:
     for count in options.counts:
         with Renderer(ctx, drawing) as one, Renderer(ctx, drawing) as other:
             for change in CHANGES:
-                told = compare((one, other), ctx, model, count, change, options)
+                cells = compare((one, other), ctx, model, count, change, options)
                 about = [name, str(model.splat_count), drawing, size, str(count), change]
-                rows.append(",".join(about + told))
+                rows.append(",".join(about + cells))
                 sys.stderr.write(rows[-1] + "\n")
     return rows
 

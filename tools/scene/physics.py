@@ -322,22 +322,22 @@ def main() -> int:
     options.add_argument("--out", type=Path, help="the table; without, it is printed alone")
     options.add_argument("--only", help="one of: " + ", ".join(part.__name__ for part in FIGURES))
     options.add_argument("--hash", type=int, metavar="STEPS", help="print the hash of a long run")
-    told = options.parse_args()
-    if told.hash:
-        sys.stdout.write(busy(told.hash) + "\n")
+    chosen = options.parse_args()
+    if chosen.hash:
+        sys.stdout.write(busy(chosen.hash) + "\n")
         return 0
     rows = []
     for part in FIGURES:
         for figure, case, value, unit, limit in (
-            part() if told.only in (None, part.__name__) else ()
+            part() if chosen.only in (None, part.__name__) else ()
         ):
             holds = "" if limit is None else "yes" if value <= limit else "NO"
             wanted = "" if limit is None else f"{limit:g}"
             rows.append((figure, case, f"{value:.3g}", unit, wanted, holds))
             sys.stdout.write("  ".join(rows[-1]) + "\n")
             sys.stdout.flush()
-    if told.out:
-        with told.out.open("w", newline="") as file:
+    if chosen.out:
+        with chosen.out.open("w", newline="") as file:
             file.write(
                 "# python tools/scene/physics.py --out docs/bench/physics.csv\n"
                 f"# Rapier {version('rapier3d')}, 90 Hz, 4 substeps, one thread; "

@@ -22,7 +22,7 @@ sys.path[:0] = [str(HERE.parents[1])]
 
 from shapeshift.app.charts.chart_rows import RowsFile, write_text  # noqa: E402
 from shapeshift.app.training.table import Options, run  # noqa: E402
-from shapeshift.app.training.table_rows import Row, VggRow  # noqa: E402
+from shapeshift.app.training.table_rows import TableRow, VggRow  # noqa: E402
 from shapeshift.training.baselines.plain_settings import PlainSettings  # noqa: E402
 from shapeshift.training.settings import TrainSettings  # noqa: E402
 
@@ -100,10 +100,10 @@ def made(name: str, work: Path) -> Path:
     return folder
 
 
-def read_table(path: Path, with_vgg: bool) -> tuple[list[Row], str]:
+def read_table(path: Path, with_vgg: bool) -> tuple[list[TableRow], str]:
     """The rows of a table and the line that names its machine."""
     lines = [line[2:] for line in path.read_text().splitlines() if line.startswith("# ")]
-    return RowsFile(path, VggRow if with_vgg else Row, lines).rows, lines[1]
+    return RowsFile(path, VggRow if with_vgg else TableRow, lines).rows, lines[1]
 
 
 def command_of(asked: argparse.Namespace) -> str:

@@ -65,8 +65,8 @@ def measured(trainer: Trainer, views: int) -> list[dict]:
                 for share in PLACES:
                     there = picture(low.x + share * (high.x - low.x), view)
                     found.append(psnr(there, (1 - share) * first + share * last))
-            told = {"psnr_db": f"{np.mean(found):.2f}", "worst_db": f"{min(found):.2f}"}
-            rows.append({"where": f"{low.name} to {high.name}"} | told)
+            likeness = {"psnr_db": f"{np.mean(found):.2f}", "worst_db": f"{min(found):.2f}"}
+            rows.append({"where": f"{low.name} to {high.name}"} | likeness)
     return rows
 
 

@@ -28,7 +28,7 @@ from shapeshift.training.heads.networks import HeadLayout, initial_weights, padd
 from shapeshift.training.heads.optimizer import Adam  # noqa: E402
 from shapeshift.training.losses.losses import ImageLoss  # noqa: E402
 from shapeshift.training.memory import step_memory  # noqa: E402
-from shapeshift.training.step import Step  # noqa: E402
+from shapeshift.training.step import TrainingStep  # noqa: E402
 
 PASSES = (
     "heads", "activate", "project", "bin", "rasterize", "loss", "rasterize backward",
@@ -70,7 +70,7 @@ def measure(anchors: int, splats: int, size: tuple[int, int], steps: int, form: 
     }
     adam = Adam(device, values, {name: np.full(1, 1e-3, np.float32) for name in values})
     voxel = 2 * RADIUS * np.sqrt(np.pi / anchors)  # the mean distance of neighbours
-    step, loss = Step(device, layout, voxel, adam), ImageLoss(device, size)
+    step, loss = TrainingStep(device, layout, voxel, adam), ImageLoss(device, size)
     stats = DensificationStats(device, layout, anchors, 1)
     rgba = rng.integers(0, 256, (size[1], size[0], 4)).astype(np.uint8)
     target = loss.target(device.upload(rgba), (0, 0, 0))

@@ -149,7 +149,7 @@ class Bench:
         code, said = self.run(case, changed, place / case.out)
         outcome = Outcome(code, said, self.fits(place / case.out, whole), before, wrong,
                           place / case.out)  # fmt: skip
-        tell(f"{case.name}: {time.perf_counter() - started:.0f} s, exit code {code}")
+        print_line(f"{case.name}: {time.perf_counter() - started:.0f} s, exit code {code}")
         return cells(case, outcome)
 
 
@@ -176,7 +176,7 @@ def sentences(text: str, folder: Path) -> Iterator[str]:
             yield words
 
 
-def tell(text: str) -> None:
+def print_line(text: str) -> None:
     print(text, file=sys.stderr, flush=True)  # noqa: T201
 
 

@@ -35,8 +35,8 @@ def main() -> None:
     hand = hand_at(FROM, wearer.room((400.0, 600.0)))
     away = replace(hand, aim=None, grip=None, active=False)
     rows = [row(ctx, wearer, "a ray on it", hand), row(ctx, wearer, "at rest", away)]
-    told = [f"# python3 tools/vr/panel.py --out {out}", f"# {ctx.info['GL_RENDERER']}"]
-    out.write_text("\n".join([*told, COLUMNS, *rows]) + "\n")
+    head = [f"# python3 tools/vr/panel.py --out {out}", f"# {ctx.info['GL_RENDERER']}"]
+    out.write_text("\n".join([*head, COLUMNS, *rows]) + "\n")
 
 
 def row(ctx, wearer: Wearer, case: str, hand) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from shapeshift.scene.pose import View
-from shapeshift.training.drawing import Color, Drawing, draw_splats, splats_backward
+from shapeshift.training.drawing import Color, DrawnView, draw_splats, splats_backward
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.networks import KERNELS
 from shapeshift.training.heads.optimizer import Adam
@@ -67,13 +67,13 @@ class PlainStep:
         """The buffer of `rest`; of degree 0, which has none, one that is not read."""
         return self.adam["rest"] if self.rest else self.adam["base"]
 
-    def draw(self, view: View, background: Color, with_depth: bool = False) -> Drawing:
+    def draw(self, view: View, background: Color, with_depth: bool = False) -> DrawnView:
         splats = self.decode(view.world_from_eye.position)
         return draw_splats(self.device, splats, view, background, with_depth)
 
     def gradients(
         self,
-        drawing: Drawing,
+        drawing: DrawnView,
         loss: ImageLoss,
         target: Target,
         stats: PlainDensificationStats | None = None,

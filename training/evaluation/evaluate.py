@@ -11,7 +11,7 @@ import numpy as np
 
 from shapeshift.rasterizer.bin import Tiles, bin_tiles
 from shapeshift.rasterizer.project import LEAST_ALPHA, Projected, project
-from shapeshift.rasterizer.raster import Frame, rasterize
+from shapeshift.rasterizer.raster import RasterFrame, rasterize
 from shapeshift.rasterizer.surface import rasterize_depth, surface
 from shapeshift.runtime_models.evaluate import Evaluator, follows_eye
 from shapeshift.runtime_models.model import BadFile, Model, Stop
@@ -80,7 +80,7 @@ class ModelRenderer:
 
     def draw(
         self, view: View, background: tuple[float, float, float]
-    ) -> tuple[Projected, Tiles, Frame]:
+    ) -> tuple[Projected, Tiles, RasterFrame]:
         """The model at the last control value: what was projected, its tiles, and the frame."""
         if follows_eye(self.evaluator.model):
             self._decode(view.world_from_eye.position)

@@ -45,7 +45,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Change:
+class DbChange:
     """Of a modality's PSNR in dB, and the standard error of that over photos and seeds."""
 
     mean: float
@@ -60,8 +60,8 @@ class Decision:
     """What taking a part away did."""
 
     part: str
-    change: dict[str, Change]  # to the model before, by modality
-    total: dict[str, Change]  # to the largest model
+    change: dict[str, DbChange]  # to the model before, by modality
+    total: dict[str, DbChange]  # to the largest model
     verdict: str  # DROPPED | KEPT | UNSURE
     needed_by: tuple[str, ...]  # modalities that lose more than the tolerance, or may
     bytes: int  # saved
@@ -69,7 +69,7 @@ class Decision:
     train_s: float
 
     def as_dict(self) -> dict:
-        def rows(found: dict[str, Change]) -> dict:
+        def rows(found: dict[str, DbChange]) -> dict:
             return {n: {"db": round(c.mean, 3), "error": finite(c.error)} for n, c in found.items()}
 
         return {
@@ -85,7 +85,7 @@ def finite(error: float) -> float | None:
     return round(error, 3) if np.isfinite(error) else None
 
 
-def change_of(before: np.ndarray, after: np.ndarray) -> Change:
+def change_of(before: np.ndarray, after: np.ndarray) -> DbChange:
     """Of (seeds, photos) dB.  The error is NaN where one photo and one seed tell no spread."""
     difference = np.asarray(after, np.float64) - before
     seeds, photos = difference.shape
@@ -95,10 +95,10 @@ def change_of(before: np.ndarray, after: np.ndarray) -> Change:
     if seeds > 1:
         squares.append(difference.mean(axis=1).var(ddof=1) / seeds)
     error = float(np.sqrt(sum(squares))) if squares else float("nan")
-    return Change(float(difference.mean()), error)
+    return DbChange(float(difference.mean()), error)
 
 
-def changes(before: Trial, after: Trial) -> dict[str, Change]:
+def changes(before: Trial, after: Trial) -> dict[str, DbChange]:
     return {n: change_of(before.psnr[n], after.psnr[n]) for n in before.psnr}
 
 

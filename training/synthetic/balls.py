@@ -16,12 +16,12 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.scene.pose import View, look_at
-from shapeshift.training.synthetic.solids import Ball, Box, Disc
+from shapeshift.training.synthetic.solids import Ball, Cuboid, Disc
 from shapeshift.training.synthetic.tracer import (
     Light,
+    Material,
     Place,
     Solid,
-    Surface,
     depth_under,
     look,
     pattern_at,
@@ -81,21 +81,21 @@ def moved(x: float, y: float, z: float) -> np.ndarray:
 
 def place() -> Place:
     shiny = {"gloss": 0.35, "shininess": 30.0}
-    red = Surface(
+    red = Material(
         red_stripes, lambda p: celsius(0.6 + 0.35 * np.cos(3 * (p[:, 1] + 0.35))), **shiny
     )
-    green = Surface(green_spots, float(celsius(0.16)))
-    yellow = Surface((0.9, 0.75, 0.1), float(celsius(0.85)), **shiny)
-    blue = Surface(
+    green = Material(green_spots, float(celsius(0.16)))
+    yellow = Material((0.9, 0.75, 0.1), float(celsius(0.85)), **shiny)
+    blue = Material(
         blue_checker, lambda p: celsius(0.25 + 0.5 * np.exp(-((p[:, 1] - 0.05) ** 2) / 0.01))
     )
     return Place.of(
         [
-            Solid(Disc(1.15), Surface(floor_color, floor_celsius)),
+            Solid(Disc(1.15), Material(floor_color, floor_celsius)),
             Solid(Ball(0.35), red, moved(-0.45, 0.35, 0.25)),
             Solid(Ball(0.25), green, moved(0.5, 0.25, -0.35)),
             Solid(Ball(0.18), yellow, moved(0.15, 0.18, 0.55)),
-            Solid(Box((0.3, 0.3, 0.2)), blue, moved(0.0, 0.3, -0.45)),
+            Solid(Cuboid((0.3, 0.3, 0.2)), blue, moved(0.0, 0.3, -0.45)),
         ]
     )
 

@@ -16,7 +16,7 @@ from shapeshift.training.synthetic.placing import (
     run_of_pipe,
     turned,
 )
-from shapeshift.training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.tracer import Solid, Material
 
 BENCH = (0.64, 0.03, 0.38)  # metres, half sizes of the top
 CABINET = (-0.40, 0.165, 0.04)  # metres, its centre
@@ -45,10 +45,10 @@ def plank_heat(p: np.ndarray) -> np.ndarray:
 
 
 def bench() -> list[Solid]:
-    iron = Surface((0.42, 0.44, 0.47), AMBIENT + 2, 0.15, 20.0)
+    iron = Material((0.42, 0.44, 0.47), AMBIENT + 2, 0.15, 20.0)
     w, h, d = BENCH
     out = [
-        box((0, -h, 0), BENCH, Surface(plank_color, plank_heat, 0.08, 20.0), 0.006),
+        box((0, -h, 0), BENCH, Material(plank_color, plank_heat, 0.08, 20.0), 0.006),
         box((0, -0.085, 0), (w - 0.05, 0.025, d - 0.05), iron, 0.006),
     ]
     for x in (-1, 1):
@@ -80,21 +80,21 @@ def cabinet_heat(p: np.ndarray) -> np.ndarray:
 def door() -> list[Solid]:
     """In its own frame: the middle of its back face is the origin, it faces +z."""
     w, h, _ = SHELL
-    black = Surface((0.12, 0.12, 0.13), 33.0, 0.3, 30.0)
+    black = Material((0.12, 0.12, 0.13), 33.0, 0.3, 30.0)
     out = [
         box(
             (0, 0, 0.007),
             (w - 0.006, h - 0.006, 0.007),
-            Surface(front, cabinet_heat, 0.15, 20.0),
+            Material(front, cabinet_heat, 0.15, 20.0),
             0.004,
         ),
         box((0, 0.075, 0.016), (0.062, 0.036, 0.004), black),
-        box((0, 0.075, 0.0205), (0.052, 0.026, 0.001), Surface(screen, 41.0, 0.2, 60.0)),
+        box((0, 0.075, 0.0205), (0.052, 0.026, 0.001), Material(screen, 41.0, 0.2, 60.0)),
         box((w - 0.022, -0.03, 0.019), (0.006, 0.03, 0.008), black),
     ]
     for k, color in enumerate(((0.15, 0.75, 0.30), (0.98, 0.70, 0.10), (0.88, 0.15, 0.12))):
         at = (-0.045 + 0.045 * k, 0.018, 0.006)
-        lamp = Surface(color, 44.0, 0.5, 30.0, 0.2)
+        lamp = Material(color, 44.0, 0.5, 30.0, 0.2)
         out.append(bar(at, (at[0], at[1], 0.02), 0.0155, black))
         out.append(bar(at, (at[0], at[1], 0.026), 0.0115, lamp, bevel=0.005))
     return out
@@ -110,10 +110,10 @@ def screen(p: np.ndarray) -> np.ndarray:
 
 def cabinet() -> list[Solid]:
     """A control cabinet on feet."""
-    paint = Surface((0.77, 0.78, 0.75), cabinet_heat, 0.15, 20.0)
+    paint = Material((0.77, 0.78, 0.75), cabinet_heat, 0.15, 20.0)
     w, h, d = SHELL
     feet = [
-        box((x, -h - 0.005, 0), (0.02, 0.005, d - 0.01), Surface((0.15, 0.15, 0.16), 22.0))
+        box((x, -h - 0.005, 0), (0.02, 0.005, d - 0.01), Material((0.15, 0.15, 0.16), 22.0))
         for x in (-0.07, 0.07)
     ]
     closed = [box((0, 0, 0), (w, h, d), paint, 0.004), *inside(frame((0, 0, d)), door())]
@@ -122,7 +122,7 @@ def cabinet() -> list[Solid]:
 
 def conduit() -> list[Solid]:
     """From the cabinet along the bench, up to the motor's terminal box."""
-    rubber = Surface((0.14, 0.14, 0.16), lambda p: 27 + 3 * noise(p, 12), 0.25, 20.0, 0.05)
+    rubber = Material((0.14, 0.14, 0.16), lambda p: 27 + 3 * noise(p, 12), 0.25, 20.0, 0.05)
     x, y, z = MOTOR
     corners = [
         (CABINET[0] + 0.1, 0.035, z - 0.09),
@@ -131,7 +131,7 @@ def conduit() -> list[Solid]:
         (x - 0.245, y + 0.108, z - 0.02),
         (x - 0.04, y + 0.108, z - 0.02),
     ]
-    gland = Surface((0.66, 0.66, 0.68), 34.0, 0.4, 30.0, 0.3)
+    gland = Material((0.66, 0.66, 0.68), 34.0, 0.4, 30.0, 0.3)
     return [
         *run_of_pipe(corners, 0.03, 0.011, rubber),
         bar((x - 0.064, y + 0.108, z - 0.02), (x - 0.04, y + 0.108, z - 0.02), 0.017, gland),
@@ -143,26 +143,26 @@ def conduit() -> list[Solid]:
 
 def mug() -> list[Solid]:
     """Coffee, still hot: the one hot thing that everybody knows."""
-    glaze = Surface((0.93, 0.90, 0.82), lambda p: 52 + 60 * p[:, 1], 0.35, 40.0, 0.12)
-    stripe = Surface((0.85, 0.35, 0.18), 56.0, 0.35, 40.0, 0.12)
+    glaze = Material((0.93, 0.90, 0.82), lambda p: 52 + 60 * p[:, 1], 0.35, 40.0, 0.12)
+    stripe = Material((0.85, 0.35, 0.18), 56.0, 0.35, 40.0, 0.12)
     return inside(
         frame(MUG, turned("y", 35)),
         [
             bar((0, 0, 0), (0, 0.082, 0), 0.037, glaze, bevel=0.004),
             bar((0, 0.03, 0), (0, 0.052, 0), 0.0375, stripe),
-            disc((0, 0.0826, 0), "y", 0.034, Surface((0.20, 0.11, 0.06), 71.0, 0.3, 60.0, 0.15)),
+            disc((0, 0.0826, 0), "y", 0.034, Material((0.20, 0.11, 0.06), 71.0, 0.3, 60.0, 0.15)),
             ring((0, 0.083, 0), "y", 0.0355, 0.0035, glaze),
             ring((0.04, 0.042, 0), "z", 0.023, 0.0055, glaze),
         ],
     )
 
 
-CHROME = Surface((0.68, 0.69, 0.72), 20.0, 0.5, 40.0, 0.45)
+CHROME = Material((0.68, 0.69, 0.72), 20.0, 0.5, 40.0, 0.45)
 
 
 def screwdriver() -> list[Solid]:
     """On the front of the bench, as are the ring spanner and the oil can."""
-    orange = Surface((0.93, 0.45, 0.08), 31.0, 0.4, 30.0, 0.1)
+    orange = Material((0.93, 0.45, 0.08), 31.0, 0.4, 30.0, 0.1)
     driver = [
         bar((0, 0.017, 0), (0.095, 0.017, 0), 0.0165, orange, top_radius=0.013, bevel=0.004),
         bar((0.095, 0.017, 0), (0.215, 0.015, 0), 0.0048, CHROME),
@@ -180,12 +180,12 @@ def spanner() -> list[Solid]:
 
 
 def oil_can() -> list[Solid]:
-    red = Surface((0.76, 0.13, 0.10), 23.0, 0.35, 30.0, 0.15)
+    red = Material((0.76, 0.13, 0.10), 23.0, 0.35, 30.0, 0.15)
     can = [
         bar((0, 0, 0), (0, 0.065, 0), 0.037, red, bevel=0.004),
         bar((0, 0.065, 0), (0, 0.098, 0), 0.035, red, top_radius=0.01),
         bar((0, 0.09, 0), (0.075, 0.165, 0), 0.007, CHROME, top_radius=0.003),
-        bar((0, 0.02, 0), (0, 0.045, 0), 0.0375, Surface((0.95, 0.82, 0.30), 23.0)),
+        bar((0, 0.02, 0), (0, 0.045, 0), 0.0375, Material((0.95, 0.82, 0.30), 23.0)),
     ]
     return inside(frame((0.56, 0, -0.04), turned("y", 120)), can)
 
@@ -193,5 +193,7 @@ def oil_can() -> list[Solid]:
 def base_plate() -> list[Solid]:
     """The steel plate that the motor is bolted to."""
     x, _, z = MOTOR
-    plate = Surface((0.42, 0.43, 0.46), lambda p: 28 + 6 * bump(p, (0, 0, 0), 0.1), 0.3, 30.0, 0.25)
+    plate = Material(
+        (0.42, 0.43, 0.46), lambda p: 28 + 6 * bump(p, (0, 0, 0), 0.1), 0.3, 30.0, 0.25
+    )
     return [box((x, 0.008, z), (0.15, 0.008, 0.115), plate)]

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from shapeshift.training.synthetic.placing import bar, box, disc, mix, noise, ring
-from shapeshift.training.synthetic.solids import Box
-from shapeshift.training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.solids import Cuboid
+from shapeshift.training.synthetic.tracer import Material, Solid
 
 SHELL = 0.088  # metres, radius of the housing
 STATOR = (0.050, 0.079)  # metres, inner and outer radius of the iron
@@ -37,18 +37,18 @@ def body_heat(p: np.ndarray) -> np.ndarray:
     return 60 + 90 * p[:, 1] + 5 * noise(p, 30)
 
 
-def painted(celsius: Any, color: Any = PAINT) -> Surface:
-    return Surface(color, celsius, 0.25, 25.0, 0.12)
+def painted(celsius: Any, color: Any = PAINT) -> Material:
+    return Material(color, celsius, 0.25, 25.0, 0.12)
 
 
-def sector_plate(degrees: float, low: float, high: float, half: float, surface: Surface) -> Solid:
+def sector_plate(degrees: float, low: float, high: float, half: float, surface: Material) -> Solid:
     """The flat face of a cut: a thin plate from radius low to high at that angle."""
     a = np.deg2rad(degrees)
     spoke = np.array([0.0, np.sin(a), np.cos(a)])
     rotation = np.stack([(1.0, 0, 0), spoke, np.cross((1.0, 0, 0), spoke)], axis=1)
     frame = np.eye(4)
     frame[:3, :3], frame[:3, 3] = rotation, spoke * (low + high) / 2
-    return Solid(Box((half, (high - low) / 2, 0.001)), surface, frame)
+    return Solid(Cuboid((half, (high - low) / 2, 0.001)), surface, frame)
 
 
 def fins(opened: bool) -> list[Solid]:
@@ -64,7 +64,7 @@ def fins(opened: bool) -> list[Solid]:
         surface = painted(lambda p: 55 + 80 * p[:, 0] - 350 * p[:, 1])
         out.append(sector_plate(degrees, SHELL - 0.004, SHELL + 0.019, HALF - 0.008, surface))
         out[-1] = Solid(
-            Box((HALF - 0.008, 0.0115, 0.0032), 0.0015), surface, out[-1].world_from_local
+            Cuboid((HALF - 0.008, 0.0115, 0.0032), 0.0015), surface, out[-1].world_from_local
         )
     return out
 
@@ -73,8 +73,8 @@ def housing(opened: bool) -> list[Solid]:
     surface = painted(body_heat)
     if not opened:
         return [bar((-HALF, 0, 0), (HALF, 0, 0), SHELL, surface)]
-    inner = Surface((0.30, 0.33, 0.35), lambda p: 66 + 0 * p[:, 0])
-    edge = Surface((0.62, 0.64, 0.66), 64.0, 0.3, 30.0, 0.3)
+    inner = Material((0.30, 0.33, 0.35), lambda p: 66 + 0 * p[:, 0])
+    edge = Material((0.62, 0.64, 0.66), 64.0, 0.3, 30.0, 0.3)
     keep = outside(CUT, HALF - 0.012)
     out = [
         bar((-HALF, 0, 0), (HALF, 0, 0), SHELL, surface, capped=False, keep=keep),
@@ -94,8 +94,8 @@ def stator() -> list[Solid]:
         turn = np.arctan2(p[:, 2], p[:, 0])
         return mix((0.55, 0.24, 0.10), (0.93, 0.55, 0.28), 0.5 + 0.5 * np.sin(36 * turn))
 
-    iron = Surface(sheets, 72.0, 0.2, 30.0, 0.2)
-    cut_iron = Surface((0.55, 0.55, 0.57), 74.0, 0.3, 30.0, 0.25)
+    iron = Material(sheets, 72.0, 0.2, 30.0, 0.2)
+    cut_iron = Material((0.55, 0.55, 0.57), 74.0, 0.3, 30.0, 0.25)
     low, high, half = *STATOR, 0.062
     keep = outside(STATOR_CUT)
     out = [
@@ -110,7 +110,7 @@ def stator() -> list[Solid]:
 
     out += [disc((x, 0, 0), "x", high, iron, keep=face) for x in (-half, half)]
     out += [sector_plate(a, low, high, half, cut_iron) for a in STATOR_CUT]
-    wire = Surface(copper, 84.0, 0.4, 25.0, 0.2)
+    wire = Material(copper, 84.0, 0.4, 25.0, 0.2)
     out += [ring((x, 0, 0), "x", 0.063, 0.0155, wire) for x in (-0.079, 0.079)]
     # Coils seen in the slots of the cut faces.
     for a in STATOR_CUT:
@@ -126,13 +126,13 @@ def rotor() -> list[Solid]:
         wave = np.sin(18 * turn + 16 * p[:, 1])
         return mix((0.36, 0.37, 0.40), (0.80, 0.81, 0.83), (wave - 0.3) * 3)
 
-    core = Surface(skewed_bars, 80.0, 0.4, 40.0, 0.3)
-    aluminium = Surface((0.80, 0.81, 0.83), 82.0, 0.4, 40.0, 0.35)
+    core = Material(skewed_bars, 80.0, 0.4, 40.0, 0.3)
+    aluminium = Material((0.80, 0.81, 0.83), 82.0, 0.4, 40.0, 0.35)
     return [
         bar((-0.07, 0, 0), (0.07, 0, 0), 0.046, core),
         bar((-0.082, 0, 0), (-0.07, 0, 0), 0.042, aluminium),
         bar((0.07, 0, 0), (0.082, 0, 0), 0.042, aluminium),
-        bar((-HALF, 0, 0), (HALF, 0, 0), 0.014, Surface((0.7, 0.7, 0.73), 74.0, 0.5, 40.0, 0.4)),
+        bar((-HALF, 0, 0), (HALF, 0, 0), 0.014, Material((0.7, 0.7, 0.73), 74.0, 0.5, 40.0, 0.4)),
     ]
 
 
@@ -146,14 +146,14 @@ def ends() -> list[Solid]:
 
     cowl = painted(lambda p: 36 + 120 * (p[:, 1] + 0.03), grille)
     bell = painted(lambda p: 66 + 300 * p[:, 1])
-    bearing = Surface((0.55, 0.55, 0.57), 93.0, 0.4, 40.0, 0.3)
-    shaft = Surface((0.74, 0.74, 0.77), lambda p: 74 - 320 * (p[:, 1] + 0.03), 0.5, 40.0, 0.4)
+    bearing = Material((0.55, 0.55, 0.57), 93.0, 0.4, 40.0, 0.3)
+    shaft = Material((0.74, 0.74, 0.77), lambda p: 74 - 320 * (p[:, 1] + 0.03), 0.5, 40.0, 0.4)
 
     def wheel(p: np.ndarray) -> np.ndarray:
         radius = np.hypot(p[:, 0], p[:, 2])
         return mix((0.30, 0.31, 0.34), (0.58, 0.58, 0.60), (radius - 0.04) * 90)
 
-    flywheel = Surface(wheel, lambda p: 46 - 250 * np.hypot(p[:, 0], p[:, 2]), 0.35, 40.0, 0.3)
+    flywheel = Material(wheel, lambda p: 46 - 250 * np.hypot(p[:, 0], p[:, 2]), 0.35, 40.0, 0.3)
     return [
         bar((-HALF - 0.06, 0, 0), (-HALF, 0, 0), SHELL + 0.006, cowl, bevel=0.006),
         bar((HALF, 0, 0), (HALF + 0.03, 0, 0), SHELL, bell, top_radius=0.055),
@@ -171,13 +171,13 @@ def feet_and_terminals() -> list[Solid]:
         out.append(box((x, -0.095, 0), (0.022, 0.012, 0.085), paint))
         out.append(box((x, -0.08, 0), (0.018, 0.02, 0.05), paint))
         for z in (-0.07, 0.07):
-            bolt = Surface((0.7, 0.7, 0.72), 34.0, 0.4, 30.0)
+            bolt = Material((0.7, 0.7, 0.72), 34.0, 0.4, 30.0)
             out.append(bar((x, -0.085, z), (x, -0.075, z), 0.009, bolt))
     lid = painted(42.0, (0.09, 0.42, 0.50))
     out += [
         box((0, 0.108, -0.02), (0.05, 0.026, 0.042), painted(46.0)),
         box((0, 0.137, -0.02), (0.053, 0.005, 0.045), lid),
-        box((0.0, 0.112, 0.0232), (0.032, 0.012, 0.001), Surface((0.80, 0.79, 0.72), 42.0)),
+        box((0.0, 0.112, 0.0232), (0.032, 0.012, 0.001), Material((0.80, 0.79, 0.72), 42.0)),
     ]
     return out
 

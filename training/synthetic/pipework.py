@@ -15,7 +15,7 @@ from shapeshift.training.synthetic.placing import (
     ring,
     run_of_pipe,
 )
-from shapeshift.training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.tracer import Material, Solid
 
 LINE_Y, LINE_Z = 0.19, -0.2  # metres; the axis of the line
 PIPE = 0.024  # metres, radius
@@ -28,8 +28,8 @@ AMBIENT = 22.0  # °C
 MEDIUM = 92.0  # °C, what flows in the pipe
 
 
-def steel(celsius, tone: float = 0.5) -> Surface:
-    return Surface((tone, tone * 1.01, tone * 1.04), celsius, 0.35, 40.0, 0.45)
+def steel(celsius, tone: float = 0.5) -> Material:
+    return Material((tone, tone * 1.01, tone * 1.04), celsius, 0.35, 40.0, 0.45)
 
 
 def line() -> list[Solid]:
@@ -45,26 +45,26 @@ def line() -> list[Solid]:
     posts = []
     for x, heat in ((-0.46, 48.0), (0.24, 38.0)):
         posts += [
-            box((x, 0.08, LINE_Z), (0.009, 0.08, 0.02), Surface((0.22, 0.24, 0.27), 30.0)),
-            box((x, 0.006, LINE_Z), (0.024, 0.006, 0.045), Surface((0.22, 0.24, 0.27), 26.0)),
+            box((x, 0.08, LINE_Z), (0.009, 0.08, 0.02), Material((0.22, 0.24, 0.27), 30.0)),
+            box((x, 0.006, LINE_Z), (0.024, 0.006, 0.045), Material((0.22, 0.24, 0.27), 26.0)),
             bar(
                 (x - 0.011, LINE_Y, LINE_Z),
                 (x + 0.011, LINE_Y, LINE_Z),
                 0.031,
-                Surface((0.22, 0.24, 0.27), heat),
+                Material((0.22, 0.24, 0.27), heat),
             ),
         ]
     return out + feet + posts
 
 
 def flange_pair(x: float, heat: float, gasket: tuple, tone: float = 0.42) -> list[Solid]:
-    def plate(a: float, b: float, radius: float, surface: Surface) -> Solid:
+    def plate(a: float, b: float, radius: float, surface: Material) -> Solid:
         return bar((x + a, LINE_Y, LINE_Z), (x + b, LINE_Y, LINE_Z), radius, surface)
 
     return [
         plate(-0.016, -0.003, 0.045, steel(heat, tone)),
         plate(0.003, 0.016, 0.045, steel(heat, tone)),
-        plate(-0.003, 0.003, 0.042, Surface(gasket, heat + 3)),
+        plate(-0.003, 0.003, 0.042, Material(gasket, heat + 3)),
         *bolt_circle((x, LINE_Y, LINE_Z), "x", 0.036, 6, steel(heat - 5, 0.66)),
         bar((x - 0.026, LINE_Y, LINE_Z), (x + 0.026, LINE_Y, LINE_Z), 0.029, steel(heat, tone)),
     ]
@@ -89,17 +89,17 @@ def insulation() -> list[Solid]:
         out[seam & (p[:, 0] < 0)] *= 0.6
         return out
 
-    jacket = Surface(cladding, heat, 0.25, 25.0, 0.3)
+    jacket = Material(cladding, heat, 0.25, 25.0, 0.3)
     a, b = LAGGED
     out = [bar((a, LINE_Y, LINE_Z), (b, LINE_Y, LINE_Z), LAGGING, jacket, bevel=0.006)]
-    band = Surface((0.50, 0.51, 0.53), heat_of_band, 0.4, 40.0, 0.4)
+    band = Material((0.50, 0.51, 0.53), heat_of_band, 0.4, 40.0, 0.4)
     for x in (a + 0.02, -0.335, -0.145, b - 0.02):
         out.append(
             bar((x - 0.007, LINE_Y, LINE_Z), (x + 0.007, LINE_Y, LINE_Z), LAGGING + 0.003, band)
         )
     for x in (a, b):
         out.append(
-            disc((x, LINE_Y, LINE_Z), "x", LAGGING - 0.004, Surface((0.85, 0.72, 0.35), 44.0))
+            disc((x, LINE_Y, LINE_Z), "x", LAGGING - 0.004, Material((0.85, 0.72, 0.35), 44.0))
         )
     return out
 
@@ -110,8 +110,8 @@ def heat_of_band(p: np.ndarray) -> np.ndarray:
 
 def valve() -> list[Solid]:
     """A globe valve of brass; its red handwheel stays cool, the stem is warm at its foot."""
-    brass = Surface((0.78, 0.60, 0.24), lambda p: 76 - 60 * p[:, 1], 0.45, 35.0, 0.35)
-    red = Surface((0.78, 0.12, 0.10), 34.0, 0.35, 30.0, 0.1)
+    brass = Material((0.78, 0.60, 0.24), lambda p: 76 - 60 * p[:, 1], 0.45, 35.0, 0.35)
+    red = Material((0.78, 0.12, 0.10), 34.0, 0.35, 30.0, 0.1)
 
     def stem_heat(p: np.ndarray) -> np.ndarray:
         return 52 - 130 * (p[:, 1] + 0.02)
@@ -130,7 +130,9 @@ def valve() -> list[Solid]:
         bar((x, LINE_Y + 0.03, z), (x, LINE_Y + 0.075, z), 0.03, brass, top_radius=0.022),
         bar((x, LINE_Y + 0.072, z), (x, LINE_Y + 0.086, z), 0.03, brass),
         bar((x, LINE_Y + 0.086, z), (x, LINE_Y + 0.11, z), 0.017, brass),
-        bar((x, LINE_Y + 0.1, z), (x, top + 0.018, z), 0.008, Surface((0.6, 0.6, 0.62), stem_heat)),
+        bar(
+            (x, LINE_Y + 0.1, z), (x, top + 0.018, z), 0.008, Material((0.6, 0.6, 0.62), stem_heat)
+        ),
         ring((x, top, z), "y", 0.076, 0.009, red),
         bar((x, top - 0.009, z), (x, top + 0.01, z), 0.019, red),
     ]
@@ -160,21 +162,23 @@ def dial(p: np.ndarray) -> np.ndarray:
 
 def gauge() -> list[Solid]:
     """A dial on a short branch, looking forward."""
-    black = Surface((0.13, 0.13, 0.15), 33.0, 0.3, 30.0, 0.1)
+    black = Material((0.13, 0.13, 0.15), 33.0, 0.3, 30.0, 0.1)
     y = LINE_Y + 0.13
     front = LINE_Z + 0.022
     return [
         bar((GAUGE, LINE_Y, LINE_Z), (GAUGE, y - 0.03, LINE_Z), 0.012, steel(50.0)),
         bar((GAUGE, LINE_Y + 0.02, LINE_Z), (GAUGE, LINE_Y + 0.038, LINE_Z), 0.019, steel(56.0)),
         bar((GAUGE, y, LINE_Z - 0.02), (GAUGE, y, front), 0.05, black),
-        disc((GAUGE, y, front + 0.001), "z", 0.044, Surface(dial, 31.0, 0.15, 60.0)),
-        ring((GAUGE, y, front), "z", 0.047, 0.005, Surface((0.72, 0.6, 0.3), 31.0, 0.5, 40.0, 0.3)),
+        disc((GAUGE, y, front + 0.001), "z", 0.044, Material(dial, 31.0, 0.15, 60.0)),
+        ring(
+            (GAUGE, y, front), "z", 0.047, 0.005, Material((0.72, 0.6, 0.3), 31.0, 0.5, 40.0, 0.3)
+        ),
     ]
 
 
 def return_line() -> list[Solid]:
     """A thin copper pipe low behind everything, lukewarm."""
-    copper = Surface((0.76, 0.42, 0.27), lambda p: 40 + 4 * noise(p, 8), 0.4, 35.0, 0.3)
+    copper = Material((0.76, 0.42, 0.27), lambda p: 40 + 4 * noise(p, 8), 0.4, 35.0, 0.3)
     corners = [
         (-0.42, 0.0, -0.31),
         (-0.42, 0.07, -0.31),
@@ -183,7 +187,7 @@ def return_line() -> list[Solid]:
     ]
     out = run_of_pipe(corners, 0.035, 0.012, copper)
     for x in (-0.2, 0.12):
-        clip = Surface((0.22, 0.24, 0.27), 28.0)
+        clip = Material((0.22, 0.24, 0.27), 28.0)
         out.append(box((x, 0.035, -0.31), (0.006, 0.035, 0.008), clip))
         out.append(bar((x - 0.008, 0.07, -0.31), (x + 0.008, 0.07, -0.31), 0.017, clip))
     return out

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from shapeshift.training.synthetic.openness import corner_weight
-from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring
-from shapeshift.training.synthetic.tracer import Solid, Surface
+from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring
+from shapeshift.training.synthetic.tracer import Material, Solid
 
 Place3 = tuple[float, float, float] | np.ndarray  # (3,) metres
 # world_from_local rotations that lay a shape's own +Y along a world axis
@@ -41,11 +41,13 @@ def inside(parent: np.ndarray, solids: list[Solid]) -> list[Solid]:
     return [replace(s, world_from_local=parent @ s.world_from_local) for s in solids]
 
 
-def box(centre: tuple, half: tuple, surface: Surface, bevel: float = 0.003, **more) -> Solid:
-    return Solid(Box(half, bevel), surface, frame(centre, more.get("rotation")), more.get("keep"))
+def box(centre: tuple, half: tuple, surface: Material, bevel: float = 0.003, **more) -> Solid:
+    return Solid(
+        Cuboid(half, bevel), surface, frame(centre, more.get("rotation")), more.get("keep")
+    )
 
 
-def bar(start: Place3, end: Place3, radius: float, surface: Surface, **more: Any) -> Solid:
+def bar(start: Place3, end: Place3, radius: float, surface: Material, **more: Any) -> Solid:
     """A cylinder from one point to another; top_radius, bevel, capped, keep as in Cylinder."""
     first, last = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(last - first))
@@ -58,20 +60,20 @@ def bar(start: Place3, end: Place3, radius: float, surface: Surface, **more: Any
     return Solid(shape, surface, frame((first + last) / 2, rotation), keep)
 
 
-def ball(centre: tuple, radius: float, surface: Surface) -> Solid:
+def ball(centre: tuple, radius: float, surface: Material) -> Solid:
     return Solid(Ball(radius), surface, frame(centre))
 
 
-def ring(centre: tuple, axis: str, major: float, minor: float, surface: Surface, **more) -> Solid:
+def ring(centre: tuple, axis: str, major: float, minor: float, surface: Material, **more) -> Solid:
     return Solid(Ring(major, minor), surface, frame(centre, ALONG[axis]), more.get("keep"))
 
 
-def disc(centre: tuple, axis: str, radius: float, surface: Surface, **more) -> Solid:
+def disc(centre: tuple, axis: str, radius: float, surface: Material, **more) -> Solid:
     return Solid(Disc(radius), surface, frame(centre, ALONG[axis]), more.get("keep"))
 
 
 def elbow(
-    corner: Place3, first: Place3, second: Place3, bend: float, radius: float, surface: Surface
+    corner: Place3, first: Place3, second: Place3, bend: float, radius: float, surface: Material
 ) -> Solid:
     """The quarter bend of a pipe at `corner` between unit directions that leave the corner."""
     one, other = np.asarray(first, float), np.asarray(second, float)
@@ -82,7 +84,7 @@ def elbow(
     return Solid(Ring(bend, radius, np.pi / 4), surface, frame(centre, rotation))
 
 
-def run_of_pipe(corners: list[tuple], bend: float, radius: float, surface: Surface) -> list[Solid]:
+def run_of_pipe(corners: list[tuple], bend: float, radius: float, surface: Material) -> list[Solid]:
     """Straight pipes through the corners, with quarter bends between them."""
     points = [np.asarray(c, float) for c in corners]
     units = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(points)]
@@ -97,7 +99,7 @@ def run_of_pipe(corners: list[tuple], bend: float, radius: float, surface: Surfa
 
 
 def bolt_circle(
-    centre: tuple, axis: str, radius: float, count: int, surface: Surface
+    centre: tuple, axis: str, radius: float, count: int, surface: Material
 ) -> list[Solid]:
     """Bolt heads of 6 mm round a flange whose axis is `axis`."""
     out = []

@@ -50,7 +50,7 @@ class Ball:
 
 
 @dataclass(frozen=True)
-class Box:
+class Cuboid:
     half: tuple[float, float, float]
     bevel: float = 1e-4  # edges are shaded as if they were rounded this much
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shapeshift.scene.pose import View
-from shapeshift.training.synthetic.solids import Ball, Box, Cylinder, Disc, Ring, dot, unit
+from shapeshift.training.synthetic.solids import Ball, Cuboid, Cylinder, Disc, Ring, dot, unit
 
 Pattern = Callable[[np.ndarray], np.ndarray]  # local points (n, 3) metres -> (n, 3) or (n,)
 NEAREST = 1e-4  # metres; a hit nearer than this is the surface the ray starts on
@@ -15,7 +15,7 @@ EDGE = 0.06  # a pixel that differs this much from a neighbour is sampled more f
 
 
 @dataclass(frozen=True)
-class Surface:
+class Material:
     color: Pattern | tuple[float, float, float] = (0.7, 0.7, 0.7)  # display sRGB
     celsius: Pattern | float = 22.0
     gloss: float = 0.0  # strength of the highlight
@@ -25,8 +25,8 @@ class Surface:
 
 @dataclass(frozen=True)
 class Solid:
-    shape: Ball | Box | Cylinder | Ring | Disc
-    surface: Surface
+    shape: Ball | Cuboid | Cylinder | Ring | Disc
+    surface: Material
     world_from_local: np.ndarray = field(default_factory=lambda: np.eye(4))
     keep: Callable[[np.ndarray], np.ndarray] | None = None  # local points; False = cut away
 

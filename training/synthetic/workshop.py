@@ -143,7 +143,7 @@ def dome(count: int, offset: float, size: tuple[int, int]) -> list[View]:
     return out
 
 
-def take(job: tuple[View, str, Path, Path]) -> None:
+def write_photo(job: tuple[View, str, Path, Path]) -> None:
     """One photo and its mask, written to their files."""
     view, stop, path, mask_path = job
     image, mask = photograph(view, radiance(stop))
@@ -151,15 +151,15 @@ def take(job: tuple[View, str, Path, Path]) -> None:
     save_png(mask_path, mask)
 
 
-def taken(jobs: list[tuple], processes: int) -> Iterator[int]:
-    """Takes all photos; yields how many are done."""
+def write_photos(jobs: list[tuple], processes: int) -> Iterator[int]:
+    """Writes all photos; yields how many are done."""
     if processes == 1:
         for done, job in enumerate(jobs, 1):
-            take(job)
+            write_photo(job)
             yield done
         return
     with get_context("spawn").Pool(processes, leave_interrupts_to_the_parent) as pool:
-        for done, _ in enumerate(pool.imap_unordered(take, jobs, chunksize=4), 1):
+        for done, _ in enumerate(pool.imap_unordered(write_photo, jobs, chunksize=4), 1):
             yield done
 
 
@@ -173,11 +173,11 @@ def make_workshop(
     views: int = 72,
     test_views: int = 8,
     processes: int = 2,
-    tell: Callable[[int, int], None] = lambda done, count: None,
+    progress: Callable[[int, int], None] = lambda done, count: None,
 ) -> Capture:
     """Writes the capture into `folder`: `views` + `test_views` photos a stop, masks, points.
 
-    `tell` hears how many photos are done, out of how many.
+    `progress` hears how many photos are done, out of how many.
     """
     folder = Path(folder)
     photos, jobs = [], []
@@ -192,8 +192,8 @@ def make_workshop(
             mask_path = folder / "masks" / name / path.name
             jobs.append((view, stop.name, path, mask_path))
             photos.append(Photo(view, path, stop.name, None, split))
-    for done in taken(jobs, processes):
-        tell(done, len(jobs))
+    for done in write_photos(jobs, processes):
+        progress(done, len(jobs))
     points, colors = colored_points(size)
     capture = Capture(
         folder,

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shapeshift.vr.frame import SIDES, Frame
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import heading, moved, pinned, resized, turned, underfoot, yaw
 from shapeshift.vr.locomotion.teleport import Arc, Ground, level_ground, throw_arc
-from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, take
+from shapeshift.vr.locomotion.world_grip import Grips, drawn_along, held_points
 
 TURNINGS = ("snap", "smooth", "none")
 LONGEST_S = 0.1  # of a frame: after a hitch nobody is thrown far
@@ -75,51 +75,51 @@ RULES = Rules()
 
 
 def move(
-    standing: Standing,
+    play_space: PlaySpace,
     travel: Travel,
     frame: Frame,
     seconds: float,
     rules: Rules = RULES,
     ground: Ground | None = None,
-) -> tuple[Standing, Travel, Comfort]:
+) -> tuple[PlaySpace, Travel, Comfort]:
     """The room a frame later; without a ground one jumps along the level that one stands on."""
     seconds = min(seconds, LONGEST_S) if seconds > 0 else 0.0
     travel = replace(travel, blink=max(travel.blink - seconds / BLINK_S, 0.0))
-    standing, travel = hold_world(standing, travel, frame)
+    play_space, travel = hold_world(play_space, travel, frame)
     if travel.grips:
         travel = replace(travel, aims=None, resets=None, pressed=pressing(frame))
         travel = fade(travel, 0.0, seconds)
-        return standing, travel, Comfort(travel.vignette, travel.blink)
-    standing, pace = walk(standing, frame, seconds, rules)
+        return play_space, travel, Comfort(travel.vignette, travel.blink)
+    play_space, pace = walk(play_space, frame, seconds, rules)
     travel, angle, pace_turned = turn(travel, frame, seconds, rules)
     if angle:
-        standing = turned(standing, angle, frame.head.position)
-    ground = ground or level_ground(standing.point(underfoot(frame.head))[1])
-    travel, arc, landing = aim(travel, frame, standing, ground)
+        play_space = turned(play_space, angle, frame.head.position)
+    ground = ground or level_ground(play_space.point(underfoot(frame.head))[1])
+    travel, arc, landing = aim(travel, frame, play_space, ground)
     if landing is not None:
-        standing = pinned(standing, underfoot(frame.head), standing.point(landing))
+        play_space = pinned(play_space, underfoot(frame.head), play_space.point(landing))
     travel, true_size, home = reset(travel, frame, seconds)
-    true_size = true_size and standing.scale != 1.0
+    true_size = true_size and play_space.scale != 1.0
     if true_size:
-        standing = resized(standing, frame.head, 1.0)
+        play_space = resized(play_space, frame.head, 1.0)
     leaps = landing is not None or true_size or home
     travel = replace(travel, blink=1.0 if leaps else travel.blink)
     travel = fade(travel, max(pace, pace_turned) * rules.vignette, seconds)
     jumps = leaps or (rules.turning == "snap" and angle != 0)
-    return standing, travel, Comfort(travel.vignette, travel.blink, arc, jumps, home)
+    return play_space, travel, Comfort(travel.vignette, travel.blink, arc, jumps, home)
 
 
-def hold_world(standing: Standing, travel: Travel, frame: Frame) -> tuple[Standing, Travel]:
+def hold_world(play_space: PlaySpace, travel: Travel, frame: Frame) -> tuple[PlaySpace, Travel]:
     """Empty hands that begin to squeeze take hold of the world, and draw it along."""
     squeezing = frozenset(side for side in SIDES if squeezes(frame, side, travel.squeezing))
     before = frozenset(side for side, _ in travel.grips)
     holding = squeezing & (before | (squeezing - travel.squeezing))
     # With every hand that comes or goes, and in a room with a new origin, holds begin anew.
     anew = holding != before or frame.recentred
-    grips = take(standing, frame, holding) if anew else travel.grips
+    grips = held_points(play_space, frame, holding) if anew else travel.grips
     if grips:
-        standing = drawn_along(standing, frame, grips)
-    return standing, replace(travel, squeezing=squeezing, grips=grips)
+        play_space = drawn_along(play_space, frame, grips)
+    return play_space, replace(travel, squeezing=squeezing, grips=grips)
 
 
 def squeezes(frame: Frame, side: str, before: frozenset[str]) -> bool:
@@ -134,7 +134,9 @@ def pressing(frame: Frame) -> frozenset[str]:
     return frozenset(side for side in SIDES if frame.hands[side].primary)
 
 
-def walk(standing: Standing, frame: Frame, seconds: float, rules: Rules) -> tuple[Standing, float]:
+def walk(
+    play_space: PlaySpace, frame: Frame, seconds: float, rules: Rules
+) -> tuple[PlaySpace, float]:
     """Along the head on the level by one stick, up and down by the other; and at what pace, 0..1.
 
     Metres of the room: who is small walks slowly.
@@ -144,12 +146,12 @@ def walk(standing: Standing, frame: Frame, seconds: float, rules: Rules) -> tupl
     up = up if abs(up) > abs(sideways) else 0.0
     pace = max(math.hypot(aside, ahead), abs(up))
     if pace == 0:
-        return standing, 0.0
+        return play_space, 0.0
     level = np.array([aside, 0.0, -ahead]) * rules.walk_m_s
     by = yaw(heading(frame.head.wxyz)).matrix()[:3, :3] @ level  # (3,) m/s, room
     by[1] = up * rules.fly_m_s
-    world = standing.world_from_play.matrix()[:3, :3] @ by * standing.scale
-    return moved(standing, world * seconds), pace
+    world = play_space.world_from_play.matrix()[:3, :3] @ by * play_space.scale
+    return moved(play_space, world * seconds), pace
 
 
 def turn(travel: Travel, frame: Frame, seconds: float, rules: Rules) -> tuple[Travel, float, float]:
@@ -168,7 +170,7 @@ def turn(travel: Travel, frame: Frame, seconds: float, rules: Rules) -> tuple[Tr
 
 
 def aim(
-    travel: Travel, frame: Frame, standing: Standing, ground: Ground
+    travel: Travel, frame: Frame, play_space: PlaySpace, ground: Ground
 ) -> tuple[Travel, Arc | None, np.ndarray | None]:
     """The arc while A or X is held, and where in the room (3,) its release lands."""
     pressed = pressing(frame)
@@ -181,7 +183,7 @@ def aim(
     # Lost, squeezing, or the origin moved under it: thought better of.
     if hand.aim is None or hand.squeeze >= GRIPS_AT or frame.recentred:
         return replace(travel, aims=None), None, None
-    arc = throw_arc(hand.aim, standing, ground)
+    arc = throw_arc(hand.aim, play_space, ground)
     if aims in pressed:
         return travel, arc, None
     return replace(travel, aims=None), None, arc.landing if arc.fine else None

@@ -9,7 +9,7 @@ from shapeshift.scene.scene import IDENTITY
 
 
 @dataclass(frozen=True)
-class Standing:
+class PlaySpace:
     """world = position + scale * rotation @ play; scale 1 is the true one."""
 
     world_from_play: Pose = IDENTITY

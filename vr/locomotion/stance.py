@@ -1,4 +1,4 @@
-"""How a room is moved about the world: pure functions from one Standing to another.
+"""How a room is moved about the world: pure functions from one PlaySpace to another.
 
 The room always stays level; it is turned about the world's up alone.
 """
@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 
 UP = np.array([0.0, 1.0, 0.0])
 LEAST_SCALE, MOST_SCALE = 0.01, 100.0  # metres of the world a metre of the room
@@ -32,30 +32,30 @@ def heading(wxyz: np.ndarray) -> float:
     return math.atan2(-ahead[0], -ahead[2])
 
 
-def moved(standing: Standing, by: np.ndarray) -> Standing:
+def moved(play_space: PlaySpace, by: np.ndarray) -> PlaySpace:
     """The room shifted by (3,) metres of the world."""
-    at = np.clip(standing.world_from_play.position + by, -FAR_M, FAR_M)
-    return replace(standing, world_from_play=Pose(at, standing.world_from_play.wxyz))
+    at = np.clip(play_space.world_from_play.position + by, -FAR_M, FAR_M)
+    return replace(play_space, world_from_play=Pose(at, play_space.world_from_play.wxyz))
 
 
-def pinned(standing: Standing, play: np.ndarray, world: np.ndarray) -> Standing:
+def pinned(play_space: PlaySpace, play: np.ndarray, world: np.ndarray) -> PlaySpace:
     """The room shifted so that a point (3,) of it lies at a point (3,) of the world."""
-    return moved(standing, np.asarray(world) - standing.point(play))
+    return moved(play_space, np.asarray(world) - play_space.point(play))
 
 
-def turned(standing: Standing, radians: float, about: np.ndarray) -> Standing:
+def turned(play_space: PlaySpace, radians: float, about: np.ndarray) -> PlaySpace:
     """The room turned to the left about a point (3,) of it, which stays where it is."""
-    there = standing.point(about)
-    room = standing.world_from_play
+    there = play_space.point(about)
+    room = play_space.world_from_play
     wxyz = Pose.from_matrix(yaw(radians).matrix() @ room.matrix()).wxyz
-    return pinned(replace(standing, world_from_play=Pose(room.position, wxyz)), about, there)
+    return pinned(replace(play_space, world_from_play=Pose(room.position, wxyz)), about, there)
 
 
-def scaled(standing: Standing, scale: float, about: np.ndarray) -> Standing:
+def scaled(play_space: PlaySpace, scale: float, about: np.ndarray) -> PlaySpace:
     """Another scale, held within bounds; a point (3,) of the room stays where it is."""
-    there = standing.point(about)
+    there = play_space.point(about)
     scale = min(max(float(scale), LEAST_SCALE), MOST_SCALE)
-    return pinned(replace(standing, scale=scale), about, there)
+    return pinned(replace(play_space, scale=scale), about, there)
 
 
 def underfoot(head: Pose) -> np.ndarray:
@@ -63,21 +63,21 @@ def underfoot(head: Pose) -> np.ndarray:
     return head.position * (1 - UP)
 
 
-def resized(standing: Standing, head: Pose, scale: float) -> Standing:
+def resized(play_space: PlaySpace, head: Pose, scale: float) -> PlaySpace:
     """Another scale, the feet staying on the spot."""
-    return scaled(standing, scale, underfoot(head))
+    return scaled(play_space, scale, underfoot(head))
 
 
-def standing_before(
+def play_space_before(
     eye: Pose, head: Pose, floor_y: float | None = None, scale: float = 1.0
-) -> Standing:
+) -> PlaySpace:
     """The head over the place of a world's eye and turned its way: the start, and recentring.
 
     On the floor where the world has one, else with the head at the eye's height.
     """
     level = yaw(heading(eye.wxyz) - heading(head.wxyz))
-    standing = Standing(Pose(np.zeros(3), level.wxyz), scale)
-    standing = pinned(standing, head.position, eye.position)
+    play_space = PlaySpace(Pose(np.zeros(3), level.wxyz), scale)
+    play_space = pinned(play_space, head.position, eye.position)
     if floor_y is None:
-        return standing
-    return moved(standing, UP * (floor_y - standing.point(underfoot(head))[1]))
+        return play_space
+    return moved(play_space, UP * (floor_y - play_space.point(underfoot(head))[1]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 
 SPEED = 6.0  # m/s of the room at which the arc leaves the hand: 3.7 m far on level ground, and more
 FALL = 9.81  # m/s2
@@ -65,7 +65,7 @@ def ground_of(world, level_y: float | None = None) -> Ground:
     return ground
 
 
-def throw_arc(aim: Pose, standing: Standing, ground: Ground) -> Arc:
+def throw_arc(aim: Pose, play_space: PlaySpace, ground: Ground) -> Arc:
     """The arc of a hand that aims."""
     along = -aim.matrix()[:3, 2]
     if not math.isfinite(float(along.sum())):
@@ -73,16 +73,16 @@ def throw_arc(aim: Pose, standing: Standing, ground: Ground) -> Arc:
     seconds = np.arange(STEPS + 1)[:, None] * STEP_S
     points = aim.position + along * SPEED * seconds  # (n, 3) metres, room
     points[:, 1] -= FALL / 2 * seconds[:, 0] ** 2
-    room = standing.world_from_play
-    world = room.position + standing.scale * points @ room.matrix()[:3, :3].T  # (n, 3)
+    room = play_space.world_from_play
+    world = room.position + play_space.scale * points @ room.matrix()[:3, :3].T  # (n, 3)
     for number in range(STEPS):
         met = ground(world[number], world[number + 1])
         if met is not None:
-            landing = _into_room(standing, met[0])
+            landing = _into_room(play_space, met[0])
             return Arc(np.vstack([points[: number + 1], landing]), landing, met[1])
     return Arc(points, None, False)
 
 
-def _into_room(standing: Standing, world: np.ndarray) -> np.ndarray:
-    room = standing.world_from_play
-    return room.matrix()[:3, :3].T @ (world - room.position) / standing.scale
+def _into_room(play_space: PlaySpace, world: np.ndarray) -> np.ndarray:
+    room = play_space.world_from_play
+    return room.matrix()[:3, :3].T @ (world - room.position) / play_space.scale

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from shapeshift.vr.frame import Frame, grip_of
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import pinned, scaled, turned
 
 LEAST_APART = 0.05  # metres between two hands: nearer, their distance and direction say nothing
@@ -17,30 +17,30 @@ LEAST_APART = 0.05  # metres between two hands: nearer, their distance and direc
 Grips = tuple[tuple[str, np.ndarray], ...]  # side, (3,) metres of the world that it holds
 
 
-def take(standing: Standing, frame: Frame, sides: frozenset[str]) -> Grips:
+def held_points(play_space: PlaySpace, frame: Frame, sides: frozenset[str]) -> Grips:
     """What these hands hold now."""
     return tuple(
-        (side, standing.point(grip_of(frame.hands[side]).position)) for side in sorted(sides)
+        (side, play_space.point(grip_of(frame.hands[side]).position)) for side in sorted(sides)
     )
 
 
-def drawn_along(standing: Standing, frame: Frame, grips: Grips) -> Standing:
+def drawn_along(play_space: PlaySpace, frame: Frame, grips: Grips) -> PlaySpace:
     """The standing in which the hands hold what they took."""
     here = [grip_of(frame.hands[side]).position for side, _ in grips]  # (3,) metres, room
     there = [world for _, world in grips]
     if len(grips) == 1:
-        return pinned(standing, here[0], there[0])
+        return pinned(play_space, here[0], there[0])
     middle = (here[0] + here[1]) / 2
     apart, apart_world = here[1] - here[0], there[1] - there[0]
     length = float(np.linalg.norm(apart))
     if length >= LEAST_APART:
-        standing = scaled(standing, float(np.linalg.norm(apart_world)) / length, middle)
+        play_space = scaled(play_space, float(np.linalg.norm(apart_world)) / length, middle)
     across, across_world = (math.hypot(v[0], v[2]) for v in (apart, apart_world))
-    if across >= LEAST_APART and across_world >= LEAST_APART * standing.scale:
-        now = standing.world_from_play.matrix()[:3, :3] @ apart
+    if across >= LEAST_APART and across_world >= LEAST_APART * play_space.scale:
+        now = play_space.world_from_play.matrix()[:3, :3] @ apart
         angle = _bearing(apart_world) - _bearing(now)
-        standing = turned(standing, math.remainder(angle, math.tau), middle)
-    return pinned(standing, middle, (there[0] + there[1]) / 2)
+        play_space = turned(play_space, math.remainder(angle, math.tau), middle)
+    return pinned(play_space, middle, (there[0] + there[1]) / 2)
 
 
 def _bearing(direction: np.ndarray) -> float:

@@ -31,28 +31,28 @@ class GoingAway:
 Event = StateChanged | Recentred | ControllersChanged | GoingAway
 
 
-def take_events(xr, instance: Any) -> list[Event]:
+def poll_events(xr, instance: Any) -> list[Event]:
     """All that have come since the last call; those of no meaning to us are left out."""
     events: list = []
     while True:
         try:
-            told = xr.poll_event(instance)
+            buffer = xr.poll_event(instance)
         except xr.exception.EventUnavailable:
             return events
-        event = read_event(xr, told)
+        event = read_event(xr, buffer)
         if event is not None:
             events.append(event)
 
 
-def read_event(xr, told) -> Event | None:
+def read_event(xr, buffer) -> Event | None:
     """An event buffer as one of ours; None for one that means nothing to us."""
-    kinds, kind = xr.StructureType, int(told._type)
+    kinds, kind = xr.StructureType, int(buffer._type)
     if kind == int(kinds.EVENT_DATA_SESSION_STATE_CHANGED):
-        number = int(_as(told, xr.EventDataSessionStateChanged)._state)
+        number = int(_as(buffer, xr.EventDataSessionStateChanged)._state)
         names = {int(state): state.name for state in xr.SessionState}
         return StateChanged(names[number]) if number in names else None
     if kind == int(kinds.EVENT_DATA_REFERENCE_SPACE_CHANGE_PENDING):
-        pending = _as(told, xr.EventDataReferenceSpaceChangePending)
+        pending = _as(buffer, xr.EventDataReferenceSpaceChangePending)
         names = {int(getattr(xr.ReferenceSpaceType, name)): name
                  for name in ("LOCAL_FLOOR", "STAGE", "LOCAL")}  # fmt: skip
         space = names.get(int(pending._reference_space_type), "")
@@ -64,5 +64,5 @@ def read_event(xr, told) -> Event | None:
     return None
 
 
-def _as(told, kind):
-    return ctypes.cast(ctypes.byref(told), ctypes.POINTER(kind)).contents
+def _as(buffer, kind):
+    return ctypes.cast(ctypes.byref(buffer), ctypes.POINTER(kind)).contents

@@ -28,9 +28,11 @@ def check_requirements(instance: Instance) -> None:
     # xr.ext.KHR.opengl_enable of pyopenxr 1.1.6501 cannot be imported on Linux.
     address = xr.get_instance_proc_addr(instance.handle, "xrGetOpenGLGraphicsRequirementsKHR")
     ask = ctypes.cast(address, xr.PFN_xrGetOpenGLGraphicsRequirementsKHR)
-    told = xr.GraphicsRequirementsOpenGLKHR()
+    requirements = xr.GraphicsRequirementsOpenGLKHR()
     with instance.asked("say which OpenGL it wants"):
-        answer = xr.exception.check_result(ask(instance.handle, instance.system, byref(told)))
+        answer = xr.exception.check_result(
+            ask(instance.handle, instance.system, byref(requirements))
+        )
         if answer.is_exception():
             raise answer
 

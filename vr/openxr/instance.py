@@ -67,10 +67,10 @@ class Instance:
 
     def _name_runtime(self) -> None:
         with self.asked("say its name"):
-            told = self.xr.get_instance_properties(self.handle)
-        version = self.xr.Version(told.runtime_version)
+            properties = self.xr.get_instance_properties(self.handle)
+        version = self.xr.Version(properties.runtime_version)
         numbers = f"{version.major}.{version.minor}.{version.patch}"
-        self.runtime = f"the OpenXR runtime {_text(told.runtime_name)} {numbers}"
+        self.runtime = f"the OpenXR runtime {_text(properties.runtime_name)} {numbers}"
 
     def _find_headset(self) -> None:
         xr = self.xr
@@ -78,14 +78,14 @@ class Instance:
             with self.asked("name its headset"):
                 wanted = xr.SystemGetInfo(xr.FormFactor.HEAD_MOUNTED_DISPLAY)
                 self.system = xr.get_system(self.handle, wanted)
-                told = xr.get_system_properties(self.handle, self.system)
+                properties = xr.get_system_properties(self.handle, self.system)
         except xr.exception.FormFactorUnavailableError:
             raise NoHeadset(
                 f"{self.runtime} finds no headset; connect it, switch it on, and start again."
             ) from None
         except xr.exception.FormFactorUnsupportedError:
             raise NoHeadset(f"{self.runtime} is not for headsets; {HOW_TO}.") from None
-        self.headset = _text(told.system_name)
+        self.headset = _text(properties.system_name)
 
     @contextmanager
     def asked(self, what: str) -> Iterator[None]:
@@ -137,5 +137,5 @@ def _no_runtime() -> str:
     return f"no OpenXR runtime is active on this machine; {HOW_TO}."
 
 
-def _text(told: bytes | str) -> str:
-    return told.decode(errors="replace") if isinstance(told, bytes) else str(told)
+def _text(name: bytes | str) -> str:
+    return name.decode(errors="replace") if isinstance(name, bytes) else str(name)

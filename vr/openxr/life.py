@@ -10,7 +10,7 @@ BEGIN, END = "begin", "end"  # what has to be done at once
 class Life:
     """Takes the runtime's states one after the other."""
 
-    states: list[str] = field(default_factory=list)  # all that were told
+    states: list[str] = field(default_factory=list)  # all that the runtime has named
     running: bool = False  # begun and not ended: frames have to be made
     lost: bool = False  # the runtime takes the session away
 
@@ -27,7 +27,7 @@ class Life:
         """Whether hands act on us: else a menu of the runtime has them."""
         return self.state == "FOCUSED"
 
-    def take(self, state: str) -> str:
+    def enter(self, state: str) -> str:
         """Notes a state; returns BEGIN, END or "" for nothing to do."""
         self.states.append(state)
         if state == "READY":

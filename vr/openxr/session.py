@@ -26,7 +26,7 @@ from shapeshift.vr.openxr.events import (
     GoingAway,
     Recentred,
     StateChanged,
-    take_events,
+    poll_events,
 )
 from shapeshift.vr.openxr.graphics import bind_current, check_requirements
 from shapeshift.vr.openxr.hands import Hands, pose_of
@@ -34,11 +34,11 @@ from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset
 from shapeshift.vr.openxr.life import BEGIN, END, Life
 from shapeshift.vr.openxr.spaces import locate, moved_by, open_head_space, open_play_space, valid
 from shapeshift.vr.openxr.swapchain import Swapchain, choose_format
-from shapeshift.vr.pace import Pace
-from shapeshift.vr.shown import Shown
+from shapeshift.vr.pace import FramePace
+from shapeshift.vr.shown import Blit
 
 REST_S = 0.01  # between two looks at what the runtime says while there is nothing to draw
-NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a Standing
+NEAR_M, FAR_M = 0.05, 1000.0  # of the eyes, before the scale of a PlaySpace
 MOST_ERRORS = 16  # of GL that a runtime may have left behind
 
 
@@ -56,7 +56,7 @@ class Session:
         pixels: str = "",  # name of a Format; "": the best
     ) -> None:
         self._instance, self._ctx, self._xr = instance, ctx, instance.xr
-        self.life, self.pace = Life(), Pace()
+        self.life, self.pace = Life(), FramePace()
         self.recentrings = 0
         self.profiles: dict[str, str] = {}  # side -> what its controller is taken for
         self.keep = False  # read the runtime's images back into `kept`
@@ -68,7 +68,7 @@ class Session:
         self._head, self._eyes = IDENTITY, (IDENTITY, IDENTITY)
         self._began = 0.0
         self._finish = ctx.finish if is_software(ctx) else lambda: None
-        self._shown = Shown(ctx)
+        self._shown = Blit(ctx)
         self._swapchains: list[Swapchain] = []
         self.hands = Hands(instance.handle)
         self._handle = self._create()
@@ -98,13 +98,13 @@ class Session:
         stereo = xr.ViewConfigurationType.PRIMARY_STEREO
         system = (instance.handle, instance.system, stereo)
         self._blend = choose_blend(xr, xr.enumerate_environment_blend_modes(*system))
-        told = xr.enumerate_view_configuration_views(*system)
+        views = xr.enumerate_view_configuration_views(*system)
         offered = [int(each) for each in xr.enumerate_swapchain_formats(self._handle)]
         try:
             self.pixels = choose_format(offered, pixels)
         except ValueError as none:
             raise NoHeadset(f"{instance.runtime}: {none}") from None
-        for view in told:
+        for view in views:
             size = eye_size(view, part)
             chain = Swapchain(instance, self._handle, self._ctx, size, self.pixels)
             self._swapchains.append(chain)
@@ -120,7 +120,7 @@ class Session:
         runtime wants no frames.
         """
         while True:
-            self._take_events()
+            self._poll_events()
             if self.life.over:
                 break
             if not self.life.running:
@@ -158,13 +158,13 @@ class Session:
         else:
             self.life.states.append("EXITING")  # never begun: there is nothing to wait for
 
-    def _take_events(self) -> None:
+    def _poll_events(self) -> None:
         xr = self._xr
         with self._instance.asked("say what is new"):
-            for event in take_events(xr, self._instance.handle):
+            for event in poll_events(xr, self._instance.handle):
                 match event:
                     case StateChanged(state):
-                        self._take_state(state)
+                        self._enter_state(state)
                     case Recentred():
                         self._pending.append(event)
                     case ControllersChanged():
@@ -172,8 +172,8 @@ class Session:
                     case GoingAway():
                         self.life.lost = True
 
-    def _take_state(self, state: str) -> None:
-        xr, act = self._xr, self.life.take(state)
+    def _enter_state(self, state: str) -> None:
+        xr, act = self._xr, self.life.enter(state)
         if act == BEGIN:
             stereo = xr.ViewConfigurationType.PRIMARY_STEREO
             xr.begin_session(self._handle, xr.SessionBeginInfo(stereo))
@@ -195,7 +195,7 @@ class Session:
             seen_s = (now - self._start_ns) * 1e-9
             period_s = state.predicted_display_period * 1e-9
             self.pace.start(seen_s, period_s, self._began - asked)
-            self._take_head(now)
+            self._locate_head(now)
             views, known = self._locate_eyes(now)
             focused = self.life.focused
             hands = self.hands.read(self.play.handle, now, focused)
@@ -203,7 +203,7 @@ class Session:
         recentred = self._recentred(now)
         return Frame(views, self._head, hands, seen_s, period_s, drawn, focused, recentred)
 
-    def _take_head(self, now: int) -> None:
+    def _locate_head(self, now: int) -> None:
         found = locate(self._xr, self._view_space, self.play, now)
         if found is not None:
             pose, placed, turned = found

@@ -63,11 +63,11 @@ def locate(xr, space: Space, base: Space, time_ns: int) -> tuple[Pose, bool, boo
     return (pose_of(found.pose), placed, turned) if placed or turned else None
 
 
-def valid(flags, told: int) -> tuple[bool, bool]:
+def valid(flags, bits: int) -> tuple[bool, bool]:
     """Whether a position and whether an orientation can be believed."""
-    told = int(told)
-    placed = bool(told & int(flags.POSITION_VALID_BIT))
-    return placed, bool(told & int(flags.ORIENTATION_VALID_BIT))
+    bits = int(bits)
+    placed = bool(bits & int(flags.POSITION_VALID_BIT))
+    return placed, bool(bits & int(flags.ORIENTATION_VALID_BIT))
 
 
 def _open(xr, session: Any, kind: str, pose: Pose) -> Space:

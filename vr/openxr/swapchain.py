@@ -7,13 +7,13 @@ import moderngl
 import numpy as np
 
 from shapeshift.vr.openxr.instance import Instance, NoHeadset
-from shapeshift.vr.shown import Shown
+from shapeshift.vr.shown import Blit
 
 WAIT_NS = 1_000_000_000  # for an image that the runtime still reads
 
 
 @dataclass(frozen=True)
-class Format:
+class SwapchainFormat:
     """A format of OpenGL; `linear`: runtimes take its values for light, not for display values."""
 
     gl: int
@@ -25,23 +25,23 @@ class Format:
 # The order of wanting: eight bits that are display values hold all that our pictures hold;
 # of light, eight bits would show bands in the dark.
 FORMATS = (
-    Format(0x8C43, "SRGB8_ALPHA8", False, "f1"),
-    Format(0x881A, "RGBA16F", True, "f2"),
-    Format(0x805B, "RGBA16", True, "f2"),
-    Format(0x8C3A, "R11F_G11F_B10F", True, "f2"),
-    Format(0x8059, "RGB10_A2", True, "f1"),
-    Format(0x8058, "RGBA8", True, "f1"),
+    SwapchainFormat(0x8C43, "SRGB8_ALPHA8", False, "f1"),
+    SwapchainFormat(0x881A, "RGBA16F", True, "f2"),
+    SwapchainFormat(0x805B, "RGBA16", True, "f2"),
+    SwapchainFormat(0x8C3A, "R11F_G11F_B10F", True, "f2"),
+    SwapchainFormat(0x8059, "RGB10_A2", True, "f1"),
+    SwapchainFormat(0x8058, "RGBA8", True, "f1"),
 )
 
 
-def choose_format(offered: list[int], wanted: str = "") -> Format:
+def choose_format(offered: list[int], wanted: str = "") -> SwapchainFormat:
     """The best of FORMATS among the runtime's, or the one that is named; ValueError for none."""
     known = [each for each in FORMATS if each.gl in offered]
     if wanted:
         known = [each for each in known if each.name == wanted]
     if not known:
-        told = ", ".join(hex(each) for each in offered)
-        raise ValueError(f"no format of {wanted or 'ours'} among the runtime's ({told}).")
+        names = ", ".join(hex(each) for each in offered)
+        raise ValueError(f"no format of {wanted or 'ours'} among the runtime's ({names}).")
     return known[0]
 
 
@@ -54,7 +54,7 @@ class Swapchain:
         session: Any,
         ctx: moderngl.Context,
         size: tuple[int, int],
-        pixels: Format,
+        pixels: SwapchainFormat,
     ) -> None:
         xr = self._xr = instance.xr
         self.size, self.pixels, self._ctx = size, pixels, ctx
@@ -77,7 +77,7 @@ class Swapchain:
             for image in images
         ]
 
-    def show(self, texture: moderngl.Texture, shown: Shown, keep: bool = False):
+    def show(self, texture: moderngl.Texture, shown: Blit, keep: bool = False):
         """Hands an eye's display-encoded picture over.
 
         With `keep` the runtime's image is read back, (H, W, 3) float32 with row 0 on top and the

@@ -202,7 +202,7 @@ def track(
     tip("Drag from stop to stop. Alt: without snapping to them.", line / theme.FONT_SIZE)
     io, xs = imgui.get_io(), list(xs)
     if imgui.is_item_activated():
-        grip.take(along, xs, io.mouse_pos.x)
+        grip.press(along, xs, io.mouse_pos.x)
     held = held and grip.knob < len(xs)
     if held:
         reached = 0.0 if io.key_alt else SNAP

@@ -99,7 +99,7 @@ def arrange(state: EditorState, changed: Sequence[Change]) -> None:
             thing = changed_thing(state.scene.objects[index], item, change)
             rows.append((thing, state.filed[index], state.sweeps[index], state.sources[index]))
             moved[index] = number
-    state.take_rows(rows, moved)
+    state.reorder_rows(rows, moved)
     if any(
         {"visible"} & change.fields or None in (change.before, change.after) for change in changed
     ):

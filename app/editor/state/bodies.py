@@ -41,7 +41,7 @@ class Bodies:
         self._given_up = False  # there can be no world: the scene is there to be seen and edited
         self._unwanted = threading.Event()  # ends the thread at its next word
         self._thread: threading.Thread | None = None
-        self._told = ("", 0.0)  # what is being done for a collider, part done
+        self._making = ("", 0.0)  # what is being done for a collider, part done
 
     def __enter__(self) -> "Bodies":
         return self
@@ -64,7 +64,7 @@ class Bodies:
             raise RuntimeError("nothing can be touched: there is no world.")
         return self.world
 
-    def take_over(self, world: "World", edited: EditedFile) -> None:
+    def adopt(self, world: "World", edited: EditedFile) -> None:
         """A world that somebody else has made of the file; it follows its edits from now on."""
         self.forget()
         file, self.world, self._stale = edited.file, world, False
@@ -82,7 +82,7 @@ class Bodies:
 
     @property
     def status(self) -> str:
-        what, part = self._told
+        what, part = self._making
         return f"{what} {part:.0%}" if self.busy else ""
 
     def follow(self, edited: EditedFile) -> None:
@@ -156,16 +156,16 @@ class Bodies:
         """Makes one collider in a thread that the program's end does not wait for."""
         future = self._future = Future()
         file, model, unwanted = edited.file, edited.model(item), self._unwanted
-        self._told = (f"{item.name}: making a collider", 0.0)
+        self._making = (f"{item.name}: making a collider", 0.0)
 
-        def told(what: str, part: float) -> None:
+        def report(what: str, part: float) -> None:
             if unwanted.is_set():
                 raise Unwanted
-            self._told = (f"{item.name}: {what}", part)
+            self._making = (f"{item.name}: {what}", part)
 
         def work() -> None:
             try:
-                future.set_result((making_of(item), *make(file, item, model, told)))
+                future.set_result((making_of(item), *make(file, item, model, report)))
             except Unwanted:
                 future.cancel()
             except BaseException as error:  # handed to the window's thread, which raises it again
@@ -190,14 +190,14 @@ def making_of(item: SceneItem) -> tuple:
 
 
 def make(
-    file: SceneFile, item: SceneItem, model: Model, told: Progress
+    file: SceneFile, item: SceneItem, model: Model, report: Progress
 ) -> "tuple[Collider | None, str]":
     """The collider, or None and why there is none."""
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.colliders.collider_files import one_collider
 
     try:
-        return one_collider(file, item, model, Making(progress=told)), ""
+        return one_collider(file, item, model, Making(progress=report)), ""
     except BadFile as error:
         return None, f"{error} It cannot be touched."
     except MemoryError:

@@ -79,9 +79,9 @@ class EditorState:
     def open(self, paths: Sequence[Path], x: float | None = None) -> None:
         """Shows the files or folders instead of what is there; BadFile leaves all as it was."""
         sources = [Source(path, self.read_model(path)) for path in paths]
-        self.take(sources, scene_of(sources, x))
+        self.open_sources(sources, scene_of(sources, x))
 
-    def take(
+    def open_sources(
         self,
         sources: Sequence[Source],
         scene: Scene,
@@ -244,11 +244,11 @@ class EditorState:
     def move(self, index: int, pose: Pose) -> None:
         """Puts an object elsewhere, at rest; what the file says stays."""
         thing = self.scene.objects[index]
-        self._put(index, replace(thing, world_from_object=pose))
+        self._replace_object(index, replace(thing, world_from_object=pose))
         if self.world is not None and thing.name in self.world.objects:
             self.world.move_object(thing.name, pose)
 
-    def take_rows(self, rows: Sequence[tuple], moved: dict[int, int]) -> None:
+    def reorder_rows(self, rows: Sequence[tuple], moved: dict[int, int]) -> None:
         """Other objects, each with model as read, sweep and source; camera and settings stay.
 
         `moved` tells where those that stay have gone: index before -> index now.
@@ -267,11 +267,11 @@ class EditorState:
     def set_x(self, index: int, x: Control) -> None:
         """Moves an object's x; what the file says stays."""
         thing = self.scene.objects[index]
-        self._put(index, replace(thing, x=x))
+        self._replace_object(index, replace(thing, x=x))
         if self.world is not None and thing.name in self.world.objects:
             self.world.control(thing.name, x)
 
-    def _put(self, index: int, thing: SceneObject) -> None:
+    def _replace_object(self, index: int, thing: SceneObject) -> None:
         objects = list(self.scene.objects)
         objects[index] = thing
         self.scene = Scene(tuple(objects))

@@ -12,7 +12,7 @@ FEWEST = 5  # frames that the median is taken of, even where they are older than
 
 
 @dataclass(frozen=True)
-class Frame:
+class FrameTimes:
     """One frame with new splats."""
 
     when: float  # seconds, when it was shown
@@ -26,12 +26,12 @@ class Meter:
     """Frames of the last second; frames that only showed the same splats again do not count."""
 
     def __init__(self) -> None:
-        self._frames: deque[Frame] = deque()
+        self._frames: deque[FrameTimes] = deque()
         self.geometry_runs = self.color_runs = 0  # since the start
 
     def note(self, now: float, ms: float, stats: FrameStats) -> None:
         """Takes a frame in and forgets those that are too old."""
-        frame = Frame(now, ms, stats.sorts, stats.geometry_runs, stats.color_runs)
+        frame = FrameTimes(now, ms, stats.sorts, stats.geometry_runs, stats.color_runs)
         self._frames.append(frame)
         self.geometry_runs += stats.geometry_runs
         self.color_runs += stats.color_runs

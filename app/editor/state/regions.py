@@ -87,7 +87,7 @@ class Regions:
         self._changed(f"add {region.name}" if kind != "lens" else "")
         return region
 
-    def take(self, selectors: tuple[Selector, ...], index: int) -> None:
+    def add_selectors(self, selectors: tuple[Selector, ...], index: int) -> None:
         """Adds the regions that selectors of object `index` stand for; none is being edited."""
         for selector in selectors:
             region = region_of(selector, "", index)

@@ -47,7 +47,7 @@ class TouchState:
         self._state, self.play = state, play
         self.hand: MouseHand | None = None  # while it holds something
         self.pads: dict[str, tuple[float, float]] = {}  # name -> balance, power as last put there
-        self.told: deque[str] = deque(maxlen=REMEMBERED)  # the last reactions, newest first
+        self.reactions: deque[str] = deque(maxlen=REMEMBERED)  # the last reactions, newest first
         self.colliders = False  # they are shown
         self.labels: list[Label] = []
         self.flashes: list[Flash] = []
@@ -77,7 +77,7 @@ class TouchState:
         """Another scene: nothing of the old one is held or told."""
         self.hand = self._known = None
         self.pads.clear()
-        self.told.clear()
+        self.reactions.clear()
         self.labels.clear()
         self.flashes.clear()
 
@@ -108,7 +108,7 @@ class TouchState:
             return ""
         return STILL if self.world.paused else MOVING
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """What the mouse holds flies on."""
         if self.hand is not None and self.world is not None:
             self.world.release(HAND)
@@ -116,7 +116,7 @@ class TouchState:
 
     def toggle(self) -> None:
         """Lets things move, or holds them still."""
-        self.let_go()
+        self.release()
         world = self.world
         if world is None:
             return
@@ -125,14 +125,14 @@ class TouchState:
 
     def step(self) -> None:
         """One step by hand; things hold still after it."""
-        self.let_go()
+        self.release()
         if self.world is not None:
             self.world.paused = True
             self.follow([self.world.step()])
 
     def reset_objects(self) -> None:
         """Everything where it was before it was touched."""
-        self.let_go()
+        self.release()
         state = self._state
         state.bodies.follow(state.edited)  # edits that the world has not heard of
         if self.world is not None:
@@ -183,5 +183,5 @@ class TouchState:
         for record in records:
             for event in record.events:
                 after = event["to"] or f"x {event['x']:.2f}"
-                self.told.appendleft(f"{event['object']}: {WORDS[event['on']]}, now {after}")
+                self.reactions.appendleft(f"{event['object']}: {WORDS[event['on']]}, now {after}")
                 self.labels.append(Label(event["object"], after))

@@ -44,7 +44,7 @@ class Grip:
     offset: float = 0.0  # from the mouse to the knob's middle
     start: float | None = None  # where the mouse took the knob and has not moved since
 
-    def take(self, track: Track, xs: Sequence[float], mouse: float) -> None:
+    def press(self, track: Track, xs: Sequence[float], mouse: float) -> None:
         """The button went down at `mouse`, with knobs at `xs`; the last one lies above."""
         offsets = [track.place(x) - mouse for x in xs]
         self.knob = min(reversed(range(len(xs))), key=lambda knob: abs(offsets[knob]))

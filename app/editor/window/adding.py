@@ -8,7 +8,7 @@ from shapeshift.app.editor.panels.widgets.path_box import PathBox
 from shapeshift.app.editor.state.arrange import edit, undo
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, Progress, read_files
-from shapeshift.app.editor.window.files import take_over
+from shapeshift.app.editor.window.files import poll_opener
 from shapeshift.app.opening import ReadingOptions, open_model
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.document import edits
@@ -41,12 +41,12 @@ class Adding:
         self._box.close()
         options = self._options
 
-        def read(paths: tuple[Path, ...], told: Progress) -> OpenedFiles:
+        def read(paths: tuple[Path, ...], progress: Progress) -> OpenedFiles:
             return read_files(
                 paths,
-                lambda path, told: open_model(path, options, told),  # finest level at once
+                lambda path, progress: open_model(path, options, progress),  # finest level at once
                 camera_reading(options),
-                told,
+                progress,
                 options.reading(),
                 beside=False,
             )
@@ -56,9 +56,9 @@ class Adding:
 
     def poll(self) -> bool:
         """Takes over what has been read; True while something is being read or looked for."""
-        return take_over(self._state, self._opener, self.take) or self._box.browsing
+        return poll_opener(self._state, self._opener, self.add_opened) or self._box.browsing
 
-    def take(self, found: OpenedFiles) -> None:
+    def add_opened(self, found: OpenedFiles) -> None:
         """One object more of each source; a scene that the device cannot hold stays without."""
         state = self._state
         if found.path is not None:

@@ -12,7 +12,7 @@ from shapeshift.app.editor.panels.widgets.path_box import PathBox
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.open_scene import first_look, opened_scene, told_of
+from shapeshift.app.editor.state.files.open_scene import first_look, opened_scene, repair_notes
 from shapeshift.app.editor.state.files.opened import OpenedFiles, Opener, ReadModel, read_files
 from shapeshift.app.editor.state.user.recent import RecentFiles
 from shapeshift.app.editor.window.window import Drop, Event, KeyDown
@@ -41,8 +41,8 @@ class Files:
         self._opener = Opener()
         self.recent: RecentFiles | None = None  # None: nothing is kept
         self._at_demo = False  # the bundled demo is what is seen: what else there is, is offered
-        # Reads one scene, in the thread that opens; replaced where progress can be told.
-        self.read: ReadModel = lambda path, told: state.read_model(path)
+        # Reads one scene, in the thread that opens; replaced where progress can be shown.
+        self.read: ReadModel = lambda path, progress: state.read_model(path)
         self._row = OpenRow()
         self._box = PathBox("Open a scene", "Open")
 
@@ -54,7 +54,7 @@ class Files:
         """Begins to read files; the window stays alive meanwhile."""
         reading, plain = camera_reading(self._options), self._options.reading()
         self._opener.start(
-            paths, lambda paths, told: read_files(paths, self.read, reading, told, plain)
+            paths, lambda paths, progress: read_files(paths, self.read, reading, progress, plain)
         )
         self._state.say(self._opener.note)
 
@@ -66,14 +66,14 @@ class Files:
             self.recent = RecentFiles.read(config_folder())
             if options.scenes:
                 self.remember_all(found)
-        self.take_cameras(found, stand=options.camera is not None)
-        self._state.say(told_of(found))
+        self.use_cameras(found, look_through=options.camera is not None)
+        self._state.say(repair_notes(found))
 
     def ask(self) -> None:
         """Opens the box that takes a path; what is dropped meanwhile is opened as well."""
         self._box.ask()
 
-    def take_event(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for Ctrl+O, for keys while the box is open, and for what is dropped on it."""
         match event:
             case KeyDown(shortcut="o") if not self._box.asking:
@@ -89,16 +89,16 @@ class Files:
 
     def poll(self) -> bool:
         """Takes over what has been read; True while something is being read or looked for."""
-        busy = take_over(self._state, self._opener, self._ask_and_take)
+        busy = poll_opener(self._state, self._opener, self._ask_and_show)
         return busy or self._box.browsing
 
-    def _ask_and_take(self, found: OpenedFiles) -> None:
+    def _ask_and_show(self, found: OpenedFiles) -> None:
         if found.sources:
-            self._actions.before_losing(lambda: self.take(found))
+            self._actions.before_losing(lambda: self.show_opened(found))
         else:
-            self.take(found)
+            self.show_opened(found)
 
-    def take(self, found: OpenedFiles) -> None:
+    def show_opened(self, found: OpenedFiles) -> None:
         """Shows what has been read; a scene that the device cannot hold leaves the old one."""
         state = self._state
         if found.sources:
@@ -108,15 +108,15 @@ class Files:
             except BadFile as error:
                 state.problem = str(error)
                 return
-            state.take(found.sources, scene, first_look(found), edited)
+            state.open_sources(found.sources, scene, first_look(found), edited)
             self._at_demo = [source.path for source in found.sources] == [DEMO]
             state.messages.problems = []
             self._actions.opened()
-        self.take_cameras(found, stand=not found.sources)
+        self.use_cameras(found, look_through=not found.sources)
         self.remember_all(found)
-        self._state.say(told_of(found))
+        self._state.say(repair_notes(found))
 
-    def take_cameras(self, found: OpenedFiles, stand: bool) -> None:
+    def use_cameras(self, found: OpenedFiles, look_through: bool) -> None:
         """The cameras of a file for n and p; of a scene without any there are none."""
         cameras, things = found.cameras, self._state.scene.objects
         if cameras is None and found.floor is not None and not found.sources:
@@ -125,7 +125,7 @@ class Files:
             return
         if cameras is not None and things:
             cameras = in_scene(cameras, things[0].model)
-        self._viewpoint.follow_cameras(cameras, stand)
+        self._viewpoint.follow_cameras(cameras, look_through)
 
     def draw_row(self, ui_scale: float) -> None:
         """The buttons under the panel's title."""
@@ -174,8 +174,8 @@ class Files:
             self.recent = None
 
 
-def take_over(state: EditorState, opener: Opener, take: Callable[[OpenedFiles], None]) -> bool:
-    """Gives what a thread has read to `take`, its failure to the messages; True while it reads."""
+def poll_opener(state: EditorState, opener: Opener, show: Callable[[OpenedFiles], None]) -> bool:
+    """Gives what a thread has read to `show`, its failure to the messages; True while it reads."""
     if not opener.busy:
         return False
     name = opener.paths[0].name
@@ -190,7 +190,7 @@ def take_over(state: EditorState, opener: Opener, take: Callable[[OpenedFiles], 
     else:
         if found is not None:
             state.say("")
-            take(found)
+            show(found)
     if opener.busy:
         state.say(opener.note)
     return opener.busy

@@ -44,7 +44,7 @@ class Gizmo:
         self._shown = False  # in the last frame: only then can a handle be under the mouse
         self._box: tuple = (None, np.zeros((2, 3)))  # a model, and its corners, object frame
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for what is meant for a handle, and for the key that goes through them."""
         match event:
             case KeyDown(key=glfw.KEY_M):
@@ -62,7 +62,7 @@ class Gizmo:
                 return False
         return True
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Another scene: nothing of the old one is held."""
         self.holding = False
 

@@ -33,7 +33,7 @@ TURN = 0.006  # radians a logical pixel of mouse movement
 LOOK = 0.003
 
 
-class Hands:
+class InputActions:
     """Lets input act; `open_soon` takes the files that are dropped."""
 
     def __init__(
@@ -43,9 +43,9 @@ class Hands:
         self._window, self._state, self._viewpoint = window, state, viewpoint
         self._hooks, self._open_soon = hooks, open_soon
 
-    def take(self, event: Event) -> None:
+    def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
-        if any(takes(event) for takes in self._hooks.takes):
+        if any(handle(event) for handle in self._hooks.event_handlers):
             return
         viewpoint = self._viewpoint
         if isinstance(event, Wheel | DoubleClick):
@@ -57,9 +57,9 @@ class Hands:
                 self.press_key(event)
             case Press() | Drag() | Release() if self.works_on_regions(event):
                 pass
-            case Drag() if viewpoint.steps.standing:
+            case Drag() if viewpoint.steps.at_camera:
                 viewpoint.leave_camera()
-                self.take(event)
+                self.handle_event(event)
             case Drag(button="middle") | Drag(button="right") if self.pans(event):
                 camera.pan(-event.dx / height, event.dy / height)
             case Drag():

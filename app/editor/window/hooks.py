@@ -32,5 +32,5 @@ class Hooks:
     marks: list[Callable[[float], None]] = field(default_factory=list)
     # closing: asked when the window is to be closed; False = not yet
     closing: list[Callable[[], bool]] = field(default_factory=list)
-    # takes: sees every event first; True = it was for this
-    takes: list[Callable[[Event], bool]] = field(default_factory=list)
+    # event_handlers: each sees every event first; True = it was for this
+    event_handlers: list[Callable[[Event], bool]] = field(default_factory=list)

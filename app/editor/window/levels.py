@@ -20,7 +20,7 @@ def attach_refiner(
     """
 
     def swap() -> bool:
-        if (pair := refiner.take()) is not None:
+        if (pair := refiner.next_level()) is not None:
             before, after = pair
             places = [i for i, thing in enumerate(state.scene.objects) if thing.model is before]
             for index in places:

@@ -7,7 +7,7 @@ from shapeshift.app.editor.panels.save_boxes import draw_saving
 from shapeshift.app.editor.state.files.saving import Saving, unsaved
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.window.adding import Adding
-from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.window import (
     CLICK_PIXELS,
     Drag,
@@ -30,7 +30,12 @@ class Objects:
     """What a person does to the objects of the scene that is open."""
 
     def __init__(
-        self, window: Window, hands: Hands, edits: ObjectEdits, saving: Saving, adding: Adding
+        self,
+        window: Window,
+        hands: InputActions,
+        edits: ObjectEdits,
+        saving: Saving,
+        adding: Adding,
     ) -> None:
         self._window, self._hands = window, hands
         self.state, self.edits = edits.state, edits
@@ -67,7 +72,7 @@ class Objects:
     def status(self) -> str:
         return "not saved" if self.unsaved else ""
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for shortcuts, for a click that chooses, and for what is dropped to be added."""
         if isinstance(event, KeyDown) and (self.saving.asking or self.adding.asking):
             return True  # a box is open, and keys are for it

@@ -9,7 +9,7 @@ from shapeshift.app.editor.panels.messages_panel import draw_messages
 from shapeshift.app.editor.panels.panel import PanelActions
 from shapeshift.app.editor.panels.widgets.theme import Box
 from shapeshift.app.editor.state.messages import Messages
-from shapeshift.app.editor.state.user.settings import Settings, other_text_size
+from shapeshift.app.editor.state.user.settings import ProgramSettings, other_text_size
 from shapeshift.app.editor.window.window import Event, KeyDown, Window
 
 LARGER, SMALLER, AS_AT_FIRST = ("+", "="), ("-",), ("0",)  # with Ctrl
@@ -19,13 +19,17 @@ class Shell:
     """Its keys, and what it draws over everything else."""
 
     def __init__(
-        self, window: Window, settings: Settings, messages: Messages, now: Callable[[], float]
+        self,
+        window: Window,
+        settings: ProgramSettings,
+        messages: Messages,
+        now: Callable[[], float],
     ) -> None:
         self._window, self._settings, self._messages, self._now = window, settings, messages, now
         self.keys_open = False
         self.actions = PanelActions(self.fold, self.resize_text, self.show_keys)
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for a key that is the shell's."""
         match event:
             case KeyDown(key=glfw.KEY_F1):

@@ -74,17 +74,17 @@ def splitting(
             names = [f"{name}  {text}" for name, text in zip("AB", sides_of(state), strict=True)]
             split().draw_line(names, (theme.ACCENT, theme.SECOND), ui_scale)
 
-    def take(event: Event) -> bool:
+    def handle_event(event: Event) -> bool:
         if isinstance(event, KeyDown) and event.key == glfw.KEY_C and not event.ctrl:
             index = next(iter(state.sliders), None)
             if index is not None:
                 split_state.toggle(state.scene.objects[index])
             return True
-        return split_state.on and bool(made) and split().take_line(event)
+        return split_state.on and bool(made) and split().handle_line_event(event)
 
     hooks.over.append(draw)
     hooks.marks.append(draw_marks)
-    hooks.takes.append(take)
+    hooks.event_handlers.append(handle_event)
     hooks.keys["Two stops at once"] = list(KEYS)
     state.split.possible = True
     try:
@@ -93,7 +93,7 @@ def splitting(
         split_state.on = split_state.possible = False
         hooks.over.remove(draw)
         hooks.marks.remove(draw_marks)
-        hooks.takes.remove(take)
+        hooks.event_handlers.remove(handle_event)
         for picture, renderer in made:
             picture.release()
             renderer.close()

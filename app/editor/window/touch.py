@@ -8,7 +8,7 @@ from shapeshift.app.editor.panels.sections.touch_panel import draw_touch
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.touch_state import HAND, Flash, TouchState
-from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.touch_marks import Marks
 from shapeshift.app.editor.window.window import (
@@ -48,7 +48,7 @@ KEYS = (
 
 
 def attach_touch(
-    window: Window, state: EditorState, viewpoint: Viewpoint, hands: Hands, hooks: Hooks,
+    window: Window, state: EditorState, viewpoint: Viewpoint, hands: InputActions, hooks: Hooks,
     options: Options,
 ) -> TouchState:  # fmt: skip
     """Adds the section, keys and mouse of touching to the hooks."""
@@ -56,7 +56,7 @@ def attach_touch(
     mouse = MouseTouch(touch, state, window, viewpoint, hands)
     marks = Marks(touch, state, window, viewpoint, mouse.under)
     waits = options.screenshot is None  # for marks to fade
-    hooks.takes.append(mouse.take)
+    hooks.event_handlers.append(mouse.handle_event)
     hooks.each_frame.append(lambda: mouse.each_frame() and waits)
     hooks.over.append(marks.draw_colliders)
     hooks.marks.append(marks.draw)
@@ -79,12 +79,12 @@ class MouseTouch:
 
     def __init__(
         self, touch: TouchState, state: EditorState, window: Window, viewpoint: Viewpoint,
-        hands: Hands,
+        hands: InputActions,
     ) -> None:  # fmt: skip
         self._touch, self._state, self._window = touch, state, window
         self._viewpoint, self._hands = viewpoint, hands
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for what concerns the hand, its ray and the physics."""
         world, hand = self._touch.world, self._touch.hand
         if world is None:
@@ -99,9 +99,9 @@ class MouseTouch:
             case Wheel():
                 self.turn_wheel(hand, event.notches)
             case Release(button="left"):
-                self._touch.let_go()
+                self._touch.release()
             case Press() | DoubleClick():  # another button, or the camera is meant
-                self._touch.let_go()
+                self._touch.release()
                 return False
             case _:
                 return False
@@ -120,7 +120,7 @@ class MouseTouch:
             case glfw.KEY_J:
                 self._touch.colliders = not self._touch.colliders
             case glfw.KEY_ESCAPE if self._touch.hand is not None:
-                self._touch.let_go()
+                self._touch.release()
             case _:
                 return False
         return True

@@ -69,7 +69,7 @@ class TwoPictures:
             self._window.screen().use()
         return self._target
 
-    def take_line(self, event: Event) -> bool:
+    def handle_line_event(self, event: Event) -> bool:
         """True for what moves the line: dragging it, the keys , and ."""
         match event:
             case KeyDown(key=glfw.KEY_COMMA | glfw.KEY_PERIOD as key):

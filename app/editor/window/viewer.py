@@ -30,11 +30,11 @@ from shapeshift.app.editor.state.layout import Box, Layout, lay_out
 from shapeshift.app.editor.state.object_edits import ObjectEdits
 from shapeshift.app.editor.state.quality_controller import FLOOR_DB, TARGET_MS, QualityController
 from shapeshift.app.editor.state.user.own_files import OwnFiles
-from shapeshift.app.editor.state.user.settings import Settings
+from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window.adding import Adding
 from shapeshift.app.editor.window.files import Files, OpenActions
 from shapeshift.app.editor.window.gizmo import Gizmo
-from shapeshift.app.editor.window.hands import Hands
+from shapeshift.app.editor.window.hands import InputActions
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.objects import KEYS as OBJECT_KEYS
 from shapeshift.app.editor.window.objects import Objects
@@ -63,11 +63,13 @@ class Viewer:
 
     def __init__(
         self, window: Window, renderer: Renderer, state: EditorState, options: Options,
-        settings: Settings | None = None, own_files: OwnFiles | None = None,
+        settings: ProgramSettings | None = None, own_files: OwnFiles | None = None,
     ) -> None:  # fmt: skip
         self.window, self.renderer, self.state, self.options = window, renderer, state, options
         state.overlay = options.panel
-        self.settings = settings or Settings()  # of the program; state.settings are the picture's
+        self.settings = (
+            settings or ProgramSettings()
+        )  # of the program; state.settings are the picture's
         folders = WorkFolders.of(options.pictures)
         self._pictures = folders.pictures
         self.hooks = Hooks()
@@ -85,7 +87,7 @@ class Viewer:
             options.floor_db or FLOOR_DB,
             wanted=(options.target_ms or options.floor_db) is not None,
         )
-        self.hands = Hands(window, state, self.viewpoint, self.hooks, self.open_soon)
+        self.hands = InputActions(window, state, self.viewpoint, self.hooks, self.open_soon)
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
@@ -94,7 +96,7 @@ class Viewer:
         self._framed = Framed(self.viewpoint.free_size, self.viewpoint.refit)
         self.hooks.each_frame.append(lambda: self._framed.poll(time.perf_counter()))
         self.hooks.opened.append(self._framed.forget)
-        self.hooks.takes.insert(0, self.shell.take)
+        self.hooks.event_handlers.insert(0, self.shell.handle_event)
         self._title = ""  # what the window's title says
         self.frames = 0  # drawn since the window opened
         self._overlay_ms = 0.0
@@ -113,7 +115,7 @@ class Viewer:
         hooks.top.append(files.draw_row)
         hooks.marks.append(files.draw_box)
         hooks.cards.append(files.draw_empty)
-        hooks.takes.append(files.take_event)
+        hooks.event_handlers.append(files.handle_event)
         hooks.status.append(lambda: state.bodies.status)
         return files
 
@@ -128,12 +130,12 @@ class Viewer:
         )  # fmt: skip
         self.gizmo = gizmo = Gizmo(state, self.viewpoint, self.window)
         objects = Objects(self.window, self.hands, edits, saving, adding)
-        hooks.takes.insert(0, gizmo.take)
-        hooks.takes.append(objects.take)
+        hooks.event_handlers.insert(0, gizmo.handle_event)
+        hooks.event_handlers.append(objects.handle_event)
         hooks.marks += [gizmo.draw, objects.draw_boxes]
         hooks.each_frame.append(objects.each_frame)
         hooks.status.append(objects.status)
-        hooks.opened += [objects.forget, gizmo.let_go]
+        hooks.opened += [objects.forget, gizmo.release]
         if self.options.screenshot is None:
             hooks.closing.append(objects.may_close)
         hooks.sections.append(
@@ -212,7 +214,7 @@ class Viewer:
         start, viewpoint = time.perf_counter(), self.viewpoint
         self.state.messages.ended(start)
         for event in self.window.begin_frame():
-            self.take(event)
+            self.handle_event(event)
         self.state.advance(seconds)
         pushed = self.hands.push
         if pushed.any:
@@ -238,9 +240,9 @@ class Viewer:
             self.dial.seen((now - start) * 1e3, self._moving)
         self.readings.idle = not fresh
 
-    def take(self, event: Event) -> None:
+    def handle_event(self, event: Event) -> None:
         """Lets one input event act."""
-        self.hands.take(event)
+        self.hands.handle_event(event)
 
     def open_soon(self, paths: tuple[Path, ...]) -> None:
         """Opens files and folders, scenes or cameras, while the window goes on."""

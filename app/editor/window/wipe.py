@@ -74,7 +74,7 @@ class Wipe(TwoPictures):
     def attach(self, hooks: Hooks) -> None:
         hooks.over.append(self.draw)
         hooks.marks.append(self.draw_marks)
-        hooks.takes.append(self.take)
+        hooks.event_handlers.append(self.handle_event)
         hooks.status.append(self.status)
         hooks.keys["Comparing"] = list(KEYS)
         hooks.each_frame.append(lambda: self.on and self._waiting)
@@ -119,12 +119,12 @@ class Wipe(TwoPictures):
         db = self._comparison.db
         return "A = B" if db == MOST_DB else f"A to B {db:.1f} dB"
 
-    def take(self, event: Event) -> bool:
+    def handle_event(self, event: Event) -> bool:
         """True for what concerns the line: dragging it, the keys , . and C."""
         if isinstance(event, KeyDown) and event.key == glfw.KEY_C:
             self.on = not self.on
             return True
-        return self.on and self.take_line(event)
+        return self.on and self.handle_line_event(event)
 
     def draw_marks(self, ui_scale: float) -> None:
         """The line and the two names beside it."""

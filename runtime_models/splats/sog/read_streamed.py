@@ -27,7 +27,7 @@ GROWTH = 4  # while a scene is refined, the next level that is read has so many 
 
 
 @dataclass(frozen=True)
-class Run:
+class SplatRun:
     """Neighbouring splats of one of the files."""
 
     file: int  # index
@@ -41,7 +41,7 @@ class Streamed:
 
     folder: Path
     files: tuple[Path, ...]  # meta.json of a folder or a .sog each
-    levels: tuple[tuple[Run, ...], ...]
+    levels: tuple[tuple[SplatRun, ...], ...]
     environment: Path | None  # splats that belong to every level
 
     @property
@@ -135,9 +135,9 @@ def read_tree(path: Path, memory: Account | None = None) -> Streamed:
     )
 
 
-def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[Run, ...], ...]:
+def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[SplatRun, ...], ...]:
     """The runs of each level, in the tree's order.  Raises BadFile."""
-    out: list[list[Run]] = [[] for _ in range(levels)]
+    out: list[list[SplatRun]] = [[] for _ in range(levels)]
     waiting = [tree]
     while waiting:
         node = waiting.pop()
@@ -157,7 +157,7 @@ def runs_of(tree: object, levels: int, files: int, name: str) -> tuple[tuple[Run
                 raise BadFile(f"{name} holds a level {level[:20]!r}, it states {levels} levels.")
             if file >= files:
                 raise BadFile(f"{name} names file {file}, it lists {files}.")
-            out[int(level)].append(Run(file, first, count))
+            out[int(level)].append(SplatRun(file, first, count))
     return tuple(map(tuple, out))
 
 
@@ -165,7 +165,7 @@ def read_level(streamed: Streamed, number: int, reading: Reading) -> SplatLayers
     """One level as a scene of one stop.  Raises BadFile."""
     check_mode(reading.mode)
     reading = reading.within(streamed.folder)
-    runs_of_file: dict[int, list[Run]] = {}
+    runs_of_file: dict[int, list[SplatRun]] = {}
     for run in streamed.levels[number]:
         if run.count:
             runs_of_file.setdefault(run.file, []).append(run)
@@ -208,13 +208,13 @@ def files_of_sog(path: Path, reading: Reading) -> list[Path]:
     return [path, *(path.parent / name for name in sog.file_names())]
 
 
-def picked(raw: RawSplats, runs: list[Run]) -> RawSplats:
+def picked(raw: RawSplats, runs: list[SplatRun]) -> RawSplats:
     """The splats of the runs.  Raises BadFile where they are not all there, or named twice."""
     count = len(raw.means)
     outside = any(run.first + run.count > count for run in runs)
     if outside or sum(run.count for run in runs) > count:
         raise BadFile(f"{raw.file} has {count:,} splats, {TREE} names others or some twice.")
-    if runs == [Run(runs[0].file, 0, count)]:
+    if runs == [SplatRun(runs[0].file, 0, count)]:
         return raw
     rows = np.concatenate([np.arange(r.first, r.first + r.count) for r in runs])
     if len(rows) == count and (np.diff(rows) == 1).all():

@@ -24,26 +24,26 @@ ATTRIBUTES = {"positions": 3, "orientations": 4, "scales": 3, "opacities": 1}
 HARMONICS, DEGREE = "radiance:sphericalHarmonicsCoefficients", "radiance:sphericalHarmonicsDegree"
 
 
-class Unreadable(ValueError):
+class UnreadableScene(ValueError):
     """What is wrong with a scene, without its name."""
 
 
 def refuse_outside(root: Path) -> None:
-    """Raises Unreadable where a layer names a file that is not in the scene's folder or package."""
+    """Raises UnreadableScene where a layer names a file outside the scene's folder or package."""
     from pxr import Sdf
 
     folder, waiting = root.parent.resolve(), [str(root)]
     seen: set[str] = set()
     while waiting:
         if len(seen) > MOST_LAYERS:
-            raise Unreadable(f"it has over {MOST_LAYERS} layers")
+            raise UnreadableScene(f"it has over {MOST_LAYERS} layers")
         name = waiting.pop()
         if name in seen:
             continue
         seen.add(name)
         layer = Sdf.Layer.FindOrOpen(name)
         if layer is None:
-            raise Unreadable("no USD that can be read" if name == str(root) else
+            raise UnreadableScene("no USD that can be read" if name == str(root) else
                              f"its layer {short(name)} cannot be read")  # fmt: skip
         refuse_clips(layer)
         for said in filter(None, layer.GetCompositionAssetDependencies()):  # "": itself
@@ -52,19 +52,19 @@ def refuse_outside(root: Path) -> None:
             usual = "://" not in said and "SDF_FORMAT_ARGS" not in said
             inner = not os.path.isabs(outer) or Path(outer).resolve().is_relative_to(folder)
             if not (usual and inner):
-                raise Unreadable(
+                raise UnreadableScene(
                     f"it names {short(said)}, and only files in its own folder are opened; flatten "
                     "it (usdcat --flatten)"
                 )
             if not inside.partition("]")[0].lower().endswith(ENDINGS):
-                raise Unreadable(f"it names {short(said)}, which is no USD")
+                raise UnreadableScene(f"it names {short(said)}, which is no USD")
             if not (os.path.isabs(outer) and os.path.isfile(outer)):
-                raise Unreadable(f"it names {short(said)}, which is not there; copy all of it")
+                raise UnreadableScene(f"it names {short(said)}, which is not there; copy all of it")
             waiting.append(inside)
 
 
 def refuse_clips(layer) -> None:
-    """Raises Unreadable where the times of a prim lie in further files."""
+    """Raises UnreadableScene where the times of a prim lie in further files."""
     found = []
 
     def look(path) -> None:
@@ -74,7 +74,7 @@ def refuse_clips(layer) -> None:
 
     layer.Traverse(layer.pseudoRoot.path, look)
     if found:
-        raise Unreadable("its splats move by value clips, which are not read")
+        raise UnreadableScene("its splats move by value clips, which are not read")
 
 
 def short(name: str) -> str:
@@ -87,7 +87,7 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
 
     stage = Usd.Stage.Open(str(root))
     if stage is None:
-        raise Unreadable("no USD that can be composed")
+        raise UnreadableScene("no USD that can be composed")
     facts = {
         "up": f"+{UsdGeom.GetStageUpAxis(stage)}",
         "metres": UsdGeom.GetStageMetersPerUnit(stage),
@@ -100,7 +100,7 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
         seen += 1
         if seen > MOST_PRIMS:
-            raise Unreadable(f"it has over {MOST_PRIMS:,} prims")
+            raise UnreadableScene(f"it has over {MOST_PRIMS:,} prims")
         if prim.GetTypeName() != KIND:
             others |= {str(prim.GetTypeName())} if prim.GetTypeName() else set()
             continue
@@ -109,7 +109,7 @@ def splats_of(root: Path) -> tuple[dict[str, np.ndarray], dict]:
             continue
         number = len(facts["fields"])
         if number >= MOST_FIELDS:
-            raise Unreadable(f"it has over {MOST_FIELDS:,} fields of splats")
+            raise UnreadableScene(f"it has over {MOST_FIELDS:,} fields of splats")
         facts["fields"].append(field_of(prim, number, arrays))
     facts["others"] = sorted(others)[:5]
     return arrays, facts
@@ -173,7 +173,7 @@ def main(given: str, wanted: str, memory: str) -> None:
         refuse_outside(Path(given))
         arrays, facts = splats_of(Path(given))
     except Exception as error:  # OpenUSD's own errors are of many kinds
-        text = str(error) if isinstance(error, Unreadable) else "no USD that can be read"
+        text = str(error) if isinstance(error, UnreadableScene) else "no USD that can be read"
         sys.stderr.write(f"\n{' '.join(text.split())[:300]}\n")
         sys.exit(REFUSED)
     save: Callable[..., None] = np.savez  # numpy takes its keywords for one flag

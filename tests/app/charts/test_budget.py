@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from shapeshift.app import cli
 from shapeshift.app.charts import budget_chart
-from shapeshift.app.charts.budget import Budget, choose, least_scale, read_budget
+from shapeshift.app.charts.budget import FrameBudget, choose, least_scale, read_budget
 from shapeshift.app.charts.budget_chart import (
     BudgetRow,
     Drawn,
@@ -95,8 +95,8 @@ def test_how_far_dynamic_resolution_may_go():
 
 def test_options():
     assert read_budget(None, None) is None
-    assert read_budget(11, None) == Budget(11, 35)
-    assert read_budget(11, 40) == Budget(11, 40)
+    assert read_budget(11, None) == FrameBudget(11, 35)
+    assert read_budget(11, 40) == FrameBudget(11, 40)
     for target, floor, told in (
         (0, None, "--target-ms is 0"),
         (float("inf"), 1, "--target-ms"),

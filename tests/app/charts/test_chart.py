@@ -14,16 +14,16 @@ from shapeshift.app.charts import chart
 from shapeshift.app.charts.chart_measure import ChartRow, Pricing
 from shapeshift.app.charts.chart_picture import draw_chart, family, family_of, name_points
 from shapeshift.app.charts.chart_rows import RowsFile
-from shapeshift.app.charts.chart_settings import EXACT, SETTINGS, settings_of
-from shapeshift.app.charts.chart_stage import (
+from shapeshift.app.charts.chart_scene import (
     QUICK,
     WARM_UP,
     Walk,
     digest,
     distances_of,
-    make_stage,
+    make_chart_scene,
     side_by_side,
 )
+from shapeshift.app.charts.chart_settings import EXACT, SETTINGS, settings_of
 from shapeshift.app.charts.comparison import MOST_DB
 from shapeshift.app.charts.pareto import pareto_front
 from shapeshift.app.document import Document
@@ -273,25 +273,29 @@ def test_scenes_stand_side_by_side():
 def test_near_and_far_are_in_the_scale_of_the_scene():
     """A scene ten times as large has them ten times as far; within them lie 60 and 90 %."""
     model = make_random_model(500)
-    stage = make_stage([Document.of(model)], 0.0, (40, 30), Walk(8, 3))
-    near, far = stage.distances.near, stage.distances.far
+    chart_scene = make_chart_scene([Document.of(model)], 0.0, (40, 30), Walk(8, 3))
+    near, far = chart_scene.distances.near, chart_scene.distances.far
     points = model_points(model)
-    eye = stage.middle.world_from_eye.position
+    eye = chart_scene.middle.world_from_eye.position
     inside = np.linalg.norm(points[0] - eye, axis=1)
     assert (inside < near).mean() == pytest.approx(0.6, abs=0.05)
     assert (inside < far).mean() == pytest.approx(0.9, abs=0.05)
     ten = Document.of(replace(model, anchors=model.anchors * 10))
-    large = make_stage([ten], 0.0, (40, 30), Walk(8, 3))
+    large = make_chart_scene([ten], 0.0, (40, 30), Walk(8, 3))
     assert large.distances.near == pytest.approx(10 * near, rel=1e-3)
     assert large.distances.far == pytest.approx(10 * far, rel=1e-3)
     nothing = (np.full((3, 3), np.nan), np.ones(3))
-    assert distances_of(nothing, stage.path).near < distances_of(nothing, stage.path).far
+    assert (
+        distances_of(nothing, chart_scene.path).near < distances_of(nothing, chart_scene.path).far
+    )
 
 
 def test_the_path_turns_evenly_about_the_scene():
-    stage = make_stage([Document.of(make_random_model(50))], 0.0, (40, 30), Walk(9, 5, step=1.5))
-    assert len(stage.path) == WARM_UP + 9 and stage.xs == (0, 0.25, 0.5, 0.75, 1)
-    forward = np.array([v.world_from_eye.matrix()[[0, 2], 2] for v in stage.path])
+    chart_scene = make_chart_scene(
+        [Document.of(make_random_model(50))], 0.0, (40, 30), Walk(9, 5, step=1.5)
+    )
+    assert len(chart_scene.path) == WARM_UP + 9 and chart_scene.xs == (0, 0.25, 0.5, 0.75, 1)
+    forward = np.array([v.world_from_eye.matrix()[[0, 2], 2] for v in chart_scene.path])
     turn = np.degrees(np.unwrap(np.arctan2(*forward.T)))
     assert np.allclose(np.abs(np.diff(turn)), 1.5, atol=1e-9)
 

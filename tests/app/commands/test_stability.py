@@ -11,15 +11,15 @@ import pytest
 from PIL import Image
 
 from shapeshift.app.drawing import open_renderer
+from shapeshift.app.stability_cases.case_context import CaseContext
 from shapeshift.app.stability_cases.finding import at_least, at_most, broken_pixels, not_here
 from shapeshift.app.stability_cases.scenes import small_model
-from shapeshift.app.stability_cases.stage import Stage
 from shapeshift.app.stability_cases.table import CASES, COLUMNS, open_table
 from shapeshift.rasterizer.device import NoDevice
 from shapeshift.runtime_models.package.write_package import write_package
 from shapeshift.runtime_models.stop_weights import Pace
 from tests.support.program import assert_refused, launch
-from tests.support.renderer.stability_stage import SIZE, failures, make_stage
+from tests.support.renderer.case_context import SIZE, failures, make_case
 from tests.support.splat_scenes import random_layers
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -30,17 +30,17 @@ def reopen():
 
 
 @pytest.fixture(scope="module")
-def stage():
+def case():
     try:
         with reopen() as (renderer, ctx):
-            yield make_stage(renderer, ctx, reopen)
+            yield make_case(renderer, ctx, reopen)
     except NoDevice as reason:
         pytest.skip(str(reason))
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_case_holds(stage, name):
-    result = CASES[name](stage)
+def test_the_case_holds(case, name):
+    result = CASES[name](case)
     assert not failures(result)
     assert result.findings and result.panels
     assert all(f.reason and f.figure for f in result.findings)
@@ -117,24 +117,24 @@ def shivering(renderer, image, i):
     ],
     ids=lambda value: getattr(value, "__name__", value),
 )
-def test_the_case_fails_where_the_renderer_does(stage, name, spoil):
+def test_the_case_fails_where_the_renderer_does(case, name, spoil):
     if name == "life":
         result = CASES[name](
-            Stage(stage.renderer, None, stage.subject, SIZE, spoiled_reopen, rounds=2)
+            CaseContext(case.renderer, None, case.subject, SIZE, spoiled_reopen, rounds=2)
         )
     else:
-        spoiled = Spoiled(stage.renderer, spoil)
-        result = CASES[name](make_stage(spoiled, None, reopen))
+        spoiled = Spoiled(case.renderer, spoil)
+        result = CASES[name](make_case(spoiled, None, reopen))
     assert failures(result)
 
 
-def test_colours_of_the_middle_between_the_eyes_fail(stage, monkeypatch):
+def test_colours_of_the_middle_between_the_eyes_fail(case, monkeypatch):
     """What every stereo frame had before each eye got colours of its own."""
     monkeypatch.setattr("shapeshift.renderer.colors.eye_colors.SHARED_DB", -1e9)
-    assert any("glossy ball" in text for text in failures(CASES["stereo"](stage)))
+    assert any("glossy ball" in text for text in failures(CASES["stereo"](case)))
 
 
-def test_a_clamp_about_the_tangents_fails(stage, monkeypatch):
+def test_a_clamp_about_the_tangents_fails(case, monkeypatch):
     """1.3 times each tangent, as the Jacobian was held before: within a picture off its axis."""
 
     def limits(camera):
@@ -145,7 +145,7 @@ def test_a_clamp_about_the_tangents_fails(stage, monkeypatch):
         )  # fmt: skip
 
     monkeypatch.setattr("shapeshift.rasterizer.project.Camera.limits", limits)
-    found = failures(CASES["lenses"](stage))
+    found = failures(CASES["lenses"](case))
     assert sum("parts" in text for text in found) >= 3, found
 
 
@@ -160,25 +160,25 @@ def spoiled_reopen():
     return opened()
 
 
-def test_networks_that_nobody_trained_flash_between_the_stops(stage):
+def test_networks_that_nobody_trained_flash_between_the_stops(case):
     """Where x is encoded as it is; a blend of the stops asks for nothing that was not trained."""
-    wild = make_stage(stage.renderer, None, reopen, direct(small_model()))
+    wild = make_case(case.renderer, None, reopen, direct(small_model()))
     assert any("step" in text or "way round" in text for text in failures(CASES["sweep"](wild)))
-    blended = make_stage(stage.renderer, None, reopen, small_model())
+    blended = make_case(case.renderer, None, reopen, small_model())
     assert not failures(CASES["sweep"](blended))
 
 
-def test_a_switch_that_flashes_nowhere_fails_too(stage):
+def test_a_switch_that_flashes_nowhere_fails_too(case):
     """The same blends, almost all of them within a fifth of the way: 4.8 even steps in one."""
     model = small_model()
     ends = [stop.name for stop in model.stops[:2]]
     switch = replace(model, pace=(Pace(*ends, (0, 0.01, 0.02, 0.98, 0.99, 1)),))
-    told = failures(CASES["sweep"](make_stage(stage.renderer, None, reopen, switch)))
+    told = failures(CASES["sweep"](make_case(case.renderer, None, reopen, switch)))
     assert len(told) == 1 and "largest step over an even one" in told[0]
 
 
-def test_a_scene_with_one_stop_has_no_sweep(stage):
-    single = make_stage(stage.renderer, None, reopen, random_layers(10, layers=1))
+def test_a_scene_with_one_stop_has_no_sweep(case):
+    single = make_case(case.renderer, None, reopen, random_layers(10, layers=1))
     (row,) = CASES["sweep"](single).findings
     assert row.verdict == "does not apply" and "single stop" in row.reason
 

@@ -25,7 +25,7 @@ def state() -> EditorState:
     found = OpenedFiles((Source(Path("/data/a.shift"), model),))
     made = EditorState(lambda path: None)
     scene, edited = opened_scene(found)
-    made.take(found.sources, scene, None, edited)
+    made.open_sources(found.sources, scene, None, edited)
     return made
 
 

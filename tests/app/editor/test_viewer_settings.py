@@ -7,7 +7,7 @@ import pytest
 from shapeshift.app.editor.state.user.own_files import MOST, OwnFiles
 from shapeshift.app.editor.state.user.settings import (
     TEXT_SIZES,
-    Settings,
+    ProgramSettings,
     default_text_size,
     other_text_size,
 )
@@ -15,11 +15,11 @@ from shapeshift.app.paths import ASSETS, DEMO, WorkFolders, is_bundled
 
 
 def test_settings_come_back(tmp_path):
-    settings = Settings.read(tmp_path / "config")
+    settings = ProgramSettings.read(tmp_path / "config")
     assert (settings.text_size, settings.panel_open) == (None, None)
     settings.text_size, settings.panel_open = 1.5, False
     settings.keep()
-    again = Settings.read(tmp_path / "config")
+    again = ProgramSettings.read(tmp_path / "config")
     assert (again.text_size, again.panel_open) == (1.5, False)
     assert [path.name for path in (tmp_path / "config").iterdir()] == ["settings.json"]
 
@@ -34,12 +34,12 @@ def test_settings_come_back(tmp_path):
 )  # fmt: skip
 def test_what_is_no_setting_counts_as_none(tmp_path, text):
     (tmp_path / "settings.json").write_text(text)
-    assert Settings.read(tmp_path) == Settings(tmp_path)
+    assert ProgramSettings.read(tmp_path) == ProgramSettings(tmp_path)
 
 
 def test_without_a_folder_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Settings(None, 1.5).keep()
+    ProgramSettings(None, 1.5).keep()
     OwnFiles().wrote(tmp_path / "a", (1, 2))
     assert not list(tmp_path.iterdir())
 

@@ -62,11 +62,11 @@ def test_quality_is_chosen(wearer, name):
 
 def test_size_leaves_the_feet_on_the_spot(wearer):
     head = a_frame(LEFT).head.position
-    under = wearer.state.standing.point(head * (1, 0, 1))
+    under = wearer.state.play_space.point(head * (1, 0, 1))
     for label, scale in (("+", 1 / 1.5), ("+", 0.5), ("\u2013", 1 / 1.5), ("1 : 1", 1.0)):
         wearer.press(label)
-        assert wearer.state.standing.scale == pytest.approx(scale)
-        np.testing.assert_allclose(wearer.state.standing.point(head * (1, 0, 1)), under)
+        assert wearer.state.play_space.scale == pytest.approx(scale)
+        np.testing.assert_allclose(wearer.state.play_space.point(head * (1, 0, 1)), under)
 
 
 def test_recentre_put_back_and_the_floor(wearer):
@@ -269,7 +269,7 @@ def test_it_is_drawn_only_while_something_changes_or_a_hand_is_on_it(wearer, mon
         lambda: setattr(wearer.state.pacing, "quality", "best"),
         lambda: setattr(wearer.state, "floor_shown", False),
         lambda: setattr(wearer.editor, "chosen", "leg"),
-        lambda: wearer.state.touch.told.append("cube: struck"),
+        lambda: wearer.state.touch.reactions.append("cube: struck"),
     ):
         change()
         wearer.wait()

@@ -129,7 +129,7 @@ def test_the_picture_is_the_golden_one(ctx, picture, request):
     editor.chosen = "leg"
     wearer = Wearer(picture, a_state(editor))
     editor.set_x(2, 0.4)
-    wearer.state.touch.told.append("leg: struck, now warm")
+    wearer.state.touch.reactions.append("leg: struck, now warm")
     wearer.wait()
     wearer.point(wearer.middle("Put back"))
     wearer.point(wearer.middle("Put back"))

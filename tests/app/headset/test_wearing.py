@@ -18,7 +18,7 @@ from shapeshift.scene.scene import IDENTITY
 from shapeshift.vr.floor import REST
 from shapeshift.vr.frame import LOST, SIDES, Frame
 from shapeshift.vr.openxr.life import Life
-from shapeshift.vr.pace import Pace
+from shapeshift.vr.pace import FramePace
 
 PERIOD = 1 / 90
 HEAD = Pose(np.array([0.3, 1.6, -0.2]), np.array([np.cos(0.4), 0.0, np.sin(0.4), 0.0]))
@@ -34,7 +34,7 @@ class Played:
     """A session, mirror, renderer and eyes in one, that note what is asked of them in order."""
 
     def __init__(self, frames: list[Frame]) -> None:
-        self.life, self.pace, self.play = Life(), Pace(display_s=PERIOD), None
+        self.life, self.pace, self.play = Life(), FramePace(display_s=PERIOD), None
         self.asked: list[str] = []
         self.queue, self.closing, self.left = frames, False, 0
         self.settings = RenderSettings()
@@ -84,7 +84,7 @@ class Played:
     def coverage(self, i) -> str:
         return f"coverage {i}"
 
-    def draw_floor(self, framebuffer, view, standing, coverage, grid, background) -> None:
+    def draw_floor(self, framebuffer, view, play_space, coverage, grid, background) -> None:
         self.asked.append(f"floor by {coverage}")
         self.grids.append(grid)
 
@@ -106,7 +106,7 @@ def wear(scene):
 
 
 def head_in_world(xr_app: XrApp, frame: Frame) -> np.ndarray:
-    return xr_app.state.standing.pose(frame.head).matrix()
+    return xr_app.state.play_space.pose(frame.head).matrix()
 
 
 def test_a_frame_goes_in_order_and_draws_both_eyes_at_once(wear):
@@ -143,12 +143,12 @@ def test_a_scene_without_a_floor_has_it_where_one_stood_first(wear):
     xr_app, played = wear([frame_at(0.0)])
     xr_app.state.user.floor_y = None
     xr_app.loop()
-    feet = xr_app.state.standing.point(HEAD.position * (1, 0, 1))[1]
+    feet = xr_app.state.play_space.point(HEAD.position * (1, 0, 1))[1]
     assert played.grids[-1].level_m == pytest.approx(feet)
     up = replace(LOST, active=True, grip=HEAD, aim=HEAD, stick=(0.0, 1.0))
     for i in range(1, 60):  # flies
         xr_app.frame(frame_at(i * PERIOD, hands={"left": LOST, "right": up}))
-    assert xr_app.state.standing.point(HEAD.position * (1, 0, 1))[1] > feet + 0.3
+    assert xr_app.state.play_space.point(HEAD.position * (1, 0, 1))[1] > feet + 0.3
     assert played.grids[-1].level_m == pytest.approx(feet)
 
 
@@ -190,8 +190,8 @@ def test_a_long_rest_is_no_long_step(wear):
     xr_app, _ = wear([frame_at(0.0), frame_at(600.0)])
     passed = []
     act = xr_app.state.user.act
-    xr_app.state.user.act = lambda frame, standing, seconds: (
-        passed.append(seconds) or act(frame, standing, seconds)
+    xr_app.state.user.act = lambda frame, play_space, seconds: (
+        passed.append(seconds) or act(frame, play_space, seconds)
     )
     xr_app.loop()
     assert passed == [0.0, LONGEST_STEP_S]

@@ -16,7 +16,15 @@ from shapeshift.app.errors import UsageError
 from shapeshift.app.training.evaluate import Options as EvalOptions
 from shapeshift.app.training.evaluate import run as evaluate
 from shapeshift.app.training.table import Options, command_line, run, train_options
-from shapeshift.app.training.table_rows import MEAN, NAMES, Row, VggRow, cells, compare, mean_row
+from shapeshift.app.training.table_rows import (
+    MEAN,
+    NAMES,
+    TableRow,
+    VggRow,
+    cells,
+    compare,
+    mean_row,
+)
 from shapeshift.app.training.train import Options as TrainOptions
 from shapeshift.app.training.train import run as run_training
 from shapeshift.app.training.train_baselines import TrainedFile, plain_settings, share_of
@@ -147,8 +155,8 @@ def test_without_a_file_the_column_is_absent_and_the_reason_is_told(balls, tmp_p
     assert "no VGG distance" in capsys.readouterr().err.replace("\n", " ")
 
 
-def made(method: str, psnr: float, mb: float, seconds: float = 10.0) -> Row:
-    return Row(method, MEAN, psnr, psnr, 0.9, mb, seconds, 100, 5, 4)
+def made(method: str, psnr: float, mb: float, seconds: float = 10.0) -> TableRow:
+    return TableRow(method, MEAN, psnr, psnr, 0.9, mb, seconds, 100, 5, 4)
 
 
 def test_the_verdict_is_arithmetic():

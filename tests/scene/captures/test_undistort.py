@@ -11,7 +11,7 @@ from PIL import Image
 
 from shapeshift.runtime_models.model import BadFile
 from shapeshift.scene.capture_photos import of_size, posed_photo
-from shapeshift.scene.captures.colmap_tables import LENSES, Lens
+from shapeshift.scene.captures.colmap_tables import LENSES, ColmapCamera
 from shapeshift.scene.captures.photo import load_photo
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.scene.captures.undistort import (
@@ -30,17 +30,17 @@ SIZE = (200, 150)
 F, CENTRE = 160.0, (103.0, 72.0)
 # As phones, wide lenses, action cameras and fisheyes have them.
 BENT = {
-    "phone": Lens("SIMPLE_RADIAL", SIZE, (F, *CENTRE, 0.05)),
-    "barrel": Lens("OPENCV", SIZE, (F, F * 1.01, *CENTRE, -0.25, 0.06, 0.002, -0.003)),
-    "pincushion": Lens("RADIAL", SIZE, (F, *CENTRE, 0.2, 0.05)),
-    "brown": Lens("FULL_OPENCV", SIZE, (F, F, *CENTRE, -0.2, 0.05, 0, 0, -0.01, 0, 0, 0)),
-    "fisheye": Lens("OPENCV_FISHEYE", SIZE, (110.0, 110.0, *CENTRE, 0.03, -0.004, 0, 0)),
-    "field of view": Lens("FOV", SIZE, (F, F, *CENTRE, 0.8)),
+    "phone": ColmapCamera("SIMPLE_RADIAL", SIZE, (F, *CENTRE, 0.05)),
+    "barrel": ColmapCamera("OPENCV", SIZE, (F, F * 1.01, *CENTRE, -0.25, 0.06, 0.002, -0.003)),
+    "pincushion": ColmapCamera("RADIAL", SIZE, (F, *CENTRE, 0.2, 0.05)),
+    "brown": ColmapCamera("FULL_OPENCV", SIZE, (F, F, *CENTRE, -0.2, 0.05, 0, 0, -0.01, 0, 0, 0)),
+    "fisheye": ColmapCamera("OPENCV_FISHEYE", SIZE, (110.0, 110.0, *CENTRE, 0.03, -0.004, 0, 0)),
+    "field of view": ColmapCamera("FOV", SIZE, (F, F, *CENTRE, 0.8)),
 }
 every_bend = pytest.mark.parametrize("bend", BENT)
 
 
-def photo_of(folder, lens: Lens, pixels: np.ndarray):
+def photo_of(folder, lens: ColmapCamera, pixels: np.ndarray):
     Image.fromarray(pixels).save(folder / "photo.png")
     return posed_photo(folder / "photo.png", "RGB", np.eye(4), lens, "here")
 
@@ -248,7 +248,7 @@ def test_every_model_of_colmap_is_read_or_refused(model):
     for spread in (0.0, 0.01, 0.1, 1.0, 30.0, np.inf):
         more = rng.normal(size=count - focals - 2) * (1 if spread == np.inf else spread)
         more = np.where(more > 0, np.inf, more) if spread == np.inf else more
-        lens = Lens(name, SIZE, (*(F,) * focals, *CENTRE, *more.tolist()))
+        lens = ColmapCamera(name, SIZE, (*(F,) * focals, *CENTRE, *more.tolist()))
         try:
             straight = pinhole_of(lens)
         except BadFile as error:
@@ -264,14 +264,14 @@ def test_numbers_that_blow_a_photo_up_are_refused():
     pinhole, radial = (20263.6, 20263.6, 500, 500), (1442012.6, 0.175, 0, 0)
     squeezed = (*pinhole, *radial, 91437023.5, 24491569.6, 6667826.6, 804.2)
     with pytest.raises(BadFile, match=r"would make 11\d+x11\d+ pixels of the photo's 1000x1000"):
-        pinhole_of(Lens("FULL_OPENCV", (1000, 1000), squeezed))
+        pinhole_of(ColmapCamera("FULL_OPENCV", (1000, 1000), squeezed))
     focal = 500 / np.radians(60)  # a field of 120 degrees
-    whole = Lens("OPENCV_FISHEYE", (1000, 1000), (focal, focal, 500, 500, 0, 0, 0, 0))
+    whole = ColmapCamera("OPENCV_FISHEYE", (1000, 1000), (focal, focal, 500, 500, 0, 0, 0, 0))
     assert 2.7 < np.prod(pinhole_of(whole).size) / 1e6 < 2.8
 
 
 def test_what_is_lost_does_not_depend_on_the_rows_at_a_time(monkeypatch):
-    lens = Lens("OPENCV", (400, 300), (320.0, 325.0, 200.0, 150.0, 0.3, 0.1, 0.001, 0))
+    lens = ColmapCamera("OPENCV", (400, 300), (320.0, 325.0, 200.0, 150.0, 0.3, 0.1, 0.001, 0))
     at_once = lost(lens, pinhole_of(lens).size, 1)
     assert at_once.any() and not at_once.all()
     lost.cache_clear()
@@ -283,7 +283,7 @@ def test_what_is_lost_does_not_depend_on_the_rows_at_a_time(monkeypatch):
 def test_a_long_lens_that_folds_far_outside_the_photo_is_read(bend):
     """Its polynomial turns at tangents of 1.4 to 1.8, the photo ends at 0.16: the straight photo
     is 1.000 to 1.004 times as wide, r k r^2, wherever between two samples the turn lies."""
-    lens = Lens("SIMPLE_RADIAL", (1000, 1000), (3084.0, 500.0, 500.0, bend))
+    lens = ColmapCamera("SIMPLE_RADIAL", (1000, 1000), (3084.0, 500.0, 500.0, bend))
     straight = pinhole_of(lens)
     edge = 500 / 3084
     for side in straight.size:
@@ -292,18 +292,18 @@ def test_a_long_lens_that_folds_far_outside_the_photo_is_read(bend):
 
 def test_a_lens_folds_back_where_its_polynomial_turns():
     """r (1 + k r^2) grows until r = 1 / sqrt(-3 k)."""
-    lens = Lens("SIMPLE_RADIAL", SIZE, (F, *CENTRE, -0.3))
+    lens = ColmapCamera("SIMPLE_RADIAL", SIZE, (F, *CENTRE, -0.3))
     assert fold(lens) == pytest.approx(1 / np.sqrt(0.9), abs=2e-3)
     assert fold(replace(lens, params=(F, *CENTRE, 0.3))) > 2
 
 
 def test_smaller_photos_keep_their_lens(tmp_path):
     """The pixels of a photo of half the size lie at half the pixels of the whole one."""
-    whole = Lens("OPENCV", (801, 600), (640.0, 650.0, 400.0, 300.0, -0.2, 0.03, 0, 0))
+    whole = ColmapCamera("OPENCV", (801, 600), (640.0, 650.0, 400.0, 300.0, -0.2, 0.03, 0, 0))
     half = of_size(whole, (400, 300), tmp_path / "a.png")
     np.testing.assert_allclose(half.params[:4], (640 * 400 / 801, 325, 400 * 400 / 801, 150))
     assert half.params[4:] == whole.params[4:]
-    one = Lens("SIMPLE_RADIAL", (801, 600), (640.0, 400.0, 300.0, 0.1))
+    one = ColmapCamera("SIMPLE_RADIAL", (801, 600), (640.0, 400.0, 300.0, 0.1))
     assert of_size(one, (400, 300), tmp_path).params[0] == pytest.approx(320, abs=0.3)
     Image.new("RGB", (400, 400)).save(tmp_path / "a.png")
     with pytest.raises(BadFile, match="400x400 pixels, the capture says 801x600"):

@@ -20,7 +20,7 @@ NAMES = ["background", "cube", "ball", "ring", "plate"]
 def viewer_of(window, found: OpenedFiles, folder: Path) -> Viewer:
     state = EditorState(lambda path: ball())
     scene, edited = opened_scene(found)
-    state.take(found.sources, scene, None, edited)
+    state.open_sources(found.sources, scene, None, edited)
     viewer = Viewer(window, PlainRenderer(window.ctx), state, Options(pictures=folder / "pictures"))
     viewer.files.read = lambda path, told: ball()
     viewer.set_title()

@@ -29,7 +29,7 @@ def read_photo(path: Path) -> object:
 def read_trained(path: Path) -> object:
     """As training does: a.png beside `path`, its mask and its lens if there are such."""
     from shapeshift.scene.captures.capture import Photo
-    from shapeshift.scene.captures.colmap_tables import Lens
+    from shapeshift.scene.captures.colmap_tables import ColmapCamera
     from shapeshift.scene.captures.photo import load_photo
     from shapeshift.scene.captures.undistort import pinhole_of
     from shapeshift.scene.pose import View
@@ -37,7 +37,7 @@ def read_trained(path: Path) -> object:
     image, mask = path.with_name("a.png"), path.with_name("mask.png")
     params, lens, size = json.loads(path.read_text()).get("fisheye"), None, (64, 64)
     if params:
-        lens = Lens("OPENCV_FISHEYE", (2400, 2400), tuple(params))
+        lens = ColmapCamera("OPENCV_FISHEYE", (2400, 2400), tuple(params))
         size = pinhole_of(lens).size
     view = View.from_pinhole(np.eye(4), (1.0, 1.0), (0.0, 0.0), size)
     return load_photo(Photo(view, image, "RGB", mask if mask.exists() else None, lens=lens), 2)

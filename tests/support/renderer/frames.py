@@ -8,7 +8,7 @@ from shapeshift.scene.pose import View
 from shapeshift.scene.scene import Scene
 
 
-def draw_told(
+def draw_counted(
     renderer: Renderer, scene: Scene, views: list[View], **settings
 ) -> tuple[list[np.ndarray], FrameStats]:
     """(a picture a view, what the frame says of itself)."""
@@ -20,4 +20,4 @@ def draw_told(
 
 def draw(renderer: Renderer, scene: Scene, views: list[View], **settings) -> list[np.ndarray]:
     """A picture a view."""
-    return draw_told(renderer, scene, views, **settings)[0]
+    return draw_counted(renderer, scene, views, **settings)[0]

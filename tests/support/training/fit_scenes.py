@@ -8,8 +8,8 @@ from shapeshift.runtime_models.model import Stop
 from shapeshift.scene.captures.capture import Capture, Photo
 from shapeshift.scene.captures.write_capture import write_capture
 from shapeshift.training.synthetic.balls import celsius, dome_views, moved, radiance, save_png
-from shapeshift.training.synthetic.solids import Ball, Box, Disc
-from shapeshift.training.synthetic.tracer import Place, Solid, Surface, photograph, surface_points
+from shapeshift.training.synthetic.solids import Ball, Cuboid, Disc
+from shapeshift.training.synthetic.tracer import Material, Place, Solid, photograph, surface_points
 
 
 def stripes(p: np.ndarray) -> np.ndarray:
@@ -21,9 +21,9 @@ def warm_top(p: np.ndarray) -> np.ndarray:
     return celsius(0.5 + 0.4 * np.tanh(6 * p[:, 1]))
 
 
-BALL = Solid(Ball(0.4), Surface(stripes, warm_top), moved(-0.45, 0.4, 0.0))
-CUBE = Solid(Box((0.3, 0.3, 0.3)), Surface((0.3, 0.5, 0.9), warm_top), moved(0.5, 0.3, 0.0))
-FLOOR = Solid(Disc(1.0), Surface((0.6, 0.55, 0.5), 30.0))
+BALL = Solid(Ball(0.4), Material(stripes, warm_top), moved(-0.45, 0.4, 0.0))
+CUBE = Solid(Cuboid((0.3, 0.3, 0.3)), Material((0.3, 0.5, 0.9), warm_top), moved(0.5, 0.3, 0.0))
+FLOOR = Solid(Disc(1.0), Material((0.6, 0.55, 0.5), 30.0))
 HEAT = Stop("Thermal", 1.0, "thermal", "ironbow", (20.0, 100.0), "°C")
 SHAPES = {  # of each: stop, what is there, and how it is photographed
     "shared": (

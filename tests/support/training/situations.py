@@ -11,7 +11,7 @@ from shapeshift.training.heads.networks import HeadLayout, initial_weights
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import SSIM_SHARE, ImageLoss
 from shapeshift.training.reference import decode_reference, step_loss_reference
-from shapeshift.training.step import Step
+from shapeshift.training.step import TrainingStep
 
 LAYOUT = HeadLayout(splats=2, features=8, hidden=8, control=4)
 OTHERS = {
@@ -50,7 +50,7 @@ def compare_gradients(device, layout: HeadLayout, seed: int) -> None:
     parameters, control, view, rgba = situation(seed, layout)
     rates = {name: np.ones(1) for name in parameters}
     adam = Adam(device, parameters, rates)
-    step = Step(device, layout, VOXEL, adam)
+    step = TrainingStep(device, layout, VOXEL, adam)
     loss = ImageLoss(device, SIZE)
     target = loss.target(device.upload(rgba), BACKGROUND)
     drawing = step.draw(view, control, BACKGROUND)

@@ -8,7 +8,7 @@ import numpy as np
 from shapeshift.scene.pose import Pose, View
 from shapeshift.vr.frame import Hand
 from shapeshift.vr.glove import fingertip
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from tests.support.xr.remote import Controller, Remote
 from tests.support.xr.xr_stand import Program
 
@@ -56,14 +56,14 @@ class Person:
 
     def in_room(self, world: np.ndarray) -> np.ndarray:
         """(3,) metres of the room of a place (3,) of the world."""
-        standing = Standing(pose_of(self.line["standing"]), self.line["standing"]["scale"])
-        room = standing.world_from_play.matrix()
-        return room[:3, :3].T @ (np.asarray(world) - room[:3, 3]) / standing.scale
+        play_space = PlaySpace(pose_of(self.line["standing"]), self.line["standing"]["scale"])
+        room = play_space.world_from_play.matrix()
+        return room[:3, :3].T @ (np.asarray(world) - room[:3, 3]) / play_space.scale
 
     def palm(self, side: str) -> np.ndarray:
         """(3,) metres of the world: where the last frame had it."""
-        standing = Standing(pose_of(self.line["standing"]), self.line["standing"]["scale"])
-        return standing.point(np.array(self.line["hands"][side]["grip"]["position"]))
+        play_space = PlaySpace(pose_of(self.line["standing"]), self.line["standing"]["scale"])
+        return play_space.point(np.array(self.line["hands"][side]["grip"]["position"]))
 
     def put(self, side: str, world: np.ndarray) -> dict:
         """The hand is there at once."""

@@ -29,7 +29,7 @@ from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.reference import decode_reference
 from shapeshift.training.settings import TrainSettings
-from shapeshift.training.step import Step
+from shapeshift.training.step import TrainingStep
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
 RNG = np.random.default_rng
@@ -40,7 +40,7 @@ def test_what_a_splat_gives_equals_the_float64_reference(device):
     """One step of a small scene at the second of two stops."""
     parameters, control, view, rgba = situation(0)
     adam = Adam(device, parameters, {name: np.ones(1) for name in parameters})
-    step, loss = Step(device, LAYOUT, VOXEL, adam), ImageLoss(device, SIZE)
+    step, loss = TrainingStep(device, LAYOUT, VOXEL, adam), ImageLoss(device, SIZE)
     target = loss.target(device.upload(rgba), BACKGROUND)
     stats = DensificationStats(device, LAYOUT, len(parameters["anchors"]), 2)
     stats.stop = 1

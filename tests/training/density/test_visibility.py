@@ -9,7 +9,7 @@ from shapeshift.training.drawing import camera_of, draw_splats
 from shapeshift.training.heads.gaussians import Gaussians
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
-from shapeshift.training.step import Step
+from shapeshift.training.step import TrainingStep
 from shapeshift.training.visibility import LOOK, Visibility
 from tests.support.training.situations import BACKGROUND, LAYOUT, SIZE, VOXEL, situation
 
@@ -141,7 +141,7 @@ def test_a_step_of_some_anchors_has_their_gradients_and_moves_nothing_else(devic
     found = {}
     for some in (False, True):
         adam = Adam(device, {n: a.copy() for n, a in parameters.items()}, rates)
-        step, loss = Step(device, LAYOUT, VOXEL, adam), ImageLoss(device, SIZE)
+        step, loss = TrainingStep(device, LAYOUT, VOXEL, adam), ImageLoss(device, SIZE)
         asked = device.upload(np.array(rows, np.int32)) if some else None
         target = loss.target(device.upload(rgba), BACKGROUND)
         drawing = step.draw(view, control, BACKGROUND, rows=asked)

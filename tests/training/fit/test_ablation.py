@@ -10,7 +10,7 @@ from shapeshift.training.fit.ablation import (
     KEPT,
     SHAPE_HEADS,
     UNSURE,
-    Change,
+    DbChange,
     Trial,
     change_of,
     decide,
@@ -33,7 +33,7 @@ def test_what_photos_have_in_common_falls_out():
     change = change_of(hard[None], (hard - 0.3 + 0.01 * rng.normal(size=40))[None])
     assert change.mean == pytest.approx(-0.3, abs=0.01)
     assert change.error == pytest.approx(0.01 / 40**0.5, rel=0.3)
-    assert str(Change(-0.25, 0.06)) == "-0.25 ± 0.06"
+    assert str(DbChange(-0.25, 0.06)) == "-0.25 ± 0.06"
 
 
 @pytest.mark.parametrize("seeds", [2, 3])

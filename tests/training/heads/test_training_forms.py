@@ -17,7 +17,7 @@ from shapeshift.training.heads.networks import (
 from shapeshift.training.heads.optimizer import Adam
 from shapeshift.training.losses.losses import ImageLoss
 from shapeshift.training.settings import TrainSettings
-from shapeshift.training.step import Step
+from shapeshift.training.step import TrainingStep
 from shapeshift.training.synthetic.balls import make_balls
 from shapeshift.training.train import Trainer
 from tests.support.training.plain_situations import situation as plain_situation
@@ -58,7 +58,7 @@ def test_a_step_of_both_forms(device, as_gpu, seed):
     found = []
     for where in (device, as_gpu):
         adam = Adam(where, parameters, {name: np.ones(1) for name in parameters})
-        step = Step(where, LAYOUT, VOXEL, adam)
+        step = TrainingStep(where, LAYOUT, VOXEL, adam)
         loss = ImageLoss(where, SIZE)
         target = loss.target(where.upload(rgba), BACKGROUND)
         drawing = step.draw(view, control, BACKGROUND)

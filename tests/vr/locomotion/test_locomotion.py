@@ -17,31 +17,31 @@ from shapeshift.vr.locomotion.locomotion import (
     Travel,
     move,
 )
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import underfoot
 from shapeshift.vr.locomotion.teleport import Arc, level_ground, throw_arc
 from tests.support.vr.vr_frames import LOST, at, frame, hand, tilted, yawed
 
 HZ = 90
-START = Standing(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)
+START = PlaySpace(Pose(np.array([1.0, 0.5, -2]), yawed(0.3)), 1.0)
 
 
-def run(frames, standing=START, travel=None, rules=RULES, ground=None, seconds=1 / HZ):
-    """Standing, travel and all that was shown after these frames."""
+def run(frames, play_space=START, travel=None, rules=RULES, ground=None, seconds=1 / HZ):
+    """Play space, travel and all that was shown after these frames."""
     travel, shown = travel or Travel(), []
     for one in frames:
-        standing, travel, comfort = move(standing, travel, one, seconds, rules, ground)
+        play_space, travel, comfort = move(play_space, travel, one, seconds, rules, ground)
         shown.append(comfort)
-    return standing, travel, shown
+    return play_space, travel, shown
 
 
-def feet(standing: Standing, one) -> np.ndarray:
-    return standing.point(underfoot(one.head))
+def feet(play_space: PlaySpace, one) -> np.ndarray:
+    return play_space.point(underfoot(one.head))
 
 
 def test_at_rest_nothing_changes_at_all():
-    standing, travel, shown = run([frame()] * 10)
-    assert standing is START and travel == Travel()
+    play_space, travel, shown = run([frame()] * 10)
+    assert play_space is START and travel == Travel()
     assert shown == [Comfort()] * 10
 
 
@@ -50,8 +50,8 @@ def test_a_full_stick_walks_along_the_head():
         start = replace(START, scale=scale)
         head = Pose(np.array([0.1, 1.7, 0.2]), yawed(look))
         one = frame(left=hand("left", stick=(0, 1)), head=head)
-        standing, _, _ = run([one] * HZ, start)
-        way = standing.world_from_play.position - start.world_from_play.position
+        play_space, _, _ = run([one] * HZ, start)
+        way = play_space.world_from_play.position - start.world_from_play.position
         angle = look + 0.3
         ahead = np.array([-math.sin(angle), 0, -math.cos(angle)])
         assert np.allclose(way, ahead * RULES.walk_m_s * scale, atol=1e-9)
@@ -60,36 +60,36 @@ def test_a_full_stick_walks_along_the_head():
 def test_sideways_backwards_and_slantwise():
     for stick in ((1, 0), (0, -1), (-0.6, 0.8)):
         one = frame(left=hand("left", stick=stick))
-        standing, _, _ = run([one] * HZ, Standing())
+        play_space, _, _ = run([one] * HZ, PlaySpace())
         wanted = np.array([stick[0], 0, -stick[1]]) * RULES.walk_m_s
-        assert np.allclose(standing.world_from_play.position, wanted, atol=1e-9)
+        assert np.allclose(play_space.world_from_play.position, wanted, atol=1e-9)
 
 
 def test_looking_down_still_walks_ahead():
     for tilt in (-math.pi / 2, -1.4, 1.4):
         head = Pose(np.array([0.1, 1.7, 0.2]), tilted(tilt))
         one = frame(left=hand("left", stick=(0, 1)), head=head)
-        standing, _, _ = run([one] * HZ, Standing())
-        assert np.allclose(standing.world_from_play.position, [0, 0, -RULES.walk_m_s], atol=1e-9)
+        play_space, _, _ = run([one] * HZ, PlaySpace())
+        assert np.allclose(play_space.world_from_play.position, [0, 0, -RULES.walk_m_s], atol=1e-9)
 
 
 @pytest.mark.parametrize("stick", [(0.1, 0.1), (0.0, 0.149), (math.nan, 0.5), (0.5, math.nan)])
 def test_a_stick_that_drifts_or_is_no_number_rests(stick):
     both = frame(left=hand("left", stick=stick), right=hand("right", stick=stick))
     for turning in ("snap", "smooth"):
-        standing, _, _ = run([both] * 50, rules=Rules(turning=turning))
-        assert standing is START
+        play_space, _, _ = run([both] * 50, rules=Rules(turning=turning))
+        assert play_space is START
 
 
 def test_the_other_stick_flies_and_does_not_turn_meanwhile():
     one = frame(right=hand(stick=(0.5, 0.9)))
-    standing, _, _ = run([one] * HZ, replace(START, scale=0.5))
-    way = standing.world_from_play.position - START.world_from_play.position
+    play_space, _, _ = run([one] * HZ, replace(START, scale=0.5))
+    way = play_space.world_from_play.position - START.world_from_play.position
     assert way[0] == way[2] == 0 and 0.3 < way[1] <= RULES.fly_m_s * 0.5
-    assert np.array_equal(standing.world_from_play.wxyz, START.world_from_play.wxyz)
+    assert np.array_equal(play_space.world_from_play.wxyz, START.world_from_play.wxyz)
 
 
-def angle_between(a: Standing, b: Standing) -> float:
+def angle_between(a: PlaySpace, b: PlaySpace) -> float:
     turns = a.world_from_play.matrix()[:3, :3].T @ b.world_from_play.matrix()[:3, :3]
     return math.degrees(math.atan2(turns[0, 2], turns[0, 0]))
 
@@ -97,40 +97,40 @@ def angle_between(a: Standing, b: Standing) -> float:
 def test_a_snap_is_thirty_degrees_about_the_head_once_until_the_stick_is_back():
     for push, turn in ((0.9, -30), (-0.9, 30)):
         one = frame(right=hand(stick=(push, 0.2)))
-        standing, travel, shown = run([one] * 40)
-        assert angle_between(START, standing) == pytest.approx(turn)
+        play_space, travel, shown = run([one] * 40)
+        assert angle_between(START, play_space) == pytest.approx(turn)
         head = one.head.position
-        assert np.allclose(standing.point(head), START.point(head), atol=1e-12)
+        assert np.allclose(play_space.point(head), START.point(head), atol=1e-12)
         assert [s.jumps for s in shown] == [True] + [False] * 39
         # half back is not back
         half = frame(right=hand(stick=(math.copysign(0.4, push), 0)))
-        again, travel, _ = run([half, one], standing, travel)
-        assert again is standing
+        again, travel, _ = run([half, one], play_space, travel)
+        assert again is play_space
         rest = frame(right=hand(stick=(0.1, 0)))
-        again, _, _ = run([rest, one], standing, travel)
+        again, _, _ = run([rest, one], play_space, travel)
         assert angle_between(START, again) == pytest.approx(2 * turn)
 
 
 def test_a_hand_unseen_for_a_moment_does_not_snap_again():
     one = frame(right=hand(stick=(1, 0)))
-    standing, _, _ = run([one, frame(right=LOST), one])
-    assert angle_between(START, standing) == pytest.approx(-30)
+    play_space, _, _ = run([one, frame(right=LOST), one])
+    assert angle_between(START, play_space) == pytest.approx(-30)
 
 
 def test_smooth_turning_is_ninety_degrees_a_second_and_none_is_none():
     one = frame(right=hand(stick=(1, 0)))
-    standing, _, shown = run([one] * HZ, rules=Rules(turning="smooth"))
-    assert angle_between(START, standing) == pytest.approx(-90)
+    play_space, _, shown = run([one] * HZ, rules=Rules(turning="smooth"))
+    assert angle_between(START, play_space) == pytest.approx(-90)
     assert not any(s.jumps for s in shown) and shown[-1].vignette > 0.5
-    standing, _, _ = run([one] * HZ, rules=Rules(turning="none"))
-    assert standing is START
+    play_space, _, _ = run([one] * HZ, rules=Rules(turning="none"))
+    assert play_space is START
 
 
 def test_hands_can_be_swapped():
     one = frame(right=hand(stick=(0, 1)), left=hand("left", stick=(1, 0)))
-    standing, _, _ = run([one] * HZ, Standing(), rules=Rules(walks="right"))
-    assert angle_between(Standing(), standing) == pytest.approx(-30)
-    there = standing.point(one.head.position) - Standing().point(one.head.position)
+    play_space, _, _ = run([one] * HZ, PlaySpace(), rules=Rules(walks="right"))
+    assert angle_between(PlaySpace(), play_space) == pytest.approx(-30)
+    there = play_space.point(one.head.position) - PlaySpace().point(one.head.position)
     assert np.linalg.norm(there) == pytest.approx(RULES.walk_m_s, rel=0.01)  # less one frame
 
 
@@ -144,8 +144,8 @@ def test_rules_are_checked():
 def test_after_a_hitch_nobody_is_thrown_far():
     one = frame(left=hand("left", stick=(0, 1)))
     for seconds, way in ((5.0, LONGEST_S), (-1.0, 0.0), (math.nan, 0.0)):
-        standing, _, _ = run([one], Standing(), seconds=seconds)
-        assert standing.world_from_play.position[2] == pytest.approx(-way * RULES.walk_m_s)
+        play_space, _, _ = run([one], PlaySpace(), seconds=seconds)
+        assert play_space.world_from_play.position[2] == pytest.approx(-way * RULES.walk_m_s)
 
 
 def test_the_vignette_comes_with_what_only_the_eye_moves_by_and_goes():
@@ -172,17 +172,17 @@ def aiming(**named):
 def test_a_jump_lands_where_the_arc_came_down():
     start = replace(START, scale=0.5)
     held = frame(right=aiming(primary=True))
-    standing, travel, shown = run([held] * 20, start)
-    assert standing is start and travel.aims == "right"
+    play_space, travel, shown = run([held] * 20, start)
+    assert play_space is start and travel.aims == "right"
     arc = shown[-1].arc
     assert arc.fine and abs(arc.landing[1]) < 1e-9 and arc.points[-1] is not None
     landing = start.point(arc.landing)
     let_go = frame(right=aiming())
-    standing, travel, shown = run([let_go], start, travel)
-    assert np.allclose(feet(standing, let_go), landing, atol=1e-12)
+    play_space, travel, shown = run([let_go], start, travel)
+    assert np.allclose(feet(play_space, let_go), landing, atol=1e-12)
     assert shown[0].blink == 1 and shown[0].arc is None
     assert shown[0].jumps and not shown[0].home
-    _, travel, shown = run([frame()] * 20, standing, travel)
+    _, travel, shown = run([frame()] * 20, play_space, travel)
     dark = [s.blink for s in shown]
     assert dark == sorted(dark, reverse=True) and dark[-1] == 0 and travel == Travel()
 
@@ -196,8 +196,8 @@ def test_a_jump_is_thought_better_of():
     ):
         _, travel, _ = run([held, instead])
         assert travel.aims is None
-        standing, _, shown = run([frame(right=aiming())], START, replace(travel, grips=()))
-        assert standing is START and not shown[0].jumps
+        play_space, _, shown = run([frame(right=aiming())], START, replace(travel, grips=()))
+        assert play_space is START and not shown[0].jumps
 
 
 def test_a_button_that_is_down_already_does_not_aim():
@@ -215,12 +215,12 @@ def test_where_one_cannot_stand_one_does_not_jump():
     for ground in (lambda start, end: None, wall):
         _, travel, shown = run([up], ground=ground)
         assert not shown[0].arc.fine
-        standing, travel, _ = run([frame()], START, travel, ground=ground)
-        assert standing is START and travel.aims is None
+        play_space, travel, _ = run([frame()], START, travel, ground=ground)
+        assert play_space is START and travel.aims is None
 
 
 def test_the_arc_is_the_parabola_and_meets_the_floor_exactly():
-    room = Standing(Pose(np.array([0, 2.0, 0]), yawed(1.0)), 3.0)
+    room = PlaySpace(Pose(np.array([0, 2.0, 0]), yawed(1.0)), 3.0)
     arc = throw_arc(at(0, 1.2, 0, tilted(0.4)), room, level_ground(2.0))
     speed, angle, height = 6.0, 0.4, 1.2
     rise = speed * math.sin(angle)
@@ -243,15 +243,15 @@ def test_one_hand_draws_the_world_along():
     start = replace(START, scale=0.25)
     places = [(0.2, 1.2, -0.4), (0.2, 1.2, -0.4), (0.5, 1.0, 0.1), (-0.3, 1.6, 0.4)]
     held = start.point(np.array(places[0]))
-    standing, travel = start, Travel()
+    play_space, travel = start, Travel()
     for place in places:
         one = frame(right=hand("right", place, squeeze=1.0))
-        standing, travel, comfort = move(standing, travel, one, 1 / HZ)
-        assert np.allclose(standing.point(np.array(place)), held, atol=1e-12)
+        play_space, travel, comfort = move(play_space, travel, one, 1 / HZ)
+        assert np.allclose(play_space.point(np.array(place)), held, atol=1e-12)
         assert comfort.vignette == 0 and not comfort.jumps
-    assert np.array_equal(standing.world_from_play.wxyz, start.world_from_play.wxyz)
-    still, travel, _ = move(standing, travel, frame(right=hand("right", (1, 1, 1))), 1 / HZ)
-    assert still is standing and travel.grips == ()
+    assert np.array_equal(play_space.world_from_play.wxyz, start.world_from_play.wxyz)
+    still, travel, _ = move(play_space, travel, frame(right=hand("right", (1, 1, 1))), 1 / HZ)
+    assert still is play_space and travel.grips == ()
 
 
 def both(left, right, squeeze=(1.0, 1.0), **named):
@@ -263,38 +263,38 @@ def both(left, right, squeeze=(1.0, 1.0), **named):
 def test_two_hands_stretch_and_turn_and_both_hold():
     a, b = (-0.2, 1.2, -0.4), (0.2, 1.2, -0.4)
     held = [START.point(np.array(p)) for p in (a, b)]
-    standing, travel, _ = run([both(a, b)])
-    assert np.allclose(standing.world_from_play.position, START.world_from_play.position)
+    play_space, travel, _ = run([both(a, b)])
+    assert np.allclose(play_space.world_from_play.position, START.world_from_play.position)
     # Twice as far apart, a quarter turned, elsewhere: level, so both points can be kept.
     c, d = (0.1, 1.5, -0.9), (0.1, 1.5, -0.1)
-    standing, travel, _ = run([both(c, d)], standing, travel)
-    assert standing.scale == pytest.approx(0.5)
+    play_space, travel, _ = run([both(c, d)], play_space, travel)
+    assert play_space.scale == pytest.approx(0.5)
     for place, world in zip((c, d), held, strict=True):
-        assert np.allclose(standing.point(np.array(place)), world, atol=1e-9)
+        assert np.allclose(play_space.point(np.array(place)), world, atol=1e-9)
     # One lets go: the other draws on, and nothing leaps.
-    after, travel, _ = run([both(c, d, (0.0, 1.0))], standing, travel)
-    assert np.allclose(after.world_from_play.position, standing.world_from_play.position)
-    assert after.scale == standing.scale
+    after, travel, _ = run([both(c, d, (0.0, 1.0))], play_space, travel)
+    assert np.allclose(after.world_from_play.position, play_space.world_from_play.position)
+    assert after.scale == play_space.scale
 
 
 def test_hands_one_above_the_other_do_not_spin_the_world():
-    standing, travel, _ = run([both((0, 1.2, -0.4), (0.01, 1.5, -0.4))])
-    standing, travel, _ = run([both((0.01, 1.2, -0.4), (0, 1.5, -0.4))], standing, travel)
-    assert angle_between(START, standing) == pytest.approx(0)
-    near, _, _ = run([both((0, 1.3, -0.4), (0.001, 1.3, -0.4))], standing, travel)
-    assert near.scale == standing.scale
+    play_space, travel, _ = run([both((0, 1.2, -0.4), (0.01, 1.5, -0.4))])
+    play_space, travel, _ = run([both((0.01, 1.2, -0.4), (0, 1.5, -0.4))], play_space, travel)
+    assert angle_between(START, play_space) == pytest.approx(0)
+    near, _, _ = run([both((0, 1.3, -0.4), (0.001, 1.3, -0.4))], play_space, travel)
+    assert near.scale == play_space.scale
 
 
 def test_the_stretch_is_bounded():
-    standing, travel, _ = run([both((-0.5, 1, 0), (0.5, 1, 0))], replace(START, scale=0.02))
+    play_space, travel, _ = run([both((-0.5, 1, 0), (0.5, 1, 0))], replace(START, scale=0.02))
     for _ in range(4):
-        standing, travel, _ = run([both((-0.03, 1, 0), (0.03, 1, 0))], standing, travel)
-        standing, travel, _ = run(
+        play_space, travel, _ = run([both((-0.03, 1, 0), (0.03, 1, 0))], play_space, travel)
+        play_space, travel, _ = run(
             [frame(), both((-0.03, 1, 0), (0.03, 1, 0)), both((-1, 1, 0), (1, 1, 0))],
-            standing,
+            play_space,
             travel,
         )
-    assert standing.scale == 0.01
+    assert play_space.scale == 0.01
 
 
 def test_a_light_squeeze_trembles_no_grip():
@@ -317,15 +317,15 @@ def test_a_squeeze_that_had_something_else_takes_no_world():
 def test_sticks_wait_while_the_world_is_held():
     one = both((-0.2, 1.2, -0.4), (0.2, 1.2, -0.4))
     one.hands["left"] = replace(one.hands["left"], stick=(0, 1))
-    standing, _, _ = run([one] * 10)
-    assert np.allclose(standing.world_from_play.position, START.world_from_play.position)
+    play_space, _, _ = run([one] * 10)
+    assert np.allclose(play_space.world_from_play.position, START.world_from_play.position)
 
 
 def test_a_new_origin_moves_nobody():
     here = frame(right=hand(squeeze=1.0))
-    standing, travel, _ = run([here])
+    play_space, travel, _ = run([here])
     there = frame(right=hand("right", (2, 1, 3), squeeze=1.0), recentred=True)
-    after, travel, _ = run([there], standing, travel)
+    after, travel, _ = run([there], play_space, travel)
     assert np.allclose(after.world_from_play.position, START.world_from_play.position, atol=1e-12)
     on = frame(right=hand("right", (2, 1.5, 3), squeeze=1.0))
     after, _, _ = run([on], after, travel)
@@ -340,9 +340,9 @@ def test_a_button_brings_the_true_size_back_with_the_feet_on_the_spot():
     for scale, changes in ((0.25, True), (1.0, False)):
         start = replace(START, scale=scale)
         down = frame(right=hand(secondary=True))
-        standing, travel, shown = run([down] * 20 + [frame()], start)
-        assert standing.scale == 1.0 and travel.resets is None
-        assert np.allclose(feet(standing, down), feet(start, down), atol=1e-12)
+        play_space, travel, shown = run([down] * 20 + [frame()], start)
+        assert play_space.scale == 1.0 and travel.resets is None
+        assert np.allclose(feet(play_space, down), feet(start, down), atol=1e-12)
         assert [s.jumps for s in shown] == [False] * 20 + [changes]
         assert shown[-1].blink == float(changes) and not any(s.home for s in shown)
 
@@ -350,14 +350,14 @@ def test_a_button_brings_the_true_size_back_with_the_feet_on_the_spot():
 def test_held_for_a_second_all_begins_anew_once():
     small = replace(START, scale=0.25)
     down = frame(left=hand("left", secondary=True))
-    standing, _, shown = run([down] * 200 + [frame()] * 2, small)
+    play_space, _, shown = run([down] * 200 + [frame()] * 2, small)
     [at_frame] = [i for i, s in enumerate(shown) if s.home]
     assert at_frame == pytest.approx(HOME_S * HZ, abs=1)
-    assert standing.scale == 0.25  # it is the caller's now
+    assert play_space.scale == 0.25  # it is the caller's now
     assert [i for i, s in enumerate(shown) if s.jumps] == [at_frame]
 
 
 def test_a_lost_hand_did_not_let_go_of_its_button():
     small = replace(START, scale=0.25)
-    standing, travel, _ = run([frame(right=hand(secondary=True)), frame(right=LOST)], small)
-    assert standing is small and travel.resets is None
+    play_space, travel, _ = run([frame(right=hand(secondary=True)), frame(right=LOST)], small)
+    assert play_space is small and travel.resets is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapeshift.scene.pose import Pose
-from shapeshift.vr.locomotion.play_space import Standing
+from shapeshift.vr.locomotion.play_space import PlaySpace
 from shapeshift.vr.locomotion.stance import (
     FAR_M,
     LEAST_SCALE,
@@ -14,21 +14,21 @@ from shapeshift.vr.locomotion.stance import (
     heading,
     moved,
     pinned,
+    play_space_before,
     resized,
     scaled,
-    standing_before,
     turned,
     underfoot,
 )
 from tests.support.vr.vr_frames import at, tilted, yawed
 
 POINTS = np.random.default_rng(3).uniform(-2, 2, (20, 3))  # metres
-ANYWHERE = Standing(Pose(np.array([3.0, -1, 7]), yawed(0.7)), 2.5)
+ANYWHERE = PlaySpace(Pose(np.array([3.0, -1, 7]), yawed(0.7)), 2.5)
 
 
-def slow_point(standing: Standing, play: np.ndarray) -> np.ndarray:
-    room = standing.world_from_play
-    return room.position + standing.scale * (room.matrix()[:3, :3] @ play)
+def slow_point(play_space: PlaySpace, play: np.ndarray) -> np.ndarray:
+    room = play_space.world_from_play
+    return room.position + play_space.scale * (room.matrix()[:3, :3] @ play)
 
 
 @pytest.mark.parametrize("point", POINTS)
@@ -44,7 +44,7 @@ def test_the_pivot_stays_and_all_else_turns_about_it(point):
 
 
 def test_left_is_left():
-    right = turned(Standing(), math.pi / 2, np.zeros(3)).point(np.array([1.0, 0, 0]))
+    right = turned(PlaySpace(), math.pi / 2, np.zeros(3)).point(np.array([1.0, 0, 0]))
     assert np.allclose(right, [0, 0, -1])  # what was on the right is ahead: one looks left
 
 
@@ -88,9 +88,9 @@ def test_one_starts_before_the_eye_on_the_floor():
     )
     head = Pose(np.array([0.3, 1.7, -0.4]), yawed(-0.6))
     for scale in (1.0, 0.25):
-        standing = standing_before(eye, head, -0.7, scale)
-        assert np.allclose(standing.point(head.position), [1, -0.7 + 1.7 * scale, 2])
-        looks = standing.pose(head).matrix()[:3, 2]
+        play_space = play_space_before(eye, head, -0.7, scale)
+        assert np.allclose(play_space.point(head.position), [1, -0.7 + 1.7 * scale, 2])
+        looks = play_space.pose(head).matrix()[:3, 2]
         assert math.atan2(looks[0], looks[2]) == pytest.approx(2)
-        assert standing.point(underfoot(head))[1] == pytest.approx(-0.7)
-    assert np.allclose(standing_before(eye, head).point(head.position), [1, 5, 2])
+        assert play_space.point(underfoot(head))[1] == pytest.approx(-0.7)
+    assert np.allclose(play_space_before(eye, head).point(head.position), [1, 5, 2])

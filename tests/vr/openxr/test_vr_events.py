@@ -9,8 +9,8 @@ from shapeshift.vr.openxr.events import (
     GoingAway,
     Recentred,
     StateChanged,
+    poll_events,
     read_event,
-    take_events,
 )
 
 xr = pytest.importorskip("xr", reason="pyopenxr is not installed", exc_type=ImportError)
@@ -66,5 +66,5 @@ def test_all_that_wait_are_taken_in_order(monkeypatch):
         return waiting.pop(0)
 
     monkeypatch.setattr(xr, "poll_event", poll)
-    assert take_events(xr, None) == [StateChanged("IDLE"), StateChanged("READY")]
-    assert take_events(xr, None) == []
+    assert poll_events(xr, None) == [StateChanged("IDLE"), StateChanged("READY")]
+    assert poll_events(xr, None) == []

@@ -15,35 +15,37 @@ from shapeshift.vr.openxr.instance import Instance, Lost, NoHeadset, load
 from shapeshift.vr.openxr.life import BEGIN, END, Life
 from shapeshift.vr.openxr.session import choose_blend, eye_size, known_part, tangents_of
 from shapeshift.vr.openxr.spaces import KINDS, choose_kind, moved_by
-from shapeshift.vr.pace import RECOVER, SETTLED, Pace
+from shapeshift.vr.pace import RECOVER, SETTLED, FramePace
 
 PERIOD = 1 / 90
 
 
 def test_a_life_begins_once_and_ends_once():
     life = Life()
-    acts = [life.take(state) for state in ("IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED")]
+    acts = [life.enter(state) for state in ("IDLE", "READY", "SYNCHRONIZED", "VISIBLE", "FOCUSED")]
     assert acts == ["", BEGIN, "", "", ""] and life.running and life.focused and not life.over
-    acts = [life.take(state) for state in ("VISIBLE", "SYNCHRONIZED", "STOPPING", "IDLE")]
+    acts = [life.enter(state) for state in ("VISIBLE", "SYNCHRONIZED", "STOPPING", "IDLE")]
     assert acts == ["", "", END, ""] and not (life.running or life.focused or life.over)
-    life.take("EXITING")
+    life.enter("EXITING")
     assert life.over and not life.lost
 
 
 def test_a_headset_that_is_taken_off_and_put_on_again_begins_anew():
     life = Life()
-    acts = [life.take(state) for state in ("IDLE", "READY", "FOCUSED", "STOPPING", "IDLE", "READY")]
+    acts = [
+        life.enter(state) for state in ("IDLE", "READY", "FOCUSED", "STOPPING", "IDLE", "READY")
+    ]
     assert acts == ["", BEGIN, "", END, "", BEGIN] and life.running and not life.over
 
 
 def test_a_session_that_is_taken_away_is_over_and_lost():
     life = Life()
     for state in ("IDLE", "READY", "FOCUSED", "LOSS_PENDING"):
-        life.take(state)
+        life.enter(state)
     assert life.over and life.lost and not life.running
 
 
-def run(pace: Pace, gaps: list[int], own_s: float = 0.004, told_s: float = PERIOD) -> None:
+def run(pace: FramePace, gaps: list[int], own_s: float = 0.004, told_s: float = PERIOD) -> None:
     """Frames that are seen so many periods after one another."""
     seen = 0.0
     for gap in gaps:
@@ -53,7 +55,7 @@ def run(pace: Pace, gaps: list[int], own_s: float = 0.004, told_s: float = PERIO
 
 
 def test_every_period_without_a_frame_of_ours_is_a_dropped_one():
-    pace = Pace(display_s=PERIOD)
+    pace = FramePace(display_s=PERIOD)
     run(pace, [1, 1, 2, 1, 4, 1])
     assert (pace.frames, pace.dropped, pace.over) == (6, 1 + 3, 0)
     assert pace.report()["own_ms"] == {"p50": 4.0, "p95": 4.0}
@@ -62,7 +64,7 @@ def test_every_period_without_a_frame_of_ours_is_a_dropped_one():
 
 
 def test_a_rest_of_the_session_drops_nothing():
-    pace = Pace(display_s=PERIOD)
+    pace = FramePace(display_s=PERIOD)
     run(pace, [1, 1])
     pace.pause()
     run(pace, [500, 1])
@@ -70,7 +72,7 @@ def test_a_rest_of_the_session_drops_nothing():
 
 
 def test_a_frame_that_measured_does_not_count_nor_do_those_after_it():
-    pace = Pace(display_s=PERIOD)
+    pace = FramePace(display_s=PERIOD)
     run(pace, [1, 1])
     pace.start(3 * PERIOD, PERIOD, 0.0)
     pace.restart()
@@ -90,7 +92,7 @@ def test_a_frame_that_measured_does_not_count_nor_do_those_after_it():
 
 
 def test_the_shortest_period_told_lately_is_the_displays_once_guesses_are_over():
-    pace = Pace()
+    pace = FramePace()
     run(pace, [1] * SETTLED, told_s=PERIOD / 3)  # a guess
     assert not pace.settled and pace.dropped == 0
     run(pace, [2, 2, 2], told_s=2 * PERIOD)  # for one who is slow
@@ -101,7 +103,7 @@ def test_the_shortest_period_told_lately_is_the_displays_once_guesses_are_over()
 def test_a_pace_without_frames_has_a_report():
     nothing = {name: {} for name in ("own_ms", "drawing_ms", "wait_ms")}
     counts = {"frames": 0, "dropped": 0, "over_period": 0, "period_ms": 0.0}
-    assert Pace().report() == counts | nothing
+    assert FramePace().report() == counts | nothing
 
 
 def test_play_space_falls_back_in_order():

@@ -27,8 +27,8 @@ class CannotRun(Exception):
 
 
 @dataclass
-class Told:
-    """What a page has told so far."""
+class Answer:
+    """What a page has answered so far."""
 
     name: str
     version: str
@@ -62,7 +62,7 @@ def tree_cpu_s(root: int) -> float:
 class Listener(SimpleHTTPRequestHandler):
     """Serves the work folder and the pages, takes what the page tells."""
 
-    told: Told
+    answer: Answer
     done: threading.Event
     browser: list  # of its one process, once it runs
 
@@ -73,20 +73,20 @@ class Listener(SimpleHTTPRequestHandler):
 
     def do_POST(self) -> None:
         body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-        told, cpu = self.told, tree_cpu_s(self.browser[0].pid)
+        answer, cpu = self.answer, tree_cpu_s(self.browser[0].pid)
         if self.path == "/picture":
             from PIL import Image
 
             image = Image.open(io.BytesIO(base64.b64decode(body))).convert("RGB")
-            told.picture = np.asarray(image, np.float32) / 255
+            answer.picture = np.asarray(image, np.float32) / 255
         elif self.path == "/start":
-            told.cpu_s = -cpu
+            answer.cpu_s = -cpu
         elif self.path == "/end":
-            told.cpu_s += cpu
-            told.wall_ms = json.loads(body)
+            answer.cpu_s += cpu
+            answer.wall_ms = json.loads(body)
             self.done.set()
         elif self.path == "/failed":
-            told.failed = body.decode(errors="replace").strip()
+            answer.failed = body.decode(errors="replace").strip()
             self.done.set()
         self.send_response(204)
         self.end_headers()
@@ -95,15 +95,15 @@ class Listener(SimpleHTTPRequestHandler):
         pass
 
 
-def browser_frames(peer: str, folder: Path) -> Told:
+def browser_frames(peer: str, folder: Path) -> Answer:
     """Runs a peer's page over folder/job.json and splats.ply."""
     programs = [shutil.which(name) for name in ("chromium", "Xvfb")]
     if not all(programs):
         raise CannotRun("Chromium and Xvfb are needed (Debian: apt-get install chromium xvfb)")
     package = json.loads((folder / "node_modules" / NAMES[peer] / "package.json").read_text())
-    told = Told(NAMES[peer], package["version"], [], 0.0, None)
+    answer = Answer(NAMES[peer], package["version"], [], 0.0, None)
     done, browser = threading.Event(), []
-    handler = type("Here", (Listener,), {"told": told, "done": done, "browser": browser})
+    handler = type("Here", (Listener,), {"answer": answer, "done": done, "browser": browser})
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(handler, directory=str(folder)))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     address = f"http://127.0.0.1:{server.server_address[1]}/page.html?peer={peer}"
@@ -113,9 +113,9 @@ def browser_frames(peer: str, folder: Path) -> Told:
         browser[0].kill()
         browser[0].wait()
         server.shutdown()
-    if not in_time or told.failed:
-        raise CannotRun(told.failed.splitlines()[0] if told.failed else "no answer in time")
-    return told
+    if not in_time or answer.failed:
+        raise CannotRun(answer.failed.splitlines()[0] if answer.failed else "no answer in time")
+    return answer
 
 
 def start_chromium(program: str, profile: str, display: str, address: str) -> subprocess.Popen:
@@ -142,8 +142,8 @@ class Display:
             pass_fds=(writer,), stderr=subprocess.DEVNULL,
         )  # fmt: skip
         os.close(writer)
-        with os.fdopen(reader) as told:
-            return f":{told.readline().strip()}"
+        with os.fdopen(reader) as lines:
+            return f":{lines.readline().strip()}"
 
     def __exit__(self, *failure) -> None:
         self.server.kill()

@@ -36,7 +36,7 @@ FORM_NAMES = {
 def draw_edges(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> None:
     """Where the picture of the camera that is looked through ends."""
     steps = viewpoint.steps
-    if steps.cameras is None or not (state.overlay and steps.standing) or steps.moving:
+    if steps.cameras is None or not (state.overlay and steps.at_camera) or steps.moving:
         return
     view = viewpoint.view()
     box = picture_box(steps.cameras.views[steps.index], view)

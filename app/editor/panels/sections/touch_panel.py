@@ -37,7 +37,7 @@ def draw_touch(touch: TouchState, ui_scale: float, colliders: bool = True) -> No
     axes = world.objects[name].item.two_axes if name is not None else None
     if name is not None and axes is not None:
         draw_pad(touch, name, axes, ui_scale)
-    for line in touch.told:
+    for line in touch.reactions:
         imgui.text_disabled(line)
 
 

@@ -60,7 +60,7 @@ class Push:
         return bool(self.right or self.up or self.forward)
 
 
-class Camera:
+class EditorCamera:
     """One eye that either orbits an anchor or flies; switching between the two moves nothing.
 
     In orbit the anchor is the point looked at, in flight it is the eye.  Inputs change the goal at

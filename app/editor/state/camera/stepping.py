@@ -22,13 +22,13 @@ class Steps:
         self.cameras: CameraList | None = None
         self.untold: tuple[str, ...] = ()  # what the file's reader assumed, until it is shown
         self.index = -1  # the last one that was stood at
-        self.standing = False  # whether the picture is that camera's; moving freely leaves it
+        self.at_camera = False  # whether the picture is that camera's; moving freely leaves it
         self._from: View | None = None  # where the flight began
         self._seconds = FLIGHT_S
 
-    def take(self, cameras: CameraList | None) -> None:
+    def set_cameras(self, cameras: CameraList | None) -> None:
         """Cameras instead of those that there were; nobody stands at one yet."""
-        self.cameras, self.index, self.standing, self._from = cameras, -1, False, None
+        self.cameras, self.index, self.at_camera, self._from = cameras, -1, False, None
         self.untold = cameras.notes if cameras else ()
 
     @property
@@ -43,14 +43,14 @@ class Steps:
 
     @property
     def moving(self) -> bool:
-        return self.standing and self._seconds < FLIGHT_S
+        return self.at_camera and self._seconds < FLIGHT_S
 
     @property
     def text(self) -> str:
         """ "camera 3 of 96 NAME" while standing at one, else how many there are."""
         if self.cameras is None or not self.count:
             return ""
-        if not self.standing:
+        if not self.at_camera:
             return f"{self.count} cameras" if self.count > 1 else "1 camera"
         name = self.cameras.names[self.index]
         short = name if len(name) <= LONGEST_NAME else "\u2026" + name[1 - LONGEST_NAME :]
@@ -69,11 +69,11 @@ class Steps:
 
     def go_to(self, index: int, now: View | None = None) -> None:
         """To that camera, in flight from `now`, or at once."""
-        self.index, self.standing = index, True
+        self.index, self.at_camera = index, True
         self._from, self._seconds = now, 0.0 if now is not None else FLIGHT_S
 
     def leave(self) -> None:
-        self.standing = False
+        self.at_camera = False
 
     def advance(self, seconds: float) -> None:
         self._seconds = min(self._seconds + seconds, FLIGHT_S)

@@ -5,7 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from shapeshift.app.editor.state.camera.camera import EVERYTHING, FIRST, SMOOTH_S, Camera, fov_y_of
+from shapeshift.app.editor.state.camera.camera import (
+    EVERYTHING,
+    FIRST,
+    SMOOTH_S,
+    EditorCamera,
+    fov_y_of,
+)
 from shapeshift.app.editor.state.camera.kept_views import KeptViews
 from shapeshift.app.editor.state.camera.stepping import Steps
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -35,10 +41,10 @@ class Viewpoint:
         self.kept = KeptViews(folder)
         self.seen = False  # whether a frame has shown anything from here
 
-    def _first_camera(self) -> Camera:
+    def _first_camera(self) -> EditorCamera:
         """The camera of a new scene: on its floor where one is given, else the whole in view."""
         state = self._state
-        camera = Camera(state.first_view(self.free_size()), state.first_target, state.radius)
+        camera = EditorCamera(state.first_view(self.free_size()), state.first_target, state.radius)
         home = state.first_look.home
         if home is not None:
             camera.toggle_flying()
@@ -55,13 +61,13 @@ class Viewpoint:
     def view(self) -> View:
         """What the window shows: a camera that was stepped to, or what the hand has turned to."""
         view = self.camera.view(self._size(), tuple(self.free))
-        if self.steps.standing:
+        if self.steps.at_camera:
             return self.steps.view(view.size, tuple(self.free), view.near, view.far)
         return view
 
     def plain_view(self) -> View:
         """The same without what the overlay covers: a camera as filed, or centred."""
-        if self.steps.standing and not self.steps.moving:
+        if self.steps.at_camera and not self.steps.moving:
             return self.steps.stood_at
         return self.camera.view(self.free_size())
 
@@ -87,7 +93,7 @@ class Viewpoint:
 
     def refit(self, size: tuple[int, int]) -> None:
         """The free part has another size: what no hand has moved is fitted into it."""
-        if self.steps.standing:
+        if self.steps.at_camera:
             return
         if self.camera.framed == FIRST and self._state.first_look.home is None:
             self.camera.come_home(self._state.first_view(size))
@@ -99,7 +105,7 @@ class Viewpoint:
 
     def leave_camera(self) -> None:
         """From the camera that was stepped to, where it stands, to moving freely."""
-        if self.steps.standing:
+        if self.steps.at_camera:
             view, (_, top, _, bottom) = self.view(), self.free
             height = (view.tangents[3] - view.tangents[2]) * (bottom - top) / view.size[1]
             self.camera.stand(view.world_from_eye, 2 * float(np.arctan(height / 2)))
@@ -127,7 +133,7 @@ class Viewpoint:
     def follow_cameras(self, cameras: CameraList | None, stand: bool) -> None:
         """Other cameras to step through; to the first of them at once where one is to `stand`."""
         now = self.view()
-        self.steps.take(cameras)
+        self.steps.set_cameras(cameras)
         if stand and cameras is not None:
             self.steps.go_to(0, now if self.seen else None)
             self.steps.untold = ()  # said with the file's other notes

@@ -38,15 +38,15 @@ class EditedFile:
     @property
     def changed(self) -> bool:
         """Whether the file says something else than what lies on the disk."""
-        return self._told[0]
+        return self._differences[0]
 
     @property
     def unsaved(self) -> bool:
         """Whether work would be lost; where a slider stands is none."""
-        return self._told[1]
+        return self._differences[1]
 
     @property
-    def _told(self) -> tuple[bool, bool]:
+    def _differences(self) -> tuple[bool, bool]:
         """Edited and unsaved; found once for each edit, however often it is asked."""
         known = self._compared
         if known is None or known[0] is not self.file or known[1] is not self.saved:

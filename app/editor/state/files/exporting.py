@@ -3,7 +3,7 @@
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from shapeshift.app.commands.exported import Look, Part, export
+from shapeshift.app.commands.exported import ExportLook, Part, export
 from shapeshift.app.drawing import make_folder
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
@@ -70,16 +70,16 @@ class Exporting:
         parts, state = self.parts(), self._state
         seen = any(follows_eye(part.thing.model) for part in parts)
         eye = three(self._viewpoint.view().world_from_eye.position) if seen else None
-        look = Look(self.sh_degree, self.palette, eye, three(state.origin))
+        look = ExportLook(self.sh_degree, self.palette, eye, three(state.origin))
         try:
             self._path = claim_name(self._folder, parts, self.ending)
         except (OSError, UsageError) as error:
             state.problem = str(error)
             return
         self.progress = ("", 0.0)
-        self._work = self._thread.submit(export, parts, look, self._path, self._tell)
+        self._work = self._thread.submit(export, parts, look, self._path, self._show_progress)
 
-    def _tell(self, what: str, part: float) -> None:
+    def _show_progress(self, what: str, part: float) -> None:
         self.progress = (what, part)
 
     def poll(self) -> bool:

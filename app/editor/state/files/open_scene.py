@@ -20,7 +20,7 @@ from shapeshift.scene.document import edits
 from shapeshift.scene.document.scene_file import scene_of as scene_of_file
 from shapeshift.scene.scene import Scene
 
-MOST_TOLD = 2  # findings that the note at opening spells out; the status line has them all
+MOST_NOTES = 2  # findings that the note at opening spells out; the status line has them all
 
 
 def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, EditedFile]:
@@ -45,12 +45,12 @@ def opened_scene(found: OpenedFiles, x: str = "") -> tuple[Scene, EditedFile]:
     return scene_of_file(file, models), edited
 
 
-def told_of(found: OpenedFiles) -> str:
+def repair_notes(found: OpenedFiles) -> str:
     """What was repaired in the files and assumed about the cameras, a line each; "" = nothing."""
     findings = [finding for source in found.sources for finding in source.model.findings]
     lines = [sentence(finding) for finding in findings if finding.repaired]
-    more = [f"and {len(lines) - MOST_TOLD} more."] if len(lines) > MOST_TOLD else []
-    return "\n".join([*lines[:MOST_TOLD], *more, *found.notes])
+    more = [f"and {len(lines) - MOST_NOTES} more."] if len(lines) > MOST_NOTES else []
+    return "\n".join([*lines[:MOST_NOTES], *more, *found.notes])
 
 
 def first_look(found: OpenedFiles) -> FirstLook:

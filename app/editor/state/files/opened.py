@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from shapeshift.app.opening import PATIENCE_S, progress_after
-from shapeshift.app.scene_files import tell_findings
+from shapeshift.app.scene_files import print_findings
 from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.runtime_models.package.package_files import MANIFEST
 from shapeshift.runtime_models.read_scene import describe
@@ -56,7 +56,7 @@ def read_files(
     paths: Sequence[Path],
     read_model: ReadModel,
     reading: CameraReading,
-    told: Progress | None,
+    progress: Progress | None,
     plain: Reading | None = None,
     beside: bool = True,
 ) -> OpenedFiles:
@@ -72,11 +72,11 @@ def read_files(
             f"{scene_files[0].name} and {scene_files[1].name} are two scene files; open one, then "
             "add what else is wanted."
         )
-    file, sources = read_scene(scene_files[0], plain, told) if scene_files else (None, [])
+    file, sources = read_scene(scene_files[0], plain, progress) if scene_files else (None, [])
     camera_paths = [path for path in paths if path not in scene_files and means_cameras(path)]
     for path in paths:
         if path not in (*camera_paths, *scene_files):
-            model = read_model(path, told)
+            model = read_model(path, progress)
             sources.append(Source(path, model, describe(model, path), plain))
     cameras = [read_camera_list(path, reading) for path in camera_paths]
     floors = [c for c in cameras if c.format == "splatapult floor"]
@@ -94,14 +94,16 @@ def read_files(
     return OpenedFiles(tuple(sources), file, scene_file, last(lists), last(floors), tuple(notes))
 
 
-def read_scene(path: Path, plain: Reading, told: Progress | None) -> tuple[SceneFile, list[Source]]:
+def read_scene(
+    path: Path, plain: Reading, progress: Progress | None
+) -> tuple[SceneFile, list[Source]]:
     """A scene file and the model of each of its objects; findings go to stderr."""
     if plain.mode or plain.up or plain.flip:
         raise BadFile(f"{path.name} says for each object how layers add up and which way is up.")
     file = read_scene_file(path)
-    with nullcontext(told) if told else progress_after(PATIENCE_S) as tell:
-        models = read_models(file, replace(plain, progress=tell))
-    tell_findings(models)
+    with nullcontext(progress) if progress else progress_after(PATIENCE_S) as shown_progress:
+        models = read_models(file, replace(plain, progress=shown_progress))
+    print_findings(models)
     facts: dict[Path, dict] = {}
     sources = []
     for item in file.all_items:
@@ -147,7 +149,7 @@ class Opener:
         self._future: Future | None = None
         self._paths: tuple[Path, ...] = ()
         self._next: tuple | None = None
-        self._told = ("", 0.0)
+        self._progress = ("", 0.0)
 
     @property
     def busy(self) -> bool:
@@ -161,7 +163,7 @@ class Opener:
     def note(self) -> str:
         """What is being opened, and how far it is."""
         names = ", ".join(path.name or str(path) for path in self._paths)
-        what, part = self._told
+        what, part = self._progress
         return f"Opening {names} \u2026" + (f" {part:.0%}" if what and part > 0 else "")
 
     def start(
@@ -171,12 +173,12 @@ class Opener:
         if self.busy:
             self._next = (paths, read)
             return
-        self._paths, self._told = paths, ("", 0.0)
+        self._paths, self._progress = paths, ("", 0.0)
         future = self._future = Future()
 
         def work() -> None:
             try:
-                future.set_result(read(paths, self._tell))
+                future.set_result(read(paths, self._show_progress))
             except BaseException as error:  # handed to the window's thread, which raises it again
                 future.set_exception(error)
 
@@ -193,5 +195,5 @@ class Opener:
             return None
         return future.result()
 
-    def _tell(self, what: str, part: float) -> None:
-        self._told = (what, part)
+    def _show_progress(self, what: str, part: float) -> None:
+        self._progress = (what, part)

@@ -19,7 +19,7 @@ PATIENCE_S = 5.0  # longest wait at the end for a level that is being read
 class Refiner:
     """Opens scenes for the viewer and reads finer levels of them in a thread of its own.
 
-    `open` and `follow` and `take` are for the window's thread; numpy and Pillow let it draw.
+    `open`, `follow` and `next_level` are for the window's thread; numpy and Pillow let it draw.
     """
 
     def __init__(self, options: ReadingOptions) -> None:
@@ -37,10 +37,10 @@ class Refiner:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def open(self, path: Path, told: Callable[[str, float], None] | None = None) -> Model:
+    def open(self, path: Path, progress: Callable[[str, float], None] | None = None) -> Model:
         """The model at `path`; of a streamed scene its coarsest level.  Raises BadFile."""
         if not path.exists() or not is_streamed(path):
-            return open_model(path, self._options, told)
+            return open_model(path, self._options, progress)
         finer = levels(path, self._options.reading())
         first = next(finer)
         self._opened.append((first, finer))
@@ -60,7 +60,7 @@ class Refiner:
         self._thread = threading.Thread(target=self._read, args=given, daemon=True)
         self._thread.start()
 
-    def take(self) -> tuple[SplatLayers, SplatLayers] | None:
+    def next_level(self) -> tuple[SplatLayers, SplatLayers] | None:
         """(a model that is shown, a finer one for its place), or None while there is none."""
         try:
             before, after = self._finer.get_nowait()
@@ -102,7 +102,7 @@ class Refiner:
         try:
             for before, finer in shown:
                 for after in finer:
-                    if not put(out, (before, after), unwanted):
+                    if not put_when_free(out, (before, after), unwanted):
                         return
                     before = after
         except (BadFile, OSError, MemoryError) as error:
@@ -110,7 +110,7 @@ class Refiner:
                 self.problem = f"no finer level can be shown: {error}"
 
 
-def put(out: queue.Queue, item: tuple, unwanted: threading.Event) -> bool:
+def put_when_free(out: queue.Queue, item: tuple, unwanted: threading.Event) -> bool:
     """Puts an item as soon as there is room; False when it is not wanted any more."""
     while not unwanted.is_set():
         try:

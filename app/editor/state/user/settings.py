@@ -16,7 +16,7 @@ PLAUSIBLE_MM = (120.0, 1500.0)  # height of a monitor; projectors and screens in
 
 
 @dataclass
-class Settings:
+class ProgramSettings:
     """In a file of the folder; a broken or missing one counts as empty."""
 
     folder: Path | None = None  # None: nothing is kept
@@ -24,12 +24,12 @@ class Settings:
     panel_open: bool | None = None  # None: as there is room
 
     @staticmethod
-    def read(folder: Path) -> "Settings":
+    def read(folder: Path) -> "ProgramSettings":
         found = saved_object(folder / FILE, LARGEST)
         size, panel = found.get("text_size"), found.get("panel_open")
         if not (is_number(size) and TEXT_SIZES[0] <= size <= TEXT_SIZES[-1]):
             size = None
-        return Settings(
+        return ProgramSettings(
             folder,
             None if size is None else float(size),
             panel if isinstance(panel, bool) else None,

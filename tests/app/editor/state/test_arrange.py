@@ -28,7 +28,7 @@ NAMES = ["background", "cube", "ball", "ring", "plate"]
 def state_of(found: OpenedFiles) -> EditorState:
     state = EditorState(lambda path: None)
     scene, edited = opened_scene(found)
-    state.take(found.sources, scene, None, edited)
+    state.open_sources(found.sources, scene, None, edited)
     return state
 
 
@@ -111,15 +111,15 @@ def test_every_edit_is_shown_and_taken_back(state):
     for scene in reversed(scenes[:-1]):
         arrange.undo(state)
         same_as_file(state)
-        assert told(state.scene) == told(scene)
+        assert shown_as(state.scene) == shown_as(scene)
     assert not state.edited.unsaved and arrange.undo(state) == ""
     for scene in scenes[1:]:
         assert arrange.redo(state) != ""
         same_as_file(state)
-        assert told(state.scene) == told(scene)
+        assert shown_as(state.scene) == shown_as(scene)
 
 
-def told(scene) -> list:
+def shown_as(scene) -> list:
     return [
         (t.name, t.x, t.visible, tuple(t.world_from_object.position), id(t.model))
         for t in scene.objects
@@ -158,8 +158,8 @@ def test_a_stop_has_the_name_that_the_scene_gives_it(state):
 
 def test_regions_go_with_their_objects(state):
     inside = Sphere(centre=(0, 0, 0), radius=0.05, x=1.0)
-    state.regions.take((inside,), 3)
-    state.regions.take((inside,), 1)
+    state.regions.add_selectors((inside,), 3)
+    state.regions.add_selectors((inside,), 1)
     edit(state, edits.remove, "cube")
     assert [region.index for region in state.regions.items] == [2]
     view = state.first_view((64, 64))
@@ -249,7 +249,7 @@ def test_strokes_are_undone_one_by_one(plain):
 
 def test_a_region_comes_back_with_its_deleted_object(state):
     state.chosen = "cube"
-    state.regions.take((Sphere(centre=(0, 0, 0), radius=0.05, x=1.0),), 3)
+    state.regions.add_selectors((Sphere(centre=(0, 0, 0), radius=0.05, x=1.0),), 3)
     state.keep_regions()
     assert state.edited.history.undoes == ""
     edit(state, edits.remove, "ring")
@@ -389,4 +389,4 @@ def test_an_edit_that_cannot_be_leaves_all_as_it_was(state):
     wrong = edits.add(wrong, replace(edits.find(wrong, "ball"), name="copy"))
     with pytest.raises(BadFile, match="paint it anew"):
         arrange.edit(state, wrong, "paint")
-    assert told(state.scene) == told(before) and not state.edited.unsaved
+    assert shown_as(state.scene) == shown_as(before) and not state.edited.unsaved

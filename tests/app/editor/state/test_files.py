@@ -14,7 +14,7 @@ from PIL import Image
 from shapeshift.app import cli
 from shapeshift.app.editor.panels.status_line import bytes_text, scene_words
 from shapeshift.app.editor.state.editor_state import EditorState
-from shapeshift.app.editor.state.files.open_scene import told_of
+from shapeshift.app.editor.state.files.open_scene import repair_notes
 from shapeshift.app.editor.state.files.opened import Opener, means_cameras, read_files
 from shapeshift.app.editor.state.scene_objects import scene_of
 from shapeshift.app.editor.state.user.recent import FILE, MOST, RecentFiles
@@ -118,9 +118,9 @@ def test_a_conversion_never_writes_over_what_it_reads(tmp_path, capsys):
 
     def refused(*arguments) -> str:
         assert cli.main(["cameras", *map(str, arguments)]) == 2
-        told = capsys.readouterr()
-        assert not told.out and len(told.err.splitlines()) == 1
-        return told.err
+        out, err = capsys.readouterr()
+        assert not out and len(err.splitlines()) == 1
+        return err
 
     assert "what is read" in refused(path, "--out", path, "--to", "ours", "--overwrite")
     assert "what is read" in refused(tmp_path, "--out", path, "--to", "ours", "--overwrite")
@@ -138,8 +138,8 @@ def test_a_list_for_people_and_one_for_programs(tmp_path, capsys):
     path = tmp_path / "cameras.json"
     write_cameras(cameras(), path, "inria")
     assert cli.main(["cameras", str(path)]) == 0
-    told = capsys.readouterr()
-    assert "3DGS cameras.json, 3 cameras" in told.out and "a.png" in told.out and not told.err
+    out, err = capsys.readouterr()
+    assert "3DGS cameras.json, 3 cameras" in out and "a.png" in out and not err
 
 
 # Recent files
@@ -190,7 +190,7 @@ def test_a_name_that_is_no_text_is_kept(tmp_path):
 # What is dropped together
 
 
-def read(path: Path, told):
+def read(path: Path, progress):
     return read_model(path)
 
 
@@ -253,11 +253,11 @@ def test_the_status_line_says_what_is_open(tmp_path):
     assert scene_words(state) == ["nothing is open"]
     path = splats(tmp_path / "a.ply", count=1234)
     sources = read_files([path], read, CameraReading(), silent).sources
-    state.take(sources, scene_of(sources))
+    state.open_sources(sources, scene_of(sources))
     words = scene_words(state)
     assert words[1:4] == ["1\u2009234 splats", "SH 1", "1 stop"]
     assert words[-1] == bytes_text(path.stat().st_size)
-    state.take(sources * 2, scene_of(sources * 2))
+    state.open_sources(sources * 2, scene_of(sources * 2))
     assert scene_words(state)[:2] == ["2 objects", "2\u2009468 splats"]
 
 
@@ -268,17 +268,21 @@ def test_what_was_repaired_is_told_at_opening(tmp_path):
     whole[start : start + 4] = np.float32(np.nan).tobytes()
     path.write_bytes(whole)
     found = read_files([path], read, CameraReading(), silent)
-    assert "a.ply" in told_of(found) and "NaN" in told_of(found) and "dropped" in told_of(found)
+    assert (
+        "a.ply" in repair_notes(found)
+        and "NaN" in repair_notes(found)
+        and "dropped" in repair_notes(found)
+    )
     good = read_files([splats(tmp_path / "b.ply")], read, CameraReading(), silent)
-    assert told_of(good) == ""
-    assert told_of(replace(found, notes=("A note.",))).endswith("\nA note.")
+    assert repair_notes(good) == ""
+    assert repair_notes(replace(found, notes=("A note.",))).endswith("\nA note.")
     many = replace(found, sources=found.sources * 5)
-    assert told_of(many).splitlines()[-1] == "and 3 more."
+    assert repair_notes(many).splitlines()[-1] == "and 3 more."
 
 
 def test_bytes_have_three_digits_and_a_unit():
-    told = [bytes_text(n) for n in (0, 999, 1000, 33_878_410, 999_600, 2_148_000_000, 99_960_000)]
-    assert told == ["0 bytes", "999 bytes", "1.0 kB", "33.9 MB", "1.0 MB", "2.1 GB", "100 MB"]
+    texts = [bytes_text(n) for n in (0, 999, 1000, 33_878_410, 999_600, 2_148_000_000, 99_960_000)]
+    assert texts == ["0 bytes", "999 bytes", "1.0 kB", "33.9 MB", "1.0 MB", "2.1 GB", "100 MB"]
 
 
 # The thread that reads
@@ -297,8 +301,8 @@ def wait(opener: Opener):
 def test_reading_goes_on_beside_the_window():
     opener, go = Opener(), threading.Event()
 
-    def slow(paths, told):
-        told("reading a.ply", 0.25)
+    def slow(paths, progress):
+        progress("reading a.ply", 0.25)
         assert go.wait(10)
         return paths
 
@@ -315,7 +319,7 @@ def test_the_last_wish_wins():
     opener, go = Opener(), threading.Event()
     began = []
 
-    def slow(paths, told):
+    def slow(paths, progress):
         began.append(paths[0].name)
         assert go.wait(10)
         return paths
@@ -329,7 +333,7 @@ def test_the_last_wish_wins():
 
 @pytest.mark.parametrize("error", [BadFile("no"), OSError("no"), ZeroDivisionError("no")])
 def test_what_the_reading_raised_is_raised_in_the_window(error):
-    def bad(paths, told):
+    def bad(paths, progress):
         raise error
 
     opener = Opener()

@@ -214,7 +214,7 @@ def test_closing_ends_the_thread(scene):
     with Refiner(ReadingOptions()) as refiner:
         viewer = FakeViewer(refiner, [scene])
         thread = refiner._thread
-    assert not thread.is_alive() and not refiner.running and refiner.take() is None
+    assert not thread.is_alive() and not refiner.running and refiner.next_level() is None
     assert viewer.counts() == [20]
 
 

@@ -198,7 +198,7 @@ def test_a_half_space_takes_the_side_that_its_arrow_points_to():
 
 def test_regions_of_a_command_are_named_and_none_is_being_edited(thing):
     regions = Regions()
-    regions.take(SELECTORS[:2] + SELECTORS[:1], 0)
+    regions.add_selectors(SELECTORS[:2] + SELECTORS[:1], 0)
     assert [r.name for r in regions.items] == ["box 1", "sphere 1", "box 2"]
     assert regions.current is None and not regions.placing
     regions.edit(1, enabled=False)
@@ -243,5 +243,5 @@ def test_picking_sees_what_a_region_shows():
     state.open([Path("a")])
     ray = np.array([0, 0, -1.0])
     assert state.pick(VIEW, ray, 0.001).point[2] == pytest.approx(1)
-    state.regions.take((HalfSpace(point=(0, 0, 0), normal=(0, 0, -1.0), x=1.0),), 0)
+    state.regions.add_selectors((HalfSpace(point=(0, 0, 0), normal=(0, 0, -1.0), x=1.0),), 0)
     assert state.pick(VIEW, ray, 0.001).point[2] == pytest.approx(-1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.app.editor.state.camera.camera import Camera, Push
+from shapeshift.app.editor.state.camera.camera import EditorCamera, Push
 from shapeshift.app.editor.state.camera.stepping import (
     FLIGHT_S,
     Steps,
@@ -24,7 +24,7 @@ NOW = orbit_path(1, np.zeros(3), 1.0, SIZE)[0]
 
 def steps(count: int = 3) -> Steps:
     out = Steps()
-    out.take(cameras(count=count))
+    out.set_cameras(cameras(count=count))
     return out
 
 
@@ -34,7 +34,7 @@ def shown(at: Steps):
 
 def test_next_and_previous_go_around():
     at = steps()
-    assert at.text == "3 cameras" and not at.standing
+    assert at.text == "3 cameras" and not at.at_camera
     order = []
     for by in (1, 1, 1, 1, -1, -1):
         assert at.step(by, NOW)
@@ -54,7 +54,7 @@ def test_next_and_previous_go_around():
 
 def test_a_long_name_is_cut_at_its_beginning():
     at = Steps()
-    at.take(CameraList(views(1), ("x" * 300 + "/photo.jpg",), "test"))
+    at.set_cameras(CameraList(views(1), ("x" * 300 + "/photo.jpg",), "test"))
     at.go_to(0)
     assert at.text.endswith("/photo.jpg") and len(at.text) < 70
 
@@ -108,8 +108,8 @@ def test_between_two_views_half_way():
 # The hand's camera takes over where one was left
 
 
-def hand() -> Camera:
-    return Camera(NOW, np.zeros(3), 1.0)
+def hand() -> EditorCamera:
+    return EditorCamera(NOW, np.zeros(3), 1.0)
 
 
 @pytest.mark.parametrize("flying", [False, True])

@@ -11,11 +11,11 @@ def state() -> EditorState:
     return EditorState(lambda path: pytest.fail("nothing is read"))
 
 
-@pytest.mark.parametrize("deed", ["toggle", "step", "reset_objects", "let_go"])
+@pytest.mark.parametrize("deed", ["toggle", "step", "reset_objects", "release"])
 def test_without_a_world_nothing_moves_and_nothing_is_said(state, deed):
     touch, before = TouchState(state, play=False), state.scene
     getattr(touch, deed)()
-    assert touch.world is None and touch.status() == "" and not touch.told
+    assert touch.world is None and touch.status() == "" and not touch.reactions
     assert state.scene is before
 
 

@@ -20,7 +20,7 @@ TRACK = Track(left=100.0, width=400.0, knob=10.0)
 @pytest.mark.parametrize("off", [-10.0, -9.0, 0.0, 9.0, 10.0])
 def test_a_knob_keeps_under_the_finger(x, off):
     grip, mouse = Grip(), TRACK.place(x) + off
-    grip.take(TRACK, (x,), mouse)
+    grip.press(TRACK, (x,), mouse)
     assert grip.drag(TRACK, x, mouse, STOPS) == x  # a press alone
     assert grip.drag(TRACK, x, mouse + 20, STOPS, 0.0) == pytest.approx(min(x + 0.05, 1))
     assert grip.drag(TRACK, x, mouse - 20, STOPS, 0.0) == pytest.approx(max(x - 0.05, 0))
@@ -30,22 +30,22 @@ def test_a_knob_keeps_under_the_finger(x, off):
 @pytest.mark.parametrize("off", [-10.1, 10.1, 60.0])
 def test_beside_the_knob_it_comes_to_the_mouse(off):
     grip, mouse = Grip(), TRACK.place(0.3) + off
-    grip.take(TRACK, (0.3,), mouse)
+    grip.press(TRACK, (0.3,), mouse)
     assert grip.drag(TRACK, 0.3, mouse, STOPS, 0.0) == pytest.approx(0.3 + off / 400)
 
 
 def test_of_two_knobs_the_nearer_is_taken_and_the_upper_of_equals():
     grip = Grip()
     for mouse, knob in ((90.0, 0), (290.0, 0), (310.0, 1), (500.0, 1)):
-        grip.take(TRACK, (0.2, 0.8), mouse)
+        grip.press(TRACK, (0.2, 0.8), mouse)
         assert grip.knob == knob
-    grip.take(TRACK, (0.5, 0.5), 300.0)
+    grip.press(TRACK, (0.5, 0.5), 300.0)
     assert grip.knob == 1
 
 
 def test_stops_catch_the_knob_on_the_way():
     grip = Grip()
-    grip.take(TRACK, (0.0,), 100.0)
+    grip.press(TRACK, (0.0,), 100.0)
     inside, outside = 0.5 + SNAP - 1e-9, math.nextafter(0.5 + SNAP, 1) + 1e-9
     assert grip.drag(TRACK, 0.0, TRACK.place(inside), STOPS) == 0.5
     assert grip.drag(TRACK, 0.0, TRACK.place(outside), STOPS) == pytest.approx(outside)

@@ -16,7 +16,7 @@ from tests.support.desktop.desktop_stand import read_stub, run_frames, until_ope
 
 
 def press(viewer, key: int, shift: bool = False) -> None:
-    viewer.take(KeyDown(key, shift))
+    viewer.handle_event(KeyDown(key, shift))
 
 
 def bright(picture: np.ndarray, box: tuple) -> float:
@@ -56,7 +56,7 @@ def test_at_rest_nothing_is_drawn_and_the_loop_sleeps(viewer):
 )
 def test_a_change_draws_until_it_has_come_to_rest(viewer, event):
     drawn = viewer.renderer.draws
-    viewer.take(event)
+    viewer.handle_event(event)
     run_frames(viewer, 60)
     assert drawn < viewer.renderer.draws < drawn + 60
     assert not viewer.busy()
@@ -119,7 +119,7 @@ def test_fly_frame_reset_and_hide(viewer):
     first = viewer.viewpoint.view().eye_from_world()
     press(viewer, glfw.KEY_V)
     assert viewer.viewpoint.camera.flying
-    viewer.take(Drag("left", 200, 10))
+    viewer.handle_event(Drag("left", 200, 10))
     run_frames(viewer, 60)
     assert np.abs(viewer.viewpoint.view().eye_from_world() - first).max() > 0.1
     press(viewer, glfw.KEY_F, shift=True)
@@ -142,12 +142,12 @@ def test_fly_frame_reset_and_hide(viewer):
 def test_double_click_centres_the_near_side_under_the_cursor(viewer):
     width, _ = viewer.window.logical_size
     left, top, right, bottom = viewer.viewpoint.free
-    viewer.take(DoubleClick((left + right) / 2 + 40, (top + bottom) / 2 - 30))
+    viewer.handle_event(DoubleClick((left + right) / 2 + 40, (top + bottom) / 2 - 30))
     run_frames(viewer, 60)
     point = viewer.viewpoint.camera.target
     assert np.linalg.norm(point) == pytest.approx(1, abs=0.1)  # on the ball
     assert point[0] > 0.05 and point[1] > 0.05
-    viewer.take(DoubleClick(width - 1, 1))  # the empty corner: nothing happens
+    viewer.handle_event(DoubleClick(width - 1, 1))  # the empty corner: nothing happens
     assert not viewer.busy()
 
 
@@ -239,7 +239,7 @@ def test_two_quick_clicks_on_one_place_are_a_double_click(
 
 def test_a_dropped_bad_file_is_told_and_the_old_scene_stays(viewer):
     before, camera = viewer.state.scene, viewer.viewpoint.camera
-    viewer.take(Drop((Path("bad.shift"),)))
+    viewer.handle_event(Drop((Path("bad.shift"),)))
     assert "bad.shift" in viewer.state.messages.note  # seen while it loads
     until_opened(viewer)
     assert viewer.state.scene is before and viewer.viewpoint.camera is camera
@@ -253,7 +253,7 @@ def test_a_dropped_bad_file_is_told_and_the_old_scene_stays(viewer):
     )
     assert bright(told, (left + 8, top, right, low)) > 0.02
     assert told[top:low, left:right].max() > 200  # readable, not dimmed
-    viewer.take(Wheel(1))  # a sentence is no box: the scene goes on
+    viewer.handle_event(Wheel(1))  # a sentence is no box: the scene goes on
     run_frames(viewer, 3)
     assert viewer.state.problem
     press(viewer, glfw.KEY_ESCAPE)
@@ -264,7 +264,7 @@ def test_a_dropped_good_file_is_shown(viewer, tmp_path):
     paths = (tmp_path / "one.shift", tmp_path / "two.shift")
     for path in paths:
         path.write_bytes(b"scene")
-    viewer.take(Drop(paths))
+    viewer.handle_event(Drop(paths))
     until_opened(viewer)
     assert [thing.name for thing in viewer.state.scene.objects] == ["one", "two"]
     assert not viewer.state.problem and not viewer.state.messages.note

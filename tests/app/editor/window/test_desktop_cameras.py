@@ -17,7 +17,7 @@ from tests.support.scene.camera_files import NAMES, assert_same, cameras
 
 
 def press(viewer, key: int, shift: bool = False) -> None:
-    viewer.take(KeyDown(key, shift))
+    viewer.handle_event(KeyDown(key, shift))
 
 
 def click(viewer, x: float, y: float) -> None:
@@ -34,7 +34,7 @@ def dropped(viewer, tmp_path):
     """A viewer that stands at the first of three cameras."""
     path = tmp_path / "ansichten ä.json"
     write_cameras(cameras(), path, "ours")
-    viewer.take(Drop((path,)))
+    viewer.handle_event(Drop((path,)))
     assert "ansichten ä.json" in viewer.state.messages.note
     until_opened(viewer)
     run_frames(viewer, 30)
@@ -66,8 +66,8 @@ def test_n_and_p_step_and_moving_leaves(dropped):
     run_frames(viewer, 40)
     assert viewer.viewpoint.steps.index == 2
     before = viewer.viewpoint.view()
-    viewer.take(Wheel(0.0))  # touches, and moves nothing
-    assert not viewer.viewpoint.steps.standing
+    viewer.handle_event(Wheel(0.0))  # touches, and moves nothing
+    assert not viewer.viewpoint.steps.at_camera
     after = viewer.viewpoint.view()
     np.testing.assert_allclose(
         after.world_from_eye.matrix(), before.world_from_eye.matrix(), atol=1e-6
@@ -78,20 +78,20 @@ def test_n_and_p_step_and_moving_leaves(dropped):
 
 @pytest.mark.parametrize("event", [Drag("left", 9, 4), Drag("right", 9, 4), Wheel(1.0)])
 def test_every_hand_leaves_a_camera(dropped, event):
-    dropped.take(event)
-    assert not dropped.viewpoint.steps.standing and dropped.viewpoint.steps.text == "3 cameras"
+    dropped.handle_event(event)
+    assert not dropped.viewpoint.steps.at_camera and dropped.viewpoint.steps.text == "3 cameras"
 
 
 @pytest.mark.parametrize("key", [glfw.KEY_V, glfw.KEY_F])
 def test_keys_that_move_leave_a_camera(dropped, key):
     press(dropped, key)
     run_frames(dropped, 3)
-    assert not dropped.viewpoint.steps.standing
+    assert not dropped.viewpoint.steps.at_camera
 
 
 def test_without_cameras_n_says_so(viewer):
     press(viewer, glfw.KEY_N)
-    assert "no cameras" in viewer.state.messages.note and not viewer.viewpoint.steps.standing
+    assert "no cameras" in viewer.state.messages.note and not viewer.viewpoint.steps.at_camera
 
 
 def test_k_keeps_views_in_one_file_of_this_start(dropped):
@@ -103,7 +103,7 @@ def test_k_keeps_views_in_one_file_of_this_start(dropped):
     press(viewer, glfw.KEY_N)
     run_frames(viewer, 40)
     press(viewer, glfw.KEY_K)
-    viewer.take(Drag("left", 50, 4))
+    viewer.handle_event(Drag("left", 50, 4))
     run_frames(viewer, 60)
     press(viewer, glfw.KEY_K)
     assert str((folder / "views-0002.ours.json").absolute()) in viewer.state.messages.note
@@ -127,11 +127,11 @@ def test_a_scene_and_its_cameras_dropped_together(viewer, tmp_path):
     scene, path = tmp_path / "stuhl äöü.shift", tmp_path / "c.json"
     scene.write_bytes(b"scene")
     write_cameras(cameras(), path, "inria")
-    viewer.take(Drop((path, scene)))
+    viewer.handle_event(Drop((path, scene)))
     until_opened(viewer)
     assert viewer.state.scene.objects[0].name == "stuhl äöü"
     assert viewer.viewpoint.steps.text == "3 cameras"  # the new scene is seen whole first
-    viewer.take(Drop((scene,)))
+    viewer.handle_event(Drop((scene,)))
     until_opened(viewer)
     assert viewer.viewpoint.steps.count == 0  # those were of the other
 
@@ -141,7 +141,7 @@ def test_a_floor_beside_a_scene_is_stood_on(viewer, tmp_path):
     scene.write_bytes(b"scene")
     write_cameras(cameras(plain=True), tmp_path / "room_vr.json", "vr")
     (stood,) = read_camera_list(tmp_path / "room_vr.json").views
-    viewer.take(Drop((scene,)))
+    viewer.handle_event(Drop((scene,)))
     until_opened(viewer)
     run_frames(viewer, 30)
     assert viewer.viewpoint.camera.flying
@@ -156,7 +156,7 @@ def test_recent_files_are_kept_and_offered(viewer, tmp_path, monkeypatch):
     scene, gone = tmp_path / "one.shift", tmp_path / "gone.shift"
     for path in (gone, scene):
         path.write_bytes(b"scene")
-        viewer.take(Drop((path,)))
+        viewer.handle_event(Drop((path,)))
         until_opened(viewer)
     assert viewer.files.recent.paths == (scene, gone)
     before = viewer.state.scene

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shapeshift.app.editor.state.camera.framed import SETTLED_S
-from shapeshift.app.editor.state.user.settings import Settings
+from shapeshift.app.editor.state.user.settings import ProgramSettings
 from shapeshift.app.editor.window import monitor
 from shapeshift.app.editor.window.split import splitting
 from shapeshift.app.editor.window.window import Drag
@@ -83,7 +83,7 @@ def test_what_no_hand_has_moved_is_fitted_into_any_window(any_size, framed):
     if framed == "everything":
         viewer.viewpoint.frame_all()
     elif framed == "by hand":
-        viewer.take(Drag("left", 3, 0))
+        viewer.handle_event(Drag("left", 3, 0))
     run_frames(viewer, 40, seconds=0.1)
     distance = viewer.viewpoint.camera.distance
     for size in ((1900, 700), (700, 900), (1280, 720)):
@@ -127,11 +127,11 @@ def test_the_text_grows_by_keys_and_is_kept(any_size, display, tmp_path):
             widths.append(viewer.window.covered[0][2])
         assert viewer.window.text_size == 1.25
         assert np.array(widths) / widths[0] == pytest.approx([1, 1.1, 1.25], abs=0.01)
-        assert Settings.read(tmp_path).text_size == 1.25
+        assert ProgramSettings.read(tmp_path).text_size == 1.25
         hands.key("minus", "Control_L")
         assert viewer.window.text_size == 1.1 and "110%" in viewer.state.messages.note
         hands.key("0", "Control_L")
-        assert viewer.window.text_size == 1.0 and Settings.read(tmp_path).text_size is None
+        assert viewer.window.text_size == 1.0 and ProgramSettings.read(tmp_path).text_size is None
         assert viewer.window.covered[0][2] == pytest.approx(widths[0])
         assert viewer.state.scene.objects[0].x == 0.0  # no stop was meant
 
@@ -163,11 +163,11 @@ def test_the_panel_is_folded_and_opened_by_its_buttons(any_size, display, tmp_pa
         wide = viewer.layout.free
         hands.click(*widgets.middle("fold"))
         assert viewer.layout.folded and viewer.layout.free[0] == 0 < wide[0]
-        assert Settings.read(tmp_path).panel_open is False
+        assert ProgramSettings.read(tmp_path).panel_open is False
         run_frames(viewer, 3)
         hands.click(*widgets.middle("unfold"))
         assert not viewer.layout.folded and viewer.layout.free == wide
-        assert Settings.read(tmp_path).panel_open is True
+        assert ProgramSettings.read(tmp_path).panel_open is True
 
 
 def test_settings_that_cannot_be_kept_are_said_once(any_size, display, tmp_path):

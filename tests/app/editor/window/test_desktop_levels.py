@@ -67,7 +67,7 @@ def test_the_first_frame_is_coarse_and_the_camera_stays(window, scene, tmp_path)
     with Refiner(options) as refiner, Renderer(window.ctx) as renderer:
         state = EditorState(refiner.open)
         sources = [Source(scene, refiner.open(scene))]
-        state.take(sources, scene_of(sources))
+        state.open_sources(sources, scene_of(sources))
         viewer = Viewer(window, renderer, state, options)
         viewer.frame(0.0)
         red, green, blue = shares(window.picture())
@@ -90,7 +90,7 @@ def test_a_streamed_scene_that_is_dropped_on_the_window_is_refined(window, scene
     with Refiner(options) as refiner, Renderer(window.ctx) as renderer:
         state = EditorState(refiner.open)
         sources = [Source(scene / "1_0", refiner.open(scene / "1_0"))]  # one level alone: blue
-        state.take(sources, scene_of(sources))
+        state.open_sources(sources, scene_of(sources))
         viewer = Viewer(window, renderer, state, options)
         attach(viewer, refiner)
         run_frames(viewer, 2)

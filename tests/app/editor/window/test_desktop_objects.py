@@ -140,7 +140,7 @@ def test_objects_are_added_by_dropping_while_the_box_is_open(viewer, tmp_path):
     run_frames(viewer, 3)
     b = ball(50)
     write_ply(PlainSplats(b.means, b.scales, b.wxyz, b.opacity, b.sh), tmp_path / "ball.ply")
-    viewer.take(Drop((tmp_path / "ball.ply",)))
+    viewer.handle_event(Drop((tmp_path / "ball.ply",)))
     until_added(viewer)
     assert names(viewer) == [*NAMES, "ball 2"] and viewer.state.chosen == "ball 2"
     assert not objects.adding.asking and "ball 2" in viewer.state.world.objects
@@ -159,17 +159,17 @@ def test_what_the_device_cannot_hold_is_not_added(viewer, monkeypatch):
             raise BadFile("more splats than the device holds.")
 
     monkeypatch.setattr(viewer.renderer, "update", refuse)
-    viewer.objects.adding.take(OpenedFiles((Source(Path("/x/more.ply"), ball(50)),)))
+    viewer.objects.adding.add_opened(OpenedFiles((Source(Path("/x/more.ply"), ball(50)),)))
     assert names(viewer) == NAMES and "device" in viewer.state.problem
     assert viewer.state.edited.history.undoes == ""
 
 
 def test_a_scene_file_is_dropped_on_the_window(plain):
-    plain.take(Drop((TOUCH,)))
+    plain.handle_event(Drop((TOUCH,)))
     until_opened(plain)
     assert names(plain) == NAMES and plain.state.edited.path == TOUCH
     wrong = Drop((TOUCH, TOUCH.with_name("other.scene.json")))
-    plain.take(wrong)
+    plain.handle_event(wrong)
     until_opened(plain)
     assert "two scene files" in plain.state.problem
     plain.state.problem = ""

@@ -13,7 +13,7 @@ from tests.support.desktop.desktop_stand import run_frames, until_opened
 
 
 def press(viewer, key: int, shift: bool = False) -> None:
-    viewer.take(KeyDown(key, shift))
+    viewer.handle_event(KeyDown(key, shift))
 
 
 def middle(viewer) -> tuple[float, float]:
@@ -71,7 +71,7 @@ def test_the_dial_measures_between_frames_and_chooses(viewer):
     run_frames(viewer, 1)
     assert viewer.dial.measuring and viewer.busy()
     for _ in range(500):
-        viewer.take(Drag("left", 1, 0))  # the hand is not held up
+        viewer.handle_event(Drag("left", 1, 0))  # the hand is not held up
         run_frames(viewer, 1)
         if not viewer.dial.measuring:
             break
@@ -89,7 +89,7 @@ def test_opening_another_scene_forgets_what_was_measured(viewer, tmp_path):
 
     viewer.dial.wanted = True
     run_frames(viewer, 1)
-    viewer.take(Drop((scene,)))
+    viewer.handle_event(Drop((scene,)))
     until_opened(viewer)
     assert not viewer.dial.rows and not viewer.dial.measuring
 
@@ -97,7 +97,7 @@ def test_opening_another_scene_forgets_what_was_measured(viewer, tmp_path):
 def test_fewer_pixels_while_moving_and_all_at_rest(viewer):
     viewer.dial.dynamic, viewer.dial.target_ms = True, 0.01  # no frame is as fast
     for _ in range(40):
-        viewer.take(Drag("left", 3, 0))
+        viewer.handle_event(Drag("left", 3, 0))
         run_frames(viewer, 1)
     assert viewer.renderer.settings.render_scale == 0.5
     run_frames(viewer, 80)
@@ -126,16 +126,16 @@ def test_a_click_places_a_region_on_the_surface_and_a_drag_moves_it_on(viewer):
     state.add_region("sphere")
     before = viewer.viewpoint.view().eye_from_world()
     x, y = middle(viewer)
-    viewer.take(Press("left", x, y))
+    viewer.handle_event(Press("left", x, y))
     first = state.regions.current.centre
     assert np.linalg.norm(first) == pytest.approx(1, abs=0.1)  # on the ball
-    viewer.take(Drag("left", 30, 0, x + 30, y))
+    viewer.handle_event(Drag("left", 30, 0, x + 30, y))
     assert np.linalg.norm(state.regions.current.centre - first) > 0.05
-    viewer.take(Release("left"))
+    viewer.handle_event(Release("left"))
     run_frames(viewer, 3)
     np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before)
-    viewer.take(Press("left", x, y))
-    viewer.take(Drag("left", 30, 0, x + 30, y))  # now it is the camera again
+    viewer.handle_event(Press("left", x, y))
+    viewer.handle_event(Drag("left", 30, 0, x + 30, y))  # now it is the camera again
     assert viewer.viewpoint.camera.moving
 
 
@@ -156,7 +156,7 @@ def test_regions_reach_the_renderer_and_change_what_is_drawn(viewer):
 def test_the_lens_follows_the_camera(viewer):
     press(viewer, glfw.KEY_L)
     (lens,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
-    viewer.take(Drag("left", 80, 0))
+    viewer.handle_event(Drag("left", 80, 0))
     run_frames(viewer, 60)
     (moved,) = viewer.state.shown(viewer.viewpoint.view()).objects[0].selectors
     np.testing.assert_array_equal(moved.position, viewer.viewpoint.view().world_from_eye.position)
@@ -170,8 +170,8 @@ def test_holding_b_paints_what_is_in_front_and_shift_erases(viewer, monkeypatch)
     before = viewer.viewpoint.view().eye_from_world()
     viewer.state.regions.brush = 80.0
     hold(monkeypatch, glfw.KEY_B)
-    viewer.take(Press("left", x, y))
-    viewer.take(Drag("left", 20, 0, x + 20, y))
+    viewer.handle_event(Press("left", x, y))
+    viewer.handle_event(Drag("left", 20, 0, x + 20, y))
     region = viewer.state.regions.current
     assert region.kind == "painted" and region.painted.sum() > 10
     model = viewer.state.scene.objects[0].model
@@ -179,7 +179,7 @@ def test_holding_b_paints_what_is_in_front_and_shift_erases(viewer, monkeypatch)
     facing = np.einsum("ac,ac->a", model.means[region.painted], eye - model.means[region.painted])
     assert (facing > 0).all()  # none on the far side of the ball
     hold(monkeypatch, glfw.KEY_B, glfw.KEY_LEFT_SHIFT)
-    viewer.take(Press("left", x, y))
+    viewer.handle_event(Press("left", x, y))
     assert viewer.state.regions.current.painted.sum() < region.painted.sum()
     monkeypatch.undo()
     run_frames(viewer, 3)

@@ -51,7 +51,7 @@ def viewer(window, tmp_path):
     source = Source(Path("a"), model)
     state = EditorState(lambda path: model)
     edited = EditedFile(History.of(FILE), saved=FILE, sources={("a", "", "", False): source})
-    state.take([source, source], scene_of(FILE, models), None, edited)
+    state.open_sources([source, source], scene_of(FILE, models), None, edited)
     state.bodies._of = {item.name: (made_of(item), BOX) for item in ITEMS}  # nothing is cut up
     with state.bodies:
         options = Options(pictures=tmp_path, play=True)
@@ -61,7 +61,7 @@ def viewer(window, tmp_path):
 
 
 def press_key(viewer, key: int, shift: bool = False) -> None:
-    viewer.take(KeyDown(key, shift))
+    viewer.handle_event(KeyDown(key, shift))
 
 
 def on_screen(viewer, point: np.ndarray) -> tuple[float, float]:
@@ -78,7 +78,7 @@ def place(viewer, name: str = "cube") -> np.ndarray:
 
 def hold(viewer, name: str = "cube") -> tuple[float, float]:
     at = on_screen(viewer, place(viewer, name))
-    viewer.take(Press("left", *at))
+    viewer.handle_event(Press("left", *at))
     return at
 
 
@@ -87,7 +87,7 @@ def test_a_drag_carries_what_lies_under_the_mouse(viewer):
     at = hold(viewer)
     assert viewer.state.world.held(HAND) == "cube" and viewer.state.chosen == "cube"
     for _ in range(30):
-        viewer.take(Drag("left", 2.0, -4.0))
+        viewer.handle_event(Drag("left", 2.0, -4.0))
         run_frames(viewer, 1)
     run_frames(viewer, 10, seconds=0.05)
     x, y = on_screen(viewer, place(viewer))
@@ -95,7 +95,7 @@ def test_a_drag_carries_what_lies_under_the_mouse(viewer):
     drawn = viewer.state.scene.objects[0].world_from_object.position
     np.testing.assert_allclose(drawn, place(viewer), atol=0.02)
     np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), before.eye_from_world())
-    viewer.take(Release("left"))
+    viewer.handle_event(Release("left"))
     assert viewer.state.world.held(HAND) is None
     run_frames(viewer, 25, seconds=0.08)
     assert place(viewer)[1] == pytest.approx(HALF, abs=0.005)  # it fell back to the floor
@@ -104,9 +104,9 @@ def test_a_drag_carries_what_lies_under_the_mouse(viewer):
 def test_a_flick_throws(viewer):
     hold(viewer)
     for _ in range(12):
-        viewer.take(Drag("left", 12.0, -6.0))
+        viewer.handle_event(Drag("left", 12.0, -6.0))
         run_frames(viewer, 1, seconds=1 / 60)
-    viewer.take(Release("left"))
+    viewer.handle_event(Release("left"))
     speed = viewer.state.world.physics.velocity(viewer.state.world.objects["cube"].body)[0]
     assert speed[0] > 0.5 and speed[1] > 0.2
 
@@ -115,14 +115,14 @@ def test_the_wheel_pushes_and_shift_turns(viewer, monkeypatch):
     hold(viewer)
     distance = np.linalg.norm(place(viewer) - viewer.viewpoint.camera.position)
     zoom = viewer.viewpoint.camera.distance
-    viewer.take(Drag("left", 0.0, -60.0))
-    viewer.take(Wheel(4))
+    viewer.handle_event(Drag("left", 0.0, -60.0))
+    viewer.handle_event(Wheel(4))
     run_frames(viewer, 12, seconds=0.08)
     assert viewer.viewpoint.camera.distance == zoom
     assert np.linalg.norm(place(viewer) - viewer.viewpoint.camera.position) > distance + 0.3
     monkeypatch.setattr(viewer.window, "held", lambda key: key == glfw.KEY_LEFT_SHIFT)
     where = place(viewer).copy()
-    viewer.take(Drag("left", 100.0, 0.0))
+    viewer.handle_event(Drag("left", 100.0, 0.0))
     run_frames(viewer, 12, seconds=0.08)
     np.testing.assert_allclose(place(viewer), where, atol=0.02)
     w, _, y, _ = viewer.state.world.objects["cube"].pose.wxyz
@@ -136,11 +136,11 @@ def test_what_is_not_for_the_hand_turns_the_camera(viewer, how):
         press_key(viewer, glfw.KEY_T)
     at = {"static": on_screen(viewer, place(viewer, "post")), "elsewhere": (450.0, 20.0)}
     button = "right" if how == "right button" else "left"
-    viewer.take(Press(button, *at.get(how, on_screen(viewer, place(viewer)))))
+    viewer.handle_event(Press(button, *at.get(how, on_screen(viewer, place(viewer)))))
     before = viewer.viewpoint.view().eye_from_world()
-    viewer.take(Drag(button, 40.0, 0.0))
+    viewer.handle_event(Drag(button, 40.0, 0.0))
     run_frames(viewer, 5)
-    viewer.take(Release(button))
+    viewer.handle_event(Release(button))
     assert viewer.state.world.held(HAND) is None
     assert np.abs(viewer.viewpoint.view().eye_from_world() - before).max() > 0.01
 
@@ -153,11 +153,11 @@ def test_what_is_not_for_the_hand_turns_the_camera(viewer, how):
 def test_it_lets_go(viewer, event):
     hold(viewer)
     run_frames(viewer, 2)
-    viewer.take(event)
+    viewer.handle_event(event)
     assert viewer.state.world.held(HAND) is None
     run_frames(viewer, 2)
-    viewer.take(Drag("left", 10.0, 0.0))
-    viewer.take(Release("left"))
+    viewer.handle_event(Drag("left", 10.0, 0.0))
+    viewer.handle_event(Release("left"))
     run_frames(viewer, 2)
 
 
@@ -179,7 +179,7 @@ def test_it_lets_go_of_what_is_gone(viewer):
     viewer.state.world.remove("cube")
     run_frames(viewer, 2)
     assert viewer.state.world.held(HAND) is None
-    viewer.take(Release("left"))
+    viewer.handle_event(Release("left"))
 
 
 def test_keys_play_step_and_put_back(viewer):
@@ -194,7 +194,7 @@ def test_keys_play_step_and_put_back(viewer):
     assert world.steps == going + 1 and world.paused
     press_key(viewer, glfw.KEY_T)
     hold(viewer)
-    viewer.take(Drag("left", 80.0, -80.0))
+    viewer.handle_event(Drag("left", 80.0, -80.0))
     run_frames(viewer, 10)
     assert world.objects["cube"].reaction_state.x == 0.5
     press_key(viewer, glfw.KEY_R)
@@ -217,7 +217,7 @@ def test_a_ray_at_the_mouse_is_answered(viewer, paused):
         world.paused = False
     run_frames(viewer, 15)
     assert viewer.state.scene.objects[0].x == 1.0
-    assert list(viewer.touch.told) == ["cube: hit by a ray, now hot"]
+    assert list(viewer.touch.reactions) == ["cube: hit by a ray, now hot"]
     assert [label.text for label in viewer.touch.labels] == ["hot"]
     run_frames(viewer, 20, seconds=0.1)
     assert not viewer.touch.fading
@@ -268,7 +268,7 @@ def test_without_a_world_nothing_is_taken(viewer):
     viewer.state.bodies.world = None
     parts = (viewer.touch, viewer.state, viewer.window, viewer.viewpoint, viewer.hands)
     for event in (KeyDown(glfw.KEY_T, False), Press("left", 450, 300), KeyDown(glfw.KEY_J, False)):
-        assert not MouseTouch(*parts).take(event)
+        assert not MouseTouch(*parts).handle_event(event)
     run_frames(viewer, 2)
     assert viewer.touch.status() == ""
 

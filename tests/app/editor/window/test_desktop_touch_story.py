@@ -56,7 +56,7 @@ def test_a_person_plays_with_the_bundled_scene(viewer):
     key(viewer, glfw.KEY_X)
     run_frames(viewer, 25)
     assert thing(viewer, "ball").x == 1.0  # confetti
-    assert viewer.touch.told[0] == "ball: hit by a ray, now confetti"
+    assert viewer.touch.reactions[0] == "ball: hit by a ray, now confetti"
 
     at = place_of(viewer, place(viewer, "cube"))
     high = (at[0] + 10, at[1] - 150)

@@ -70,23 +70,23 @@ def test_the_line_follows_mouse_and_keys_and_the_camera_stays(stand):
     viewer, wipe, _ = stand
     width = viewer.window.logical_size[0]
     before = viewer.viewpoint.view()
-    viewer.take(Press("left", wipe.part * width + 4, 100))
-    viewer.take(Drag("left", -90, 0, 0.25 * width, 100))
+    viewer.handle_event(Press("left", wipe.part * width + 4, 100))
+    viewer.handle_event(Drag("left", -90, 0, 0.25 * width, 100))
     assert wipe.part == 0.25
-    viewer.take(Drag("left", 9e9, 0, 9e9, 100))
+    viewer.handle_event(Drag("left", 9e9, 0, 9e9, 100))
     assert wipe.part == 1.0
-    viewer.take(Release("left"))
-    viewer.take(KeyDown(glfw.KEY_COMMA, False))
+    viewer.handle_event(Release("left"))
+    viewer.handle_event(KeyDown(glfw.KEY_COMMA, False))
     assert wipe.part == pytest.approx(0.98)
     assert str(viewer.viewpoint.view()) == str(before) and not viewer.viewpoint.camera.moving
-    viewer.take(Press("left", 10, 100))  # far from the line: the camera's
-    viewer.take(Drag("left", 30, 0, 40, 100))
+    viewer.handle_event(Press("left", 10, 100))  # far from the line: the camera's
+    viewer.handle_event(Drag("left", 30, 0, 40, 100))
     assert viewer.viewpoint.camera.moving and wipe.part == pytest.approx(0.98)
 
 
 def test_it_can_be_switched_off(stand):
     viewer, wipe, _ = stand
-    viewer.take(KeyDown(glfw.KEY_C, False))
+    viewer.handle_event(KeyDown(glfw.KEY_C, False))
     wipe.part = 0.5
     of_a = alone(viewer, viewer.state.scene.objects[0].model)
     np.testing.assert_array_equal(screen(viewer), of_a)

@@ -12,7 +12,7 @@ from shapeshift.scene.pose import Pose, View
 from tests.support.renderer.eye_scenes import SCENES as COLOURED
 from tests.support.renderer.eye_scenes import eyes as coloured_eyes
 from tests.support.renderer.eye_views import eyes
-from tests.support.renderer.frames import draw, draw_told
+from tests.support.renderer.frames import draw, draw_counted
 from tests.support.renderer.renderers import quads
 from tests.support.splat_scenes import (
     alone,
@@ -214,11 +214,11 @@ def test_a_kept_order_still_holds_what_was_outside(renderer):
 def test_memory_of_a_second_eye_comes_and_goes(ctx):
     with Renderer(ctx, "quads") as renderer:
         scene, pair = COLOURED["both"](), coloured_eyes()
-        draw_told(renderer, scene, pair)
+        draw_counted(renderer, scene, pair)
         arena, made = renderer.drawing._arena, renderer.drawing.allocations
         assert len(arena.colors) == 2
         for _ in range(3):
-            draw_told(renderer, scene, pair)
+            draw_counted(renderer, scene, pair)
         assert renderer.drawing.allocations == made, "nothing is made anew in a frame"
-        draw_told(renderer, scene, pair[:1])
+        draw_counted(renderer, scene, pair[:1])
         assert len(arena.colors) == 1

@@ -5,7 +5,7 @@ import pytest
 from shapeshift.app.drawing import open_renderer
 from shapeshift.app.stability_cases.table import CASES
 from shapeshift.renderer.renderer import Renderer
-from tests.support.renderer.stability_stage import failures, make_stage
+from tests.support.renderer.case_context import failures, make_case
 from tests.support.splat_scenes import random_layers
 
 
@@ -16,8 +16,8 @@ def reopen():
 @pytest.mark.parametrize("name", CASES)
 def test_the_case_holds(ctx, name):
     with Renderer(ctx, "quads") as renderer:
-        stage = make_stage(renderer, ctx, reopen, random_layers(600, seed=3, layers=2))
-        result = CASES[name](stage)
+        case = make_case(renderer, ctx, reopen, random_layers(600, seed=3, layers=2))
+        result = CASES[name](case)
     assert not failures(result)
     assert result.panels
 
@@ -25,11 +25,11 @@ def test_the_case_holds(ctx, name):
 def test_half_floats_lose_faint_layers(ctx):
     """What the default was: the case would have said so."""
     with Renderer(ctx, "quads", target="rgba16f") as renderer:
-        found = failures(CASES["faint-layers"](make_stage(renderer, ctx, reopen)))
+        found = failures(CASES["faint-layers"](make_case(renderer, ctx, reopen)))
     assert len(found) == 2, found
 
 
 @pytest.mark.parametrize("name", ["disparity", "limits", "needles", "broken-heads", "crowd"])
 def test_the_case_holds_where_all_runs_in_gl(ctx, name):
     with Renderer(ctx, "quads", mlps="gl", sort="gl", target="rgba32f") as renderer:
-        assert not failures(CASES[name](make_stage(renderer, ctx, reopen)))
+        assert not failures(CASES[name](make_case(renderer, ctx, reopen)))

@@ -20,7 +20,7 @@ EMPTY = Scene(())
 
 
 @dataclass
-class Stage:
+class CaseContext:
     """A scene in a renderer; cases draw with it and leave nothing behind but the last frame."""
 
     renderer: Renderer

@@ -38,7 +38,7 @@ QUICK = Walk(frames=8, sweep=3, step=2.0)  # as wide an arc as kept colours need
 
 
 @dataclass(frozen=True)
-class Stage:
+class ChartScene:
     """Everything that is drawn for one row of a chart."""
 
     scene: Scene
@@ -56,13 +56,13 @@ class Stage:
         return Scene(tuple(replace(thing, x=x) for thing in self.scene.objects))
 
 
-def make_stage(
+def make_chart_scene(
     subjects: Sequence[Document],
     x: float | None,
     size: tuple[int, int],
     walk: Walk,
     cameras: Sequence[View] = (),
-) -> Stage:
+) -> ChartScene:
     """`subjects` in a row along x, seen from an arc before them or from the views of `cameras`.
 
     x: of all objects; None: each at its own.
@@ -78,7 +78,7 @@ def make_stage(
         path = arc(first, centre, walk)
     xs = tuple(np.linspace(0, 1, walk.sweep).tolist())
     apart = eyes_apart(distances_from(points, path[len(path) // 2]))
-    return Stage(scene, path, xs, distances_of(points, path), apart)
+    return ChartScene(scene, path, xs, distances_of(points, path), apart)
 
 
 def arc(first: View, centre: np.ndarray, walk: Walk) -> tuple[View, ...]:
