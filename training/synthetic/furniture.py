@@ -16,7 +16,7 @@ from shapeshift.training.synthetic.placing import (
     run_of_pipe,
     turned,
 )
-from shapeshift.training.synthetic.tracer import Solid, Material
+from shapeshift.training.synthetic.tracer import Material, Solid
 
 BENCH = (0.64, 0.03, 0.38)  # metres, half sizes of the top
 CABINET = (-0.40, 0.165, 0.04)  # metres, its centre
