@@ -33,7 +33,7 @@ def photo_view(views: Sequence[View], centre: np.ndarray, radius: float) -> dict
     cosine = (toward * ahead).sum(axis=1) / np.maximum(away, 1e-9)
     level = ahead.mean(axis=0)
     score = np.arccos(np.clip(cosine, -1, 1)) + np.abs(np.log(np.maximum(away, 1e-9) / usual))
-    score -= 0.1 * ahead @ level  # of equal ones, the one that looks as most do
+    score -= 0.5 * ahead @ level  # the front is where most look
     best = int(score.argmin())
     (_, _, down, up), eye = tangents[best], eyes[best]
     return {
